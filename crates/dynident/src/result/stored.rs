@@ -168,8 +168,9 @@ impl ResultFile {
             let law = stored.and_then(|stored| stored.law.clone()).unwrap_or_default();
             let own = function.description();
             if law != own {
-                let message =
-                    format!("torque `{symbol}` was `{law}`, but is `{own}` in the study: use the study that the result was made with");
+                let message = format!(
+                    "torque `{symbol}` was `{law}`, but is `{own}` in the study: use the study that the result was made with"
+                );
                 return Err(Error::Result { path: path.to_owned(), message });
             }
         }

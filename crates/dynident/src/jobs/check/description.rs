@@ -1,14 +1,19 @@
 //! Findings on the robot description: its units, its masses, or another robot.
 
-use super::wording::{Words, finding};
+use super::wording::{FindingContext, finding};
 use crate::result::{CheckFinding, StudyChange};
 use dynident_identification::diagnosis::{DescriptionFit, WrongMass};
 use dynident_model::{AuditFinding, Model, audit};
 use dynident_recording::Level;
 
 /// Torque magnitude that differs from the robot description's: another torque unit, or another unit of the masses.
-pub(super) fn torque_unit(fit: &DescriptionFit, far: &[usize], model: &Model, words: &Words<'_>) -> CheckFinding {
-    let Words { joints, keys, thresholds } = *words;
+pub(super) fn torque_unit(
+    fit: &DescriptionFit,
+    far: &[usize],
+    model: &Model,
+    words: &FindingContext<'_>,
+) -> CheckFinding {
+    let FindingContext { joints, keys, thresholds } = *words;
     let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], fit.scale[joint].unwrap_or(1.0)));
     let factors = factors.collect::<Vec<_>>().join(", ");
     let common = fit.common_unit();

@@ -3,7 +3,7 @@
 use super::CheckSettings;
 use super::changes::{changes, keys_of_log, keys_of_study};
 use super::description::{another_robot, torque_unit, wrong_mass};
-use super::wording::{Words, alternative, evidence, finding};
+use super::wording::{FindingContext, alternative, evidence, finding};
 use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
@@ -26,7 +26,7 @@ pub(super) fn study_check(
 ) -> StudyCheck {
     let joints = robot.parametric.joint_names();
     let keys = keys_of_study(study, robot);
-    let words = Words { joints: &joints, keys: keys.as_ref(), thresholds };
+    let words = FindingContext { joints: &joints, keys: keys.as_ref(), thresholds };
     let search = &diagnosis.search;
     let spoilt = spoilt_columns(diagnosis, &joints);
     let is_spoilt = !spoilt.is_empty();
@@ -76,7 +76,7 @@ fn explanation<'a>(search: &'a Search, thresholds: &CheckSettings) -> Option<&'a
     search.best.as_ref().filter(|best| !best.is_unexplained() && best.left_of_all < most_left)
 }
 
-impl Words<'_> {
+impl FindingContext<'_> {
     /// One finding per mistake of the best hypothesis; the last finding lists indistinguishable hypotheses.
     fn mistakes(self, search: &Search, best: &Hypothesis) -> Vec<CheckFinding> {
         let Self { joints, keys, .. } = self;

@@ -12,7 +12,7 @@ const MIN_LOG_RATIO: f64 = 0.2;
 
 /// Names of joints and study keys for the texts, with the thresholds.
 #[derive(Clone, Copy)]
-pub(super) struct Words<'a> {
+pub(super) struct FindingContext<'a> {
     pub(super) joints: &'a [String],
     pub(super) keys: Option<&'a StudyKeys>,
     pub(super) thresholds: &'a CheckSettings,

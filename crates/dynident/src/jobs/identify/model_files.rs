@@ -41,7 +41,7 @@ pub(super) fn model_files(
     let JointValues { changes: joints, nearest } = JointValues::of(found, inertials, parameters)?;
     let mut links = link_changes(model.model(), inertials).map_err(|error| error.to_string())?;
     note_locked(robot, &mut links);
-    let known = Known { model, parameters, std, sources, nearest: &nearest };
+    let known = BodyNotes { model, parameters, std, sources, nearest: &nearest };
     known.note(lost_in_urdf, &mut links);
     let Robot { model: whole, format, text, .. } = &robot.robot;
     let urdf = |text: &str| rewrite_urdf(text, &links, &joints).map_err(|error| error.to_string());
@@ -129,7 +129,7 @@ fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) 
 }
 
 /// Data for the comments of bodies.
-struct Known<'a> {
+struct BodyNotes<'a> {
     model: &'a ParametricModel,
     parameters: &'a [f64],
     std: &'a [Option<f64>],
@@ -137,7 +137,7 @@ struct Known<'a> {
     nearest: &'a [Option<NearestFriction>],
 }
 
-impl Known<'_> {
+impl BodyNotes<'_> {
     /// Writes the comment of a body: error bar of its mass, identifiable values, and drive values that the file cannot
     /// express or only approximates.
     fn note(&self, lost: fn(Option<JointProperty>) -> bool, changes: &mut [LinkChange]) {

@@ -6,7 +6,7 @@ use super::job::Job;
 use super::model::{EndedStage, RobotFiles};
 use super::plan::Plan;
 use super::report::{Stage, merged};
-use super::watch::{IterationWatch, Watched};
+use super::watch::{IterationWatch, StageSupervisor};
 use crate::error::{Error, StudyError};
 use crate::pages::iteration::{RunName, RunTrace};
 use crate::result::IterationsFile;
@@ -116,7 +116,7 @@ impl<'a> Stages<'a> {
             unwritten = self.write_progress(stage, &records, results).err();
             run(record, runs);
         };
-        let mut watched = Watched { stop: &watch.stop, allow: &mut watch.allow, made: &mut made };
+        let mut watched = StageSupervisor { stop: &watch.stop, allow: &mut watch.allow, made: &mut made };
         let outcome = iterate_supervised(stage.iteration, &mut robots, Some(stage.store), &mut watched);
         let outcome = outcome.map_err(|error| self.job.iteration_error(error))?;
         unwritten.map_or(Ok(outcome), Err)

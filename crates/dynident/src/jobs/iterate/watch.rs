@@ -30,13 +30,13 @@ impl<'a> IterationWatch<'a> {
 }
 
 /// Forwards the runs of a stage and requests for permission.
-pub(super) struct Watched<'a, 'b> {
+pub(super) struct StageSupervisor<'a, 'b> {
     pub(super) stop: &'a StopSignal,
     pub(super) allow: &'a mut Option<&'b mut dyn FnMut(&NextMotion) -> bool>,
     pub(super) made: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
 }
 
-impl Supervisor for Watched<'_, '_> {
+impl Supervisor for StageSupervisor<'_, '_> {
     fn stop(&self) -> Option<&StopSignal> {
         Some(self.stop)
     }

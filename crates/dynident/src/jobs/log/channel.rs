@@ -5,7 +5,7 @@ const MAX_PARTS: usize = 48;
 
 /// Running statistics of a channel.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tally {
+pub(super) struct ChannelStatistics {
     pub(super) samples: u64,
     pub(super) range: Option<[f64; 2]>,
     first: Option<f64>,
@@ -17,7 +17,7 @@ pub(super) struct Tally {
     parts: Vec<(f64, u64)>,
 }
 
-impl Tally {
+impl ChannelStatistics {
     pub(super) fn add(&mut self, value: f64) {
         if self.rows_of_part == 0 {
             self.rows_of_part = 1;
@@ -62,13 +62,13 @@ mod tests {
     #[test]
     fn the_course_is_that_of_the_channel_at_any_length() {
         for rows in [1, 47, 48, 49, 1000, 10_000] {
-            let mut tally = Tally::default();
+            let mut tally = ChannelStatistics::default();
             (0..rows).for_each(|row| tally.add(f64::from(row)));
             let course: Vec<f64> = tally.course().into_iter().map(Option::unwrap).collect();
             assert!(course.len() <= MAX_PARTS && course.windows(2).all(|pair| pair[0] < pair[1]), "{rows}: {course:?}");
             assert_eq!((tally.samples, tally.range), (rows as u64, Some([0.0, f64::from(rows - 1)])));
         }
-        let mut gap = Tally::default();
+        let mut gap = ChannelStatistics::default();
         for value in [1.0, f64::NAN, f64::INFINITY, -2.0] {
             gap.add(value);
         }

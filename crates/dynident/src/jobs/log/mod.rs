@@ -7,7 +7,7 @@ mod study_format;
 use crate::error::Error;
 use crate::jobs::columns::{time_unit_s, unit};
 use crate::result::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
-use channel::Tally;
+use channel::ChannelStatistics;
 use clock::Clock;
 use dynident_recording::RecordingError;
 use dynident_recording::log::{FileLog, LogGroup, LogTable};
@@ -30,7 +30,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     let names = column_names(table.as_ref());
     let (groups, notes) = (table.groups(), table.notes());
     let times: Vec<_> = groups.iter().map(|group| time_column(group, &names[group.columns.clone()])).collect();
-    let mut read: Vec<Tallies> = groups.iter().map(|group| Tallies::new(group.columns.len())).collect();
+    let mut read: Vec<GroupStatistics> = groups.iter().map(|group| GroupStatistics::new(group.columns.len())).collect();
     table.all_rows(&mut |group, row| read[group].add(row, times[group].map(|(column, _)| column)))?;
     let mut found = LogContents {
         schema: LOG_SCHEMA.to_owned(),
@@ -43,7 +43,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
         notes,
         study_format: String::new(),
     };
-    for (index, (group, Tallies { rows, channels, clock })) in groups.iter().zip(read).enumerate() {
+    for (index, (group, GroupStatistics { rows, channels, clock })) in groups.iter().zip(read).enumerate() {
         let names = &names[group.columns.clone()];
         let time = times[index];
         let seconds = time.and_then(|(column, unit_s)| Some((channels[column].increase()?, unit_s)));
@@ -97,15 +97,15 @@ fn time_column(group: &LogGroup, names: &[String]) -> Option<(usize, f64)> {
 }
 
 /// Running statistics of a group.
-struct Tallies {
+struct GroupStatistics {
     rows: u64,
-    channels: Vec<Tally>,
+    channels: Vec<ChannelStatistics>,
     clock: Clock,
 }
 
-impl Tallies {
+impl GroupStatistics {
     fn new(columns: usize) -> Self {
-        Self { rows: 0, channels: vec![Tally::default(); columns], clock: Clock::default() }
+        Self { rows: 0, channels: vec![ChannelStatistics::default(); columns], clock: Clock::default() }
     }
 
     /// Adds a row; column `time` contains the time.

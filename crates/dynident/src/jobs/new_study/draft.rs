@@ -1,7 +1,8 @@
 //! Draft of a study: tables and keys with reasons.
 
-use crate::result::{StudyChange, Unsure};
+use crate::result::{CheckFinding, StudyChange, StudyCheck, Unsure};
 use core::fmt::Write;
+use dynident_recording::Level;
 use dynident_text::{comment, toml_document};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -82,6 +83,27 @@ impl Draft {
             None => table.lines.push(line),
         }
         true
+    }
+
+    /// Applies unambiguous corrections of an examination; returns whether anything changed. Signs, orders, mountings and
+    /// units have few possible values. A zero or a factor has any value and may compensate for another mistake, so a person
+    /// decides.
+    pub(super) fn apply_corrections(&mut self, found: &StudyCheck) -> bool {
+        let is_discrete = |finding: &&CheckFinding| match finding.kind.as_str() {
+            "sign" | "order" | "mounting" => true,
+            "unit" => finding.write.iter().all(|change| change.line.starts_with("unit")),
+            _ => false,
+        };
+        let problems = found.findings.iter().filter(|finding| finding.level == Level::Problem && finding.or.is_empty());
+        let corrections = problems.filter(is_discrete);
+        let mut changed = false;
+        for finding in corrections {
+            for change in &finding.write {
+                let reason = format!("From `dynident check`: {}: {}", finding.what, finding.evidence);
+                changed |= self.apply(change, &reason);
+            }
+        }
+        changed
     }
 
     /// The keys that a person should check.

@@ -13,7 +13,7 @@ use crate::jobs::check::check;
 use crate::jobs::columns::{Family, Quantity, Source, best, column_list, families, time_as_toml};
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
-use crate::result::{CheckFinding, LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
+use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
 use crate::robot_file::{LoadSettings, XacroSettings, load_robot};
 use crate::study::Study;
 use channels::{LoggedJoints, in_order, logged_joints};
@@ -83,7 +83,7 @@ pub fn new_study_with(
     };
     let logs: Vec<(&Path, LogContents)> =
         request.logs.iter().map(|path| Ok((path.as_path(), log_contents(path)?))).collect::<Result<_, Error>>()?;
-    let recorded = Recorded::find(&robot.model, &logs, thresholds).map_err(Error::NewStudy)?;
+    let recorded = RecognisedColumns::find(&robot.model, &logs, thresholds).map_err(Error::NewStudy)?;
     let mut draft = recorded.draft(request, &robot.model, &logs);
     for change in &request.stated {
         draft.apply(change, "As stated");
@@ -97,7 +97,7 @@ pub fn new_study_with(
         for _ in 0..MAX_ROUNDS {
             let study = request.study(&draft)?;
             let found = check(&study, &request.out, options)?.check;
-            let changed = apply_corrections(&mut draft, &found);
+            let changed = draft.apply_corrections(&found);
             examined = Some(found);
             if !changed {
                 break;
@@ -125,28 +125,7 @@ pub fn new_study_with(
     })
 }
 
-/// Applies unambiguous corrections of an examination; returns whether anything changed. Signs, orders, mountings and
-/// units have few possible values. A zero or a factor has any value and may compensate for another mistake, so a person
-/// decides.
-fn apply_corrections(draft: &mut Draft, found: &StudyCheck) -> bool {
-    let is_discrete = |finding: &&CheckFinding| match finding.kind.as_str() {
-        "sign" | "order" | "mounting" => true,
-        "unit" => finding.write.iter().all(|change| change.line.starts_with("unit")),
-        _ => false,
-    };
-    let problems = found.findings.iter().filter(|finding| finding.level == Level::Problem && finding.or.is_empty());
-    let corrections = problems.filter(is_discrete);
-    let mut changed = false;
-    for finding in corrections {
-        for change in &finding.write {
-            let reason = format!("From `dynident check`: {}: {}", finding.what, finding.evidence);
-            changed |= draft.apply(change, &reason);
-        }
-    }
-    changed
-}
-
-struct Recorded {
+struct RecognisedColumns {
     thresholds: NewStudySettings,
     /// Joint assignment, in the order of the columns.
     logged: LoggedJoints,
@@ -162,7 +141,7 @@ struct Recorded {
     time: Option<(String, Option<f64>)>,
 }
 
-impl Recorded {
+impl RecognisedColumns {
     fn find(
         model: &Model,
         logs: &[(&Path, LogContents)],
