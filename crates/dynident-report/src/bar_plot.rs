@@ -82,7 +82,6 @@ impl BarPlot {
         self
     }
 
-    /// Text for screen readers.
     fn in_words(&self) -> String {
         let bars = self.bars.iter().map(|bar| {
             let half = bar.half_width.map_or_else(String::new, |half| format!(" ± {}", short(half, 2)));

@@ -12,7 +12,6 @@ use serde::Serialize;
 pub(crate) const COLOURS: [&str; 8] =
     ["#0072b2", "#c24e00", "#00785a", "#a83c7d", "#8a6d00", "#2a7fae", "#7a3fb0", "#5f6368"];
 
-/// Maximum number of samples with markers.
 pub(crate) const MAX_MARKED_SAMPLES: usize = 250;
 /// Maximum number of characters of a legend name; width of a character and of a line sample, px.
 const MAX_NAME_CHARS: usize = 26;
@@ -51,7 +50,6 @@ pub(crate) struct CurvePicture<'a> {
     pub(crate) counts: bool,
 }
 
-/// Context of a picture.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Place {
     /// Separate document: white background, title, fixed colours.
@@ -69,7 +67,6 @@ impl Place {
     }
 }
 
-/// Area of the curves, px, and ranges of the axes.
 struct Frame {
     left: f64,
     right: f64,
@@ -82,25 +79,21 @@ struct Frame {
 }
 
 impl Frame {
-    /// Converts x to px.
     fn at_x(&self, x: f64) -> f64 {
         self.left + (x - self.from) / (self.to - self.from) * (self.right - self.left)
     }
 
-    /// Converts y to px.
     fn at_y(&self, y: f64) -> f64 {
         self.bottom - (y - self.low) / (self.high - self.low) * (self.bottom - self.top)
     }
 }
 
-/// The drawn samples.
 struct Samples<'a> {
     x: &'a [f64],
     kept: Vec<usize>,
 }
 
 impl Samples<'_> {
-    /// Path through values of the y axis.
     fn path(&self, values: &[f64], frame: &Frame) -> String {
         let mut pen = Pen::default();
         for &i in &self.kept {
@@ -109,7 +102,6 @@ impl Samples<'_> {
         pen.path()
     }
 
-    /// Points of the finite values.
     fn points(&self, values: &[f64], frame: &Frame) -> Vec<[f64; 2]> {
         let finite = self.kept.iter().filter(|&&i| values[i].is_finite());
         finite.map(|&i| [tenth(frame.at_x(self.x[i])), tenth(frame.at_y(values[i]))]).collect()
@@ -120,7 +112,6 @@ impl Samples<'_> {
     }
 }
 
-/// The difference of two curves, in a strip below the frame.
 fn strip_view(name: &str, values: &[f64], colour: String, samples: &Samples<'_>, above: &Frame) -> StripView {
     let [low, high] = padded(range(values.iter().copied().chain([0.0])));
     let (top, bottom) = (above.bottom + STRIP_GAP, above.bottom + STRIP_GAP + STRIP_HEIGHT);
@@ -226,7 +217,6 @@ impl CurvePicture<'_> {
         }
     }
 
-    /// Range of the x axis.
     fn x_range(&self) -> [f64; 2] {
         let room = if self.counts { 0.3 } else { 0.0 };
         let from = self.x.first().map_or(0.0, |x| x - room);
@@ -234,7 +224,6 @@ impl CurvePicture<'_> {
         [from, if to > from { to } else { from + 1.0 }]
     }
 
-    /// One curve with its values on the y axis.
     fn line(
         &self,
         curve: &Curve<'_>,
@@ -264,7 +253,6 @@ impl CurvePicture<'_> {
         }
     }
 
-    /// Entries of the legend, arranged in rows.
     fn legend(&self, left: f64, right: f64, first: f64) -> Vec<LegendView> {
         let (mut x, mut y) = (left, first);
         let entries = self.curves.iter().map(|curve| {
@@ -282,7 +270,6 @@ impl CurvePicture<'_> {
     }
 }
 
-/// Smallest and largest finite value.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let finite = values.filter(|value| value.is_finite());
     finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)])
@@ -306,7 +293,6 @@ struct Picture<'a> {
     width: f64,
     height: f64,
     frame: [f64; 4],
-    /// Position of the numbers of the x axis.
     axis: f64,
     x_label: &'a str,
     y_label: &'a str,

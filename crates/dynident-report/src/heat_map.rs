@@ -11,7 +11,6 @@ const MAX_TOOLTIPS: usize = 4096;
 const CELLS_WIDTH: f64 = 560.0;
 const MAX_NAME_CHARS: usize = 22;
 const CHAR_WIDTH: f64 = 6.5;
-/// Colours below and above zero.
 const NEGATIVE_COLOUR: &str = "#0072b2";
 const POSITIVE_COLOUR: &str = "#d55e00";
 /// Width of the colour scale, px, and number of steps on each side.

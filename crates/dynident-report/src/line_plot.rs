@@ -5,7 +5,6 @@ use crate::decimation::kept_samples;
 use crate::error::ReportError;
 use crate::plot_data::{CurveData, PlotData, StripData, check_axis, check_length, rounded, rounded_time};
 
-/// Number of pixel columns of a curve.
 const PIXEL_COLUMNS: usize = 1200;
 
 /// One curve.
@@ -120,7 +119,6 @@ impl LinePlot {
         self.lines.iter().try_for_each(|line| check_length(&self.title, &line.name, line.values.len(), self.x.len()))
     }
 
-    /// The value, or NaN if it cannot be drawn.
     fn drawn(&self, value: f64) -> f64 {
         if self.log_y && value <= 0.0 { f64::NAN } else { value }
     }

@@ -95,7 +95,6 @@ impl<'a> MotionPicture<'a> {
     }
 }
 
-/// One curve with its limits and scale.
 fn plot(corner: [f64; 2], times: &[f64], curve: &MotionCurve<'_>) -> Plot {
     let [left, top] = corner;
     let [width, height] = PLOT;

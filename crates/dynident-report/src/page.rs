@@ -60,7 +60,6 @@ pub struct Report {
     pub sections: Vec<Section>,
 }
 
-/// Width and height of a static plot, px.
 const STATIC_PLOT_SIZE: [f64; 2] = [1040.0, 300.0];
 
 const UPLOT_JS: &str = include_str!("../vendor/uplot/uPlot.iife.min.js");
@@ -135,7 +134,6 @@ impl Report {
 }
 
 impl Section {
-    /// Title; empty for sections without one.
     fn title(&self) -> &str {
         match self {
             Self::Heading(heading) => &heading.text,

@@ -9,7 +9,6 @@ const VIEW: [f64; 2] = [420.0, 420.0];
 const GAP: f64 = 58.0;
 const MARGIN_TOP: f64 = 58.0;
 
-/// Minimum size of the shown space, m.
 const MIN_SPAN: f64 = 0.1;
 
 /// Views: name, and horizontal and vertical axis of the base frame.
@@ -78,7 +77,6 @@ impl PathPicture<'_> {
         crate::templates::rendered("path_picture.svg", &picture)
     }
 
-    /// Bounds of all points, the base, and near limits.
     fn frame(&self) -> Frame {
         let rods = self.poses.iter().flat_map(|pose| pose.rods.iter().flatten().chain(&pose.joints));
         let points = self.paths.iter().flatten().chain(rods).filter(|point| point.iter().all(|x| x.is_finite()));
@@ -174,7 +172,6 @@ impl View<'_> {
         Some([tenth(y), tenth((MARGIN_TOP + VIEW[1] - y).max(0.0) + 2.0)])
     }
 
-    /// The column from above: centre and radius, px.
     fn round_column(&self, picture: &PathPicture<'_>) -> Option<[f64; 3]> {
         let column = picture.column.filter(|_| self.axes[1] != 2)?;
         let [x, y] = column.axis_xy_m;
@@ -206,7 +203,6 @@ impl View<'_> {
         })
     }
 
-    /// Round numbers along one axis of the view, m, with their texts.
     fn ticks(&self, place: usize) -> Vec<(f64, String)> {
         let Frame { middle, half } = self.frame;
         let span = 2.0 * half;

@@ -2,7 +2,6 @@
 
 use core::fmt::Write;
 
-/// Rounds to a tenth of a pixel.
 pub(crate) fn tenth(x: f64) -> f64 {
     (10.0 * x).round() / 10.0
 }
@@ -26,7 +25,6 @@ impl Pen {
         self.down = drawn;
     }
 
-    /// The path as SVG attribute `d`.
     pub(crate) fn path(self) -> String {
         self.text
     }

@@ -24,16 +24,13 @@ pub(crate) struct CurveData<'a> {
     pub(crate) dashed: bool,
     pub(crate) points: bool,
     pub(crate) broad: bool,
-    /// Lower and upper ends of error bars.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) bars: Option<[Vec<Option<f64>>; 2]>,
 }
 
-/// The difference of two curves.
 #[derive(Serialize)]
 pub(crate) struct StripData<'a> {
     pub(crate) name: &'a str,
-    /// Indices of minuend and subtrahend.
     pub(crate) of: [usize; 2],
 }
 

@@ -91,7 +91,6 @@ impl Table {
         }
     }
 
-    /// Whether each column is numeric.
     pub(crate) fn numeric(&self) -> Vec<bool> {
         let number = |text: &str| {
             let text = text.trim().trim_end_matches(['%', '°']).trim_end();

@@ -19,7 +19,6 @@ pub(crate) fn utc(at: SystemTime) -> Option<String> {
     (since.as_secs() < END_OF_RFC3339_S as u64).then(|| humantime::format_rfc3339_seconds(at).to_string())
 }
 
-/// As [`utc`], from seconds since 1970.
 pub(crate) fn utc_of_seconds(seconds: f64) -> Option<String> {
     let since = Duration::try_from_secs_f64(seconds).ok()?;
     utc(UNIX_EPOCH.checked_add(since)?)

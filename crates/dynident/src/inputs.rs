@@ -103,7 +103,6 @@ pub fn study_inputs(study: &Study, study_path: &Path, data: Option<&Path>, secti
     named_files(study, study_path, data, |section| sections.contains(&section))
 }
 
-/// The study file and the files of the sections that `chosen` selects.
 fn named_files(study: &Study, study_path: &Path, data: Option<&Path>, chosen: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let folders = Folders::new(study, study_path, data);
     let mut texts = Vec::new();
@@ -124,7 +123,6 @@ fn named_files(study: &Study, study_path: &Path, data: Option<&Path>, chosen: im
     files
 }
 
-/// Collects all texts in `value` that could name a file.
 fn collect_texts(value: &Value, texts: &mut Vec<String>) {
     match value {
         Value::String(text) if !text.is_empty() => texts.push(text.clone()),

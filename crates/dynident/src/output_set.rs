@@ -7,7 +7,6 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
-/// Prefix of the hidden staging folder.
 const STAGE_PREFIX: &str = ".dynident-set-";
 /// Its subfolders: new files, old files, and the final content of each file's place for either case.
 const NEW: &str = "new";
@@ -19,14 +18,12 @@ const LINKS: &str = "links";
 /// A link to [`OLD`], then to [`NEW`]: this single step switches all files.
 const CURRENT: &str = "current";
 const NEXT: &str = "next";
-/// Names of the set, one per line.
 const NAMES: &str = "names";
 /// Without links: the old files, and a marker that all of them have been moved, so that the new files may follow.
 const MOVED: &str = "moved";
 const DECIDED: &str = "decided";
 /// Subfolders of a stage that contain files under the names of the set.
 const PARTS: [&str; 6] = [NEW, OLD, PLACE_NEW, PLACE_OLD, LINKS, MOVED];
-/// Largest readable list of names, bytes.
 const MAX_NAMES_BYTES: u64 = 1 << 20;
 
 /// Maximum waiting time for another program that writes a set to the same folder.
@@ -81,7 +78,6 @@ impl OutputSet {
     }
 }
 
-/// Path and reason of a failure.
 type Failed = (PathBuf, io::Error);
 
 fn at(path: &Path) -> impl FnOnce(io::Error) -> Failed {
@@ -216,12 +212,10 @@ impl Stage {
             }
         }
         if settled && self.places_synced().is_ok() {
-            // A remaining stage is harmless.
             let _ = remove_folder(&self.path);
         }
     }
 
-    /// Restores the old files after a failure.
     fn given_up(&self, failed: Failed) -> Failed {
         self.settle();
         failed
@@ -251,7 +245,6 @@ impl Stage {
         })
     }
 
-    /// Moves the old files back.
     fn put_back(&self, failed: Failed) -> Failed {
         let back = |name: &String| {
             let old = self.path.join(MOVED).join(name);
@@ -263,7 +256,6 @@ impl Stage {
         failed
     }
 
-    /// Moves the remaining new files to their places.
     fn put_rest(&self) -> Result<(), Failed> {
         for name in &self.names {
             let (file, place) = (self.path.join(NEW).join(name), self.folder.join(name));
@@ -271,12 +263,10 @@ impl Stage {
                 fs::rename(&file, &place).map_err(at(&place))?;
             }
         }
-        // A remaining stage is harmless.
         let _ = remove_folder(&self.path);
         Ok(())
     }
 
-    /// Syncs folders of the stage.
     fn synced(&self, parts: &[&str]) -> Result<(), Failed> {
         for part in parts {
             let base = self.path.join(part);
@@ -291,7 +281,6 @@ impl Stage {
         Ok(())
     }
 
-    /// Syncs the folders of the files' places.
     fn places_synced(&self) -> Result<(), Failed> {
         sync_folder(&self.folder).map_err(at(&self.folder))?;
         for below in self.folders_below() {
@@ -301,7 +290,6 @@ impl Stage {
         Ok(())
     }
 
-    /// Subfolders in the names of the set.
     fn folders_below(&self) -> std::collections::BTreeSet<&Path> {
         let above = self.names.iter().flat_map(|name| Path::new(name).ancestors().skip(1));
         above.filter(|path| !path.as_os_str().is_empty()).collect()

@@ -26,9 +26,7 @@ use std::path::PathBuf;
 
 const MAGIC: &[u8; 16] = b"DYNIDENT FACTORS";
 const VERSION: u32 = 1;
-/// Bytes before the header.
 const HEADER_START: usize = 32;
-/// Bytes of the hash.
 const HASH_BYTES: usize = 32;
 
 #[derive(Serialize, Deserialize)]
@@ -117,7 +115,6 @@ impl Factors {
     }
 }
 
-/// Header and numbers of a file, after checking its hash.
 fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), FactorsError> {
     if !bytes.starts_with(MAGIC) {
         return Err(FactorsError::Kind);

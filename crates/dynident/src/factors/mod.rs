@@ -62,7 +62,6 @@ impl FactorLog {
 pub struct Factors {
     /// Common robot, drives, filters and estimator; the robot description is in memory, and there are no logs.
     pub(crate) study: Study,
-    /// Name of the study in messages.
     pub(crate) study_path: PathBuf,
     /// Sorted by key, without duplicates.
     logs: Vec<FactorLog>,
@@ -150,7 +149,6 @@ impl Factors {
     }
 }
 
-/// Checks that two parts have the same settings.
 fn check_same_kind(kind: &serde_json::Value, other: &serde_json::Value) -> Result<(), FactorsError> {
     if kind == other {
         return Ok(());
@@ -160,7 +158,6 @@ fn check_same_kind(kind: &serde_json::Value, other: &serde_json::Value) -> Resul
     Err(FactorsError::Unlike { sections: sections.unwrap_or_default() })
 }
 
-/// Sorts logs by key and removes duplicates.
 fn sorted_unique(mut logs: Vec<FactorLog>) -> Vec<FactorLog> {
     logs.sort_by(|a, b| a.key().cmp(&b.key()));
     let mut seen = HashSet::new();

@@ -29,7 +29,6 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Required groups of columns.
     fn groups(self) -> &'static [&'static str] {
         match self {
             Self::InverseDynamics | Self::Regressor => &["q", "dq", "ddq"],
@@ -125,7 +124,6 @@ pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn 
     Ok(rows)
 }
 
-/// Column index of every required column.
 fn column_places(
     header: &csv::StringRecord,
     states: &Path,

@@ -141,7 +141,6 @@ fn base_summary(model: &Model) -> BaseSummary {
     }
 }
 
-/// Findings of the audit and of the reader.
 fn audit_entries(robot: &Robot) -> Vec<AuditEntry> {
     let mut entries: Vec<AuditEntry> = audit(&robot.model)
         .into_iter()

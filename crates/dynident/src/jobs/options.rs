@@ -20,7 +20,6 @@ impl<'a> RunOptions<'a> {
     }
 }
 
-/// Name of a study: stated, or from its file.
 pub(crate) fn study_name(study: &Study, path: &Path) -> String {
     let stem = || path.file_stem().map_or_else(|| "study".to_owned(), |stem| stem.to_string_lossy().into_owned());
     study.name.clone().unwrap_or_else(stem)

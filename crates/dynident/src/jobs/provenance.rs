@@ -10,9 +10,7 @@ use sha2::{Digest, Sha256};
 use std::io::Read;
 use std::path::{Component, Path};
 
-/// Hexadecimal digits of an identity.
 const IDENTITY_DIGITS: usize = 12;
-/// Read block, bytes.
 const BLOCK_BYTES: usize = 1 << 16;
 
 /// Provenance of a result of `study`; `read` are the other inputs with their kinds, duplicates allowed.
@@ -54,7 +52,6 @@ pub(crate) fn later_provenance(
     Ok(identified_by(study, begun.study.clone(), robot.chain(since).collect::<Result<_, _>>()?))
 }
 
-/// Provenance of a result from reduced logs.
 pub(crate) fn factors_provenance(factors: &Factors) -> Provenance {
     let robot = factors.study.robot.description.iter();
     let robot =

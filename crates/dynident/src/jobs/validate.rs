@@ -87,7 +87,6 @@ pub fn validate_result(
     })
 }
 
-/// Problems: selected logs that were used for the fit.
 fn training_logs(
     stored: &ResultFile,
     study: &Study,

@@ -9,7 +9,6 @@ use dynident_excitation::optimisers::Generation;
 use dynident_model::{Model, Vec3};
 use dynident_report::{ArmPose, ColumnShape, FitnessPicture, MotionCurve, MotionPicture, PathPicture, Place};
 
-/// Number of plotted poses, including both ends.
 const POSE_COUNT: usize = 9;
 
 /// Maximum number of points of a path, limited by the resolution of the plot.
@@ -58,7 +57,6 @@ pub(crate) fn path(file: &DesignFile, limits: &Limits, model: &Model, motion: &M
     let title = format!("{}: {}, {} s", file.name, file.family, file.duration_s);
     let mut workspace = Workspace::new(model);
     let tools = tools(model);
-    // Positions of the joints and tools at one sample, m.
     let mut places_at = |sample: usize| -> [Vec<Place>; 2] {
         let q: Vec<f64> = (0..motion.joints).map(|joint| motion.q[joint * motion.samples + sample]).collect();
         let placements = body_placements(model, &mut workspace, &q);

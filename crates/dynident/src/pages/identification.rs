@@ -15,7 +15,6 @@ use dynident_identification::{DriveInertiaEstimate, Role};
 use dynident_recording::Level;
 use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone, short};
 
-/// Maximum number of base parameters for the correlation plot.
 const MAX_CORRELATED_PARAMETERS: usize = 80;
 
 /// The page of a stored result with torque over time, as
@@ -178,7 +177,6 @@ fn error_table(r: &ResultFile) -> Table {
     table
 }
 
-/// One held-out log with all parameter sets.
 fn held_out_table(log: &LogValidation) -> Table {
     let sets = [
         ("consistent set (exported)", log.physical.as_ref()),
@@ -252,7 +250,6 @@ fn base_table(page: &mut Report, r: &ResultFile) {
     page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
 }
 
-/// The largest source of a parameter's error and its share of the variance.
 fn largest_error(p: &BaseParameterResult) -> String {
     let words = |(term, share): (&ErrorTermResult, f64)| format!("{} ({:.0} %)", term.name(), 100.0 * share);
     p.largest_error().map_or_else(String::new, words)

@@ -93,7 +93,7 @@ impl IterationsFile {
     pub fn lowered_bandwidths_sentence(&self) -> Option<String> {
         let in_words = |model: &str| match model {
             "none" => "without a model",
-            "nominal" => "with the model of the robot description",
+            "nominal" => "with the nominal model",
             _ => "with the newest model",
         };
         let mut each: Vec<String> = Vec::new();

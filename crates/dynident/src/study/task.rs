@@ -23,7 +23,6 @@ impl Study {
         self.task_with(self.settings(path, robot)?, robot, folders)
     }
 
-    /// The same with given settings.
     pub(crate) fn task_with(
         &self,
         settings: IdentificationSettings,
@@ -156,7 +155,6 @@ impl Study {
         })
     }
 
-    /// Joints whose drive inertia no key states.
     fn unstated_drives(&self, robot: &StudyRobot) -> Vec<String> {
         let names = robot.model().joints().iter().map(|joint| &joint.name);
         names.filter(|name| self.drive.drive_inertia_of(name).is_none()).cloned().collect()

@@ -204,7 +204,7 @@ fn a_design_ends_in_every_part_of_it() {
             if ended.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
         .unwrap();
-        assert!(ended.load(Ordering::SeqCst), "{round} was never come to");
+        assert!(ended.load(Ordering::SeqCst), "{round} was never reached");
         assert!(outcome.file.stopped, "{round}: design.json does not record that it was stopped");
         assert!(asked.load(Ordering::SeqCst) <= 20, "{round}: {asked:?}");
         let whole_hz = outcome.robot.model().own_scale().round_hertz(10_000.0);

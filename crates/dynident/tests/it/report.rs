@@ -54,5 +54,5 @@ fn every_joint_is_drawn_and_no_name_becomes_markup() {
     for heading in ["Torque", "Parameters", "Friction and drives", "Bodies", "Logs", "Origin and time"] {
         assert!(page.contains(&format!(">{heading}</h2>")), "{heading}");
     }
-    assert!(page.contains("steps longer than three median steps"), "what was found in the log");
+    assert!(page.contains("steps longer than three median steps"), "findings about the log");
 }

@@ -107,7 +107,6 @@ impl FindingContext<'_> {
         found
     }
 
-    /// Wrong mass of one body, or torques in another unit.
     fn wrong_scale(self, fit: &DescriptionFit, model: &Model) -> Option<CheckFinding> {
         let far = fit.joints_in_another_unit();
         match &fit.wrong_mass {
@@ -117,7 +116,6 @@ impl FindingContext<'_> {
     }
 }
 
-/// Finding if no hypothesis explains the logs.
 fn unexplained(search: &Search, joints: &[String]) -> CheckFinding {
     let left = &search.as_written.left;
     let worst = (0..left.len()).max_by(|&a, &b| left[a].total_cmp(&left[b])).unwrap_or(0);
@@ -147,7 +145,6 @@ fn unrelated_torques(search: &Search) -> CheckFinding {
     )
 }
 
-/// Finding for torque columns with currents and no stated scale.
 pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSettings) -> Option<CheckFinding> {
     let index = *study.logs_of_role(Role::Identify).first()?;
     let torque = study.format_of(index).torque;
@@ -197,7 +194,6 @@ fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding>
     found
 }
 
-/// A mistake in one held-out log only.
 fn of_held_out_log(
     study: &Study,
     robot: &StudyRobot,

@@ -74,7 +74,6 @@ pub fn check_with(
     Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study_name(study, study_path), check })
 }
 
-/// Finding for logs that are too short for the number of parameters.
 fn too_few_rows(examined: &StudyExamination, thresholds: &CheckSettings) -> Option<CheckFinding> {
     let [too_few, few] =
         [thresholds.too_few_equations, thresholds.few_equations].map(|each| examined.rows < each * examined.parameters);
@@ -147,7 +146,6 @@ pub(super) fn diagnosis_check(
     check
 }
 
-/// Warnings and problems from the import of one log.
 fn import_findings(log: &str, import: &ImportReport) -> Vec<CheckFinding> {
     let matters = import.findings.iter().filter(|finding| finding.level != Level::Info);
     let one = |finding: &dynident_recording::Finding| CheckFinding {

@@ -10,7 +10,6 @@ use dynident_recording::Level;
 /// Smallest evidence: natural logarithm of the ratio of a joint's unexplained torque before and after the correction.
 const MIN_LOG_RATIO: f64 = 0.2;
 
-/// Names of joints and study keys for the texts, with the thresholds.
 #[derive(Clone, Copy)]
 pub(super) struct FindingContext<'a> {
     pub(super) joints: &'a [String],
@@ -18,12 +17,10 @@ pub(super) struct FindingContext<'a> {
     pub(super) thresholds: &'a CheckSettings,
 }
 
-/// A problem without study keys.
 pub(super) fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {
     CheckFinding { level: Level::Problem, kind: kind.to_owned(), what, evidence, write: Vec::new(), or: Vec::new() }
 }
 
-/// Another explanation, with the study keys.
 pub(super) fn alternative(mistake: &Mistake, joints: &[String], keys: Option<&StudyKeys>) -> String {
     let write: Vec<String> =
         changes(mistake, keys).iter().map(|change| format!("[{}] {}", change.table, change.line)).collect();

@@ -8,7 +8,6 @@ use std::path::Path;
 /// Columns of one quantity, one per joint of `joints`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::jobs) struct Family {
-    /// Index of the recording.
     pub(in crate::jobs) file: usize,
     /// Index of the group (topic) within it.
     pub(in crate::jobs) group: usize,
@@ -21,7 +20,6 @@ pub(in crate::jobs) struct Family {
     pub(in crate::jobs) columns: Vec<(JointKey, String)>,
 }
 
-/// Finds all families of columns in the recordings.
 pub(in crate::jobs) fn families<'a>(
     logs: impl IntoIterator<Item = (&'a Path, &'a LogContents)>,
     joints: &[String],

@@ -3,7 +3,6 @@
 use super::quantity::Quantity;
 use super::units::ended;
 
-/// Joint that a name refers to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::jobs) enum JointKey {
     /// Index of a joint of the robot.
@@ -27,7 +26,6 @@ pub(in crate::jobs) enum Source {
     Measured,
 }
 
-/// Information from a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::jobs) struct Meaning {
     /// `None` if only the name of the file could give it.
@@ -155,7 +153,6 @@ fn without_joint(lower: &str, joints: &[String]) -> (String, Option<usize>) {
     }
 }
 
-/// Splits off a word in brackets at the end.
 fn without_brackets(lower: &str) -> (String, Option<String>) {
     let found = lower.strip_suffix(']').and_then(|name| name.rsplit_once('['));
     match found.filter(|(_, inside)| inside.chars().any(char::is_alphabetic)) {
@@ -164,7 +161,6 @@ fn without_brackets(lower: &str) -> (String, Option<String>) {
     }
 }
 
-/// Splits into words and numbers, in order.
 fn words(text: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut before: Option<bool> = None;

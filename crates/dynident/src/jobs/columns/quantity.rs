@@ -1,6 +1,5 @@
 //! Quantity of a column.
 
-/// Joint quantity of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::jobs) enum Quantity {
     Position,

@@ -15,7 +15,6 @@ fn split_pattern(name: &str) -> (String, String) {
     (format!("{}{{}}{}", &name[..begin], &name[end + 1..]), name[begin..=end].to_owned())
 }
 
-/// Columns in study notation: a pattern with a range, or a list of names.
 fn columns(members: &[(String, String)]) -> String {
     let numbers: Option<Vec<u64>> = members.iter().map(|(own, _)| own.parse().ok()).collect();
     if let Some(numbers) = numbers

@@ -37,7 +37,6 @@ const ENDINGS: [(&str, &str, Option<Quantity>); 30] = [
     ("s", "s", None),
 ];
 
-/// Joint fields of ROS messages, and their units (REP 103).
 const FIELDS: [(&str, &str); 8] = [
     (".position", "rad"),
     (".positions", "rad"),
@@ -74,7 +73,6 @@ pub(super) fn ended(lower: &str) -> Option<(String, &'static str, Option<Quantit
     found.map(|(before, unit, quantity)| (format!("{before}{index}"), unit, quantity))
 }
 
-/// Splits off an index in brackets at the end.
 fn indexed(name: &str) -> (&str, &str) {
     match name.rfind('[') {
         Some(at) if name.ends_with(']') && at > 0 => name.split_at(at),

@@ -16,14 +16,12 @@ use dynident_recording::MotionBlock;
 use nalgebra::DMatrix;
 use std::path::Path;
 
-/// Checked data for a table and for a log.
 const SPLINE: &str = "the quintic spline through the samples of the table";
 const SAMPLES: &str = "the log's own samples, its positions through the study's differentiator";
 
 /// No search for limit changes, no stop request.
 const NO_SEARCH: SingleChanges<'static> = (&|| Ok(Vec::new()), &|| false);
 
-/// Maximum number of samples of a log.
 const MAX_SAMPLES: usize = 2_000_000;
 
 /// Largest speed of a joint at rest, relative to its peak speed.
@@ -125,7 +123,6 @@ pub fn check_log(
     Ok(DesignOutcome::new(setup, origin, review).with_provenance(provenance))
 }
 
-/// Index of the log with this name or file.
 fn log_called(study: &Study, name: &str) -> Result<usize, StudyError> {
     let all: Vec<usize> = (0..study.log.len()).collect();
     let mut called: Vec<usize> = all.iter().copied().filter(|&index| study.log_name(index) == name).collect();

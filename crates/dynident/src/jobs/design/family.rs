@@ -9,11 +9,9 @@ use dynident_excitation::{DesignSettings, Family};
 use std::path::Path;
 
 pub(in crate::jobs) struct MotionFamily {
-    /// The family, with the study's duration.
     pub(in crate::jobs) family: Box<dyn Family>,
     /// The limits in force: those of the robot description, the assumed ones, and the study's.
     pub(in crate::jobs) limits: Limits,
-    /// Settings of the search.
     pub(in crate::jobs) search: DesignSettings,
 }
 

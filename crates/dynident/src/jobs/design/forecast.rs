@@ -5,9 +5,7 @@ use crate::study::StudyRobot;
 use dynident_excitation::predicted_covariance;
 use nalgebra::DMatrix;
 
-/// Number of worst directions in the result.
 const MAX_DIRECTIONS: usize = 3;
-/// Number of terms per direction.
 const MAX_TERMS: usize = 6;
 
 /// Nominal values below this fraction of the largest are rounding errors of zero.

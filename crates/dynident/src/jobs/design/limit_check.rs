@@ -13,13 +13,10 @@ const DIAGNOSIS_RATE_HZ: f64 = 1000.0;
 /// Divisor of both sample rates after a stop request.
 const STOPPED_RATE_DIVISOR: f64 = 10.0;
 
-/// Result of a limit check.
 pub(super) struct LimitCheck {
     /// Utilisation of every limit at the worst moment of the motion.
     pub(super) reports: Vec<LimitReport>,
-    /// Sample rate of the check, Hz.
     pub(super) rate_hz: f64,
-    /// Checked data, for the report.
     pub(super) of: &'static str,
     /// Reasons for violated limits, as sentences; empty without violations.
     pub(super) diagnosis: Vec<String>,
@@ -78,7 +75,6 @@ impl LimitCheck {
     }
 }
 
-/// Reasons why the motion is infeasible.
 fn sentences(
     set: &LimitSet,
     duration_s: f64,

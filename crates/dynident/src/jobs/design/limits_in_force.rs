@@ -14,7 +14,6 @@ use dynident_model::terms::{JointProperty, TorqueTerm};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Purpose of the limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum LimitsFor<'a> {
     /// A search, which keeps a margin inside the iteration's envelope.
@@ -124,7 +123,6 @@ pub(in crate::jobs) fn limits_of(
     Ok(in_force(study, study_path, folders, robot, LimitsFor::Ways)?.limits)
 }
 
-/// Known start and home positions.
 fn starts(
     section: &DesignSection,
     iteration: Option<&IterationSection>,
@@ -166,7 +164,6 @@ fn with_typical(robot: &StudyRobot, known: KnownTorque) -> (KnownTorque, Vec<Str
     (all, joints)
 }
 
-/// Whether this property of a joint is known.
 fn is_known(known: &KnownTorque, joint: usize, property: Option<JointProperty>) -> bool {
     known.terms().iter().any(|(term, _)| {
         let is_same = match property {
@@ -242,7 +239,6 @@ pub(super) fn not_included(limits: &Limits, robot: &StudyRobot, reports: &[Limit
     lines
 }
 
-/// Joins names, with a maximum number.
 fn join_names(names: &[String]) -> String {
     const MAX_SHOWN: usize = 8;
     match names.len().checked_sub(MAX_SHOWN) {

@@ -95,5 +95,4 @@ pub fn design_study(
     Ok(outcome)
 }
 
-/// Note for windowed designs.
 const WINDOWED_NOTE: &str = "the search for strokes uses only the position, velocity and acceleration limits; limits of jerk, torque, power and workspace are checked afterwards on the whole motion";

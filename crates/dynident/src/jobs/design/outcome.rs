@@ -21,7 +21,6 @@ use nalgebra::DMatrix;
 /// Sample rate of plots for a 1.2 m arm, Hz.
 const PLOT_RATE_HZ: f64 = 100.0;
 
-/// A motion with its origin: a search, or a given motion.
 pub(super) struct MotionOrigin {
     motion: Box<dyn Family>,
     parameters: Vec<f64>,
@@ -79,13 +78,11 @@ impl MotionOrigin {
     }
 }
 
-/// Results of the check of a motion.
 pub(super) struct MotionReview {
     /// Duration, s; for a log with gaps, the sum of its pieces.
     pub(super) duration_s: f64,
     /// Rate of the samples used for the information, Hz.
     pub(super) rate_hz: f64,
-    /// Information about the parameters.
     pub(super) information: MotionInformation,
     pub(super) check: LimitCheck,
 }

@@ -11,7 +11,6 @@ use nalgebra::DMatrix;
 use serde::Deserialize;
 use std::path::Path;
 
-/// Parts of an earlier result.
 #[derive(Deserialize)]
 struct EarlierEstimate {
     base_parameters: Vec<BaseParameterResult>,
@@ -151,7 +150,6 @@ fn information_of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>
     if rows.len() != count || rows.iter().any(|row| row.len() != count) {
         return Err(wrong(format!("base_parameter_covariance is not {count} rows of {count} numbers: identify again")));
     }
-    // Indices of excited parameters in the file.
     let excited: Vec<usize> = (0..count).filter(|&index| stored.base_parameters[index].excited).collect();
     let covariance = DMatrix::from_fn(excited.len(), excited.len(), |i, j| rows[excited[i]][excited[j]]);
     // The comparison is false for NaN, so NaN is rejected.
@@ -174,10 +172,8 @@ fn information_of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>
     Ok(information)
 }
 
-/// Maximum number of names in a message.
 const MAX_LISTED: usize = 6;
 
-/// Column in the robot of every stored parameter.
 fn places(stored: &[BaseParameterResult], robot: &StudyRobot) -> Result<Vec<usize>, String> {
     let symbols: Vec<String> = robot.layout().columns().iter().map(Column::symbol).collect();
     let expressions = robot.base().expressions();

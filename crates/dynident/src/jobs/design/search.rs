@@ -23,18 +23,14 @@ pub(super) struct SearchResult {
     pub(super) figure: Option<f64>,
     /// Largest limit violation in the search; zero for a windowed design.
     pub(super) violation: f64,
-    /// The strokes of a windowed design.
     pub(super) windowed: Option<WindowedFile>,
     /// Generations of the search; empty for gradients.
     pub(super) history: Vec<Generation>,
-    /// Evaluations of criterion, limits and gradient.
     pub(super) evaluations: usize,
-    /// Elapsed time, s.
     pub(super) seconds: f64,
 }
 
 impl SearchResult {
-    /// Progress report after the search.
     pub(super) fn progress(&self, round: &'static str) -> DesignProgress {
         DesignProgress {
             round,

@@ -14,10 +14,8 @@ use dynident_model::Model;
 use nalgebra::DMatrix;
 use std::path::Path;
 
-/// Samples per regressor block.
 const BLOCK_SAMPLES: usize = 4096;
 
-/// Information of a motion about the base parameters.
 pub(super) struct MotionInformation {
     /// `Σ WᵀW`: unit torque noise, 1 Nm (N).
     pub(super) plain: DMatrix<f64>,
@@ -127,7 +125,6 @@ impl DesignSetup {
         if self.section.criterion.ignores_torque_noise() { &self.ones } else { &self.torque_std_nm }
     }
 
-    /// Information of a motion, sampled at `times`.
     pub(super) fn information(&self, times: &[f64], motion_at: &dyn Fn(&[f64], &mut Motion)) -> MotionInformation {
         let [plain, weighted] =
             [&self.ones, &self.torque_std_nm].map(|std| information(&self.robot, std, times, motion_at));
@@ -138,7 +135,6 @@ impl DesignSetup {
         self.criteria.last().map_or("", |criterion| criterion.name())
     }
 
-    /// Value of the criterion for a given motion.
     pub(super) fn figure(&self, MotionInformation { plain, weighted }: &MotionInformation) -> Option<f64> {
         let criterion = self.criteria.last()?;
         match &self.prior {

@@ -14,13 +14,11 @@ use dynident_excitation::step_wise::{StepWiseJoint, StepWiseProblem, Stroke, Str
 use dynident_excitation::{DesignProgress, Family};
 use std::time::Instant;
 
-/// Random starts of the gradient optimiser per joint.
 const STARTS_PER_JOINT: usize = 4;
 
 /// Position limit of a joint without position limits, rad: larger than any amplitude range.
 const UNLIMITED_RAD: f64 = 1e6;
 
-/// Solves the step-wise problem of a study.
 pub(crate) fn step_wise(
     section: &DesignSection,
     windowed: &WindowedCondition,
@@ -137,7 +135,6 @@ fn searched(
     Ok(FoundStrokes { x, evaluations, optimiser: section.optimiser.name(), history })
 }
 
-/// A step-wise problem with the data for its motion.
 struct StrokeMotion<'a> {
     problem: &'a StepWiseProblem,
     settings: &'a SplicedLogisticSettings,
@@ -147,7 +144,6 @@ struct StrokeMotion<'a> {
 }
 
 impl StrokeMotion<'_> {
-    /// Motion of the strokes in sequence.
     fn family(&self, strokes: &[Stroke]) -> Result<StepWiseLogistic, StudyError> {
         let steps = self.problem.joints.iter().zip(strokes).map(|(joint, stroke)| Step {
             joint: joint.joint,
@@ -176,7 +172,6 @@ impl StrokeMotion<'_> {
         }
     }
 
-    /// Strokes in the format of the result file.
     fn stroke_files(&self, strokes: &[Stroke]) -> Vec<StrokeFile> {
         let Self { problem, settings, offsets, robot } = *self;
         let conditions = problem.condition_numbers(strokes);
@@ -205,7 +200,6 @@ impl StrokeMotion<'_> {
     }
 }
 
-/// Builds the problem with the constants of every joint.
 fn problem(
     section: &DesignSection,
     windowed: &WindowedCondition,
@@ -263,7 +257,6 @@ fn problem(
     Ok(StepWiseProblem { joints })
 }
 
-/// Vector of unknowns for given strokes.
 fn given(strokes: &[GivenStroke], names: &[String]) -> Result<Vec<f64>, StudyError> {
     if let Some(stroke) = strokes.iter().find(|stroke| !names.contains(&stroke.joint)) {
         let (what, name, known) = ("joint that moves", stroke.joint.clone(), names.to_vec());

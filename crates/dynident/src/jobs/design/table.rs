@@ -7,7 +7,6 @@ use dynident_files::quoted;
 use dynident_recording::{Derivatives, MotionSettings, cutoff};
 use std::path::Path;
 
-/// Maximum number of rows.
 const MAX_ROWS: usize = 1_000_000;
 
 /// Largest relative deviation of the time steps of a table without derivatives.
@@ -17,7 +16,6 @@ const MAX_RELATIVE_STEP_DEVIATION: f64 = 1e-3;
 const MAX_RELATIVE_DISAGREEMENT: f64 = 0.05;
 const MIN_ALLOWED_DISAGREEMENT: f64 = 1e-3;
 
-/// A trajectory and a note about its derivatives.
 pub(crate) struct Trajectory {
     pub(crate) given: Given,
     /// Method of velocity and acceleration if they are not in the table.

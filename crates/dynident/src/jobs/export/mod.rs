@@ -47,7 +47,6 @@ pub fn export_result(
     export(&robot, target, &reservations(stored)).map_err(cannot)
 }
 
-/// Notes about the result for users of the model.
 fn reservations(stored: &ResultFile) -> Vec<String> {
     let mut notes: Vec<String> =
         stored.problems.iter().map(|problem| format!("The result has a PROBLEM: {problem}")).collect();
@@ -64,7 +63,6 @@ fn reservations(stored: &ResultFile) -> Vec<String> {
     notes
 }
 
-/// The robot with the values of the result.
 fn robot_model(
     stored: &ResultFile,
     path: &Path,

@@ -108,8 +108,8 @@ fn milliseconds(seconds: f64, half_width_95_s: Option<f64>, note: Option<String>
 }
 
 fn delay(lag: &TorqueLag) -> SimulatorValue {
-    let compensated = (lag.taken_off_s != 0.0)
-        .then(|| format!("of which {:.3} ms were compensated before the fit", 1e3 * lag.taken_off_s));
+    let compensated =
+        (lag.taken_off_s != 0.0).then(|| format!("compensated before the fit: {:.3} ms", 1e3 * lag.taken_off_s));
     milliseconds(lag.lag_s, Some(lag.half_width_95_s), compensated)
 }
 

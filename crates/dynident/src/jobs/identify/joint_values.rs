@@ -7,9 +7,7 @@ use dynident_identification::Identification;
 use dynident_model::terms::JointProperty;
 use dynident_model::{InertialParameters, JointChange};
 
-/// New joint values, and approximations of friction.
 pub(super) struct JointValues {
-    /// New damping, friction, drive inertia and stiffness.
     pub(super) changes: Vec<JointChange>,
     /// Best approximation by damping and friction for each joint whose friction law the robot description cannot
     /// express.
@@ -82,7 +80,6 @@ fn changes_of_terms(model: &ParametricModel, values: &[f64]) -> Vec<JointChange>
     changes
 }
 
-/// The change of the joint `name`; appended if missing.
 fn change_of<'a>(changes: &'a mut Vec<JointChange>, name: &str) -> &'a mut JointChange {
     let place = changes.iter().position(|change| change.joint == name).unwrap_or_else(|| {
         let joint = name.to_owned();

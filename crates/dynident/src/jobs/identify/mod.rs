@@ -31,7 +31,6 @@ use sections::{
 use std::path::Path;
 use std::time::Instant;
 
-/// Maximum number of correlations in a result.
 const MAX_CORRELATIONS: usize = 10;
 
 /// A finished identification of a study.
@@ -109,7 +108,6 @@ fn identify_from_files(
     options: &RunOptions<'_>,
     source: Option<&mut dyn InstrumentSource>,
 ) -> Result<IdentificationOutcome, Error> {
-    // Files: robot, known arm, logs.
     let start = Instant::now();
     study.require_training_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
@@ -163,7 +161,6 @@ fn identify_from_files(
     build_outcome(study, study_path, &robot, &task, found, metadata)
 }
 
-/// Metadata of an identification.
 pub(in crate::jobs) struct FitMetadata {
     pub(in crate::jobs) timings: Timings,
     pub(in crate::jobs) provenance: Provenance,
@@ -229,7 +226,6 @@ pub(in crate::jobs) fn build_outcome(
     Ok(IdentificationOutcome { result, estimate: found.estimate, inertials, urdf, table, mjcf, sdf, traces })
 }
 
-/// Earlier result of an arm, with its path.
 fn known_arm(section: &ArmSection, folders: &Folders) -> Result<(std::path::PathBuf, ResultFile), Error> {
     let path = folders.find(&section.result, None)?;
     let stored = ResultFile::read(&path)?;
@@ -280,7 +276,6 @@ fn exported_model(
     model_files(robot, found, &sources)
 }
 
-/// Parts of the result in addition to the identification.
 struct Parts<'a> {
     name: String,
     timings: Timings,

@@ -16,12 +16,10 @@ use dynident_model::{
 };
 use std::path::Path;
 
-/// Robot descriptions with the identified values.
 #[derive(Debug)]
 pub(super) struct ModelFiles {
     /// The user's URDF, or one converted from a D-H table, MJCF or SDF.
     pub(super) urdf: String,
-    /// The user's D-H table.
     pub(super) table: Option<String>,
     /// The user's MJCF, or the reason why it is missing.
     pub(super) mjcf: Option<Result<String, String>>,
@@ -128,7 +126,6 @@ fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) 
     Ok(links)
 }
 
-/// Data for the comments of bodies.
 struct BodyNotes<'a> {
     model: &'a ParametricModel,
     parameters: &'a [f64],

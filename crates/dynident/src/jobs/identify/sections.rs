@@ -256,7 +256,6 @@ pub(super) fn training_result(
     })
 }
 
-/// Rows of each joint, and residuals of parameters on them.
 fn training_errors(
     identification: &Identification,
     values: &[f64],
@@ -304,7 +303,6 @@ pub(super) fn verdict(model: &RegressorModel, inertials: &[InertialParameters], 
     }
 }
 
-/// Physically consistent fit in `result.json`.
 pub(super) fn physical_fit_result(fit: &PhysicalFit, estimate: &Estimate) -> PhysicalFitResult {
     PhysicalFitResult {
         status: match fit.status {

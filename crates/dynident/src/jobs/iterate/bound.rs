@@ -7,7 +7,6 @@ use dynident_iteration::Leg;
 use dynident_simulation::SensorSettings;
 use nalgebra::DMatrix;
 
-/// Samples per regressor block.
 const BLOCK_SAMPLES: usize = 4096;
 
 /// Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the used samples of the trajectories, for

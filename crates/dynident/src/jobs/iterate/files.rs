@@ -10,7 +10,6 @@ const ITERATIONS: &str = "iterations.json";
 const TRAJECTORY: &str = "trajectory.json";
 const PAGE: &str = "report.html";
 
-/// Files in the result folder.
 pub(super) struct ResultFiles<'a> {
     out: &'a Path,
     /// Whether robot and page in the folder are from an iteration. Those of another command are kept until this
@@ -19,7 +18,6 @@ pub(super) struct ResultFiles<'a> {
 }
 
 impl<'a> ResultFiles<'a> {
-    /// Files of `out` from an earlier call.
     pub(super) fn of(out: &'a Path) -> Self {
         let earlier = IterationsFile::read(&out.join(ITERATIONS));
         Self { out, robot_is_own: earlier.is_ok_and(|earlier| !earlier.base_parameters.is_empty()) }
@@ -29,7 +27,6 @@ impl<'a> ResultFiles<'a> {
         self.out.join(TRAJECTORY)
     }
 
-    /// Removes the results of an earlier call.
     pub(super) fn remove(&self) -> Result<(), Error> {
         let set = OutputSet::new(self.out).absent(ITERATIONS).absent(TRAJECTORY);
         RobotFiles::none().added_to(self.without_page(set), self.robot_is_own).write()

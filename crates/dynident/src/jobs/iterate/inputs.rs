@@ -39,7 +39,6 @@ impl Inputs {
         Ok(Self { section, simulation, files, folders, robot, settings, truth })
     }
 
-    /// Checks the table `[iteration]`.
     pub(super) fn check_section(&self, study: &Study) -> Result<(), StudyError> {
         let Self { section, robot, .. } = self;
         section.check_legs(robot)?;

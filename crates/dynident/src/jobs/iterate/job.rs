@@ -10,7 +10,6 @@ use std::path::Path;
 pub(super) struct Job<'a> {
     pub(super) study: &'a Study,
     pub(super) study_path: &'a Path,
-    /// Folder of all results.
     pub(super) out: &'a Path,
     /// Whether to keep the runs in the folder.
     pub(super) resume: bool,

@@ -61,7 +61,6 @@ pub(super) fn trajectories(
 }
 
 impl IterationSection {
-    /// Leg indices of each separate iteration.
     pub(super) fn stages(&self) -> Vec<Vec<usize>> {
         match self.order {
             LegOrder::OneAfterAnother if self.leg.len() > 1 => (0..self.leg.len()).map(|leg| vec![leg]).collect(),
@@ -77,7 +76,6 @@ impl IterationSection {
         Ok(())
     }
 
-    /// Legs with held joints at rest and time windows.
     pub(super) fn legs(&self, trajectories: &[Trajectory], robot: &StudyRobot) -> Result<Vec<Leg>, StudyError> {
         let names = robot.parametric.joint_names();
         let free = [LegSection::default()];

@@ -73,7 +73,6 @@ pub fn iterate_with_robot(
     iterated(Job { study: &study, study_path, out, resume, options }, watch, Some(robot))
 }
 
-/// Checks the study, prepares folder and motions, runs all stages and writes the results.
 fn iterated(
     job: Job<'_>,
     watch: &mut IterationWatch<'_>,

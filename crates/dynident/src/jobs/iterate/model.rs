@@ -35,7 +35,6 @@ pub(super) struct EndedStage<'a> {
 
 pub(super) struct RobotFiles {
     files: Vec<(&'static str, Vec<u8>)>,
-    /// The base parameters, with names, units and error bars.
     pub(super) base_parameters: Vec<BaseParameterResult>,
 }
 
@@ -136,7 +135,6 @@ fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
     Ok((text + "\n").into_bytes())
 }
 
-/// Controller of the next run with these model parameters.
 fn controller(stage: &EndedStage<'_>, parameters: &[f64]) -> Result<serde_json::Value, IterationError> {
     let EndedStage { iteration, records, .. } = stage;
     let model = iteration.controller_model(records, &ModelParameters::All(parameters.to_vec()))?;

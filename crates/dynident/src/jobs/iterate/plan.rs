@@ -26,7 +26,6 @@ pub(super) struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// The plan of a study with these trajectories.
     pub(super) fn of(job: &Job<'a>, inputs: &'a Inputs, trajectories: &Trajectories) -> Result<Self, Error> {
         let Inputs { section, simulation, robot, truth, .. } = inputs;
         let Job { study, study_path, options, .. } = *job;
@@ -61,7 +60,6 @@ impl<'a> Plan<'a> {
         Ok(Self { prior, legs, settings, torque_limits, planner, held_out, report })
     }
 
-    /// The iteration of some legs, with fixed base parameters from earlier legs.
     pub(super) fn iteration(&self, members: &[usize], known: &[(usize, f64)]) -> Result<Iteration, StudyError> {
         let task = IterationTask {
             robot: self.prior.clone(),

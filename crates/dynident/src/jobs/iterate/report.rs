@@ -28,13 +28,10 @@ pub(super) struct IterationReport<'a> {
     pub(super) robot: &'a StudyRobot,
     /// Length of a run with all its legs, s.
     pub(super) duration_s: f64,
-    /// True base parameters, if known.
     pub(super) truth: Option<Vec<f64>>,
     /// Cramér-Rao bound of a run with the first motion.
     pub(super) bound: Option<Vec<f64>>,
-    /// Sensors for the bound.
     pub(super) sensors: &'a SensorSettings,
-    /// Joints whose loops are slower than requested.
     pub(super) lowered: Vec<LoweredBandwidth>,
 }
 
@@ -42,11 +39,9 @@ pub(super) struct IterationReport<'a> {
 pub(super) struct Stage<'a> {
     /// Leg number from 1, if each leg has a separate iteration.
     pub(super) leg: Option<usize>,
-    /// The robot with the selected friction.
     pub(super) robot: &'a ParametricModel,
     pub(super) records: &'a [RunRecord],
     pub(super) status: &'a IterationStatus,
-    /// Unmet conditions after the last record.
     pub(super) shortfalls: &'a [Shortfall],
     /// Forecast of a further run that was not worthwhile.
     pub(super) declined: Option<&'a MotionForecast>,
@@ -55,7 +50,6 @@ pub(super) struct Stage<'a> {
 }
 
 impl IterationReport<'_> {
-    /// The file of one stage.
     pub(super) fn file(&self, stage: &Stage<'_>) -> IterationsFile {
         let Stage { records, status, shortfalls, declined, .. } = *stage;
         let known = self.known(stage);
@@ -139,7 +133,6 @@ impl IterationReport<'_> {
         (!ratios.is_empty()).then(|| (ratios.iter().sum::<f64>() / ratios.len() as f64).sqrt())
     }
 
-    /// The bound of a run with another motion than the first.
     fn own_bound(&self, record: &RunRecord) -> Option<Vec<f64>> {
         let references = &record.motion.as_ref()?.references;
         let legs: Result<Vec<Leg>, _> = references.iter().map(|reference| Leg::whole(reference.clone())).collect();
@@ -147,7 +140,6 @@ impl IterationReport<'_> {
     }
 }
 
-/// Truth and Cramér-Rao bound of the base parameters, if known.
 #[derive(Clone, Copy)]
 struct Known<'a> {
     truth: Option<&'a [f64]>,
@@ -174,7 +166,6 @@ fn parameters(estimate: &RunEstimate, stage: &Stage<'_>, truth: Option<&[f64]>) 
     (0..columns.len()).map(one).collect()
 }
 
-/// Key of a status in the file.
 fn status_key(status: &IterationStatus) -> &'static str {
     match status {
         IterationStatus::Converged => "converged",

@@ -24,15 +24,11 @@ pub(super) struct Stages<'a> {
     pub(super) inputs: &'a Inputs,
     pub(super) plan: &'a Plan<'a>,
     pub(super) files: &'a ResultFiles<'a>,
-    /// Leg indices of each stage.
     pub(super) members: &'a [Vec<usize>],
-    /// Run store of each stage.
     pub(super) stores: &'a [IterationStore],
-    /// The permitted program of the study.
     pub(super) program: Option<&'a PermittedProgram>,
 }
 
-/// Results of completed stages.
 pub(super) struct StageResults<'a> {
     pub(super) files: Vec<IterationsFile>,
     pub(super) traces: Vec<RunTrace>,
@@ -50,7 +46,6 @@ struct CurrentStage<'a> {
     iteration: &'a Iteration,
     /// Leg number from 1, if each leg has a separate iteration.
     leg: Option<usize>,
-    /// Number of legs.
     legs: usize,
     store: &'a IterationStore,
 }
@@ -85,7 +80,6 @@ impl<'a> Stages<'a> {
         Ok(results)
     }
 
-    /// Robots of a stage, including the caller's.
     fn robots(
         &self,
         stage: usize,
@@ -122,7 +116,6 @@ impl<'a> Stages<'a> {
         unwritten.map_or(Ok(outcome), Err)
     }
 
-    /// Writes `iterations.json` with the runs so far.
     fn write_progress(
         &self,
         stage: &CurrentStage<'_>,
@@ -196,7 +189,6 @@ impl StageResults<'_> {
     }
 }
 
-/// Whether a stage with this status ends the iteration.
 fn ends_iteration(status: &IterationStatus) -> bool {
     match status {
         IterationStatus::Refused { .. } | IterationStatus::Waiting { .. } | IterationStatus::Interrupted { .. } => true,

@@ -14,9 +14,7 @@ use std::path::Path;
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct Trajectories {
-    /// One per leg.
     pub(super) trajectories: Vec<Trajectory>,
-    /// The held-out motion.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) held_out: Option<Trajectory>,
 }

@@ -15,9 +15,7 @@ use std::path::Path;
 pub(crate) struct Trajectory {
     /// Sample rate, Hz.
     pub(crate) rate_hz: f64,
-    /// Number of joints.
     pub(crate) joints: usize,
-    /// Samples per joint.
     pub(crate) samples: usize,
     /// Positions, joint-major, rad (m).
     pub(crate) q: Vec<f64>,
@@ -27,15 +25,12 @@ pub(crate) struct Trajectory {
     pub(crate) ddq: Vec<f64>,
     /// Time ranges (from, to; s) of each joint that are used in the fit; `None` for the whole motion.
     pub(crate) windows: Option<Vec<Vec<[f64; 2]>>>,
-    /// Strokes of a step-wise design.
     #[serde(default)]
     pub(crate) strokes: Vec<StrokeSpan>,
 }
 
-/// Time range of one joint's stroke.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StrokeSpan {
-    /// Joint index.
     pub(crate) joint: usize,
     /// Start, s.
     pub(crate) from_s: f64,
@@ -101,7 +96,6 @@ impl Trajectory {
         }
     }
 
-    /// As a reference for controllers.
     pub(crate) fn reference(&self) -> Result<Reference, SimulationError> {
         let motion = Motion {
             samples: self.samples,

@@ -29,7 +29,6 @@ impl<'a> IterationWatch<'a> {
     }
 }
 
-/// Forwards the runs of a stage and requests for permission.
 pub(super) struct StageSupervisor<'a, 'b> {
     pub(super) stop: &'a StopSignal,
     pub(super) allow: &'a mut Option<&'b mut dyn FnMut(&NextMotion) -> bool>,

@@ -3,7 +3,6 @@
 /// Maximum number of averaged parts of the course; must be even.
 const MAX_PARTS: usize = 48;
 
-/// Running statistics of a channel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ChannelStatistics {
     pub(super) samples: u64,
@@ -13,7 +12,6 @@ pub(super) struct ChannelStatistics {
     rows: u64,
     /// Rows per part: a power of two that doubles when all parts are full.
     rows_of_part: u64,
-    /// Sum and count of the values in each part.
     parts: Vec<(f64, u64)>,
 }
 
@@ -47,7 +45,6 @@ impl ChannelStatistics {
         Some(self.last? - self.first?).filter(|span| *span > 0.0 && span.is_finite())
     }
 
-    /// Mean of each part, in order.
     pub(super) fn course(&self) -> Vec<Option<f64>> {
         let mean =
             |(sum, count): &(f64, u64)| (*count > 0).then(|| sum / *count as f64).filter(|mean| mean.is_finite());

@@ -5,7 +5,6 @@ const MIN_GAP_STEPS: f64 = 5.0;
 /// Steps before the mean is reliable.
 const MIN_STEPS_FOR_MEAN: u64 = 8;
 
-/// Statistics of time steps without gaps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
     last: Option<f64>,

@@ -96,7 +96,6 @@ fn time_column(group: &LogGroup, names: &[String]) -> Option<(usize, f64)> {
     }
 }
 
-/// Running statistics of a group.
 struct GroupStatistics {
     rows: u64,
     channels: Vec<ChannelStatistics>,

@@ -7,7 +7,6 @@ use crate::jobs::columns::{Family, JointKey};
 pub(super) struct LoggedJoints {
     /// Joint indices in the order of the columns.
     pub(super) joints: Vec<usize>,
-    /// Reason of the assignment.
     pub(super) reason: String,
     pub(super) is_sure: bool,
 }

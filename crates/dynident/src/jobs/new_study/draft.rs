@@ -8,7 +8,6 @@ use dynident_text::{comment, toml_document};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Line {
     key: String,
-    /// As TOML.
     value: String,
     reason: String,
     is_sure: bool,
@@ -28,13 +27,11 @@ impl Table {
         Self { heading: heading.to_owned(), reason: reason.into(), lines: Vec::new() }
     }
 
-    /// Adds a key.
     #[must_use]
     pub(super) fn with(self, key: &str, value: impl Into<String>, reason: impl Into<String>) -> Self {
         self.with_line(key, value, reason, true)
     }
 
-    /// Adds a key that a person should check.
     #[must_use]
     pub(super) fn with_unsure(self, key: &str, value: impl Into<String>, reason: impl Into<String>) -> Self {
         self.with_line(key, value, reason, false)
@@ -59,7 +56,6 @@ pub(super) struct Draft {
 }
 
 impl Draft {
-    /// Adds a table at the end.
     #[must_use]
     pub(super) fn with(&self, table: Table) -> Self {
         let mut tables = self.tables.clone();
@@ -85,9 +81,9 @@ impl Draft {
         true
     }
 
-    /// Applies unambiguous corrections of an examination; returns whether anything changed. Signs, orders, mountings and
-    /// units have few possible values. A zero or a factor has any value and may compensate for another mistake, so a person
-    /// decides.
+    /// Applies unambiguous corrections of an examination; returns whether anything changed. Signs, orders, mountings
+    /// and units have few possible values. A zero or a factor has any value and may compensate for another mistake, so
+    /// a person decides.
     pub(super) fn apply_corrections(&mut self, found: &StudyCheck) -> bool {
         let is_discrete = |finding: &&CheckFinding| match finding.kind.as_str() {
             "sign" | "order" | "mounting" => true,
@@ -106,7 +102,6 @@ impl Draft {
         changed
     }
 
-    /// The keys that a person should check.
     pub(super) fn unsure(&self) -> Vec<Unsure> {
         let of_table = |table: &Table| {
             let unsure = |line: &Line| Unsure {
@@ -122,7 +117,6 @@ impl Draft {
         self.tables.iter().flat_map(of_table).collect()
     }
 
-    /// The study as TOML.
     pub(super) fn text(&self) -> String {
         let mut text =
             "# Written by `dynident new`: each line with its reason. Check the lines marked UNSURE.\n".to_owned();

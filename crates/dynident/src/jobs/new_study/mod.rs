@@ -25,7 +25,6 @@ use dynident_text::quoted;
 use paths::path_in_study;
 use std::path::{Path, PathBuf};
 
-/// Maximum number of rounds of check and correction.
 const MAX_ROUNDS: usize = 3;
 
 /// Inputs of a new study.
@@ -48,7 +47,6 @@ pub struct NewStudy {
 }
 
 impl NewStudy {
-    /// The study of a draft, with the robot description in memory.
     fn study(&self, draft: &Draft) -> Result<Study, Error> {
         let mut study = Study::parse(&draft.text(), &self.out)?;
         study.robot.description.clone_from(&self.description);
@@ -132,12 +130,10 @@ struct RecognisedColumns {
     position: Family,
     torque: Family,
     velocity: Option<Family>,
-    /// Position and torque columns in the order of the joints.
     columns: [Vec<String>; 2],
     velocity_columns: Option<Vec<String>>,
     /// Recordings with these columns; recordings with torques only belong to one of them.
     files: Vec<usize>,
-    /// The time column with its sample rate.
     time: Option<(String, Option<f64>)>,
 }
 
@@ -203,7 +199,6 @@ impl RecognisedColumns {
         })
     }
 
-    /// Recordings that the study does not use.
     fn unused_recordings(&self, logs: &[(&Path, LogContents)]) -> Vec<Unsure> {
         let channel_files =
             [Some(&self.torque), self.velocity.as_ref()].into_iter().flatten().map(|family| family.file);
@@ -377,7 +372,6 @@ fn key(name: &str) -> String {
     if name.contains(['.', '/']) { quoted(name) } else { name.to_owned() }
 }
 
-/// Reason why a family has its quantity.
 fn basis(family: &Family, what: &str) -> String {
     let by = if family.by_file_name { "by file name" } else { "by column names" };
     let source = match family.source {

@@ -13,7 +13,6 @@ pub(super) fn path_in_study(path: &Path, folder: &Path) -> String {
     seen.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/")
 }
 
-/// Relative path between absolute paths; `None` between drives.
 fn relative(path: &Path, folder: &Path) -> Option<PathBuf> {
     let (to, from): (Vec<Component<'_>>, Vec<Component<'_>>) =
         (path.components().collect(), folder.components().collect());

@@ -7,8 +7,8 @@ use crate::error::{Expected, StudyError};
 pub struct NewStudySettings {
     /// Part of a single recording for training, as fractions of its rows. Default 0 to 0.65.
     pub training_fraction: [f64; 2],
-    /// Part of a single recording for validation, as fractions of its rows. Default 0.7 to 1: the gap after the training
-    /// part separates correlated samples.
+    /// Part of a single recording for validation, as fractions of its rows. Default 0.7 to 1: the gap after the
+    /// training part separates correlated samples.
     pub validation_fraction: [f64; 2],
     /// Largest position that is assumed to be in radians, turns. Default 4.
     pub max_radian_turns: f64,

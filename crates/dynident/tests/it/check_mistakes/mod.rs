@@ -33,7 +33,7 @@ fn read(name: &str) -> (String, Vec<Row>) {
     (header.trim().to_owned(), rest.lines().map(row).collect())
 }
 
-/// One mistake: what it does to the rows, and to the study's text.
+/// One mistake: its changes of the rows and of the study's text.
 struct Case {
     name: &'static str,
     rows: fn(&mut Vec<Row>),
