@@ -1,4 +1,4 @@
-//! Every kind of section on one page, written to the file that is named: for looking at.
+//! Writes a page with all kinds of sections to the given file, for visual inspection.
 //!
 //! `cargo run -p dynident-report --example gallery -- gallery.html`
 
@@ -10,13 +10,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "gallery.html".to_owned());
     let time: Vec<f64> = (0..200_000).map(|i| f64::from(i) * 1e-3).collect();
     let torque = |scale: f64| -> Vec<f64> {
-        // A gap of ten seconds, and a spike of one sample.
+        // A gap of 10 s, and a spike of one sample.
         let value = |t: f64| {
             if (60.0..70.0).contains(&t) { f64::NAN } else { scale * (20.0 * (0.6 * t).sin() + 5.0 * (2.3 * t).cos()) }
         };
         time.iter().enumerate().map(|(i, t)| if i == 123_456 { 60.0 } else { value(*t) }).collect()
     };
-    let mut page = Report::new("Gallery <of sections>").subtitle("what a page can hold; data made up");
+    let mut page = Report::new("Gallery <of sections>").subtitle("all kinds of sections, with artificial data");
     page.add(Heading::new("Figures and words"));
     page.add(
         KeyFigures::new()
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     page.add(
         BarPlot::new("Base parameters", "kg m²")
-            .reference_label("by the description")
+            .reference_label("robot description")
             .bar("Izz1 + 0.0488149 m2 + 0.441882 my2 + Izz2 + 0.0024 m3", 0.91, Some(0.02), Some(0.95))
             .bar("Ixy2", -0.4, Some(0.2), Some(-0.1))
             .bar("not excited", f64::NAN, None, None),

@@ -2,49 +2,49 @@
 
 use crate::error::ReportError;
 use crate::pen::tenth;
-use crate::ticks::{short, ticks};
+use crate::ticks::{short, shortened, ticks};
 use serde::Serialize;
 
-/// Letters of a label that are drawn; the whole label stands under the pointer.
-const LETTERS: usize = 38;
-/// Bars that are read aloud.
-const SPOKEN: usize = 12;
-/// Width of the picture, of the labels, of the figures, and height of a bar's row, px.
+/// Maximum number of characters of a label; the tooltip has the full label.
+const MAX_LABEL_CHARS: usize = 38;
+/// Maximum number of bars in the text for screen readers.
+const MAX_SPOKEN_BARS: usize = 12;
+/// Width of the plot, the labels and the figures, and height of a row, px.
 const WIDTH: f64 = 800.0;
-const LABELS: f64 = 270.0;
-const FIGURES: f64 = 140.0;
-const ROW: f64 = 22.0;
+const LABEL_WIDTH: f64 = 270.0;
+const FIGURE_WIDTH: f64 = 140.0;
+const ROW_HEIGHT: f64 = 22.0;
 
 /// One bar.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bar {
-    /// What it is.
+    /// Label.
     pub label: String,
-    /// Its length; a bar that is not finite is left empty.
+    /// Value; a value that is not finite gives no bar.
     pub value: f64,
-    /// Half the length of its error bar.
+    /// Half-width of the error bar.
     pub half_width: Option<f64>,
-    /// A value to compare with, drawn as a mark: a prior, a truth.
+    /// Reference value (a prior, a true value), drawn as a mark.
     pub reference: Option<f64>,
 }
 
-/// Horizontal bars with error bars and marks to compare with, one below another.
+/// Horizontal bars with error bars and reference marks, from top to bottom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BarPlot {
-    /// Headline.
+    /// Title.
     pub title: String,
-    /// A sentence below it; may be empty.
+    /// Note below the title; may be empty.
     pub note: String,
-    /// What is drawn, with its unit.
+    /// Label of the axis, with its unit.
     pub label: String,
-    /// What the marks are; may be empty.
+    /// Meaning of the marks; may be empty.
     pub reference_label: String,
     /// The bars, from top to bottom.
     pub bars: Vec<Bar>,
 }
 
 impl BarPlot {
-    /// A plot without bars.
+    /// Creates a plot without bars.
     pub fn new(title: impl Into<String>, label: impl Into<String>) -> Self {
         Self {
             title: title.into(),
@@ -55,21 +55,21 @@ impl BarPlot {
         }
     }
 
-    /// A sentence below the headline.
+    /// Sets the note below the title.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
 
-    /// What the marks are.
+    /// Sets the meaning of the marks.
     #[must_use]
     pub fn reference_label(mut self, label: impl Into<String>) -> Self {
         self.reference_label = label.into();
         self
     }
 
-    /// A further bar.
+    /// Adds a bar.
     #[must_use]
     pub fn bar(
         mut self,
@@ -82,22 +82,21 @@ impl BarPlot {
         self
     }
 
-    /// The bars in words, for who does not see them.
     fn in_words(&self) -> String {
         let bars = self.bars.iter().map(|bar| {
             let half = bar.half_width.map_or_else(String::new, |half| format!(" ± {}", short(half, 2)));
-            format!("{}: {}{half}", shortened(&bar.label), short(bar.value, 4))
+            format!("{}: {}{half}", shortened(&bar.label, MAX_LABEL_CHARS), short(bar.value, 4))
         });
-        let shown: Vec<String> = bars.take(SPOKEN).collect();
-        let more = self.bars.len().saturating_sub(SPOKEN);
-        let rest = if more > 0 { format!("; and {more} more, which the table has") } else { String::new() };
+        let shown: Vec<String> = bars.take(MAX_SPOKEN_BARS).collect();
+        let more = self.bars.len().saturating_sub(MAX_SPOKEN_BARS);
+        let rest = if more > 0 { format!("; and {more} more, listed in the table") } else { String::new() };
         format!("{}; {}{rest}", self.label, shown.join("; "))
     }
 
-    /// The plot as an SVG picture; its colours are those of the page around it, or the defaults written into it.
+    /// Renders the plot as SVG; its colours are those of the page, or the defaults in the SVG.
     ///
     /// # Errors
-    /// Only if the template fails.
+    /// If the template fails.
     pub fn svg(&self) -> Result<String, ReportError> {
         let finite = |value: f64| value.is_finite() && value.abs() < 1e300;
         let ends = self.bars.iter().filter(|bar| finite(bar.value)).flat_map(|bar| {
@@ -106,14 +105,14 @@ impl BarPlot {
         });
         let [low, high] = ends.fold([0.0_f64, 0.0_f64], |[a, b], x| [a.min(x), b.max(x)]);
         let high = if high > low { high } else { low + 1.0 };
-        let (left, right) = (LABELS + 8.0, WIDTH - FIGURES);
+        let (left, right) = (LABEL_WIDTH + 8.0, WIDTH - FIGURE_WIDTH);
         let at = |x: f64| tenth(left + (x - low) / (high - low) * (right - left));
         let bars = self.bars.iter().enumerate().map(|(k, bar)| {
             let shown = finite(bar.value).then_some(bar.value);
             let half = bar.half_width.filter(|half| finite(*half) && shown.is_some());
             BarView {
-                y: 26.0 + ROW * k as f64,
-                label: shortened(&bar.label),
+                y: 26.0 + ROW_HEIGHT * k as f64,
+                label: shortened(&bar.label, MAX_LABEL_CHARS),
                 whole: &bar.label,
                 from: at(shown.unwrap_or(0.0).min(0.0)),
                 length: (at(shown.unwrap_or(0.0).max(0.0)) - at(shown.unwrap_or(0.0).min(0.0))).max(0.0),
@@ -131,23 +130,15 @@ impl BarPlot {
             title: &self.title,
             words: self.in_words(),
             width: WIDTH,
-            height: 26.0 + ROW * self.bars.len() as f64 + 8.0,
+            height: 26.0 + ROW_HEIGHT * self.bars.len() as f64 + 8.0,
             right,
-            labels: LABELS,
+            labels: LABEL_WIDTH,
             zero: at(0.0),
             ticks: ticks(low, high, 5).into_iter().map(|x| (at(x), short(x, 3))).collect(),
             bars: bars.collect(),
         };
         crate::templates::rendered("bar_plot.svg", &view)
     }
-}
-
-/// The first letters of a long label.
-fn shortened(label: &str) -> String {
-    if label.chars().count() <= LETTERS {
-        return label.to_owned();
-    }
-    label.chars().take(LETTERS - 1).chain(['…']).collect()
 }
 
 #[derive(Serialize)]
@@ -182,7 +173,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bars_stay_inside_the_picture_whatever_they_are() {
+    fn bars_stay_inside_the_plot_for_any_values() {
         let plot = BarPlot::new("t", "kg")
             .bar("a \"b\" <c>", 2.0, Some(0.5), Some(-1.0))
             .bar("gap", f64::NAN, Some(1.0), None)

@@ -1,10 +1,10 @@
-//! How figures settle from run to run.
+//! Convergence of figures over runs.
 
 use crate::curve_picture::{Curve, CurvePicture};
 use crate::error::ReportError;
 use crate::plot_data::{CurveData, PlotData, check_length, rounded};
 
-/// Figures by run (or iteration), with error bars where they are known.
+/// Figures by run (or iteration), with optional error bars.
 ///
 /// ```
 /// use dynident_report::ConvergencePlot;
@@ -13,25 +13,25 @@ use crate::plot_data::{CurveData, PlotData, check_length, rounded};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvergencePlot {
-    /// Headline.
+    /// Title.
     pub title: String,
-    /// A sentence below it; may be empty.
+    /// Note below the title; may be empty.
     pub note: String,
-    /// What is counted; `run` unless changed.
+    /// Label of the x axis; `run` by default.
     pub x_label: String,
-    /// What the y axis is, with its unit.
+    /// Label of the y axis, with its unit.
     pub y_label: String,
-    /// Number of the first run; 1 unless changed.
+    /// Number of the first run; 1 by default.
     pub first: u32,
-    /// Name, values by run (NaN where there is none) and half widths of the error bars (as many; or none) of each
-    /// curve.
+    /// Name, values by run (NaN for a missing value), and half-widths of the error bars (one per value, or none) of
+    /// each curve.
     pub curves: Vec<(String, Vec<f64>, Vec<f64>)>,
     /// Logarithmic y axis.
     pub log_y: bool,
 }
 
 impl ConvergencePlot {
-    /// A plot without curves.
+    /// Creates a plot without curves.
     pub fn new(title: impl Into<String>, y_label: impl Into<String>) -> Self {
         Self {
             title: title.into(),
@@ -44,41 +44,40 @@ impl ConvergencePlot {
         }
     }
 
-    /// A sentence below the headline.
+    /// Sets the note below the title.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
 
-    /// A further curve.
+    /// Adds a curve.
     #[must_use]
     pub fn curve(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
         self.curves.push((name.into(), values, Vec::new()));
         self
     }
 
-    /// A further curve with error bars `value ± half_width`.
+    /// Adds a curve with error bars `value ± half_width`.
     #[must_use]
     pub fn curve_with_bars(mut self, name: impl Into<String>, values: Vec<f64>, half_widths: Vec<f64>) -> Self {
         self.curves.push((name.into(), values, half_widths));
         self
     }
 
-    /// The y axis logarithmic.
+    /// Makes the y axis logarithmic.
     #[must_use]
     pub fn log_y(mut self) -> Self {
         self.log_y = true;
         self
     }
 
-    /// The numbers of the runs.
     pub(crate) fn axis(&self) -> Vec<f64> {
         let runs = self.curves.iter().map(|(_, values, _)| values.len()).max().unwrap_or(0);
         (0..runs).map(|run| f64::from(self.first) + run as f64).collect()
     }
 
-    /// Over the axis `x`; [`data`](Self::data) checks.
+    /// Static picture over the axis `x`; [`data`](Self::data) checks the lengths.
     pub(crate) fn picture<'a>(&'a self, x: &'a [f64]) -> CurvePicture<'a> {
         let curve = |(name, values, half_widths): &'a (String, Vec<f64>, Vec<f64>)| {
             let ends = |sign: f64| -> Vec<f64> {
@@ -149,7 +148,6 @@ mod tests {
         );
         let data = plot.data().unwrap();
         assert!(data.contains("[1.0,4.0,null]") && data.contains("[0.5,-1.0,null]"), "{data}");
-        // Below zero there is no logarithm.
         assert!(plot.clone().log_y().data().unwrap().contains("[0.5,null,null]"));
         assert!(plot.curve_with_bars("c", vec![1.0], vec![1.0, 2.0]).data().is_err());
         assert!(ConvergencePlot::new("none", "").data().is_ok());

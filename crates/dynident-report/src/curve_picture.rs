@@ -1,43 +1,42 @@
-//! Curves as a still picture: for documents, for paper, and for who reads a page without its script.
+//! Curves as a static picture: for documents, for print, and for pages without scripts.
 
 use crate::decimation::kept_samples;
 use crate::error::ReportError;
 use crate::pen::{Pen, tenth};
-use crate::ticks::{short, ticks};
+use crate::ticks::{short, shortened, ticks};
 use core::fmt::Write;
 use serde::Serialize;
 
-/// The page's colours: distinguished by people who see colours differently (after Okabe and Ito), three to one and more
-/// against white. The page has lighter ones for dark paper (`report.css`).
+/// Colours that colour-blind people can distinguish (after Okabe and Ito), with a contrast of at least 3:1 on white.
+/// The dark theme has lighter ones (`report.css`).
 pub(crate) const COLOURS: [&str; 8] =
     ["#0072b2", "#c24e00", "#00785a", "#a83c7d", "#8a6d00", "#2a7fae", "#7a3fb0", "#5f6368"];
 
-/// Samples up to which each is marked: a line through a few points is no curve.
-pub(crate) const MARKED: usize = 250;
-/// Letters of a name in the legend, and what a letter and the sample of a line before it take, px.
-const LETTERS: usize = 26;
-const LETTER: f64 = 6.2;
-const SAMPLE: f64 = 30.0;
-/// Height of a row of the legend, of the strip below the curves and of the axis between, px.
-const LEGEND: f64 = 16.0;
-const STRIP: f64 = 84.0;
-const BETWEEN: f64 = 26.0;
+pub(crate) const MAX_MARKED_SAMPLES: usize = 250;
+/// Maximum number of characters of a legend name; width of a character and of a line sample, px.
+const MAX_NAME_CHARS: usize = 26;
+const CHAR_WIDTH: f64 = 6.2;
+const LINE_SAMPLE_WIDTH: f64 = 30.0;
+/// Height of a legend row, of the strip below the curves, and of the gap between, px.
+const LEGEND_ROW_HEIGHT: f64 = 16.0;
+const STRIP_HEIGHT: f64 = 84.0;
+const STRIP_GAP: f64 = 26.0;
 
-/// One curve.
 pub(crate) struct Curve<'a> {
     pub(crate) name: &'a str,
-    /// A value for each entry of the axis; NaN leaves a gap.
+    /// One value per entry of the axis; NaN gives a gap.
     pub(crate) values: Vec<f64>,
     pub(crate) dashed: bool,
-    /// Points alone.
+    /// Points without a line.
     pub(crate) points: bool,
-    /// Broad and pale, to lie below others.
+    /// Broad and pale, below other curves.
     pub(crate) broad: bool,
-    /// Lower and upper ends of error bars, none or one for each value.
+    /// Lower and upper ends of error bars, one per value.
     pub(crate) bars: Option<[Vec<f64>; 2]>,
 }
 
-/// Curves over a common axis, a logarithm's axis as its exponents, and below them the difference of two, if asked for.
+/// Curves over a common axis, and optionally a strip with the difference of two curves. Values on a logarithmic axis
+/// are exponents.
 pub(crate) struct CurvePicture<'a> {
     pub(crate) title: &'a str,
     pub(crate) x_label: &'a str,
@@ -45,23 +44,21 @@ pub(crate) struct CurvePicture<'a> {
     pub(crate) x: &'a [f64],
     pub(crate) curves: Vec<Curve<'a>>,
     pub(crate) log_y: bool,
-    /// Name of the difference, and which curve less which.
+    /// Name of the difference, and indices of minuend and subtrahend.
     pub(crate) difference: Option<(&'a str, [usize; 2])>,
-    /// Whole numbers on the axis, with some room before the first and after the last.
+    /// Integers on the x axis, with a margin on both sides.
     pub(crate) counts: bool,
 }
 
-/// Where a picture appears.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Place {
-    /// Alone: on white, with its title and colours of its own.
+    /// Separate document: white background, title, fixed colours.
     Document,
-    /// Under a headline of a page, in the page's colours, light or dark.
+    /// Section of a page: colours of the light or dark theme.
     Page,
 }
 
 impl Place {
-    /// The colour of a curve.
     fn colour(self, curve: usize) -> String {
         match self {
             Self::Document => COLOURS[curve % COLOURS.len()].to_owned(),
@@ -70,7 +67,6 @@ impl Place {
     }
 }
 
-/// A rectangle for curves, px, and the ranges of its axes.
 struct Frame {
     left: f64,
     right: f64,
@@ -83,25 +79,21 @@ struct Frame {
 }
 
 impl Frame {
-    /// A value of the x axis, px.
     fn at_x(&self, x: f64) -> f64 {
         self.left + (x - self.from) / (self.to - self.from) * (self.right - self.left)
     }
 
-    /// A value of the y axis, px.
     fn at_y(&self, y: f64) -> f64 {
         self.bottom - (y - self.low) / (self.high - self.low) * (self.bottom - self.top)
     }
 }
 
-/// The samples that are drawn.
 struct Samples<'a> {
     x: &'a [f64],
     kept: Vec<usize>,
 }
 
 impl Samples<'_> {
-    /// The line through values of the y axis.
     fn path(&self, values: &[f64], frame: &Frame) -> String {
         let mut pen = Pen::default();
         for &i in &self.kept {
@@ -110,25 +102,22 @@ impl Samples<'_> {
         pen.path()
     }
 
-    /// The points of the finite values of the y axis.
     fn points(&self, values: &[f64], frame: &Frame) -> Vec<[f64; 2]> {
         let finite = self.kept.iter().filter(|&&i| values[i].is_finite());
         finite.map(|&i| [tenth(frame.at_x(self.x[i])), tenth(frame.at_y(values[i]))]).collect()
     }
 
-    /// Whether each sample is marked.
     fn are_marked(&self) -> bool {
-        self.kept.len() <= MARKED
+        self.kept.len() <= MAX_MARKED_SAMPLES
     }
 }
 
-/// The difference of two curves, in a strip below the frame.
 fn strip_view(name: &str, values: &[f64], colour: String, samples: &Samples<'_>, above: &Frame) -> StripView {
     let [low, high] = padded(range(values.iter().copied().chain([0.0])));
-    let (top, bottom) = (above.bottom + BETWEEN, above.bottom + BETWEEN + STRIP);
+    let (top, bottom) = (above.bottom + STRIP_GAP, above.bottom + STRIP_GAP + STRIP_HEIGHT);
     let frame = Frame { top, bottom, low, high, ..*above };
     StripView {
-        name: shortened(name),
+        name: shortened(name, MAX_NAME_CHARS),
         colour,
         top,
         bottom,
@@ -140,7 +129,7 @@ fn strip_view(name: &str, values: &[f64], colour: String, samples: &Samples<'_>,
 }
 
 impl CurvePicture<'_> {
-    /// What a person who does not see the picture is told: ranges of axis and curves, size of the difference.
+    /// Text for screen readers: ranges of axis and curves, rms of the difference.
     pub(crate) fn in_words(&self) -> String {
         let range = |values: &[f64]| {
             let finite = values.iter().copied().filter(|value| value.is_finite());
@@ -148,7 +137,6 @@ impl CurvePicture<'_> {
             (low <= high).then(|| format!("{} to {}", short(low, 3), short(high, 3)))
         };
         let mut words = format!("{}; {}", self.x_label, range(self.x).unwrap_or_else(|| "empty".to_owned()));
-        // Writing to a string cannot fail.
         for curve in &self.curves {
             let range = range(&curve.values).unwrap_or_else(|| "no values".to_owned());
             let _ = write!(words, "; {}: {range}", curve.name);
@@ -164,14 +152,13 @@ impl CurvePicture<'_> {
         words + &format!("; in {}", self.y_label)
     }
 
-    /// The difference of two curves.
     fn strip(&self) -> Option<(&str, Vec<f64>)> {
         let (name, [of, less]) = self.difference?;
         let (of, less) = (&self.curves.get(of)?.values, &self.curves.get(less)?.values);
         Some((name, of.iter().zip(less).map(|(of, less)| of - less).collect()))
     }
 
-    /// The picture, `width` by `height` px without the strip.
+    /// Renders the picture with `width` by `height` px, plus the strip.
     pub(crate) fn svg(&self, width: f64, height: f64, place: Place) -> Result<String, ReportError> {
         let curves: Vec<Vec<f64>> =
             self.curves.iter().map(|curve| curve.values.iter().map(|y| self.on_axis(*y)).collect()).collect();
@@ -180,7 +167,6 @@ impl CurvePicture<'_> {
         let [low, high] = padded(range(curves.iter().flatten().copied().chain(bars)));
         let [from, to] = self.x_range();
 
-        // The frame, below the title and the legend.
         let (left, right) = (64.0, width - 12.0);
         let titled = if place == Place::Document { 18.0 } else { 0.0 };
         let legend = self.legend(left, right, titled + 12.0);
@@ -197,7 +183,7 @@ impl CurvePicture<'_> {
         let lines = lines.collect();
         let strip =
             strip.map(|(name, values)| strip_view(name, &values, place.colour(self.curves.len()), &samples, &frame));
-        let grown = strip.as_ref().map_or(0.0, |_| BETWEEN + STRIP);
+        let grown = strip.as_ref().map_or(0.0, |_| STRIP_GAP + STRIP_HEIGHT);
         let whole = |x: &f64| !self.counts || (*x == x.round() && *x >= from && *x <= to);
         let count = if self.counts { ((to - from) as usize).clamp(1, 12) } else { 8 };
         let exact = |y: f64| if self.log_y { 10.0_f64.powf(y) } else { y };
@@ -222,7 +208,7 @@ impl CurvePicture<'_> {
         crate::templates::rendered("line_plot.svg", &view)
     }
 
-    /// A value on the y axis: its exponent on a logarithmic one, NaN if it has none.
+    /// A value on the y axis: its exponent on a logarithmic axis, NaN if undefined.
     fn on_axis(&self, y: f64) -> f64 {
         match self.log_y {
             true if y > 0.0 => y.log10(),
@@ -231,7 +217,6 @@ impl CurvePicture<'_> {
         }
     }
 
-    /// The first and the last value of the x axis.
     fn x_range(&self) -> [f64; 2] {
         let room = if self.counts { 0.3 } else { 0.0 };
         let from = self.x.first().map_or(0.0, |x| x - room);
@@ -239,7 +224,6 @@ impl CurvePicture<'_> {
         [from, if to > from { to } else { from + 1.0 }]
     }
 
-    /// One curve, whose values on the y axis are `values`.
     fn line(
         &self,
         curve: &Curve<'_>,
@@ -269,14 +253,13 @@ impl CurvePicture<'_> {
         }
     }
 
-    /// The names, each next to a sample of its line, in rows.
     fn legend(&self, left: f64, right: f64, first: f64) -> Vec<LegendView> {
         let (mut x, mut y) = (left, first);
         let entries = self.curves.iter().map(|curve| {
-            let name = shortened(curve.name);
-            let width = SAMPLE + LETTER * name.chars().count() as f64 + 14.0;
+            let name = shortened(curve.name, MAX_NAME_CHARS);
+            let width = LINE_SAMPLE_WIDTH + CHAR_WIDTH * name.chars().count() as f64 + 14.0;
             if x > left && x + width > right {
-                (x, y) = (left, y + LEGEND);
+                (x, y) = (left, y + LEGEND_ROW_HEIGHT);
             }
             let entry =
                 LegendView { name, x: tenth(x), y, points: curve.points, broad: curve.broad, dashed: curve.dashed };
@@ -287,21 +270,12 @@ impl CurvePicture<'_> {
     }
 }
 
-/// The first letters of a long name.
-fn shortened(name: &str) -> String {
-    if name.chars().count() <= LETTERS {
-        return name.to_owned();
-    }
-    name.chars().take(LETTERS - 1).chain(['…']).collect()
-}
-
-/// The least and the largest finite value.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let finite = values.filter(|value| value.is_finite());
     finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)])
 }
 
-/// A little air above and below; a flat or empty range gets one of its own.
+/// Adds a margin; a flat or empty range gets a default size.
 fn padded(bounds: [f64; 2]) -> [f64; 2] {
     let [low, high] = bounds;
     if !(low.is_finite() && high.is_finite()) {
@@ -319,7 +293,6 @@ struct Picture<'a> {
     width: f64,
     height: f64,
     frame: [f64; 4],
-    /// Where the x axis has its numbers.
     axis: f64,
     x_label: &'a str,
     y_label: &'a str,

@@ -1,12 +1,11 @@
-//! Which samples of a long log a plot needs: the least and the largest of every pixel column.
+//! Decimation of long logs for plots: minimum and maximum of every pixel column.
 
-/// The samples to draw of curves over a common axis, ascending: all if there are at most `4 · columns`; otherwise, for
-/// each of `columns` equal stretches of x and each curve, its least and its largest value, the first and the last
-/// sample of the stretch, and where a gap (a value that is not finite) begins and ends. So every peak and every gap of
-/// the log shows, however long it is, and every point drawn was measured.
+/// Indices of the samples to draw for curves over a common axis, ascending. All samples if there are at most `4 ·
+/// columns`; otherwise, for each of `columns` equal intervals of x and each curve, the minimum and maximum, the first
+/// and last sample, and the ends of a gap (a value that is not finite). So every peak and gap is visible, and every
+/// point is a measured sample.
 ///
 /// ```
-/// // One spike in a million samples.
 /// let x: Vec<f64> = (0..1_000_000).map(f64::from).collect();
 /// let mut y = vec![0.0; x.len()];
 /// y[123_456] = 1.0;
@@ -22,7 +21,7 @@ pub fn kept_samples(x: &[f64], curves: &[&[f64]], columns: usize) -> Vec<usize> 
     }
     let width = (last - first) / columns as f64;
     let column_of = |i: usize| {
-        // A vertical line has one column.
+        // All samples at one x belong to one column.
         let column = (x[i] - first) / width;
         if column.is_finite() { (column as usize).min(columns - 1) } else { 0 }
     };
@@ -46,7 +45,7 @@ pub fn kept_samples(x: &[f64], curves: &[&[f64]], columns: usize) -> Vec<usize> 
     kept
 }
 
-/// Places of the least and the largest value, and of the ends of the longest gap, in `from..to`.
+/// Indices of the minimum and maximum, and of the ends of the longest gap, in `from..to`.
 fn extremes(curve: &[f64], from: usize, to: usize, kept: &mut Vec<usize>) {
     let (mut least, mut largest) = (None, None);
     let mut gap: Option<[usize; 2]> = None;
@@ -89,8 +88,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against a plain search: in every column the kept samples span what all its samples span, and a gap stays a
-        /// gap.
+        /// Compared with a direct search: in every column the kept samples have the same range, and gaps remain.
         #[test]
         fn every_column_keeps_its_span(values in prop::collection::vec(prop_oneof![9 => -1e3_f64..1e3, 1 => Just(f64::NAN)], 100..2000)) {
             let x: Vec<f64> = (0..values.len()).map(|i| i as f64 * 0.5).collect();

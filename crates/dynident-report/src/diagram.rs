@@ -1,68 +1,68 @@
-//! Boxes, arrows and words: a mechanism or a procedure as a picture.
+//! Diagrams of boxes, arrows and words.
 
 use crate::curve_picture::Place;
 use crate::error::ReportError;
 use serde::Serialize;
 
-/// Width of a letter and height of a line of the picture's 13 px type, px.
-const LETTER: f64 = 6.8;
-const LINE: f64 = 17.0;
+/// Width of a character and height of a line in 13 px type, px.
+const CHAR_WIDTH: f64 = 6.8;
+const LINE_HEIGHT: f64 = 17.0;
 
-/// How a line is drawn.
+/// Line style.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LineStyle {
     /// Thin.
     Thin,
-    /// Thin and dashed, for what is imagined: axes of symmetry, dimensions.
+    /// Thin and dashed, for auxiliary lines: axes of symmetry, dimensions.
     Dashed,
-    /// Thin, with an arrow's head at its end.
+    /// Thin, with an arrowhead at the end.
     Arrow,
-    /// Broad, for what is solid: the rod of a robot.
+    /// Broad, for solid parts: the links of a robot.
     Broad,
 }
 
-/// One shape of a diagram, in px from its upper left corner.
+/// A shape of a diagram, coordinates in px from the upper left corner.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "shape")]
 pub enum Shape {
-    /// A frame with centred lines of text.
+    /// A box with centred lines of text.
     Box {
-        /// Its centre.
+        /// Centre.
         at: [f64; 2],
         /// Width and height.
         size: [f64; 2],
-        /// The lines.
+        /// Lines of text.
         lines: Vec<String>,
-        /// Whether it stands on a corner, as a decision does in a flow chart.
+        /// Whether it is a diamond (a decision in a flow chart).
         decision: bool,
     },
     /// A line through points.
     Line {
         /// The points.
         points: Vec<[f64; 2]>,
-        /// How it is drawn.
+        /// Line style.
         style: LineStyle,
     },
-    /// A ring, filled with the paper's colour.
+    /// A ring, filled with the background colour.
     Ring {
-        /// Its centre.
+        /// Centre.
         at: [f64; 2],
-        /// Its radius.
+        /// Radius.
         radius: f64,
     },
-    /// A word.
+    /// A text.
     Word {
-        /// Where its line begins, or its middle.
+        /// Start of its baseline, or its centre.
         at: [f64; 2],
-        /// The word.
+        /// Text.
         text: String,
-        /// Whether `at` is its middle.
+        /// Whether `at` is the centre.
         centred: bool,
     },
 }
 
-/// A picture of boxes, lines and words, with words for who does not see it.
+/// A diagram of boxes, lines and texts, with a description for screen readers.
 ///
 /// ```
 /// use dynident_report::{Diagram, LineStyle, Shape};
@@ -76,38 +76,38 @@ pub enum Shape {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagram {
-    /// Headline.
+    /// Title.
     pub title: String,
-    /// A sentence below it; may be empty.
+    /// Note below the title; may be empty.
     pub note: String,
-    /// What the picture says, in words.
+    /// Description for screen readers.
     pub words: String,
     /// Width and height, px.
     pub size: [f64; 2],
-    /// The shapes, the lowest first.
+    /// Shapes in drawing order.
     pub shapes: Vec<Shape>,
 }
 
 impl Diagram {
-    /// A picture without shapes.
+    /// Creates a diagram without shapes.
     pub fn new(title: impl Into<String>, words: impl Into<String>, size: [f64; 2]) -> Self {
         Self { title: title.into(), note: String::new(), words: words.into(), size, shapes: Vec::new() }
     }
 
-    /// A sentence below the headline.
+    /// Sets the note below the title.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
 
-    /// A further frame with lines of text; it grows to the width of the longest.
+    /// Adds a box with lines of text; it grows to the width of the longest line.
     #[must_use]
     pub fn boxed(self, at: [f64; 2], size: [f64; 2], lines: &[&str]) -> Self {
         self.framed(at, size, lines, false)
     }
 
-    /// A further frame that stands on a corner.
+    /// Adds a diamond with lines of text.
     #[must_use]
     pub fn decision(self, at: [f64; 2], size: [f64; 2], lines: &[&str]) -> Self {
         self.framed(at, size, lines, true)
@@ -116,39 +116,40 @@ impl Diagram {
     fn framed(mut self, at: [f64; 2], size: [f64; 2], lines: &[&str], decision: bool) -> Self {
         let [width, height] = size;
         let longest = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0) as f64;
-        // Half of a frame on its corner is empty at the height of its words.
+        // At the height of its text a diamond is only partly usable.
         let room = if decision { 1.7 } else { 1.0 };
-        let size = [width.max(room * LETTER * longest + 12.0), height.max(room * LINE * lines.len() as f64 + 8.0)];
+        let size =
+            [width.max(room * CHAR_WIDTH * longest + 12.0), height.max(room * LINE_HEIGHT * lines.len() as f64 + 8.0)];
         let lines = lines.iter().map(|&line| line.to_owned()).collect();
         self.shapes.push(Shape::Box { at, size, lines, decision });
         self
     }
 
-    /// A further line.
+    /// Adds a line.
     #[must_use]
     pub fn line(mut self, points: &[[f64; 2]], style: LineStyle) -> Self {
         self.shapes.push(Shape::Line { points: points.to_vec(), style });
         self
     }
 
-    /// A further ring.
+    /// Adds a ring.
     #[must_use]
     pub fn ring(mut self, at: [f64; 2], radius: f64) -> Self {
         self.shapes.push(Shape::Ring { at, radius });
         self
     }
 
-    /// A further word that begins at a place.
+    /// Adds a text that starts at `at`.
     #[must_use]
     pub fn word(mut self, at: [f64; 2], text: impl Into<String>) -> Self {
         self.shapes.push(Shape::Word { at, text: text.into(), centred: false });
         self
     }
 
-    /// The diagram as an SVG picture on white, for documents.
+    /// Renders the diagram as SVG on white, for documents.
     ///
     /// # Errors
-    /// Only if the template fails.
+    /// If the template fails.
     pub fn svg(&self) -> Result<String, ReportError> {
         self.picture(Place::Document)
     }
@@ -162,8 +163,9 @@ impl Diagram {
                 } else {
                     format!("M{left} {up}H{right}V{down}H{left}z")
                 };
-                let first = y + 4.5 - 0.5 * LINE * (lines.len() as f64 - 1.0);
-                let words = lines.iter().enumerate().map(|(k, text)| (*x, first + LINE * k as f64, text.as_str()));
+                let first = y + 4.5 - 0.5 * LINE_HEIGHT * (lines.len() as f64 - 1.0);
+                let words =
+                    lines.iter().enumerate().map(|(k, text)| (*x, first + LINE_HEIGHT * k as f64, text.as_str()));
                 ShapeView { kind: "box", path, words: words.collect(), centred: true }
             }
             Shape::Line { points, style } => {
@@ -198,7 +200,7 @@ impl Diagram {
     }
 }
 
-/// The two strokes of an arrow's head at the end of a line.
+/// Path of an arrowhead at the end of a line.
 fn head(points: &[[f64; 2]]) -> String {
     let [.., [x0, y0], [x1, y1]] = points else { return String::new() };
     let length = (x1 - x0).hypot(y1 - y0);
@@ -206,7 +208,7 @@ fn head(points: &[[f64; 2]]) -> String {
         return String::new();
     }
     let (ux, uy) = ((x1 - x0) / length, (y1 - y0) / length);
-    // 9 px long, half of that to either side.
+    // 9 px long, 4.5 px to each side.
     let end = |side: f64| [x1 - 9.0 * ux - side * 4.5 * uy, y1 - 9.0 * uy + side * 4.5 * ux];
     let ([ax, ay], [bx, by]) = (end(1.0), end(-1.0));
     format!("M{ax:.1} {ay:.1}L{x1} {y1}L{bx:.1} {by:.1}")
@@ -247,7 +249,7 @@ mod tests {
         assert!(
             matches!(&chart.shapes[0], Shape::Box { size: [width, height], .. } if *width > 200.0 && *height > 17.0)
         );
-        // The head of the arrow from (0, 0) to (30, 40): 9 px back along it, 4.5 px to either side.
+        // Arrowhead from (0, 0) to (30, 40): 9 px back along the line, 4.5 px to each side.
         assert!(svg.contains("L30 40") && svg.contains("M21.0 35.5"), "{svg}");
         assert!(svg.contains("role=\"img\" aria-label=\"t: words\""));
     }

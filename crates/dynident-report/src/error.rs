@@ -1,43 +1,43 @@
-//! What can be wrong with a section.
+//! Errors of report sections.
 
-/// A section that cannot be drawn.
+/// A section that cannot be rendered.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
-    /// A cell leads to a section that the page does not have.
-    #[error("table `{section}`: a cell leads to `{to}`, which is the title of no section: give a title of this page")]
+    /// A cell that links to a missing section.
+    #[error("table `{section}`: a cell links to the missing section `{to}`: use the title of a section of this page")]
     Link {
-        /// The table's title.
+        /// Title of the table.
         section: String,
-        /// The title that was looked for.
+        /// The missing title.
         to: String,
     },
-    /// Lists that do not belong together.
-    #[error("section `{section}`: {what} has {found} entries where {expected} are needed; give one for each")]
+    /// Lists with inconsistent lengths.
+    #[error("section `{section}`: {what} has {found} entries, but needs {expected}")]
     Shape {
-        /// The section's title.
+        /// Title of the section.
         section: String,
-        /// Which list.
+        /// The list.
         what: String,
-        /// Entries it should have.
+        /// Expected number of entries.
         expected: usize,
-        /// Entries it has.
+        /// Actual number of entries.
         found: usize,
     },
-    /// Times or positions that are not finite or do not increase.
+    /// An x axis that is not finite or decreases.
     #[error("section `{section}`: the x axis must be finite and not decrease, but entry {at} (0-based) is {value}")]
     Axis {
-        /// The section's title.
+        /// Title of the section.
         section: String,
-        /// Place of the entry.
+        /// Index of the entry.
         at: usize,
-        /// The entry.
+        /// The value.
         value: f64,
     },
-    /// A template that failed: a defect of this crate.
-    #[error("the page's template failed: {0}")]
+    /// A template that failed, a bug in this crate.
+    #[error("a template of the page failed: {0}")]
     Template(#[from] minijinja::Error),
-    /// Data that could not be written as JSON: a defect of this crate.
-    #[error("a plot's data could not be written: {0}")]
+    /// Data that cannot be written as JSON, a bug in this crate.
+    #[error("cannot write the data of a plot: {0}")]
     Data(#[from] serde_json::Error),
 }

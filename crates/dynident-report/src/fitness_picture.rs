@@ -1,37 +1,37 @@
-//! The fitness of a search by generations.
+//! Fitness of a search by generation.
 
 use crate::error::ReportError;
 use crate::pen::{Pen, tenth};
 use crate::plot_data::check_length;
 use serde::Serialize;
 
-/// The plot and what stands around it, px.
+/// Size of the plot, and margins to the left and above, px.
 const PLOT: [f64; 2] = [560.0, 300.0];
-const LEFT: f64 = 64.0;
-const TOP: f64 = 44.0;
+const MARGIN_LEFT: f64 = 64.0;
+const MARGIN_TOP: f64 = 44.0;
 
-/// A picture of the best (dark) and the mean (light) fitness of every generation on a logarithmic scale, with the known
-/// optimum dashed.
+/// Best (dark) and mean (light) fitness of every generation on a logarithmic scale, with the known optimum as a dashed
+/// line.
 ///
-/// The scale is that of the best: a mean beyond twice their largest (one individual without full rank is enough) is
-/// drawn at the top. What is not finite or not positive is not drawn.
+/// The scale follows the best fitness: a mean above twice its maximum (for example one individual with rank deficiency)
+/// is drawn at the top. Values that are not finite or not positive are not drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitnessPicture<'a> {
-    /// Headline.
+    /// Title.
     pub title: &'a str,
     /// Best fitness of each generation.
     pub best: &'a [f64],
     /// Mean fitness of each generation.
     pub mean: &'a [f64],
-    /// The fitness that cannot be beaten, where it is known.
+    /// The optimal fitness, if known.
     pub optimum: Option<f64>,
 }
 
 impl FitnessPicture<'_> {
-    /// The picture.
+    /// Renders the picture as SVG.
     ///
     /// # Errors
-    /// If there are not as many means as bests.
+    /// If `mean` and `best` have different lengths.
     pub fn svg(&self) -> Result<String, ReportError> {
         check_length(self.title, "mean", self.mean.len(), self.best.len())?;
         let generations = self.best.len();
@@ -41,8 +41,8 @@ impl FitnessPicture<'_> {
         let (low, high) = all.fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
         let drawn = low <= high;
         let (low, high) = (0.92 * low, 2.0 * high);
-        let x_of = |generation: usize| LEFT + PLOT[0] * generation as f64 / generations.max(1) as f64;
-        let y_of = |value: f64| TOP + PLOT[1] * (high / value).ln() / (high / low).ln();
+        let x_of = |generation: usize| MARGIN_LEFT + PLOT[0] * generation as f64 / generations.max(1) as f64;
+        let y_of = |value: f64| MARGIN_TOP + PLOT[1] * (high / value).ln() / (high / low).ln();
         let line = |values: &[f64], most: f64| {
             let mut pen = Pen::default();
             let values = values.iter().map(|value| value.min(most));
@@ -56,9 +56,9 @@ impl FitnessPicture<'_> {
         let shown = if drawn { vec![1, (generations / 2).max(1), generations.max(1)] } else { Vec::new() };
         let view = Picture {
             title: self.title,
-            width: LEFT + PLOT[0] + 24.0,
-            height: TOP + PLOT[1] + 56.0,
-            frame: [LEFT, TOP, PLOT[0], PLOT[1]],
+            width: MARGIN_LEFT + PLOT[0] + 24.0,
+            height: MARGIN_TOP + PLOT[1] + 56.0,
+            frame: [MARGIN_LEFT, MARGIN_TOP, PLOT[0], PLOT[1]],
             ticks: if drawn { ticks(low, high) } else { Vec::new() }
                 .into_iter()
                 .map(|value| (tenth(y_of(value)), value.to_string()))
@@ -72,12 +72,12 @@ impl FitnessPicture<'_> {
     }
 }
 
-/// Round numbers (1, 2, 5 times powers of ten) inside a range.
+/// Round numbers (1, 2, 5 times powers of ten) in a range.
 fn ticks(low: f64, high: f64) -> Vec<f64> {
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let decades = (first..=last).flat_map(|power| [1.0, 2.0, 5.0].map(|digit| digit * 10.0_f64.powi(power)));
     let ticks: Vec<f64> = decades.filter(|value| (low..=high).contains(value)).collect();
-    // A search over many decades: whole ones are enough.
+    // Only powers of ten for a range of many decades.
     if ticks.len() <= 12 { ticks } else { ticks.into_iter().step_by(3).collect() }
 }
 

@@ -2,15 +2,15 @@
 
 use serde::Serialize;
 
-/// A headline; it stands in the page's list of contents.
+/// A heading; it is listed in the table of contents.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Heading {
-    /// The headline.
+    /// Text.
     pub text: String,
 }
 
 impl Heading {
-    /// A headline.
+    /// Creates a heading.
     pub fn new(text: impl Into<String>) -> Self {
         Self { text: text.into() }
     }

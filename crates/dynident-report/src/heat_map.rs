@@ -5,28 +5,27 @@ use crate::pen::tenth;
 use crate::ticks::short;
 use serde::Serialize;
 
-/// Most cells that carry a text under the pointer: beyond, the page would grow too large.
-const MOST_TEXTS: usize = 4096;
-/// Width of the cells together, px; letters of a name that are drawn, and their width.
-const CELLS: f64 = 560.0;
-const LETTERS: usize = 22;
-const LETTER: f64 = 6.5;
-/// Colours below and above zero.
-const BELOW: &str = "#0072b2";
-const ABOVE: &str = "#d55e00";
-/// Width of the colour scale, px, and its steps to either side.
-const SCALE: f64 = 240.0;
-const STEPS: usize = 10;
-/// Entries that are read aloud.
-const SPOKEN: usize = 5;
+/// Maximum number of cells with a tooltip, which limits the size of the page.
+const MAX_TOOLTIPS: usize = 4096;
+/// Total width of the cells, px; maximum number of characters of a name, and their width, px.
+const CELLS_WIDTH: f64 = 560.0;
+const MAX_NAME_CHARS: usize = 22;
+const CHAR_WIDTH: f64 = 6.5;
+const NEGATIVE_COLOUR: &str = "#0072b2";
+const POSITIVE_COLOUR: &str = "#d55e00";
+/// Width of the colour scale, px, and number of steps on each side.
+const SCALE_WIDTH: f64 = 240.0;
+const SCALE_STEPS: usize = 10;
+/// Maximum number of entries in the text for screen readers.
+const MAX_SPOKEN_ENTRIES: usize = 5;
 
-/// A matrix in colours: blue below zero, red above, as strong as the value against the largest, with a scale; gaps stay
-/// empty, and so does the upper half of a symmetric one. The value appears under the pointer.
+/// A matrix in colours with a scale: blue for negative and red for positive values, with a strength relative to the
+/// largest value. Gaps and the upper half of a symmetric matrix are empty. Tooltips show the values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
-    /// Headline.
+    /// Title.
     pub title: String,
-    /// A sentence below it; may be empty.
+    /// Note below the title; may be empty.
     pub note: String,
     /// Names of the columns.
     pub columns: Vec<String>,
@@ -34,12 +33,12 @@ pub struct HeatMap {
     pub rows: Vec<String>,
     /// Values by row, NaN for gaps.
     pub values: Vec<Vec<f64>>,
-    /// The value of full colour; the largest magnitude unless given.
+    /// The value with full colour; by default the largest magnitude.
     pub limit: Option<f64>,
 }
 
 impl HeatMap {
-    /// A matrix with its names.
+    /// Creates a map from names and values.
     pub fn new<C: Into<String>, R: Into<String>>(
         title: impl Into<String>,
         rows: impl IntoIterator<Item = R>,
@@ -56,21 +55,20 @@ impl HeatMap {
         }
     }
 
-    /// A sentence below the headline.
+    /// Sets the note below the title.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
 
-    /// The value of full colour.
+    /// Sets the value with full colour.
     #[must_use]
     pub fn limit(mut self, limit: f64) -> Self {
         self.limit = Some(limit);
         self
     }
 
-    /// Whether it says everything twice: its lower half is enough.
     fn is_symmetric(&self) -> bool {
         let same = |row: usize, column: usize| {
             let [one, other] = [self.values[row][column], self.values[column][row]];
@@ -79,7 +77,7 @@ impl HeatMap {
         self.rows == self.columns && (0..self.rows.len()).all(|row| (0..row).all(|column| same(row, column)))
     }
 
-    /// The strongest entries off the diagonal in words, for who does not see colours.
+    /// Text for screen readers: the largest entries, without the upper half of a symmetric matrix.
     fn in_words(&self) -> String {
         let entries = self
             .values
@@ -90,54 +88,56 @@ impl HeatMap {
         let wanted = |(row, column, value): &(usize, usize, f64)| value.is_finite() && (!symmetric || row > column);
         let mut entries: Vec<_> = entries.filter(wanted).collect();
         entries.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
-        let words = entries.iter().take(SPOKEN).map(|(row, column, value)| {
+        let words = entries.iter().take(MAX_SPOKEN_ENTRIES).map(|(row, column, value)| {
             format!("{} and {} {}", self.rows[*row], self.columns[*column], short(*value, 2))
         });
         format!("strongest {}", words.collect::<Vec<_>>().join(", "))
     }
 
-    /// The map as an SVG picture.
+    /// Renders the map as SVG.
     ///
     /// # Errors
-    /// If rows or columns do not have as many values as names.
+    /// If the numbers of values and names differ.
     pub fn svg(&self) -> Result<String, ReportError> {
         self.check_shape()?;
         let finite = self.values.iter().flatten().filter(|value| value.is_finite());
         let largest = finite.fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let limit = self.limit.filter(|limit| limit.is_finite() && *limit > 0.0).unwrap_or(largest);
-        let side = (CELLS / self.columns.len().max(1) as f64).clamp(4.0, 36.0);
-        let longest = self.rows.iter().chain(&self.columns).map(|name| name.chars().count().min(LETTERS)).max();
-        let labels = 14.0 + LETTER * longest.unwrap_or(0) as f64;
+        let side = (CELLS_WIDTH / self.columns.len().max(1) as f64).clamp(4.0, 36.0);
+        let longest = self.rows.iter().chain(&self.columns).map(|name| name.chars().count().min(MAX_NAME_CHARS)).max();
+        let labels = 14.0 + CHAR_WIDTH * longest.unwrap_or(0) as f64;
         let (right, bottom) = (labels + side * self.columns.len() as f64, labels + side * self.rows.len() as f64);
         let lines = (0..=self.columns.len())
             .map(|k| format!("M{} {labels}V{}", tenth(labels + side * k as f64), tenth(bottom)));
         let rows =
             (0..=self.rows.len()).map(|k| format!("M{labels} {}H{}", tenth(labels + side * k as f64), tenth(right)));
-        // The scale: from the limit below zero to that above.
-        let step_width = SCALE / (2 * STEPS + 1) as f64;
-        let scale = (0..=2 * STEPS).map(|k| {
-            let value = k as f64 / STEPS as f64 - 1.0;
+        // The scale from the negative to the positive limit.
+        let step_width = SCALE_WIDTH / (2 * SCALE_STEPS + 1) as f64;
+        let scale = (0..=2 * SCALE_STEPS).map(|k| {
+            let value = k as f64 / SCALE_STEPS as f64 - 1.0;
             ScaleStep {
                 x: tenth(labels + step_width * k as f64),
                 y: tenth(bottom + 18.0),
-                colour: if value < 0.0 { BELOW } else { ABOVE },
+                colour: if value < 0.0 { NEGATIVE_COLOUR } else { POSITIVE_COLOUR },
                 strength: value.abs(),
             }
         });
         let marks = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|share| {
-            let x = labels + 0.5 * step_width + (SCALE - step_width) * 0.5 * (share + 1.0);
+            let x = labels + 0.5 * step_width + (SCALE_WIDTH - step_width) * 0.5 * (share + 1.0);
             (tenth(x), short(share * limit, 3))
         });
-        // Names that would overlap are left out; the text under the pointer has them.
+        // Overlapping names are skipped; the tooltips have them.
         let every = (11.0 / side).ceil().max(1.0) as usize;
         let names = |names: &[String]| -> Vec<(f64, String)> {
             let shown = names.iter().enumerate().step_by(every);
-            shown.map(|(k, name)| (labels + side * (k as f64 + 0.5), name.chars().take(LETTERS).collect())).collect()
+            shown
+                .map(|(k, name)| (labels + side * (k as f64 + 0.5), name.chars().take(MAX_NAME_CHARS).collect()))
+                .collect()
         };
         let view = Picture {
             title: &self.title,
             words: self.in_words(),
-            width: (right + 8.0).max(labels + SCALE + 24.0),
+            width: (right + 8.0).max(labels + SCALE_WIDTH + 24.0),
             height: bottom + 46.0,
             labels,
             side: tenth(side),
@@ -147,13 +147,12 @@ impl HeatMap {
             grid: lines.chain(rows).collect(),
             scale: scale.collect(),
             step_width: tenth(step_width + 0.1),
-            scale_frame: [labels, tenth(bottom + 18.0), SCALE],
+            scale_frame: [labels, tenth(bottom + 18.0), SCALE_WIDTH],
             marks,
         };
         crate::templates::rendered("heat_map.svg", &view)
     }
 
-    /// Checks that there is a value for each row and column.
     fn check_shape(&self) -> Result<(), ReportError> {
         let wrong =
             |what: String, expected, found| ReportError::Shape { section: self.title.clone(), what, expected, found };
@@ -166,10 +165,10 @@ impl HeatMap {
         }
     }
 
-    /// The cells below zero and the others, with their colours. `side` and the room for `labels` are in px; values of
-    /// `limit` have full colour.
+    /// Negative cells and the others with their colours. `side` and the width of `labels` are in px; values of `limit`
+    /// have full colour.
     fn cells(&self, limit: f64, side: f64, labels: f64) -> [(&'static str, Vec<CellView>); 2] {
-        let texts = self.columns.len() * self.rows.len() <= MOST_TEXTS;
+        let texts = self.columns.len() * self.rows.len() <= MAX_TOOLTIPS;
         let symmetric = self.is_symmetric();
         let strength =
             |value: f64| if limit > 0.0 { ((value.abs() / limit).min(1.0) * 100.0).round() / 100.0 } else { 0.0 };
@@ -177,7 +176,7 @@ impl HeatMap {
         for (row, values) in self.values.iter().enumerate() {
             for (column, &value) in values.iter().enumerate() {
                 let is_hidden = !value.is_finite() || (symmetric && column > row);
-                // An invisible cell is needed only for its text.
+                // An invisible cell is needed only for its tooltip.
                 if is_hidden || !(texts || strength(value) > 0.0) {
                     continue;
                 }
@@ -190,7 +189,7 @@ impl HeatMap {
                 if value < 0.0 { below.push(cell) } else { above.push(cell) }
             }
         }
-        [(BELOW, below), (ABOVE, above)]
+        [(NEGATIVE_COLOUR, below), (POSITIVE_COLOUR, above)]
     }
 }
 

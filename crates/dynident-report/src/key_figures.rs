@@ -1,4 +1,4 @@
-//! A few figures in large type.
+//! Key figures in large type.
 
 use crate::tone::Tone;
 use serde::Serialize;
@@ -6,17 +6,17 @@ use serde::Serialize;
 /// One figure.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct KeyFigure {
-    /// What it is.
+    /// Label.
     pub label: String,
-    /// The figure, with its unit.
+    /// Value, with its unit.
     pub value: String,
-    /// A word on it; may be empty.
+    /// Note; may be empty.
     pub note: String,
-    /// How it is to be taken.
+    /// Rating.
     pub tone: Tone,
 }
 
-/// A few figures side by side.
+/// Key figures side by side.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct KeyFigures {
     /// The figures.
@@ -24,18 +24,18 @@ pub struct KeyFigures {
 }
 
 impl KeyFigures {
-    /// None yet.
+    /// Creates an empty list.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A further figure.
+    /// Adds a figure.
     #[must_use]
     pub fn figure(self, label: impl Into<String>, value: impl Into<String>, note: impl Into<String>) -> Self {
         self.judged(label, value, note, Tone::Plain)
     }
 
-    /// A further figure, and how it is to be taken.
+    /// Adds a figure with a rating.
     #[must_use]
     pub fn judged(
         mut self,

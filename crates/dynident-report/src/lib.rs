@@ -1,10 +1,10 @@
-//! **What came out?** Results as one HTML page that needs nothing else: no network, no other file.
+//! **Report pages**: results as one self-contained HTML page, without network access or other files.
 //!
-//! A [`Report`] is a list of typed sections, each a plain struct with its own template. Line plots are interactive
-//! ([uPlot](https://github.com/leeoniya/uPlot), embedded): values under the pointer, a stretch zoomed by dragging,
-//! curves switched by a click on the legend. Bars and heat maps are pictures with values under the pointer. Without the
-//! script, and on paper, every plot is a still picture. Light and dark, wide and narrow screens, keyboard and screen
-//! reader. What a section is given is escaped: no name of a joint or file becomes markup or script.
+//! A [`Report`] is a list of typed sections, each a plain struct with a template. Line plots are interactive
+//! ([uPlot](https://github.com/leeoniya/uPlot), embedded): values at the cursor, zoom by dragging, curves switched in
+//! the legend. Bars and heat maps are pictures with tooltips. Without scripts and in print, every plot is a static
+//! picture. Pages support light and dark themes, narrow screens, keyboard and screen readers. All content is escaped:
+//! names of joints or files never become markup or script.
 //!
 //! ```
 //! use dynident_report::{KeyFigures, LinePlot, Report, Table};

@@ -5,50 +5,49 @@ use crate::decimation::kept_samples;
 use crate::error::ReportError;
 use crate::plot_data::{CurveData, PlotData, StripData, check_axis, check_length, rounded, rounded_time};
 
-/// Pixel columns that a curve is drawn for.
-const COLUMNS: usize = 1200;
+const PIXEL_COLUMNS: usize = 1200;
 
 /// One curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// Its name in the legend.
+    /// Name in the legend.
     pub name: String,
-    /// A value for each entry of the axis; NaN leaves a gap.
+    /// One value per entry of the axis; NaN gives a gap.
     pub values: Vec<f64>,
     /// Drawn dashed.
     pub dashed: bool,
     /// Drawn as points without a line.
     pub points: bool,
-    /// Drawn broad and pale, so that a curve over it shows where the two part.
+    /// Broad and pale, so that differences to a curve above are visible.
     pub broad: bool,
 }
 
-/// Curves over a common axis: zoomed by dragging, values under the pointer, curves switched in the legend.
+/// Curves over a common axis: zoom by dragging, values at the cursor, curves switched in the legend.
 ///
-/// Of more than 4800 samples the page holds the least and the largest of each of 1200 pixel columns
-/// ([`kept_samples`](crate::kept_samples)): nothing that shows is lost, but zooming in adds no detail.
+/// For more than 4800 samples the page contains the minimum and maximum of each of 1200 pixel columns
+/// ([`kept_samples`](crate::kept_samples)): the plot looks the same, but zooming adds no detail.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LinePlot {
-    /// Headline.
+    /// Title.
     pub title: String,
-    /// A sentence below it; may be empty.
+    /// Note below the title; may be empty.
     pub note: String,
-    /// What the x axis is, with its unit.
+    /// Label of the x axis, with its unit.
     pub x_label: String,
-    /// What the y axis is, with its unit.
+    /// Label of the y axis, with its unit.
     pub y_label: String,
     /// The axis: finite, not decreasing.
     pub x: Vec<f64>,
     /// The curves.
     pub lines: Vec<Line>,
-    /// Logarithmic y axis; values that are not positive leave gaps.
+    /// Logarithmic y axis; values that are not positive give gaps.
     pub log_y: bool,
-    /// A strip below with a difference of two curves, on a scale of its own: its name, and which less which.
+    /// Strip with the difference of two curves on a separate scale: name, and indices of minuend and subtrahend.
     pub difference: Option<(String, [usize; 2])>,
 }
 
 impl LinePlot {
-    /// A plot without curves.
+    /// Creates a plot without curves.
     pub fn new(title: impl Into<String>, x_label: impl Into<String>, y_label: impl Into<String>, x: Vec<f64>) -> Self {
         Self {
             title: title.into(),
@@ -62,49 +61,49 @@ impl LinePlot {
         }
     }
 
-    /// A sentence below the headline.
+    /// Sets the note below the title.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
 
-    /// A further curve.
+    /// Adds a curve.
     #[must_use]
     pub fn line(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
         self.lines.push(Line { name: name.into(), values, dashed: false, points: false, broad: false });
         self
     }
 
-    /// A further curve, dashed.
+    /// Adds a dashed curve.
     #[must_use]
     pub fn dashed(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
         self.lines.push(Line { name: name.into(), values, dashed: true, points: false, broad: false });
         self
     }
 
-    /// A further curve, as points.
+    /// Adds a curve as points.
     #[must_use]
     pub fn points(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
         self.lines.push(Line { name: name.into(), values, dashed: false, points: true, broad: false });
         self
     }
 
-    /// A further curve, broad and pale, for others to lie over.
+    /// Adds a broad, pale curve, below other curves.
     #[must_use]
     pub fn broad(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
         self.lines.push(Line { name: name.into(), values, dashed: false, points: false, broad: true });
         self
     }
 
-    /// A strip below with curve number `of` less number `less` (from 0), on a scale of its own.
+    /// Adds a strip with curve `of` minus curve `less` (indices from 0), on a separate scale.
     #[must_use]
     pub fn difference(mut self, name: impl Into<String>, of: usize, less: usize) -> Self {
         self.difference = Some((name.into(), [of, less]));
         self
     }
 
-    /// The y axis logarithmic.
+    /// Makes the y axis logarithmic.
     #[must_use]
     pub fn log_y(mut self) -> Self {
         self.log_y = true;
@@ -120,7 +119,6 @@ impl LinePlot {
         self.lines.iter().try_for_each(|line| check_length(&self.title, &line.name, line.values.len(), self.x.len()))
     }
 
-    /// A value as it can be drawn.
     fn drawn(&self, value: f64) -> f64 {
         if self.log_y && value <= 0.0 { f64::NAN } else { value }
     }
@@ -132,7 +130,7 @@ impl LinePlot {
             pairs.map(|(of, less)| of - less).collect()
         });
         let curves: Vec<&[f64]> = self.lines.iter().map(|line| &line.values[..]).chain(strip.as_deref()).collect();
-        let kept = kept_samples(&self.x, &curves, COLUMNS);
+        let kept = kept_samples(&self.x, &curves, PIXEL_COLUMNS);
         let curve = |line: &Line| kept.iter().map(|&i| rounded(self.drawn(line.values[i]))).collect();
         PlotData {
             x: kept.iter().map(|&i| rounded_time(self.x[i])).collect(),
@@ -157,7 +155,7 @@ impl LinePlot {
         .embedded()
     }
 
-    /// The same as a still picture of `width` by `height` px, for documents.
+    /// Renders the plot as a static SVG of `width` by `height` px, for documents.
     ///
     /// # Errors
     /// As [`Report::html`](crate::Report::html).
@@ -210,13 +208,13 @@ mod tests {
     }
 
     #[test]
-    fn a_logarithmic_axis_has_no_place_for_what_is_not_positive() {
+    fn a_logarithmic_axis_skips_values_that_are_not_positive() {
         assert!(plot().log_y().data().unwrap().contains("[1.0,null,null,1e-9]"));
         assert!(!plot().log_y().svg(400.0, 200.0).unwrap().contains("NaN"));
     }
 
     #[test]
-    fn a_difference_stands_in_a_strip_of_its_own() {
+    fn a_difference_has_a_separate_strip() {
         let pair = LinePlot::new("t", "t, s", "Nm", vec![0.0, 1.0]).broad("predicted", vec![1.0, 2.0]);
         let pair = pair.line("measured", vec![1.5, 2.5]).difference("measured less predicted", 1, 0);
         let (with, without) = (pair.svg(400.0, 200.0).unwrap(), plot().svg(400.0, 200.0).unwrap());
@@ -234,7 +232,7 @@ mod tests {
         let all_gap = LinePlot::new("gap", "", "", vec![1.0]).line("x", vec![f64::NAN]).points("y", vec![2.0]);
         assert!(!all_gap.svg(300.0, 100.0).unwrap().contains("NaN"));
         let short = plot().line("y", vec![1.0]);
-        assert!(short.data().unwrap_err().to_string().contains("`y` has 1 entries where 4"));
+        assert!(short.data().unwrap_err().to_string().contains("`y` has 1 entries, but needs 4"));
         let backwards = LinePlot::new("b", "", "", vec![1.0, 0.5]);
         assert!(backwards.data().unwrap_err().to_string().contains("entry 1"));
     }

@@ -1,33 +1,33 @@
-//! A motion over time: for each joint its position, velocity and whatever else is known, with limits dashed.
+//! A motion over time: position, velocity and further quantities of each joint, with limits as dashed lines.
 
 use crate::error::ReportError;
 use crate::pen::{Pen, tenth};
 use crate::plot_data::{check_axis, check_length};
 use serde::Serialize;
 
-/// Width and height of one plot, and what stands around them, px.
+/// Width and height of one plot, gaps and margins, px.
 const PLOT: [f64; 2] = [230.0, 84.0];
 const GAP: [f64; 2] = [62.0, 22.0];
-const LEFT: f64 = 62.0;
-const TOP: f64 = 64.0;
+const MARGIN_LEFT: f64 = 62.0;
+const MARGIN_TOP: f64 = 64.0;
 
-/// A limit is drawn if it lies within so many times the span of the curve; else the curve would be a flat line.
-const LIMIT_WITHIN: f64 = 4.0;
+/// Maximum distance of a drawn limit from the curve, in spans of the curve; beyond it the curve would look flat.
+const MAX_LIMIT_DISTANCE: f64 = 4.0;
 
-/// Most points of one curve: more than pixels show nothing.
-const MOST_POINTS: usize = 600;
+/// Maximum number of points of a curve, limited by the resolution of the plot.
+const MAX_POINTS: usize = 600;
 
 /// One quantity of one joint over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionCurve<'a> {
-    /// A value for each time; NaN leaves a gap.
+    /// One value per time; NaN gives a gap.
     pub values: &'a [f64],
-    /// Lower and upper limit; none where there is no limit.
+    /// Lower and upper limit, if any.
     pub limits: Option<[f64; 2]>,
 }
 
-/// A picture of a motion, joints from top to bottom, quantities from left to right. A limit that is out of a plot is
-/// named in its corner.
+/// A picture of a motion, joints from top to bottom, quantities from left to right. Limits outside of a plot are
+/// printed in its corner.
 ///
 /// ```
 /// use dynident_report::{MotionCurve, MotionPicture};
@@ -47,30 +47,30 @@ pub struct MotionPicture<'a> {
 }
 
 impl<'a> MotionPicture<'a> {
-    /// A picture without joints: its headline, the times in s, and the names of the quantities, all in SI units.
+    /// Creates a picture without joints: title, times in s, and names of the quantities in SI units.
     pub fn new(title: &'a str, times_s: &'a [f64], quantities: &'a [&'a str]) -> Self {
         Self { title, times_s, quantities, joints: Vec::new() }
     }
 
-    /// A further joint with a curve for each quantity.
+    /// Adds a joint with one curve per quantity.
     #[must_use]
     pub fn joint(mut self, name: &'a str, curves: Vec<MotionCurve<'a>>) -> Self {
         self.joints.push((name, curves));
         self
     }
 
-    /// The picture.
+    /// Renders the picture as SVG.
     ///
     /// # Errors
-    /// Times that run backwards, a joint with another number of curves than quantities, a curve of another length.
+    /// Decreasing times, or inconsistent numbers of curves or values.
     pub fn svg(&self) -> Result<String, ReportError> {
         check_axis(self.title, self.times_s)?;
         for (name, curves) in &self.joints {
             check_length(self.title, name, curves.len(), self.quantities.len())?;
             curves.iter().try_for_each(|c| check_length(self.title, name, c.values.len(), self.times_s.len()))?;
         }
-        let x_of = |quantity: usize| LEFT + quantity as f64 * (PLOT[0] + GAP[0]);
-        let y_of = |joint: usize| TOP + joint as f64 * (PLOT[1] + GAP[1]);
+        let x_of = |quantity: usize| MARGIN_LEFT + quantity as f64 * (PLOT[0] + GAP[0]);
+        let y_of = |joint: usize| MARGIN_TOP + joint as f64 * (PLOT[1] + GAP[1]);
         let rows = self.joints.iter().enumerate().map(|(joint, (name, curves))| Row {
             name,
             y: y_of(joint),
@@ -84,7 +84,7 @@ impl<'a> MotionPicture<'a> {
             title: self.title,
             width: x_of(self.quantities.len()),
             height: y_of(self.joints.len()) + 24.0,
-            left: LEFT,
+            left: MARGIN_LEFT,
             size: PLOT,
             quantities: self.quantities.iter().enumerate().map(|(k, name)| (x_of(k), *name)).collect(),
             rows: rows.collect(),
@@ -95,7 +95,6 @@ impl<'a> MotionPicture<'a> {
     }
 }
 
-/// One curve with its limits and the ends of its scale.
 fn plot(corner: [f64; 2], times: &[f64], curve: &MotionCurve<'_>) -> Plot {
     let [left, top] = corner;
     let [width, height] = PLOT;
@@ -106,7 +105,7 @@ fn plot(corner: [f64; 2], times: &[f64], curve: &MotionCurve<'_>) -> Plot {
         (lower, upper) = (0.0, 0.0);
     }
     let span = (upper - lower).max(1e-9);
-    let near = |limit: &f64| (limit - lower).abs().min((limit - upper).abs()) <= LIMIT_WITHIN * span;
+    let near = |limit: &f64| (limit - lower).abs().min((limit - upper).abs()) <= MAX_LIMIT_DISTANCE * span;
     let (drawn, beyond): (Vec<f64>, Vec<f64>) = curve.limits.into_iter().flatten().partition(near);
     for limit in &drawn {
         (lower, upper) = (lower.min(*limit), upper.max(*limit));
@@ -115,7 +114,7 @@ fn plot(corner: [f64; 2], times: &[f64], curve: &MotionCurve<'_>) -> Plot {
     (lower, upper) = (lower - margin, upper + margin);
     let y_of = |value: f64| top + height * (upper - value) / (upper - lower);
     let (start, end) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
-    let step = times.len().div_ceil(MOST_POINTS).max(1);
+    let step = times.len().div_ceil(MAX_POINTS).max(1);
     let mut pen = Pen::default();
     for sample in (0..times.len()).step_by(step).chain(times.len().checked_sub(1)) {
         pen.to([left + width * (times[sample] - start) / (end - start).max(1e-9), y_of(curve.values[sample])]);
@@ -176,7 +175,7 @@ mod tests {
         let picture = MotionPicture::new("a < b & \u{7}c", &times, &["position", "velocity", "acceleration"]);
         let svg = picture.clone().joint("one", curves.clone()).joint("two", curves).svg().unwrap();
         assert_eq!(svg.matches("class=\"curve\"").count(), 6);
-        // Both ends of the velocity's band are near; those of the acceleration are named instead.
+        // Both velocity limits are near; the acceleration limits are printed instead.
         assert_eq!(svg.matches("class=\"limit\"").count(), 4);
         assert!(
             svg.contains("limits beyond: -1000000.000, 1000000.000") && svg.contains("a &lt; b &amp; \\u0007c"),
@@ -184,7 +183,7 @@ mod tests {
         );
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
         let error = picture.joint("one", vec![curve(None)]).svg().unwrap_err();
-        assert!(error.to_string().contains("`one` has 1 entries where 3"), "{error}");
+        assert!(error.to_string().contains("`one` has 1 entries, but needs 3"), "{error}");
     }
 
     #[test]

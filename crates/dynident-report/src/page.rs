@@ -1,4 +1,4 @@
-//! Sections put together to one page.
+//! Assembly of sections to a page.
 
 use crate::bar_plot::BarPlot;
 use crate::convergence_plot::ConvergencePlot;
@@ -15,14 +15,14 @@ use crate::text::Text;
 use minijinja::{Value, context};
 use std::collections::BTreeMap;
 
-/// One section of a page; the registry of what there is.
+/// A section of a page.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Section {
-    /// A headline.
+    /// A heading.
     Heading(Heading),
     /// Paragraphs and lists.
     Text(Text),
-    /// Figures in large type.
+    /// Key figures in large type.
     KeyFigures(KeyFigures),
     /// A table.
     Table(Table),
@@ -49,31 +49,30 @@ macro_rules! sections {
 }
 sections!(Heading, Text, KeyFigures, Table, LinePlot, ConvergencePlot, BarPlot, HeatMap, Diagram);
 
-/// A page: a title and its sections in order.
+/// A page: title and sections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
-    /// The page's title.
+    /// Title.
     pub title: String,
-    /// A line below it; may be empty.
+    /// Subtitle; may be empty.
     pub subtitle: String,
     /// The sections.
     pub sections: Vec<Section>,
 }
 
-/// Width and height of a plot where the script does not draw it, px.
-const STILL: [f64; 2] = [1040.0, 300.0];
+const STATIC_PLOT_SIZE: [f64; 2] = [1040.0, 300.0];
 
 const UPLOT_JS: &str = include_str!("../vendor/uplot/uPlot.iife.min.js");
 const UPLOT_CSS: &str = include_str!("../vendor/uplot/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("../vendor/uplot/LICENSE");
 
 impl Report {
-    /// A page without sections.
+    /// Creates a page without sections.
     pub fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), ..Self::default() }
     }
 
-    /// The line below the title.
+    /// Sets the subtitle.
     #[must_use]
     pub fn subtitle(mut self, subtitle: impl Into<String>) -> Self {
         self.subtitle = subtitle.into();
@@ -86,11 +85,10 @@ impl Report {
         self
     }
 
-    /// The page: one HTML file with all scripts, styles and data inside. It asks nothing of any network, and its
-    /// security policy forbids that.
+    /// Renders the page: one HTML file with all scripts, styles and data. Its security policy forbids network access.
     ///
     /// # Errors
-    /// A section whose lists do not belong together, or whose axis runs backwards; the message names it.
+    /// A section with inconsistent lists or a decreasing axis; the message names it.
     pub fn html(&self) -> Result<String, ReportError> {
         let mut contents = Vec::new();
         let links = self.links();
@@ -122,7 +120,7 @@ impl Report {
 }
 
 impl Report {
-    /// Where each title stands; the first of equal ones counts.
+    /// Anchor of each title; the first of equal titles.
     fn links(&self) -> BTreeMap<&str, String> {
         let mut links = BTreeMap::new();
         for (number, section) in self.sections.iter().enumerate() {
@@ -136,7 +134,6 @@ impl Report {
 }
 
 impl Section {
-    /// The headline; empty for sections that have none.
     fn title(&self) -> &str {
         match self {
             Self::Heading(heading) => &heading.text,
@@ -157,7 +154,7 @@ impl Section {
         };
         let plot = |title: &str, note: &str, data: String, picture: CurvePicture<'_>| {
             let data = Value::from_safe_string(data);
-            let svg = Value::from_safe_string(picture.svg(STILL[0], STILL[1], Place::Page)?);
+            let svg = Value::from_safe_string(picture.svg(STATIC_PLOT_SIZE[0], STATIC_PLOT_SIZE[1], Place::Page)?);
             let words = picture.in_words();
             rendered("plot.html", &context! { number, title, note, data, svg, words })
         };

@@ -1,33 +1,32 @@
-//! An arm's way through space: the tool's path and some poses, from above and from the side.
+//! Path of an arm in space: tool path and some poses, from above and from the side.
 
 use crate::error::ReportError;
 use crate::pen::{Pen, tenth};
 use serde::Serialize;
 
-/// Width and height of one view, and what stands around them, px.
+/// Width and height of one view, gap and top margin, px.
 const VIEW: [f64; 2] = [420.0, 420.0];
 const GAP: f64 = 58.0;
-const TOP: f64 = 58.0;
+const MARGIN_TOP: f64 = 58.0;
 
-/// Room that is shown however small the arm, m.
-const LEAST_SPAN: f64 = 0.1;
+const MIN_SPAN: f64 = 0.1;
 
-/// A view: its name and the base frame's axes to the right and upwards.
+/// Views: name, and horizontal and vertical axis of the base frame.
 const VIEWS: [(&str, [usize; 2]); 2] = [("from above", [0, 1]), ("from the side", [0, 2])];
 
-/// A place in the base frame: x, y, z in m.
+/// A point in the base frame: x, y, z in m.
 pub type Place = [f64; 3];
 
-/// The arm at one moment.
+/// The arm at one instant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ArmPose {
-    /// Straight rods, from joint to joint and from the last joints to their tools.
+    /// Straight rods between joints, and from the last joints to their tools.
     pub rods: Vec<[Place; 2]>,
     /// Joints, drawn as dots.
     pub joints: Vec<Place>,
 }
 
-/// An upright column that the arm keeps away from.
+/// A vertical column that the arm avoids.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColumnShape {
     /// Its axis, x and y in the base frame, m.
@@ -37,13 +36,13 @@ pub struct ColumnShape {
 }
 
 /// A picture of a motion in the base frame: from above (x to the right, y upwards) and from the side (x to the right, z
-/// upwards), both at one scale; tools' paths blue, the first pose black, later ones orange. Floor, column and boxes are
-/// drawn where they can be seen.
+/// upwards), both at one scale; tool paths blue, the first pose black, later ones orange. Floor, column and boxes are
+/// drawn where visible.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PathPicture<'a> {
-    /// Headline.
+    /// Title.
     pub title: &'a str,
-    /// The way of each tool.
+    /// Path of each tool.
     pub paths: Vec<Vec<Place>>,
     /// Poses in the order of time.
     pub poses: Vec<ArmPose>,
@@ -51,15 +50,15 @@ pub struct PathPicture<'a> {
     pub floor_m: Option<f64>,
     /// The column.
     pub column: Option<ColumnShape>,
-    /// Boxes: for x, y and z the least and the largest, m; none where a side is free.
+    /// Boxes: minimum and maximum of x, y and z, m; `None` for an open side.
     pub boxes: Vec<[Option<[f64; 2]>; 3]>,
 }
 
 impl PathPicture<'_> {
-    /// The picture.
+    /// Renders the picture as SVG.
     ///
     /// # Errors
-    /// Only if the template fails.
+    /// If the template fails.
     pub fn svg(&self) -> Result<String, ReportError> {
         let frame = self.frame();
         let views = VIEWS.into_iter().enumerate().map(|(index, (name, axes))| {
@@ -69,16 +68,15 @@ impl PathPicture<'_> {
         let picture = Picture {
             title: self.title,
             width: GAP + 2.0 * (VIEW[0] + GAP),
-            height: TOP + VIEW[1] + 52.0,
+            height: MARGIN_TOP + VIEW[1] + 52.0,
             gap: GAP,
-            top: TOP,
+            top: MARGIN_TOP,
             size: VIEW,
             views: views.collect(),
         };
         crate::templates::rendered("path_picture.svg", &picture)
     }
 
-    /// All points, the base, and what limits add near them.
     fn frame(&self) -> Frame {
         let rods = self.poses.iter().flat_map(|pose| pose.rods.iter().flatten().chain(&pose.joints));
         let points = self.paths.iter().flatten().chain(rods).filter(|point| point.iter().all(|x| x.is_finite()));
@@ -88,7 +86,7 @@ impl PathPicture<'_> {
                 (low[axis], high[axis]) = (low[axis].min(point[axis]), high[axis].max(point[axis]));
             }
         }
-        let span = |low: &Place, high: &Place| (0..3).fold(LEAST_SPAN, |span, axis| span.max(high[axis] - low[axis]));
+        let span = |low: &Place, high: &Place| (0..3).fold(MIN_SPAN, |span, axis| span.max(high[axis] - low[axis]));
         let near = span(&low, &high);
         let mut edges: Vec<(usize, f64)> = self.floor_m.iter().map(|height| (2, *height)).collect();
         if let Some(column) = &self.column {
@@ -98,7 +96,7 @@ impl PathPicture<'_> {
         for (axis, ends) in self.boxes.iter().flat_map(|sides| sides.iter().enumerate()) {
             edges.extend(ends.iter().flatten().map(|end| (axis, *end)));
         }
-        // What is farther away than the arm is large would make the arm small.
+        // Distant limits are excluded, because the arm would become too small.
         for (axis, edge) in edges {
             if edge > low[axis] - near && edge < high[axis] + near {
                 (low[axis], high[axis]) = (low[axis].min(edge), high[axis].max(edge));
@@ -109,13 +107,12 @@ impl PathPicture<'_> {
     }
 }
 
-/// The part of space that is shown: a middle, and half the width of a view in metres.
+/// The shown space: centre, and half the width of a view, m.
 struct Frame {
     middle: Place,
     half: f64,
 }
 
-/// One view of the frame.
 struct View<'a> {
     left: f64,
     axes: [usize; 2],
@@ -132,7 +129,7 @@ impl View<'_> {
     }
 
     fn y(&self, metres: f64) -> f64 {
-        TOP + 0.5 * VIEW[1] - (metres - self.frame.middle[self.axes[1]]) * self.pixels_per_m()
+        MARGIN_TOP + 0.5 * VIEW[1] - (metres - self.frame.middle[self.axes[1]]) * self.pixels_per_m()
     }
 
     fn at(&self, point: &Place) -> [f64; 2] {
@@ -168,25 +165,23 @@ impl View<'_> {
         }
     }
 
-    /// The floor's upper edge and what is shown of its depth, px; none from above.
+    /// Upper edge and height of the floor, px; `None` from above.
     fn floor(&self, picture: &PathPicture<'_>) -> Option<[f64; 2]> {
         let height = picture.floor_m.filter(|_| self.axes[1] == 2)?;
         let y = self.y(height);
-        Some([tenth(y), tenth((TOP + VIEW[1] - y).max(0.0) + 2.0)])
+        Some([tenth(y), tenth((MARGIN_TOP + VIEW[1] - y).max(0.0) + 2.0)])
     }
 
-    /// The column from above: middle and radius, px.
     fn round_column(&self, picture: &PathPicture<'_>) -> Option<[f64; 3]> {
         let column = picture.column.filter(|_| self.axes[1] != 2)?;
         let [x, y] = column.axis_xy_m;
         Some([self.x(x), self.y(y), column.radius_m * self.pixels_per_m()].map(tenth))
     }
 
-    /// The column from the side.
     fn standing_column(&self, picture: &PathPicture<'_>) -> Option<Shape> {
         let column = picture.column.filter(|_| self.axes[1] == 2)?;
         let radius = column.radius_m * self.pixels_per_m();
-        let corner = [self.x(column.axis_xy_m[0]) - radius, TOP - 2.0];
+        let corner = [self.x(column.axis_xy_m[0]) - radius, MARGIN_TOP - 2.0];
         Some(Shape {
             class: "column",
             filled: true,
@@ -196,7 +191,7 @@ impl View<'_> {
     }
 
     fn boxes(&self, picture: &PathPicture<'_>) -> impl Iterator<Item = Shape> {
-        // A free side lies outside the picture.
+        // An open side is outside of the picture.
         let far = 3.0 * self.frame.half;
         picture.boxes.iter().map(move |sides| {
             let [[left, right], [lower, upper]] = self.axes.map(|axis| {
@@ -208,7 +203,6 @@ impl View<'_> {
         })
     }
 
-    /// Round numbers along one of the view's axes, m, and how they are written.
     fn ticks(&self, place: usize) -> Vec<(f64, String)> {
         let Frame { middle, half } = self.frame;
         let span = 2.0 * half;
@@ -267,7 +261,7 @@ struct Pose {
 mod tests {
     use super::*;
 
-    /// The tip of a rod of 1 m that turns a quarter about the base.
+    /// The tip of a rod of 1 m that turns by 90° about the base.
     #[test]
     fn a_quarter_turn_is_a_quarter_circle() {
         let tip = |degrees: i32| [f64::from(degrees).to_radians().cos(), f64::from(degrees).to_radians().sin(), 0.0];
@@ -286,7 +280,7 @@ mod tests {
         let drawn = ["floor", "column", "box"].map(|class| svg.matches(&format!("class=\"{class}\"")).count());
         assert_eq!(drawn, [1, 2, 2]);
         assert!(!svg.contains("NaN") && !svg.contains("inf") && svg.contains("a &lt; b"));
-        // In the view from above every point stands as far from the base as the first, to some tenths of a pixel.
+        // From above all points have the same distance to the base, within some tenths of a pixel.
         let first = svg.split("class=\"path\" d=\"M").nth(1).unwrap().split('"').next().unwrap();
         let points: Vec<Vec<f64>> =
             first.split('L').map(|point| point.split(' ').map(|x| x.parse().unwrap()).collect()).collect();

@@ -1,13 +1,12 @@
-//! Lines of still pictures.
+//! Paths of static pictures.
 
 use core::fmt::Write;
 
-/// A tenth of a pixel is finer than any screen.
 pub(crate) fn tenth(x: f64) -> f64 {
     (10.0 * x).round() / 10.0
 }
 
-/// Draws a line through points, px; a point that is not finite leaves a gap.
+/// Draws a path through points, px; a point that is not finite gives a gap.
 #[derive(Default)]
 pub(crate) struct Pen {
     text: String,
@@ -26,7 +25,6 @@ impl Pen {
         self.down = drawn;
     }
 
-    /// The line as the `d` of a path.
     pub(crate) fn path(self) -> String {
         self.text
     }

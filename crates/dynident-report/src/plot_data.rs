@@ -1,24 +1,22 @@
-//! What the page's script is given for an interactive plot.
+//! Data of interactive plots for the page's script.
 
 use crate::error::ReportError;
 use serde::Serialize;
 
-/// One plot, decimated, gaps as null.
+/// One decimated plot, with gaps as null.
 #[derive(Serialize)]
 pub(crate) struct PlotData<'a> {
     pub(crate) x: Vec<f64>,
     pub(crate) curves: Vec<CurveData<'a>>,
-    /// A strip below with a difference.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) strip: Option<StripData<'a>>,
     pub(crate) x_label: &'a str,
     pub(crate) y_label: &'a str,
     pub(crate) log: bool,
-    /// Whole numbers on the x axis.
+    /// Integers on the x axis.
     pub(crate) counts: bool,
 }
 
-/// One curve.
 #[derive(Serialize)]
 pub(crate) struct CurveData<'a> {
     pub(crate) name: &'a str,
@@ -26,29 +24,25 @@ pub(crate) struct CurveData<'a> {
     pub(crate) dashed: bool,
     pub(crate) points: bool,
     pub(crate) broad: bool,
-    /// Lower and upper ends of error bars.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) bars: Option<[Vec<Option<f64>>; 2]>,
 }
 
-/// The difference of two curves, of their numbers.
 #[derive(Serialize)]
 pub(crate) struct StripData<'a> {
     pub(crate) name: &'a str,
-    /// Which less which.
     pub(crate) of: [usize; 2],
 }
 
 impl PlotData<'_> {
-    /// JSON that may stand inside a script element: without `<`, which alone could end it, and without `>` and `&` for
-    /// readers who look for markup.
+    /// JSON for a script element: without `<`, which could end it, and without `>` and `&`.
     pub(crate) fn embedded(&self) -> Result<String, ReportError> {
         let json = dynident_text::json::to_string(self)?;
         Ok(json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"))
     }
 }
 
-/// Seven significant digits: more than any screen shows, and half the page's size.
+/// Seven significant digits, to reduce the size of the page.
 pub(crate) fn rounded(value: f64) -> Option<f64> {
     if !value.is_finite() {
         return None;
@@ -56,12 +50,11 @@ pub(crate) fn rounded(value: f64) -> Option<f64> {
     format!("{value:.6e}").parse().ok()
 }
 
-/// Eleven significant digits of a time: at seven, a long log's samples would fall together.
+/// Eleven significant digits of a time, so that samples of a long log remain distinct.
 pub(crate) fn rounded_time(value: f64) -> f64 {
     format!("{value:.10e}").parse().unwrap_or(value)
 }
 
-/// The x axis must be finite and not decrease.
 pub(crate) fn check_axis(section: &str, x: &[f64]) -> Result<(), ReportError> {
     let wrong = (0..x.len()).find(|&i| !x[i].is_finite() || (i > 0 && x[i] < x[i - 1]));
     match wrong {
@@ -70,7 +63,6 @@ pub(crate) fn check_axis(section: &str, x: &[f64]) -> Result<(), ReportError> {
     }
 }
 
-/// A list must have one entry for each point of the axis.
 pub(crate) fn check_length(section: &str, what: &str, found: usize, expected: usize) -> Result<(), ReportError> {
     if found == expected {
         return Ok(());

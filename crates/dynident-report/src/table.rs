@@ -7,11 +7,11 @@ use serde::Serialize;
 /// One cell.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Cell {
-    /// What it says.
+    /// Text.
     pub text: String,
-    /// How it is to be taken.
+    /// Rating.
     pub tone: Tone,
-    /// The title of a section of the same page that it leads to.
+    /// Title of the section of this page that the cell links to.
     pub to: Option<String>,
 }
 
@@ -22,33 +22,33 @@ impl<T: Into<String>> From<T> for Cell {
 }
 
 impl Cell {
-    /// A cell that is to be taken in some way.
+    /// Creates a cell with a rating.
     pub fn judged(text: impl Into<String>, tone: Tone) -> Self {
         Self { text: text.into(), tone, to: None }
     }
 
-    /// A cell that leads to the section of this page with the title `to`.
+    /// Creates a cell that links to the section of this page with the title `to`.
     pub fn link(text: impl Into<String>, to: impl Into<String>) -> Self {
         Self { text: text.into(), tone: Tone::Plain, to: Some(to.into()) }
     }
 }
 
-/// A table with named columns; columns whose cells are all numbers (or empty) stand to the right. A click on a column's
-/// name sorts by it.
+/// A table with named columns; numeric columns (or empty cells) are right-aligned. A click on a column name sorts by
+/// it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Table {
-    /// Headline; may be empty.
+    /// Title; may be empty.
     pub title: String,
-    /// A sentence below it; may be empty.
+    /// Note below the title; may be empty.
     pub note: String,
     /// Names of the columns.
     pub columns: Vec<String>,
-    /// Rows, one cell a column.
+    /// Rows, one cell per column.
     pub rows: Vec<Vec<Cell>>,
 }
 
 impl Table {
-    /// A table without rows.
+    /// Creates a table without rows.
     pub fn new<C: Into<String>>(title: impl Into<String>, columns: impl IntoIterator<Item = C>) -> Self {
         Self {
             title: title.into(),
@@ -58,21 +58,21 @@ impl Table {
         }
     }
 
-    /// A sentence below the headline.
+    /// Sets the note below the title.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
 
-    /// A further row.
+    /// Adds a row.
     #[must_use]
     pub fn row<C: Into<Cell>>(mut self, cells: impl IntoIterator<Item = C>) -> Self {
         self.rows.push(cells.into_iter().map(Into::into).collect());
         self
     }
 
-    /// Further rows.
+    /// Adds rows.
     #[must_use]
     pub fn rows(mut self, rows: impl IntoIterator<Item = Vec<Cell>>) -> Self {
         self.rows.extend(rows);
@@ -91,7 +91,6 @@ impl Table {
         }
     }
 
-    /// For each column whether it holds numbers.
     pub(crate) fn numeric(&self) -> Vec<bool> {
         let number = |text: &str| {
             let text = text.trim().trim_end_matches(['%', '°']).trim_end();

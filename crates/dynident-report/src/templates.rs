@@ -1,4 +1,4 @@
-//! The templates of pages and pictures, and how they are filled in.
+//! Templates of pages and pictures.
 
 use crate::error::ReportError;
 use dynident_text::visible;
@@ -25,7 +25,7 @@ pub(crate) const TEMPLATES: [(&str, &str); 16] = [
     ("report.js", include_str!("templates/report.js")),
 ];
 
-/// Text as HTML: escaped, and what stands between back-ticks set as code. A back-tick without its partner stays.
+/// Converts text to HTML: escaped, with text between backticks as code. An unpaired backtick remains.
 fn prose(text: &str) -> Value {
     let parts: Vec<&str> = text.split('`').collect();
     if parts.len().is_multiple_of(2) {
@@ -38,7 +38,7 @@ fn prose(text: &str) -> Value {
     Value::from_safe_string(parts.iter().enumerate().map(part).collect())
 }
 
-/// A template filled in; everything that is not marked safe is escaped, in SVG as in HTML. Invisible characters are
+/// Renders a template; everything that is not marked as safe is escaped, in HTML and SVG. Invisible characters are
 /// shown as escape sequences.
 pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, ReportError> {
     let mut environment = Environment::new();
@@ -50,7 +50,7 @@ pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, Repo
         environment.add_template(name, source)?;
     }
     let text = environment.get_template(name)?.render(view)?;
-    // In text and in the data of plots alike: the sequences are those of JSON.
+    // The escape sequences are valid in text and in JSON.
     Ok(match visible(&text) {
         Cow::Borrowed(_) => text,
         Cow::Owned(visible) => visible,

@@ -1,7 +1,7 @@
-//! Round numbers for axes, and numbers as text.
+//! Ticks of axes, and numbers and labels as text.
 
-/// About `count` round numbers (1, 2 or 5 times a power of ten apart) inside `[low, high]`, ascending; none unless both
-/// are finite and low < high.
+/// About `count` round numbers (multiples of 1, 2 or 5 times a power of ten) in `[low, high]`, ascending; empty unless
+/// both are finite and low < high.
 pub(crate) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {
@@ -14,12 +14,11 @@ pub(crate) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     if last - first > 1000.0 || (last - first).is_nan() {
         return Vec::new();
     }
-    // Through the number of the step, so that 0.3 is not 0.30000000000000004 for long.
+    // Multiplying the step avoids accumulated rounding errors.
     (0..=(last - first).max(0.0) as usize).map(|k| (first + k as f64) * step).collect()
 }
 
-/// A number to `digits` significant digits, with an exponent where that is shorter; a dash for what is no finite
-/// number.
+/// A number with `digits` significant digits, with an exponent if that is shorter; a dash if it is not finite.
 ///
 /// ```
 /// assert_eq!(dynident_report::short(0.123456, 3), "0.123");
@@ -42,6 +41,14 @@ pub fn short(value: f64, digits: usize) -> String {
     without_zeros(&format!("{value:.decimals$}")).to_owned()
 }
 
+/// The first `most` characters of a label, with an ellipsis if it is longer.
+pub(crate) fn shortened(label: &str, most: usize) -> String {
+    if label.chars().count() <= most {
+        return label.to_owned();
+    }
+    label.chars().take(most - 1).chain(['…']).collect()
+}
+
 fn without_zeros(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
@@ -56,7 +63,7 @@ mod tests {
         assert_eq!(ticks(-0.31, 0.29, 6), [-0.30000000000000004, -0.2, -0.1, 0.0, 0.1, 0.2]);
         assert!(ticks(1.0, 1.0, 5).is_empty());
         assert!(ticks(f64::NAN, 1.0, 5).is_empty());
-        // A span below the last bit of the numbers ends all the same.
+        // A range below the resolution of the numbers must terminate.
         assert!(ticks(1e300, f64::MAX, 5).len() < 20);
     }
 

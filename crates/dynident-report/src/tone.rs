@@ -1,18 +1,18 @@
-//! Good, bad, or neither.
+//! Rating of a value.
 
 use serde::Serialize;
 
-/// How a value is to be taken; it colours the text, and a mark beside it says the same to those who do not see colours.
+/// Rating of a value; it sets the colour of the text, and a symbol for people who cannot distinguish the colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Tone {
-    /// A value.
+    /// No rating.
     #[default]
     Plain,
-    /// As it should be.
+    /// Good.
     Good,
-    /// Worth a look.
+    /// To be checked.
     Warning,
-    /// As it should not be.
+    /// Bad.
     Bad,
 }

@@ -1,13 +1,13 @@
-//! Makes the example log that this repository holds: a simulated UR10 with known parameters follows two motions.
+//! Generates the stored example log: a simulated UR10 with known parameters follows two motions.
 //!
 //! ```sh
 //! cargo run --release -p dynident --example simulate_ur10 -- examples/ur10_simulated
 //! ```
 //!
 //! The true robot is `robots/ur10.urdf` with masses, centres of mass and inertias changed by 10 to 15 %, and with drive
-//! inertia, viscous and Coulomb friction and a torque offset in every joint. `train.csv` and `test.csv` hold 20 s at
-//! 125 Hz each: what an encoder says of the position, and the torque with slightly coloured noise. `truth.json` holds
-//! the parameters. Same seed, same files.
+//! inertia, viscous and Coulomb friction and a torque offset in every joint. `train.csv` and `test.csv` contain 20 s at
+//! 125 Hz each: encoder positions, and torque with slightly coloured noise. `truth.json` contains the parameters. Equal
+//! seeds give equal files.
 
 use dynident_dynamics::{BatchWorkspace, all_columns, inverse_dynamics_batch};
 use dynident_model::sample::Random;
@@ -25,9 +25,9 @@ const DURATION_S: f64 = 20.0;
 const RAMP_S: f64 = 2.0;
 /// Harmonics of 0.1 Hz in every joint's motion.
 const HARMONICS: usize = 6;
-/// Middle of the motion, rad: upper arm raised, elbow bent.
+/// Centre of the motion, rad: upper arm raised, elbow bent.
 const HOME_RAD: [f64; 6] = [0.0, -1.2, 1.1, -0.6, 0.8, 0.0];
-/// Largest departure from the middle, rad, and largest share of the limit of velocity.
+/// Largest distance from the centre, rad, and largest fraction of the velocity limit.
 const REACH_RAD: [f64; 6] = [2.4, 0.9, 1.3, 2.0, 2.0, 2.4];
 const SPEED_SHARE: f64 = 0.8;
 /// Velocity at which the true Coulomb friction has reached 76 %, rad/s.
@@ -51,7 +51,7 @@ const DRIVES: [[f64; 4]; 6] = [
 /// The example's files: name and content.
 ///
 /// # Errors
-/// If the robot description that the repository holds is not readable.
+/// If the robot description in the repository cannot be read.
 pub fn files() -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
     let mut random = Random::new(SEED);
     let robot = read_urdf(include_str!("../../../robots/ur10.urdf"))?.model;
@@ -84,7 +84,7 @@ fn changed(robot: &Model, random: &mut Random) -> Result<Model, Box<dyn Error>> 
     Ok(robot.with_inertials(&inertials)?)
 }
 
-/// One log: a random motion, and what encoders and torque sensors make of it.
+/// One log: a random motion with encoder and torque sensor errors.
 fn csv(truth: &Model, terms: &[TorqueTerm], drives: &[f64], random: &mut Random) -> String {
     let (dof, samples) = (truth.dof(), (DURATION_S * RATE_HZ) as usize + 1);
     let [q, dq, ddq] = motion(truth, samples, random);
@@ -125,12 +125,12 @@ fn csv(truth: &Model, terms: &[TorqueTerm], drives: &[f64], random: &mut Random)
     text
 }
 
-/// Positions, velocities and accelerations, joint-major: a finite Fourier series about the home position, faded in and
-/// out, as large as reach and limit of velocity allow.
+/// Positions, velocities and accelerations, joint-major: a finite Fourier series about the home position with fade-in
+/// and fade-out, scaled to range and velocity limit.
 fn motion(model: &Model, samples: usize, random: &mut Random) -> [Vec<f64>; 3] {
     let mut out: [Vec<f64>; 3] = Default::default();
     for (joint, home) in HOME_RAD.iter().enumerate() {
-        // Smaller with frequency, so that every harmonic takes the same share of the velocity.
+        // Decreasing with frequency, so that every harmonic has the same share of the velocity.
         let coefficients: Vec<[f64; 2]> =
             (1..=HARMONICS).map(|k| [(); 2].map(|()| random.uniform(-1.0, 1.0) / k as f64)).collect();
         let shape: Vec<[f64; 3]> = (0..samples).map(|s| faded_series(&coefficients, s as f64 / RATE_HZ)).collect();

@@ -1,26 +1,24 @@
-//! Times of the calendar: `2026-11-22T10:30:13Z`.
+//! Time stamps: `2026-11-22T10:30:13Z`.
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// The first second that RFC 3339 has no text for: the year 10000, s since 1970.
-pub(crate) const LAST_SECOND: f64 = 253_402_300_800.0;
+/// First second without an RFC 3339 text: the year 10000, s since 1970.
+pub(crate) const END_OF_RFC3339_S: f64 = 253_402_300_800.0;
 
-/// Text in place of the time if the computer's clock is not set.
 const UNKNOWN: &str = "unknown (the clock of the computer is not set)";
 
-/// Now, by the computer's clock; a clock before 1970 or after the year 9999 is not set.
+/// Current time; a clock before 1970 or after the year 9999 is treated as not set.
 pub(crate) fn now() -> String {
     utc(SystemTime::now()).unwrap_or_else(|| UNKNOWN.to_owned())
 }
 
-/// A time in UTC to the second; `None` before 1970 and after the year 9999.
+/// A time in UTC with a resolution of 1 s; `None` before 1970 and after the year 9999.
 pub(crate) fn utc(at: SystemTime) -> Option<String> {
     let since = at.duration_since(UNIX_EPOCH).ok()?;
     // The formatter panics for other times.
-    (since.as_secs() < LAST_SECOND as u64).then(|| humantime::format_rfc3339_seconds(at).to_string())
+    (since.as_secs() < END_OF_RFC3339_S as u64).then(|| humantime::format_rfc3339_seconds(at).to_string())
 }
 
-/// As [`utc`], of seconds since 1970.
 pub(crate) fn utc_of_seconds(seconds: f64) -> Option<String> {
     let since = Duration::try_from_secs_f64(seconds).ok()?;
     utc(UNIX_EPOCH.checked_add(since)?)

@@ -1,7 +1,7 @@
-//! The processor time of this process.
+//! Processor time of this process.
 
-/// Seconds of processor time, all threads together; `None` where the system does not say.
-#[cfg_attr(unix, allow(clippy::unnecessary_wraps, reason = "other systems do not say"))]
+/// Processor time of all threads, s; `None` if the operating system does not report it.
+#[cfg_attr(unix, allow(clippy::unnecessary_wraps, reason = "other systems do not report it"))]
 pub(crate) fn cpu_seconds() -> Option<f64> {
     #[cfg(unix)]
     {

@@ -1,4 +1,4 @@
-//! The files that a job reads: none is overwritten, and none changes while the job reads it.
+//! Input files of a job: they are not overwritten, and must not change during the job.
 
 use crate::error::Error;
 use crate::study::{Folders, Study};
@@ -7,26 +7,26 @@ use dynident_model::collision::find_mesh;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Largest file of a result, a design, runs or factors that is read, bytes.
+/// Largest readable file of a result, a design, runs or factors, bytes.
 pub const MAX_RESULT_BYTES: u64 = 1 << 32;
 /// Largest robot description that is searched for meshes and included files, bytes.
 const MAX_ROBOT_BYTES: u64 = 64 << 20;
 
-/// Reads a file that a command has written: a result, a design, runs, factors.
+/// Reads an output file of a command: a result, a design, runs, factors.
 ///
 /// # Errors
-/// [`Error::File`] if it cannot be read, is no regular file or is larger than [`MAX_RESULT_BYTES`].
+/// [`Error::File`] if the file cannot be read, is not a regular file, or is larger than [`MAX_RESULT_BYTES`].
 pub fn read_result(path: &Path) -> Result<Vec<u8>, Error> {
     dynident_files::read(path, MAX_RESULT_BYTES).map_err(|source| Error::File { path: path.to_owned(), source })
 }
 
-/// The files of a study as they were when a job began to read them.
+/// State of a study's files at the start of a job.
 #[derive(Debug)]
 pub(crate) struct InputFiles(SeenFiles);
 
 impl InputFiles {
-    /// Takes note of the study's file, every file that the study names, and the meshes and included files that its
-    /// robot names, as far as they exist.
+    /// Records the study file, all existing files that the study refers to, and the meshes and included files of its
+    /// robot.
     pub(crate) fn of(study: &Study, study_path: &Path, data: Option<&Path>) -> Self {
         let mut files = named_files(study, study_path, data, |_| true);
         if let Ok(robot) = Folders::new(study, study_path, data).find(&study.robot.file, None) {
@@ -34,7 +34,7 @@ impl InputFiles {
         }
         let seen = SeenFiles::default();
         for file in files {
-            // A recording may be several files. Errors are reported by the reader.
+            // A recording may consist of several files. Its reader reports errors.
             for part in dynident_recording::log::files(&file).unwrap_or_default() {
                 let _ = seen.is_unchanged(&part);
             }
@@ -42,19 +42,19 @@ impl InputFiles {
         Self(seen)
     }
 
-    /// That no file has changed since.
+    /// Checks that no file has changed since.
     ///
     /// # Errors
-    /// [`Error::Changed`] with the first one that has.
+    /// [`Error::Changed`] with the first changed file.
     pub(crate) fn unchanged(&self) -> Result<(), Error> {
         self.0.first_changed().map_or(Ok(()), |path| Err(Error::Changed { path }))
     }
 
-    /// Does a job that reads the files. A file that changes during the job is an error, also if the job failed:
-    /// its numbers and the hashes in its provenance may belong to different contents.
+    /// Runs a job that reads the files. A change during the job is an error even if the job failed, because its numbers
+    /// and the hashes in its provenance may belong to different contents.
     ///
     /// # Errors
-    /// [`Error::Changed`], and those of the job.
+    /// [`Error::Changed`], and errors of the job.
     pub(crate) fn while_unchanged<R>(&self, job: impl FnOnce() -> Result<R, Error>) -> Result<R, Error> {
         let done = job();
         self.unchanged()?;
@@ -62,7 +62,7 @@ impl InputFiles {
     }
 }
 
-/// The meshes and included files that a robot description names in attributes `file` and `filename`.
+/// Meshes and included files in the attributes `file` and `filename` of a robot description.
 fn files_of_robot(robot: &Path) -> Vec<PathBuf> {
     let folder = robot.parent().unwrap_or(Path::new(""));
     let Ok(text) = dynident_files::read_text(robot, MAX_ROBOT_BYTES) else { return Vec::new() };
@@ -78,7 +78,7 @@ fn files_of_robot(robot: &Path) -> Vec<PathBuf> {
     names.into_iter().filter_map(|name| find_mesh(folder, name)).collect()
 }
 
-/// That none of `outputs` (files or folders, which need not exist yet) is one of `inputs` or holds one, also under
+/// Checks that none of `outputs` (files or folders, which may not exist yet) is or contains one of `inputs`, also under
 /// another path or through a link.
 ///
 /// # Errors
@@ -87,7 +87,7 @@ pub fn refuse_overwriting(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<(),
     let inputs: Vec<(&PathBuf, PathBuf)> =
         inputs.iter().filter_map(|input| Some((input, input.canonicalize().ok()?))).collect();
     for output in outputs {
-        // What is not there yet is no input.
+        // A missing output cannot be an input.
         let Ok(place) = output.canonicalize() else { continue };
         if let Some((input, _)) = inputs.iter().find(|(_, input)| input.starts_with(&place)) {
             return Err(Error::Overwrite { output: output.clone(), input: (*input).clone() });
@@ -96,40 +96,38 @@ pub fn refuse_overwriting(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<(),
     Ok(())
 }
 
-/// The study file, and every file that the study names in `sections` (`robot`, `log`, ..), as far as they exist. What
-/// names a file is found by looking: every text of these sections that is a file in one of the study's folders, or
-/// beside one that is (as the `file` keys of a log's channels are), so that no key can be forgotten.
+/// The study file, and every existing file that the study refers to in `sections` (`robot`, `log`, ..). Every text of
+/// these sections is tested: in the study's folders, and next to the files found there (as the `file` keys of a log's
+/// channels). So no key can be forgotten.
 pub fn study_inputs(study: &Study, study_path: &Path, data: Option<&Path>, sections: &[&str]) -> Vec<PathBuf> {
     named_files(study, study_path, data, |section| sections.contains(&section))
 }
 
-/// The study file and the files that its sections name, of those sections that are `chosen`.
 fn named_files(study: &Study, study_path: &Path, data: Option<&Path>, chosen: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let folders = Folders::new(study, study_path, data);
     let mut texts = Vec::new();
     if let Ok(Value::Object(all)) = serde_json::to_value(study) {
-        all.iter().filter(|(section, _)| chosen(section)).for_each(|(_, value)| gather(value, &mut texts));
+        all.iter().filter(|(section, _)| chosen(section)).for_each(|(_, value)| collect_texts(value, &mut texts));
     }
     let mut files: Vec<PathBuf> = texts.iter().filter_map(|text| folders.find(Path::new(text), None).ok()).collect();
-    let beside: Vec<PathBuf> = files
+    let siblings: Vec<PathBuf> = files
         .iter()
         .filter_map(|file| file.parent())
         .flat_map(|folder| texts.iter().map(move |text| folder.join(text)))
         .filter(|path| path.is_file())
         .collect();
-    files.extend(beside);
+    files.extend(siblings);
     files.push(study_path.to_owned());
     files.sort();
     files.dedup();
     files
 }
 
-/// All texts in `value` that could name a file.
-fn gather(value: &Value, texts: &mut Vec<String>) {
+fn collect_texts(value: &Value, texts: &mut Vec<String>) {
     match value {
         Value::String(text) if !text.is_empty() => texts.push(text.clone()),
-        Value::Array(values) => values.iter().for_each(|value| gather(value, texts)),
-        Value::Object(entries) => entries.values().for_each(|value| gather(value, texts)),
+        Value::Array(values) => values.iter().for_each(|value| collect_texts(value, texts)),
+        Value::Object(entries) => entries.values().for_each(|value| collect_texts(value, texts)),
         Value::String(_) | Value::Null | Value::Bool(_) | Value::Number(_) => {}
     }
 }

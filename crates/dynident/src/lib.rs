@@ -1,26 +1,26 @@
-//! **The whole job**: a study file in; a dynamic model with error bars and its proof out.
+//! **Facade and jobs**: from a study file to a validated dynamic model with error bars.
 //!
-//! | task | take |
+//! | task | function |
 //! | --- | --- |
 //! | read a study file | [`Study::load`], [`Study::parse`] |
-//! | logs to a model | [`identify()`]; its result: [`ResultFile`], a page: [`IdentificationOutcome::report`] |
-//! | a finished model on other logs | [`validate()`] |
-//! | logs to factors, many of them to one model without the logs | [`reduce()`], [`Factors`], [`identify_factors()`], [`factors_errors()`] |
-//! | the torque of a finished model along a motion, with its band | [`TorquePredictor`] |
-//! | look at a robot description | [`inspect()`]; undo its slips: [`mended()`] |
-//! | a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters, JSON; drives for a simulator; a payload for a controller | [`export_model()`], [`export_simulator()`], [`export_payload()`] |
+//! | logs to a model | [`identify()`]; result: [`ResultFile`], page: [`IdentificationOutcome::report`] |
+//! | validate a model on other logs | [`validate()`] |
+//! | logs to factors, and factors to one model | [`reduce()`], [`Factors`], [`identify_factors()`], [`factors_errors()`] |
+//! | predict torque along a motion, with its error band | [`TorquePredictor`] |
+//! | inspect a robot description | [`inspect()`]; correct it: [`mended()`] |
+//! | export a model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters, JSON; drives for a simulator; a payload for a controller | [`export_model()`], [`export_simulator()`], [`export_payload()`] |
 //! | dynamics for a table of states | [`evaluate()`] |
-//! | the motion to record | [`design_study()`]; judge one that is there: [`check_trajectory()`], [`check_log()`] |
-//! | what a recording holds | [`log_contents()`] |
-//! | a study from a robot and its recordings | [`new_study()`] |
-//! | one run of a simulated robot | [`simulate_study()`] |
-//! | run, identify, run again | [`iterate_study()`]; on a robot that is a function: [`iterate_with_robot()`] |
-//! | the sections of a study, the parts of results | [`study`], [`result`] |
-//! | a progress bar | [`Progress`] in [`RunOptions`] |
+//! | design a motion | [`design_study()`]; check an existing one: [`check_trajectory()`], [`check_log()`] |
+//! | contents of a recording | [`log_contents()`] |
+//! | create a study from a robot and its recordings | [`new_study()`] |
+//! | simulate one run | [`simulate_study()`] |
+//! | repeated runs and identification | [`iterate_study()`]; with a robot in code: [`iterate_with_robot()`] |
+//! | sections of a study, parts of results | [`study`], [`result`] |
+//! | progress | [`Progress`] in [`RunOptions`] |
 //!
-//! A study may hold its samples and its robot itself ([`samples`](study::LogSection::samples),
-//! [`description`](study::RobotSection::description)). Who wants no study at all: [`identification`] takes arrays.
-//! The crates below are re-exported:
+//! A study may contain its samples and its robot in memory ([`samples`](study::LogSection::samples),
+//! [`description`](study::RobotSection::description)). [`identification`] works on arrays without a study. The lower
+//! crates are re-exported:
 //! [`model`], [`dynamics`], [`recording`], [`estimation`], [`excitation`], [`simulation`], [`identification`],
 //! [`iteration`], [`export`].
 //!
@@ -34,7 +34,7 @@
 //! let found = identify(&study, path, &RunOptions { data: None, threads: 1, progress: &Silent })?;
 //!
 //! let test = &found.result.validation[0];
-//! let prior = test.prior.as_ref().expect("the description has all inertials");
+//! let prior = test.prior.as_ref().expect("the robot description has all inertials");
 //! assert!(test.model.relative_error_percent < prior.relative_error_percent);
 //! assert!(found.result.physical.consistent && found.urdf.is_some());
 //! # Ok::<(), dynident::Error>(())
@@ -77,7 +77,7 @@ pub use dynident_text::shortened_message;
 pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError, XacroError};
 pub use factors::{FactorLog, Factors, seconds_of};
 pub use inputs::{MAX_RESULT_BYTES, read_result, refuse_overwriting, study_inputs};
-pub use jobs::check::check;
+pub use jobs::check::{CheckSettings, check, check_with};
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::export::{
@@ -90,7 +90,7 @@ pub use jobs::inspect::{
 };
 pub use jobs::iterate::{IterationWatch, RobotMaker, iterate_study, iterate_with_robot};
 pub use jobs::log::log_contents;
-pub use jobs::new_study::{NewStudy, new_study};
+pub use jobs::new_study::{NewStudy, NewStudySettings, new_study, new_study_with};
 pub use jobs::options::RunOptions;
 pub use jobs::predict::{PredictedTorque, TorquePredictor};
 pub use jobs::reduce::{ReduceSettings, factors_errors, identify_factors, reduce};

@@ -1,4 +1,4 @@
-//! The files of one result change together, or not at all: `docs/decisions/0017-output-sets.md`.
+//! Atomic replacement of all files of one result: `docs/decisions/0017-output-sets.md`.
 
 use crate::error::Error;
 use dynident_system::{TemporaryFolder, names, remove_folder};
@@ -7,37 +7,34 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
-/// What the hidden folder of a set on its way begins with.
-const STAGE: &str = ".dynident-set-";
-/// Inside of it: the new files, the old ones, and what stands for either at its place in the end.
+const STAGE_PREFIX: &str = ".dynident-set-";
+/// Its subfolders: new files, old files, and the final content of each file's place for either case.
 const NEW: &str = "new";
 const OLD: &str = "old";
 const PLACE_NEW: &str = "place-new";
 const PLACE_OLD: &str = "place-old";
-/// The links that lead from a file's place through [`CURRENT`].
+/// Links at the files' places, which lead through [`CURRENT`].
 const LINKS: &str = "links";
-/// A link to [`OLD`], then to [`NEW`]: the one step in which all files change.
+/// A link to [`OLD`], then to [`NEW`]: this single step switches all files.
 const CURRENT: &str = "current";
 const NEXT: &str = "next";
-/// The names of the set, one a line.
 const NAMES: &str = "names";
-/// Where there are no links: the old files on their way out, and that all of them are, so that the new ones follow.
+/// Without links: the old files, and a marker that all of them have been moved, so that the new files may follow.
 const MOVED: &str = "moved";
 const DECIDED: &str = "decided";
-/// Folders of a stage that hold files under the names of the set.
+/// Subfolders of a stage that contain files under the names of the set.
 const PARTS: [&str; 6] = [NEW, OLD, PLACE_NEW, PLACE_OLD, LINKS, MOVED];
-/// Largest list of names that is read, bytes.
 const MAX_NAMES_BYTES: u64 = 1 << 20;
 
-/// How long another program may take with its own set in the same folder.
-const PATIENCE: Duration = Duration::from_secs(20);
-const PAUSE: Duration = Duration::from_millis(20);
+/// Maximum waiting time for another program that writes a set to the same folder.
+const LOCK_TIMEOUT: Duration = Duration::from_secs(20);
+const LOCK_RETRY_INTERVAL: Duration = Duration::from_millis(20);
 
-/// The files that belong together, and the folder in which they stand. Other files there are left alone.
+/// Files of one result in a folder. Other files in the folder are not touched.
 ///
-/// Who opens them by their names finds, at every moment, after a kill at any moment and with a full disk, the files of
-/// one set, the old or the new one. On a file system without links (FAT; Windows without the right to make them) a kill
-/// leaves a part of one set and never parts of two; the next set that is written clears that up.
+/// At every moment, also after a kill or with a full disk, readers find the files of one set, the old or the new one.
+/// On a file system without links (FAT; Windows without the right to create them) a kill leaves an incomplete set, but
+/// never a mixture of two; the next write cleans up.
 #[derive(Clone, Debug)]
 pub struct OutputSet {
     folder: PathBuf,
@@ -45,29 +42,29 @@ pub struct OutputSet {
 }
 
 impl OutputSet {
-    /// An empty set in a folder, which need not exist yet.
+    /// An empty set for a folder, which may not exist yet.
     pub fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned(), files: Vec::new() }
     }
 
-    /// A file of the set; `name` may name folders below (`study/arm.toml`).
+    /// Adds a file; `name` may contain subfolders (`study/arm.toml`).
     #[must_use]
     pub fn file(mut self, name: &str, contents: impl Into<Vec<u8>>) -> Self {
         self.files.push((name.to_owned(), Some(contents.into())));
         self
     }
 
-    /// A file that other sets of this kind have and this one does not: an older one is removed.
+    /// Marks a file of other sets that this set does not have: an older one is removed.
     #[must_use]
     pub fn absent(mut self, name: &str) -> Self {
         self.files.push((name.to_owned(), None));
         self
     }
 
-    /// Puts the set in the place of the old one.
+    /// Replaces the old set.
     ///
     /// # Errors
-    /// [`Error::Output`] with the system's reason; all files are then as they were.
+    /// [`Error::Output`] with the reason from the operating system; all files are then unchanged.
     pub fn write(&self) -> Result<(), Error> {
         let cannot = |(path, source): Failed| Error::Output { path, source };
         fs::create_dir_all(&self.folder).map_err(|source| cannot((self.folder.clone(), source)))?;
@@ -81,27 +78,27 @@ impl OutputSet {
     }
 }
 
-/// What failed where.
 type Failed = (PathBuf, io::Error);
 
 fn at(path: &Path) -> impl FnOnce(io::Error) -> Failed {
     move |source| (path.to_owned(), source)
 }
 
-/// The folder, locked against other programs that write a set into it; none where the system has no such lock.
+/// Locks the folder against other programs that write a set to it; `None` if the operating system does not support
+/// this.
 fn locked(folder: &Path) -> Result<Option<File>, Failed> {
     let Ok(file) = File::open(folder) else { return Ok(None) };
-    for _ in 0..PATIENCE.as_millis() / PAUSE.as_millis() {
+    for _ in 0..LOCK_TIMEOUT.as_millis() / LOCK_RETRY_INTERVAL.as_millis() {
         match file.try_lock() {
             Ok(()) => return Ok(Some(file)),
-            Err(fs::TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
+            Err(fs::TryLockError::WouldBlock) => std::thread::sleep(LOCK_RETRY_INTERVAL),
             Err(fs::TryLockError::Error(_)) => return Ok(None),
         }
     }
     Err((folder.to_owned(), io::Error::new(io::ErrorKind::WouldBlock, "another program holds the folder locked")))
 }
 
-/// A set on its way, in a hidden folder beside the files' places.
+/// A set that is being written, in a hidden folder next to the files.
 struct Stage {
     folder: PathBuf,
     path: PathBuf,
@@ -109,10 +106,10 @@ struct Stage {
 }
 
 impl Stage {
-    /// Writes the new files, all the way to the disk. On failure nothing is left.
+    /// Writes and syncs the new files. Leaves nothing after a failure.
     fn fill(set: &OutputSet) -> Result<Self, Failed> {
-        // Readers go through this folder while files change.
-        let temporary = TemporaryFolder::create_open_in(&set.folder, STAGE).map_err(at(&set.folder))?;
+        // Readers need access to this folder during the exchange.
+        let temporary = TemporaryFolder::create_open_in(&set.folder, STAGE_PREFIX).map_err(at(&set.folder))?;
         let names: Vec<String> = set.files.iter().map(|(name, _)| name.clone()).collect();
         let path = temporary.path().to_owned();
         for folder in [NEW, OLD, PLACE_NEW, PLACE_OLD, LINKS] {
@@ -136,7 +133,7 @@ impl Stage {
         Ok(stage)
     }
 
-    /// Whether the file system has both kinds of links. That the disk is full is no answer: the exchange will say so.
+    /// Whether the file system supports symbolic and hard links. A full disk is ignored here; the exchange reports it.
     fn has_links(&self) -> bool {
         let (soft, hard) = (self.path.join("soft"), self.path.join("hard"));
         let full = |error: io::Error| matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
@@ -146,8 +143,8 @@ impl Stage {
         has
     }
 
-    /// Lets every name lead to its old file through one link, turns that link to the new files, and puts these in the
-    /// links' places. All that needs room on the disk comes before the first file's place is touched.
+    /// Redirects every name to its old file through one link, switches that link to the new files, and replaces the
+    /// links by the new files. All steps that need disk space precede the first change of a file's place.
     fn exchange(self) -> Result<(), Failed> {
         self.prepare().map_err(|failed| self.given_up(failed))?;
         for name in &self.names {
@@ -159,14 +156,14 @@ impl Stage {
         self.places_synced().map_err(|failed| self.given_up(failed))?;
         let turned = fs::rename(self.path.join(NEXT), self.path.join(CURRENT)).map_err(at(&self.path));
         turned.map_err(|failed| self.given_up(failed))?;
-        // From here on the new set is what everybody reads; what cannot be cleared up now, the next set will.
+        // The new set is in force. The next write cleans up whatever fails from here on.
         if self.synced(&[""]).is_ok() {
             self.settle();
         }
         Ok(())
     }
 
-    /// Everything of the exchange that takes room on the disk.
+    /// Steps of the exchange that need disk space.
     fn prepare(&self) -> Result<(), Failed> {
         let of = |part: &str, name: &str| self.path.join(part).join(name);
         for name in &self.names {
@@ -193,15 +190,15 @@ impl Stage {
         self.synced(&[OLD, PLACE_OLD, PLACE_NEW, LINKS, ""])
     }
 
-    /// What the link at a file's place says: the way to the stage, relative, so that a folder can be moved or copied.
+    /// Target of the link at a file's place: a relative path to the stage, so that the folder can be moved or copied.
     fn link_of(&self, name: &str) -> PathBuf {
         let depth = Path::new(name).components().count() - 1;
         let up: PathBuf = std::iter::repeat_n("..", depth).collect();
         up.join(self.path.file_name().unwrap_or_default()).join(CURRENT).join(name)
     }
 
-    /// Puts files in the places of the links, those of the set in force, and removes the stage. Needs no room on
-    /// the disk. What cannot be done stays as it is: the links lead to the same files.
+    /// Replaces the links by the files of the set in force and removes the stage. Needs no disk space. A failure is
+    /// harmless: the links lead to the same files.
     fn settle(&self) {
         let in_force = fs::read_link(self.path.join(CURRENT)).unwrap_or_default();
         let places = if in_force == Path::new(NEW) { PLACE_NEW } else { PLACE_OLD };
@@ -215,18 +212,16 @@ impl Stage {
             }
         }
         if settled && self.places_synced().is_ok() {
-            // A stage that stays is only rubbish.
             let _ = remove_folder(&self.path);
         }
     }
 
-    /// Back to the old files after a failure.
     fn given_up(&self, failed: Failed) -> Failed {
         self.settle();
         failed
     }
 
-    /// Without links: all old files go before the first new one comes, so that never two sets stand beside each other.
+    /// Without links: moves all old files away before the first new one is placed, so that two sets are never mixed.
     fn put(self) -> Result<(), Failed> {
         for name in &self.names {
             let (place, old) = (self.folder.join(name), self.path.join(MOVED).join(name));
@@ -250,7 +245,6 @@ impl Stage {
         })
     }
 
-    /// The old files in their places again.
     fn put_back(&self, failed: Failed) -> Failed {
         let back = |name: &String| {
             let old = self.path.join(MOVED).join(name);
@@ -262,7 +256,6 @@ impl Stage {
         failed
     }
 
-    /// The new files that are not in their places yet.
     fn put_rest(&self) -> Result<(), Failed> {
         for name in &self.names {
             let (file, place) = (self.path.join(NEW).join(name), self.folder.join(name));
@@ -270,12 +263,10 @@ impl Stage {
                 fs::rename(&file, &place).map_err(at(&place))?;
             }
         }
-        // A stage that stays is only rubbish.
         let _ = remove_folder(&self.path);
         Ok(())
     }
 
-    /// Folders of the stage reach the disk.
     fn synced(&self, parts: &[&str]) -> Result<(), Failed> {
         for part in parts {
             let base = self.path.join(part);
@@ -290,7 +281,6 @@ impl Stage {
         Ok(())
     }
 
-    /// The folders of the files' places reach the disk.
     fn places_synced(&self) -> Result<(), Failed> {
         sync_folder(&self.folder).map_err(at(&self.folder))?;
         for below in self.folders_below() {
@@ -300,16 +290,16 @@ impl Stage {
         Ok(())
     }
 
-    /// Folders below that names of the set name.
     fn folders_below(&self) -> std::collections::BTreeSet<&Path> {
         let above = self.names.iter().flat_map(|name| Path::new(name).ancestors().skip(1));
         above.filter(|path| !path.as_os_str().is_empty()).collect()
     }
 }
 
-/// Clears up after a program that was killed: links give way to the files of the set that is in force.
+/// Cleans up after a killed program: replaces links by the files of the set in force.
 fn settle_interrupted(folder: &Path) {
-    let stages = names(folder).unwrap_or_default().into_iter().filter(|name| name.to_string_lossy().starts_with(STAGE));
+    let stages =
+        names(folder).unwrap_or_default().into_iter().filter(|name| name.to_string_lossy().starts_with(STAGE_PREFIX));
     for stage in stages {
         let Some(names) = names_of_stage(folder, Path::new(&stage)) else { continue };
         let stage = Stage { folder: folder.to_owned(), path: folder.join(stage), names };
@@ -323,9 +313,9 @@ fn settle_interrupted(folder: &Path) {
     }
 }
 
-/// Names of the set in a stage that was found in `folder`. The folder may come from a stranger, so a stage is left as
-/// it is (`None`) if a name or a symbolic link leads out of it or out of `folder`: moving its files would overwrite or
-/// remove files elsewhere.
+/// Names of the set in a stage in `folder`. The folder may come from an untrusted source, so `None` (leave the stage)
+/// if a name or a symbolic link leads out of the stage or of `folder`; moving its files could overwrite or remove other
+/// files.
 fn names_of_stage(folder: &Path, stage: &Path) -> Option<Vec<String>> {
     let is_through_link = |way: &Path| {
         let mut above = way.ancestors().skip(1).filter(|above| !above.as_os_str().is_empty());
@@ -344,8 +334,8 @@ fn names_of_stage(folder: &Path, stage: &Path) -> Option<Vec<String>> {
     names.iter().all(is_inside).then_some(names)
 }
 
-/// Keeps what stands at a place under two names: one to be read, one to be put back. A link of the user's own leads
-/// elsewhere, and is put back as the link that it is.
+/// Keeps the content of a place under two names: one to read, one to restore. A symbolic link of the user is restored
+/// as a link.
 fn keep_old(place: &Path, is_link: bool, read: &Path, back: &Path) -> io::Result<()> {
     if is_link {
         let target =
@@ -353,7 +343,7 @@ fn keep_old(place: &Path, is_link: bool, read: &Path, back: &Path) -> io::Result
         soft_link(&target, read)?;
         return soft_link(&fs::read_link(place)?, back);
     }
-    // Another user's file may refuse to be linked: its contents are what counts.
+    // The file of another user may refuse hard links; then its content is copied.
     for kept in [read, back] {
         fs::hard_link(place, kept).or_else(|_| fs::copy(place, kept).and_then(|_| File::open(kept)?.sync_all()))?;
     }
@@ -379,7 +369,7 @@ fn write_synced(path: &Path, contents: &[u8]) -> io::Result<()> {
     file.sync_all()
 }
 
-/// Names in a folder reach the disk with the folder itself, where the system knows such a thing.
+/// Syncs the names in a folder, if the operating system supports it.
 fn sync_folder(path: &Path) -> io::Result<()> {
     if cfg!(unix) { File::open(path)?.sync_all() } else { Ok(()) }
 }
@@ -392,7 +382,7 @@ mod tests {
         fs::read_to_string(folder.join(name)).unwrap_or_default()
     }
 
-    /// The way for file systems without links, on one that has them.
+    /// Tests the fallback for file systems without links.
     #[test]
     fn without_links_a_set_still_replaces_a_set() {
         let folder = tempfile::tempdir().unwrap();
@@ -406,7 +396,7 @@ mod tests {
         assert_eq!(fs::read_dir(path).unwrap().count(), 3);
     }
 
-    /// Killed while the old files go, and while the new ones come.
+    /// Killed while old files are moved, and while new files are placed.
     #[test]
     fn without_links_an_interrupted_set_is_cleared_up() {
         let folder = tempfile::tempdir().unwrap();

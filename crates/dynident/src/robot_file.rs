@@ -1,4 +1,4 @@
-//! A robot file; the program `xacro` expands its macros, if that is permitted.
+//! Robot files; the program `xacro` expands macros if permitted.
 
 use crate::error::{Error, XacroError};
 use dynident_model::{MAX_DESCRIPTION_BYTES, Robot, load_robot_with};
@@ -6,10 +6,10 @@ use dynident_system::{ProgramPermission, ProgramPurpose, ProgramRequest, RunLimi
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// How the program `xacro` is called.
+/// Arguments and time limit of the program `xacro`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct XacroSettings {
-    /// Arguments by their names: `xacro FILE NAME:=VALUE`. Without one its default in the file is used.
+    /// Arguments by name: `xacro FILE NAME:=VALUE`. Missing ones have their default in the file.
     pub arguments: BTreeMap<String, String>,
     /// Time limit of the program, s. Default [`DEFAULT_LIMIT_S`](Self::DEFAULT_LIMIT_S).
     pub limit_s: f64,
@@ -17,13 +17,13 @@ pub struct XacroSettings {
 
 impl XacroSettings {
     /// The default time limit, s. xacro 2.1.1 expands a UR10 in 0.06 s of processor time, in 0.8 s on a busy computer;
-    /// the limit leaves room for large robots and a first start from a slow disk.
+    /// the limit allows for large robots and a slow disk.
     pub const DEFAULT_LIMIT_S: f64 = 30.0;
 
     /// Checks the settings.
     ///
     /// # Errors
-    /// A name that is no name of a xacro argument; a time limit that is not positive.
+    /// An invalid argument name, or a time limit that is not positive.
     pub fn validate(&self) -> Result<(), XacroError> {
         let is_name = |name: &str| {
             name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
@@ -39,9 +39,8 @@ impl XacroSettings {
         Ok(())
     }
 
-    /// The command that expands a file.
     fn request(&self, file: &str) -> ProgramRequest {
-        // A name that begins with a dash would be an option.
+        // A name that starts with a dash would be an option.
         let file = if file.starts_with('-') { format!("./{file}") } else { file.to_owned() };
         let arguments = self.arguments.iter().map(|(name, value)| format!("{name}:={value}"));
         ProgramRequest::new(ProgramPurpose::Xacro, ["xacro".to_owned(), file].into_iter().chain(arguments))
@@ -54,24 +53,23 @@ impl Default for XacroSettings {
     }
 }
 
-/// How a robot file is read. By default no program is started.
+/// Settings for reading a robot file. By default no program is started.
 #[derive(Clone, Default)]
 pub struct LoadSettings<'a> {
-    /// How the program `xacro` is called.
+    /// Settings of the program `xacro`.
     pub xacro: XacroSettings,
     /// Whether it may be started.
     pub programs: ProgramPermission<'a>,
-    /// Stops it once it returns true.
+    /// Stops the program when it returns true.
     pub is_stopped: Option<&'a dyn Fn() -> bool>,
 }
 
-/// Reads a robot file as [`dynident_model::load_robot`] does. A file with xacro macros is expanded by the program
-/// `xacro`, if `settings` permit that: xacro evaluates Python expressions of the file, so that a file from a stranger
-/// can run any command.
+/// Reads a robot file like [`dynident_model::load_robot`]. A file with xacro macros is expanded by the program `xacro`
+/// if `settings` permit that: xacro evaluates Python expressions of the file, so an untrusted file can run any command.
 ///
 /// # Errors
-/// [`Error::Robot`] if the file cannot be read; [`Error::Xacro`] if it cannot be expanded, and for xacro arguments of a
-/// file without macros.
+/// [`Error::Robot`] if the file cannot be read; [`Error::Xacro`] if it cannot be expanded, and for xacro arguments for
+/// a file without macros.
 pub fn load_robot(path: &Path, settings: &LoadSettings<'_>) -> Result<Robot, Error> {
     let wrong = |source: XacroError| Error::Xacro { path: path.to_owned(), source: Box::new(source) };
     settings.xacro.validate().map_err(wrong)?;
@@ -83,7 +81,6 @@ pub fn load_robot(path: &Path, settings: &LoadSettings<'_>) -> Result<Robot, Err
     if has_macros || settings.xacro.arguments.is_empty() { Ok(robot) } else { Err(wrong(XacroError::NoMacros)) }
 }
 
-/// What xacro makes of a file.
 fn expanded(path: &Path, settings: &LoadSettings<'_>) -> Result<String, XacroError> {
     let file = path.to_str().ok_or(XacroError::Path)?;
     let request = settings.xacro.request(file);
@@ -98,7 +95,7 @@ fn expanded(path: &Path, settings: &LoadSettings<'_>) -> Result<String, XacroErr
     String::from_utf8(bytes).map_err(|_| XacroError::NotText)
 }
 
-/// A name for the expanded file: never that of the file itself.
+/// Name of the expanded file, which differs from that of the input.
 fn expanded_name(file: &str) -> String {
     let name = Path::new(file).file_name().map_or_else(|| file.to_owned(), |name| name.to_string_lossy().into_owned());
     let name = name.strip_suffix(".xacro").unwrap_or(&name);

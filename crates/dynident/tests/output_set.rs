@@ -1,4 +1,4 @@
-//! Killed at any moment and with a full disk, a folder of outputs holds one whole set: the old one or the new one.
+//! Killed at any moment or with a full disk, an output folder contains one complete set: the old one or the new one.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 #![cfg(unix)]
@@ -10,10 +10,10 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 const FOLDER: &str = "DYNIDENT_TEST_OUTPUTS";
-/// Every set has a file of each of these names but one, the absent one, which changes from set to set.
+/// All but one of these files are in every set; the missing one changes from set to set.
 const NAMES: [&str; 4] = ["result.json", "report.html", "identified.urdf", "study/arm.toml"];
 
-/// Set number `k`; its files say which it is, and are as long as `long`.
+/// Set number `k`; its files contain the number and have `long` bytes.
 fn set(folder: &Path, k: usize, long: usize) -> OutputSet {
     let mut set = OutputSet::new(folder);
     for (place, name) in NAMES.iter().enumerate() {
@@ -23,7 +23,7 @@ fn set(folder: &Path, k: usize, long: usize) -> OutputSet {
     set
 }
 
-/// The number of the set that stands in the folder; none if there is none. Fails on parts of two sets.
+/// Number of the set in the folder; `None` if there is none. Fails on a mixture of two sets.
 fn found(folder: &Path) -> Option<usize> {
     let number = |name: &str| -> Option<usize> {
         let text = std::fs::read_to_string(folder.join(name)).ok()?;
@@ -37,14 +37,14 @@ fn found(folder: &Path) -> Option<usize> {
     all[0]
 }
 
-/// The process that is killed: this very program with this test alone. It writes set after set.
+/// The killed process: this program with this test alone, which writes sets repeatedly.
 #[test]
 #[ignore = "the child of the tests below"]
 fn child() {
     let Ok(folder) = std::env::var(FOLDER) else { return };
     let folder = Path::new(&folder);
     let from = found(folder).map_or(1, |k| k + 1);
-    // As many as are asked for: faults can be put into one set alone.
+    // The number of sets can be one, to test faults.
     let sets = std::env::var("DYNIDENT_TEST_SETS").map_or(100_000, |sets| sets.parse().unwrap());
     for k in from..from + sets {
         set(folder, k, 3000).write().unwrap();
@@ -69,7 +69,7 @@ fn killed_at_any_moment_one_whole_set_is_there() {
     let (mut last, mut interrupted) = (0, 0);
     for _ in 0..dynident_testing::count(50, 1000) {
         let mut running = spawned(folder.path());
-        // The program's start takes a few milliseconds, a set about as long.
+        // The program starts in a few ms; a set takes about as long.
         std::thread::sleep(Duration::from_secs_f64(random.uniform(0.005, 0.06)));
         running.kill().unwrap();
         running.wait().unwrap();
@@ -79,7 +79,7 @@ fn killed_at_any_moment_one_whole_set_is_there() {
         interrupted += usize::from(stages(folder.path()) > 0);
     }
     assert!(last > 0 && interrupted > 0, "no kill fell into the writing: {last} sets, {interrupted} interrupted");
-    // The next set clears up: files in place of links, the user's own untouched.
+    // The next set cleans up: files replace links, the user's link is kept.
     set(folder.path(), last + 1, 10).write().unwrap();
     assert_eq!((found(folder.path()), stages(folder.path())), (Some(last + 1), 0));
     assert!(NAMES.iter().all(|name| !folder.path().join(name).is_symlink()));
@@ -87,7 +87,7 @@ fn killed_at_any_moment_one_whole_set_is_there() {
     println!("{last} sets written, {interrupted} kills in the middle of one");
 }
 
-/// A stage that a stranger prepared in `folder`: it moves `name` from its new files to its place.
+/// A stage prepared by an attacker in `folder`: it moves `name` from its new files to its place.
 fn prepared_stage(folder: &Path, name: &str) -> PathBuf {
     let stage = folder.join(".dynident-set-abcdef");
     std::fs::create_dir_all(stage.join("new")).unwrap();
@@ -96,7 +96,7 @@ fn prepared_stage(folder: &Path, name: &str) -> PathBuf {
     stage
 }
 
-/// Checks that the next set is written and that the file outside of the folder is still there.
+/// Checks that the next set is written and that the outside file remains.
 fn assert_next_set_keeps_outside(folder: &Path, outside: &Path) {
     set(folder, 1, 10).write().unwrap();
     assert_eq!(found(folder), Some(1));
@@ -115,14 +115,14 @@ fn a_prepared_stage_moves_no_files_outside_of_its_folder() {
         std::fs::create_dir(&folder).unwrap();
         folder
     };
-    // A folder above the file's place is a link: the file would be overwritten.
+    // A parent folder of the file's place is a link: the file would be overwritten.
     let folder = output("place");
     symlink(&outside, folder.join("link")).unwrap();
     let stage = prepared_stage(&folder, "link/key");
     std::fs::create_dir(stage.join("new/link")).unwrap();
     std::fs::write(stage.join("new/link/key"), "foreign").unwrap();
     assert_next_set_keeps_outside(&folder, &outside);
-    // The folder of the new files is a link, or one below it: the file would be moved away.
+    // The folder of new files, or one below it, is a link: the file would be moved.
     let folder = output("new");
     let stage = prepared_stage(&folder, "key");
     std::fs::remove_dir(stage.join("new")).unwrap();
@@ -152,27 +152,26 @@ fn a_stage_with_a_pipe_for_its_names_does_not_block() {
     assert_eq!((found(folder.path()), stages(folder.path())), (Some(1), 0));
 }
 
-/// Stages of sets on their way.
 fn stages(folder: &Path) -> usize {
     let entries = std::fs::read_dir(folder).unwrap().flatten();
     entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(".dynident-set-")).count()
 }
 
-/// The child on a small file system of its own, which only it sees: it fills that to all but `free` KiB and writes.
+/// Child process on a separate small file system: it fills all but `free` KiB and writes.
 #[test]
 #[ignore = "the child of the test below"]
 fn child_on_a_full_disk() {
     let Ok(folder) = std::env::var(FOLDER) else { return };
     let folder = Path::new(&folder);
     set(folder, 1, 3000).write().unwrap();
-    // A page at a time until the set fits: every point at which the disk can be full on the way.
+    // One page at a time until the set fits, which covers all possible failure points.
     let ballast = |page: usize| folder.join(format!("ballast-{page}"));
     let mut pages = 0;
     while std::fs::write(ballast(pages), [1_u8; 4096]).is_ok() {
         pages += 1;
     }
     for (failures, page) in (0..=pages).rev().enumerate() {
-        // The last one may have failed before it had a name.
+        // The last file may have failed before it was created.
         let _ = std::fs::remove_file(ballast(page));
         let Err(error) = set(folder, 2, 9000).write() else {
             assert_eq!((found(folder), stages(folder)), (Some(2), 0));
@@ -180,13 +179,13 @@ fn child_on_a_full_disk() {
             return;
         };
         assert!(matches!(error, Error::Output { .. }), "{error}");
-        assert!(error.to_string().contains("nothing that was there has changed"), "{error}");
+        assert!(error.to_string().contains("existing files are unchanged"), "{error}");
         assert_eq!((found(folder), stages(folder)), (Some(1), 0), "{error}");
     }
     panic!("the set never fitted");
 }
 
-/// Needs a file system of its own: a user namespace, which not every system gives to everybody.
+/// Needs a separate file system in a user namespace, which is not available on every system.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_leaves_the_old_set() {
@@ -206,7 +205,7 @@ fn a_full_disk_leaves_the_old_set() {
         };
         let out = String::from_utf8_lossy(&ran.stdout).into_owned() + &String::from_utf8_lossy(&ran.stderr);
         if ran.status.code() == Some(77) || out.contains("unshare") {
-            println!("skipped: no file system of its own: {out}");
+            println!("skipped: no separate file system: {out}");
             return;
         }
         assert!(ran.status.success(), "{out}");

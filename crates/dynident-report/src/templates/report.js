@@ -2,12 +2,12 @@
 (() => {
   const root = document.documentElement;
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  // Samples up to which each is marked, as in the still pictures.
+  // Maximum number of samples with markers, as in the static pictures.
   const marked = 250;
   const theme = (name) => { root.dataset.theme = name; };
   theme(dark.matches ? "dark" : "light");
 
-  // A column is sorted by its numbers if all its cells are numbers, else by its letters.
+  // Sorts a column numerically if all cells are numbers, otherwise alphabetically.
   for (const table of document.querySelectorAll("table")) {
     table.querySelectorAll("th").forEach((head, column) => {
       const button = document.createElement("button");
@@ -65,7 +65,7 @@
 
   const plots = [];
   const width = (holder) => Math.max(holder.clientWidth, 280);
-  // The curves, and below them the strip with their difference; both zoom together.
+  // The curves and the strip with their difference; both zoom together.
   const draw = (entry) => {
     const { holder, data } = entry;
     const shown = entry.plot ? entry.plot.series.slice(1).map((series) => series.show) : [];
@@ -124,7 +124,7 @@
         holder,
       );
     }
-    // A legend's entry switches its curve, by key as by click.
+    // A legend entry switches its curve, by key or click.
     holder.querySelectorAll(".u-legend .u-series th").forEach((head) => {
       head.tabIndex = 0;
       head.setAttribute("role", "button");
@@ -137,7 +137,7 @@
     holder.classList.add("live");
   };
 
-  // Arrows move the stretch that is shown, + and - zoom, 0 or Escape shows all.
+  // Arrows move the shown range, + and - zoom, 0 or Escape shows all.
   const steer = (entry) => (event) => {
     if (event.target !== entry.holder || !entry.plot) return;
     const all = entry.data.x;
@@ -168,7 +168,7 @@
     holder.addEventListener("keydown", steer(entry));
     plots.push(entry);
   }
-  // Only what comes into view is drawn: a long page opens at once.
+  // Plots are drawn when they become visible, so that a long page opens quickly.
   const seen = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) {
       const entry = plots.find((plot) => plot.holder === target);

@@ -1,9 +1,9 @@
-//! The whole page: nothing that it is given becomes markup or script, and it asks nothing of any network.
+//! The complete page: no content becomes markup or script, and there is no network access.
 use dynident_report::{
     BarPlot, Cell, ConvergencePlot, Diagram, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone,
 };
 
-/// Ends every context that a page has: element, attribute, script, comment.
+/// Ends every context of a page: element, attribute, script, comment.
 const HOSTILE: &str = "</script><script>alert(1)</script><!-- \"'><img src=x onerror=alert(2)> `<b onclick=alert(3)>` ${x} {{ 7*7 }} {% raw %} */";
 
 fn page_of(text: &str) -> String {
@@ -28,7 +28,6 @@ fn names_never_become_markup_or_script() {
         assert_eq!(hostile.matches(what).count(), harmless.matches(what).count(), "{what}");
     }
     assert!(!hostile.contains("49 {%"), "a template ran twice");
-    // What is shown is what was given.
     assert!(hostile.contains("script&gt;&lt;script&gt;alert(1)"));
     for data in hostile.split("data-plot=").skip(1) {
         let json = data.split_once('>').unwrap().1.split_once("</script>").unwrap().0;
@@ -46,7 +45,7 @@ fn the_page_needs_nothing_else() {
     for outside in ["src=\"http", "href=\"http", "@import", "url(http", "fetch(", "XMLHttpRequest"] {
         assert!(!page.contains(outside), "{outside}");
     }
-    // No plots, no plotting library.
+    // Without plots the plot library is not included.
     let plain = Report::new("plain").html().unwrap();
     assert!(!plain.contains("uPlot 1.6") && plain.len() < 20_000);
 }
@@ -90,11 +89,11 @@ fn a_million_samples_make_a_small_page() {
     let curve = |phase: f64| time.iter().map(|t| (3.0 * t + phase).sin()).collect::<Vec<_>>();
     let mut report = Report::new("long");
     report.add(LinePlot::new("", "", "", time.clone()).line("a", curve(0.0)).line("b", curve(0.1)));
-    // 1200 columns, six samples each at most, three numbers of up to 14 letters; the library is 51 kB.
+    // 1200 columns, at most six samples each, three numbers of up to 14 characters; the library has 51 kB.
     assert!(report.html().unwrap().len() < 60_000 + 1200 * 6 * 3 * 15);
 }
 
-/// The value of a style's variable in the part of the style sheet that begins with `scope`.
+/// Value of a style variable in the part of the style sheet that starts with `scope`.
 fn variable(style: &str, scope: &str, name: &str) -> [f64; 3] {
     let part = style.split_once(scope).unwrap().1.split_once('}').unwrap().0;
     let value = part.split_once(&format!("--{name}: #")).unwrap().1.split_once(';').unwrap().0.trim();
@@ -110,7 +109,7 @@ fn contrast(one: [f64; 3], other: [f64; 3]) -> f64 {
     (one.max(other) + 0.05) / (one.min(other) + 0.05)
 }
 
-/// WCAG 2.2: 4.5 to one for text (1.4.3), three to one for what is drawn (1.4.11); in light, in dark and on paper.
+/// WCAG 2.2: a contrast of 4.5:1 for text (1.4.3), 3:1 for graphics (1.4.11); light, dark and in print.
 #[test]
 fn text_and_curves_stand_out_from_the_paper() {
     let style = include_str!("../../src/templates/report.css");
@@ -126,14 +125,14 @@ fn text_and_curves_stand_out_from_the_paper() {
             let ratio = contrast(of(&format!("c{number}")), of("paper"));
             assert!(ratio >= 3.0, "{scope} curve {number}: {ratio:.2}");
         }
-        // The broad curve below others, of the first colour at three quarters of its strength (`line_plot.svg`).
+        // The broad curve has the first colour with 75 % opacity (`line_plot.svg`).
         let (own, paper) = (of("c0"), of("paper"));
         let pale = [0, 1, 2].map(|k| 0.75 * own[k] + 0.25 * paper[k]);
         assert!(contrast(pale, paper) >= 3.0, "{scope} broad curve: {:.2}", contrast(pale, paper));
     }
 }
 
-/// Without its script, and on paper, a page shows every plot; and says it to who does not see it.
+/// Without scripts and in print, a page shows every plot, with a text for screen readers.
 #[test]
 fn every_plot_is_a_picture_with_words_before_any_script_runs() {
     let page = page_of("name");

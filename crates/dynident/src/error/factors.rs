@@ -1,63 +1,63 @@
-//! What can be wrong with factors.
+//! Errors of factor files.
 
 use dynident_estimation::EstimationError;
 use thiserror::Error;
 
-/// Why factors cannot be read or put together.
+/// Reason why factors cannot be read or merged.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FactorsError {
-    /// Not such a file.
-    #[error("this is no file of factors: give one that `reduce` wrote")]
+    /// Not a factor file.
+    #[error("this is no file of factors: give a file that `reduce` wrote")]
     Kind,
-    /// A version that this program does not read.
+    /// An unsupported version.
     #[error("version {found} of the format; this program reads version {known}: reduce the logs again with it")]
     Version {
-        /// The file's.
+        /// Version of the file.
         found: u32,
-        /// The program's.
+        /// Version of the program.
         known: u32,
     },
-    /// A part of a file.
-    #[error("the file ends at byte {bytes}, before its end: copy it again")]
+    /// A truncated file.
+    #[error("truncated file ({bytes} bytes): copy it again")]
     Short {
-        /// Its length.
+        /// Length, bytes.
         bytes: usize,
     },
-    /// A file that is not as it was written.
-    #[error("the contents do not have the hash that they were written with: copy the file again")]
+    /// A corrupt file.
+    #[error("corrupt file (hash mismatch): copy it again")]
     Hash,
-    /// A head that cannot be read, although its hash is right.
-    #[error("the head cannot be read: {problem}; reduce the logs again")]
+    /// An unreadable header with a valid hash.
+    #[error("unreadable header: {problem}; reduce the logs again")]
     Header {
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
-    /// Numbers that are no factor's.
+    /// Invalid numbers in a factor.
     #[error("log {log}: {source}; reduce it again")]
     Numbers {
         /// The log.
         log: String,
-        /// What is wrong.
+        /// The problem.
         source: EstimationError,
     },
-    /// Nothing to put together.
-    #[error("there are no factors to merge: give at least one")]
+    /// An empty list to merge.
+    #[error("no factors to merge: give at least one file")]
     Empty,
-    /// Factors of another robot, or made with other settings.
-    #[error("factors of different studies cannot be merged: {} differ; reduce all logs with one study (and like one model)", sections.iter().map(|name| format!("[{name}]")).collect::<Vec<_>>().join(", "))]
+    /// Factors of different robots or settings.
+    #[error("factors of different studies cannot be merged: {} differ; reduce all logs with the same study (and the same --like model)", sections.iter().map(|name| format!("[{name}]")).collect::<Vec<_>>().join(", "))]
     Unlike {
         /// The sections that differ.
         sections: Vec<String>,
     },
-    /// A study with code in it.
-    #[error("{part} is a function of a caller, and factors hold no code: identify from the logs themselves")]
+    /// A study with code of the caller.
+    #[error("{part} is a function of the caller, but factor files cannot contain code: identify from the logs")]
     Function {
-        /// Which part, and what its function is called.
+        /// The part with the name of its function.
         part: String,
     },
-    /// A study that needs a file beside it.
-    #[error("the torque table {file} lies beside the study, and factors hold no files: leave this torque out")]
+    /// A study that refers to a file.
+    #[error("the torque table {file} is a separate file, but factor files cannot contain files: remove this torque")]
     Table {
         /// The file.
         file: String,

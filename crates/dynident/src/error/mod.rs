@@ -1,4 +1,4 @@
-//! Everything that can stop a job, each with the file, the place and the fix in its message.
+//! Errors that end a job. Each message contains the file, the place and the fix.
 
 mod factors;
 mod new_study;
@@ -18,7 +18,7 @@ use dynident_system::ProgramRefused;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Why a job could not be done. All of these are bad usage or bad input: the command exits with status 2.
+/// Reason why a job failed. All are usage or input errors; the command exits with status 2.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -27,16 +27,16 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Reason from the operating system.
         source: std::io::Error,
     },
-    /// A file that is not the one that was first read: what is known of it does not belong to its hash.
-    #[error("{}: the file changed while it was read; wait until nothing writes to it, then run the command again", path.display())]
+    /// An input file that changed while it was read, so that its hash is not valid.
+    #[error("{}: the file changed while it was read; run the command again when no program writes to it", path.display())]
     Changed {
         /// The file.
         path: PathBuf,
     },
-    /// A study that is wrong at a place of its text.
+    /// An error at a place in the text of a study.
     #[error("{}:{line}:{column}: {source}", path.display())]
     StudyAt {
         /// The study file.
@@ -45,34 +45,34 @@ pub enum Error {
         line: u32,
         /// Column, from 1.
         column: u32,
-        /// What is wrong.
+        /// The problem.
         source: StudyError,
     },
-    /// A study that is wrong as a whole, or does not go with its robot.
+    /// An error of the whole study, or a mismatch with its robot.
     #[error("{}: {source}", path.display())]
     Study {
         /// The study file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         source: Box<StudyError>,
     },
-    /// A study whose model cannot be identified from its logs.
+    /// An identification that failed.
     #[error("{}: {source}", path.display())]
     Identification {
         /// The study file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         source: Box<IdentificationError>,
     },
-    /// A file of the study that is in none of its folders.
+    /// A file that is in none of the study's folders.
     #[error("{} is in none of the study's folders (tried {}); fix its path, or name its folder with --data{}",
         file.display(), list(tried), source_of_data.as_ref().map_or(String::new(), |s| format!(". The recordings are public: {s}")))]
     Missing {
         /// The file.
         file: PathBuf,
-        /// Where it was looked for.
+        /// The paths tried.
         tried: Vec<PathBuf>,
-        /// Where it can be had.
+        /// Source of the recordings.
         source_of_data: Option<String>,
     },
     /// A robot description that cannot be read.
@@ -83,10 +83,10 @@ pub enum Error {
     Xacro {
         /// The robot file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         source: Box<XacroError>,
     },
-    /// A study's program that was not permitted.
+    /// A program in the study that was not permitted.
     #[error(
         "{}: {source}. Read the command, and if you trust it, permit it (--allow-command; in Python allow_command=True)",
         path.display()
@@ -102,69 +102,69 @@ pub enum Error {
     Recording {
         /// The log.
         log: String,
-        /// What is wrong.
+        /// The problem.
         source: Box<RecordingError>,
     },
-    /// A report that could not be put together.
-    #[error("report.html: {0}; this is a defect of the program: please report it")]
+    /// A report that could not be built.
+    #[error("report.html: {0}; this is a bug in Dynident: please report it")]
     Report(#[from] dynident_report::ReportError),
     /// A result that does not belong to the study.
     #[error("{}: {message}", path.display())]
     Result {
         /// The result file.
         path: PathBuf,
-        /// What is wrong, and the fix.
+        /// The problem and the fix.
         message: String,
     },
-    /// Factors of logs that cannot be read or put together.
+    /// Factors that cannot be read or merged.
     #[error("{}: {source}", path.display())]
     Factors {
         /// The file, or the study.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         source: FactorsError,
     },
-    /// Recordings from which no study can be written.
+    /// Recordings from which a study cannot be written.
     #[error(transparent)]
     NewStudy(NewStudyError),
-    /// A model that a form cannot hold.
+    /// A model that the export target cannot represent.
     #[error("{}: {source}", path.display())]
     Export {
         /// The result file.
         path: PathBuf,
-        /// What cannot be written.
+        /// The problem.
         source: Box<ExportError>,
     },
-    /// A table of states that cannot be used.
+    /// An invalid table of states.
     #[error("{}:{line}: {message}", path.display())]
     States {
         /// The table.
         path: PathBuf,
         /// Line, from 1.
         line: u64,
-        /// What is wrong, and the fix.
+        /// The problem and the fix.
         message: String,
     },
-    /// Somebody asked for a stop before there was anything to keep.
-    #[error("{what} was interrupted, and nothing was kept of it: the same command begins it anew")]
+    /// A stop request before there was a result.
+    #[error("{what} was interrupted before there was a result: run the command again to restart it")]
     Interrupted {
-        /// What.
+        /// The interrupted step.
         what: &'static str,
     },
-    /// An output that would take the place of an input.
-    #[error("{}: would overwrite {}, which this command reads; nothing was written: give another --out", output.display(), input.display())]
+    /// An output that would overwrite an input.
+    #[error("{}: would overwrite the input {}; nothing was written: give another --out", output.display(), input.display())]
     Overwrite {
-        /// What would be written.
+        /// The output.
         output: PathBuf,
-        /// What is read.
+        /// The input.
         input: PathBuf,
     },
-    /// An output that cannot be written. What was there before is untouched.
-    #[error("{}: cannot be written: {source}; nothing that was there has changed", path.display())]
+    /// An output that cannot be written. Existing files are unchanged.
+    #[error("{}: cannot be written: {source}; existing files are unchanged", path.display())]
     Output {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Reason from the operating system.
         source: std::io::Error,
     },
 }
@@ -176,22 +176,21 @@ impl From<ReadError> for Error {
 }
 
 impl Error {
-    /// A log that cannot be read.
     pub(crate) fn recording(log: &str, source: RecordingError) -> Self {
         Self::Recording { log: log.to_owned(), source: Box::new(source) }
     }
 
-    /// For `map_err`: what stops an identification of the study at `path`.
+    /// For `map_err`: wraps an identification error of the study at `path`.
     pub(crate) fn identification<E: Into<IdentificationError>>(path: &Path) -> impl Fn(E) -> Self {
         move |source| Self::Identification { path: path.to_owned(), source: Box::new(source.into()) }
     }
 
-    /// For `map_err`: what is wrong in the study at `path`.
+    /// For `map_err`: wraps an error in the study at `path`.
     pub(crate) fn study<E: Into<StudyError>>(path: &Path) -> impl Fn(E) -> Self {
         move |source| Self::Study { path: path.to_owned(), source: Box::new(source.into()) }
     }
 
-    /// For `map_err`: what is wrong in a section of the study at `path`.
+    /// For `map_err`: wraps an error in a section of the study at `path`.
     pub(crate) fn section<E: Into<StudyError>>(path: &Path, section: &str) -> impl Fn(E) -> Self {
         move |source| Self::study(path)(StudyError::at(format!("[{section}]"))(source))
     }

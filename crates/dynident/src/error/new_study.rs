@@ -1,36 +1,37 @@
-//! Why no study can be written from recordings.
+//! Errors of `new`.
 
 use thiserror::Error;
 
-/// Names of columns that a message shows at most.
-const SHOWN: usize = 12;
+/// Maximum number of column names in a message.
+const MAX_SHOWN: usize = 12;
 
-/// Why no study can be written from these recordings.
+/// Reason why a study cannot be written from these recordings.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum NewStudyError {
-    /// No columns of a quantity, or not for the joints of the positions.
-    #[error("no columns of {quantity} were recognised among {}; write the study by hand: docs/src/your-robot.md, and `dynident log` for what a recording holds", shown(.columns))]
+    /// No columns for a quantity, or not for the joints of the positions.
+    #[error("no columns of {quantity} recognised among {}; write the study by hand (docs/src/your-robot.md); `dynident log` shows the contents of a recording", shown(.columns))]
     NotRecognised {
-        /// Positions, or torques or currents.
+        /// `positions`, or `torques or currents`.
         quantity: &'static str,
         /// All columns.
         columns: Vec<String>,
     },
-    /// More positions than joints.
+    /// More position columns than joints.
     #[error(
-        "{columns} columns of positions, and the description has {joints} joints that move by themselves: is it the robot of this recording?"
+        "{columns} position columns, but the robot description has {joints} independent joints: check that it is the robot of this recording"
     )]
     MoreColumnsThanJoints {
-        /// Columns of positions.
+        /// Position columns.
         columns: usize,
-        /// Joints that follow no other.
+        /// Independent joints.
         joints: usize,
     },
 }
 
 fn shown(columns: &[String]) -> String {
-    let first: Vec<&str> = columns.iter().take(SHOWN).map(String::as_str).collect();
-    let more = if columns.len() > SHOWN { format!(" and {} more", columns.len() - SHOWN) } else { String::new() };
+    let first: Vec<&str> = columns.iter().take(MAX_SHOWN).map(String::as_str).collect();
+    let more =
+        if columns.len() > MAX_SHOWN { format!(" and {} more", columns.len() - MAX_SHOWN) } else { String::new() };
     format!("{}{more}", first.join(", "))
 }

@@ -1,4 +1,4 @@
-//! What can be wrong in a study: the key, the value, and what it may be.
+//! Errors in a study: key, value, and valid values.
 
 use super::XacroError;
 use core::fmt;
@@ -19,31 +19,31 @@ use dynident_recording::FilterError;
 use dynident_simulation::SimulationError;
 use thiserror::Error;
 
-/// What is wrong in a study.
+/// Error in a study.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StudyError {
-    /// What is wrong at a place of the study.
+    /// An error at a place in the study.
     #[error("{place}: {source}")]
     At {
-        /// The section, or the entry of a list.
+        /// The section, or the list entry.
         place: String,
-        /// What is wrong there.
+        /// The error.
         source: Box<StudyError>,
     },
-    /// A text that TOML does not allow, or a key that a study does not have.
+    /// Invalid TOML, or an unknown key.
     #[error("{problem}; docs/src/study.md lists every key")]
     Toml {
-        /// What the reader says.
+        /// Message of the parser.
         problem: String,
     },
-    /// A file in another encoding.
+    /// Another encoding than UTF-8.
     #[error("not UTF-8 text: save the study as UTF-8")]
     NotUtf8,
     /// A file that is too large for a study.
-    #[error("larger than {} MiB: name a study file", most_bytes >> 20)]
+    #[error("larger than {} MiB: give a study file", most_bytes >> 20)]
     TooLarge {
-        /// Most bytes.
+        /// Maximum size, bytes.
         most_bytes: u64,
     },
     /// A number outside its range.
@@ -53,7 +53,7 @@ pub enum StudyError {
         key: String,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// The valid values.
         expected: Expected,
     },
     /// An array with a number outside its range.
@@ -63,11 +63,11 @@ pub enum StudyError {
         key: String,
         /// Its values.
         values: Vec<f64>,
-        /// What each may be.
+        /// The valid values.
         expected: &'static str,
     },
-    /// A list that has not one entry for each joint.
-    #[error("{key} has {found} entries, the robot {expected} joints: give one each")]
+    /// A list whose length differs from the number of joints.
+    #[error("{key} has {found} entries, the robot {expected} joints: give one entry per joint")]
     Length {
         /// The key.
         key: &'static str,
@@ -76,40 +76,40 @@ pub enum StudyError {
         /// Joints.
         expected: usize,
     },
-    /// A name that stands for nothing.
-    #[error("{key}: there is no {what} `{name}`; there is {}", known.join(", "))]
+    /// An unknown name.
+    #[error("{key}: unknown {what} `{name}`; known: {}", known.join(", "))]
     Unknown {
         /// The key.
         key: &'static str,
-        /// What was looked for.
+        /// The kind of object.
         what: &'static str,
         /// The name.
         name: String,
-        /// The names there are.
+        /// The known names.
         known: Vec<String>,
     },
-    /// A name that no log has, or several have.
+    /// A name of no log, or of several logs.
     #[error("{}", log_name(name, *found, known))]
     LogName {
         /// The name.
         name: String,
-        /// How many logs are called so.
+        /// Number of logs with the name.
         found: usize,
         /// The names of all logs.
         known: Vec<String>,
     },
-    /// A name that stands twice in a list.
+    /// A duplicate name in a list.
     #[error("{what} `{name}` stands twice: {fix}")]
     Twice {
-        /// The list.
+        /// The kind of list.
         what: String,
         /// The name.
         name: String,
-        /// What to do.
+        /// The fix.
         fix: &'static str,
     },
-    /// A joint under two keys that exclude each other.
-    #[error("{key}: joint `{joint}` is {state} as well: take it out of {key} or of {other}")]
+    /// A joint under two exclusive keys.
+    #[error("{key}: joint `{joint}` is {state} as well: remove it from {key} or from {other}")]
     JointInBoth {
         /// The joint.
         joint: String,
@@ -117,108 +117,108 @@ pub enum StudyError {
         key: &'static str,
         /// The other key.
         other: &'static str,
-        /// What the other key makes of a joint.
+        /// State of the joint under the other key.
         state: &'static str,
     },
-    /// A held-out log with samples that the model is fitted to.
+    /// A held-out log that contains training samples.
     #[error(
-        "log `{held_out}` is to test what `{training}` is fitted to, and has samples of it: give the two parts of a file that do not overlap (both by rows, by fraction, or by time_range_s), or another file"
+        "log `{held_out}` is to test what `{training}` is fitted to, and has samples of it: give parts of the file that do not overlap (both by rows, by fraction, or by time_range_s), or another file"
     )]
     Overlap {
-        /// The log that is fitted to.
+        /// The training log.
         training: String,
-        /// The log to test on.
+        /// The held-out log.
         held_out: String,
     },
-    /// A held-out log that holds samples which the model is fitted to, saved once more.
+    /// A held-out log in another file that contains the same samples as a training log.
     #[error(
-        "log `{held_out}` is to test what `{training}` is fitted to, and holds the same samples: from its row {held_out_row} on they are those of `{training}` from row {training_row} on (no two runs of a robot agree to the last digit in every position and torque): give a log of another run, or parts that do not overlap"
+        "validation log `{held_out}` contains the same samples as the training log `{training}`: its row {held_out_row} and the following equal those of `{training}` from row {training_row} (two runs never have identical positions and torques): give a log of another run, or parts that do not overlap"
     )]
     SameSamples {
-        /// The log that is fitted to.
+        /// The training log.
         training: String,
-        /// Its 0-based data row from which on both are the same.
+        /// First common row of the training log, 0-based.
         training_row: u64,
-        /// The log to test on.
+        /// The held-out log.
         held_out: String,
-        /// The same of the log to test on.
+        /// First common row of the held-out log, 0-based.
         held_out_row: u64,
     },
-    /// Keys of which one can be given.
+    /// Exclusive keys.
     #[error("{} are both given: keep one", keys.join(" and "))]
     Exclusive {
-        /// The keys given.
+        /// The stated keys.
         keys: Vec<&'static str>,
     },
-    /// Something that the job needs and the study does not have.
+    /// A missing part of the study.
     #[error("{what}: {fix}")]
     Missing {
-        /// What is not there.
+        /// The missing part.
         what: String,
-        /// What to do.
+        /// The fix.
         fix: String,
     },
-    /// A key that does not go with the rest of the study.
+    /// A key that conflicts with the rest of the study.
     #[error("{key}: {fix}")]
     Conflict {
         /// The key.
         key: String,
-        /// With what it does not go, and what to do.
+        /// The conflict and the fix.
         fix: &'static str,
     },
-    /// Bodies whose inertial parameters the job needs.
+    /// Bodies without the inertial parameters that a job needs.
     #[error("the inertial parameters of {} are unknown: {fix}", bodies.join(", "))]
     NoInertials {
         /// The bodies.
         bodies: Vec<String>,
-        /// What to do.
+        /// The fix.
         fix: &'static str,
     },
-    /// How the program `xacro` is called.
+    /// An error of the program `xacro` or its settings.
     #[error("robot: {0}")]
     Xacro(Box<XacroError>),
-    /// A joint that nothing keeps from moving infinitely fast.
+    /// A joint without a limit on its speed.
     #[error(
-        "joint `{joint}` has no limit of speed, acceleration, jerk, torque or power, so that the best motion would be infinitely fast; give one: joints = [{{ joint = \"{joint}\", acceleration = ... }}]"
+        "joint `{joint}` has no limit of speed, acceleration, jerk, torque or power, so its motion could be infinitely fast; give one: joints = [{{ joint = \"{joint}\", acceleration = ... }}]"
     )]
     Unbounded {
         /// The joint.
         joint: String,
     },
     /// A joint without a limit that its stroke needs.
-    #[error("joint `{joint}` has no {limit} limit, which a stroke needs: give one in limits.joints")]
+    #[error("joint `{joint}` has no {limit} limit, which a stroke needs: add it in limits.joints")]
     NoStrokeLimit {
         /// The joint.
         joint: String,
         /// The limit.
         limit: &'static str,
     },
-    /// A stroke that begins where its joint may not be.
+    /// A stroke that starts outside of the position limits.
     #[error(
-        "family.offsets: joint `{joint}` starts its stroke at {offset_rad} rad, but its limits are {} to {} rad; a stroke goes up from its offset",
+        "family.offsets: joint `{joint}` starts its stroke at {offset_rad} rad, but its limits are {} to {} rad; a stroke moves in the positive direction",
         limits_rad[0], limits_rad[1]
     )]
     StrokeStart {
         /// The joint.
         joint: String,
-        /// Where its stroke starts.
+        /// Start of the stroke, rad.
         offset_rad: f64,
-        /// Its limits.
+        /// Position limits, rad.
         limits_rad: [f64; 2],
     },
-    /// A robot that cannot be made of its description.
+    /// An invalid robot model.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A closed chain that is not what the study says.
+    /// An inconsistent closed chain.
     #[error("[[robot.loop]]: {0}")]
     Loop(#[from] LoopError),
-    /// An expression that cannot be read.
+    /// An invalid expression.
     #[error("expression {0}")]
     Expression(#[from] ExpressionError),
-    /// A table that says no torque.
+    /// An invalid torque table.
     #[error("table: {0}")]
     Table(#[from] TorqueTableError),
-    /// Bodies and torque terms that do not fit.
+    /// Bodies and torque terms that do not match.
     #[error(transparent)]
     ParametricModel(#[from] ParametricModelError),
     /// A payload that does not belong to the robot.
@@ -230,7 +230,7 @@ pub enum StudyError {
     /// The parallel filter.
     #[error(transparent)]
     ParallelFilter(#[from] ParallelFilterError),
-    /// The repeated motion of an estimator.
+    /// The periodic motion of an estimator.
     #[error(transparent)]
     Periods(#[from] PeriodError),
     /// A setting of an estimator.
@@ -272,7 +272,7 @@ impl From<XacroError> for StudyError {
 }
 
 impl StudyError {
-    /// For `map_err`: what is wrong, at `place`.
+    /// For `map_err`: adds `place` to an error.
     pub(crate) fn at<E: Into<Self>>(place: impl Into<String>) -> impl FnOnce(E) -> Self {
         move |source| Self::At { place: place.into(), source: Box::new(source.into()) }
     }
@@ -286,24 +286,24 @@ impl StudyError {
     }
 }
 
-/// What a number may be.
+/// Valid values of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Expected {
-    /// Least and greatest.
+    /// Minimum and maximum, inclusive.
     Range(f64, f64),
-    /// The limits of a joint's position, rad (m).
+    /// Limits of a joint's position, rad (m).
     PositionLimits(f64, f64),
     /// Above zero.
     Positive,
     /// Zero or more.
     NotNegative,
-    /// Any that is finite.
+    /// Any finite number.
     Finite,
 }
 
 impl Expected {
-    /// The value of a key, if it is as expected; NaN never is.
+    /// Checks the value of a key; NaN is always invalid.
     ///
     /// # Errors
     /// [`StudyError::Number`].
@@ -333,7 +333,7 @@ impl fmt::Display for Expected {
 fn log_name(name: &str, found: usize, known: &[String]) -> String {
     let known = known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     match found {
-        0 => format!("no log is called `{name}`: the study's logs are {known}"),
-        _ => format!("{found} logs are called `{name}`: give each a name of its own; they are {known}"),
+        0 => format!("unknown log `{name}`; the study's logs are {known}"),
+        _ => format!("{found} logs have the name `{name}`: give each a unique name; the logs are {known}"),
     }
 }

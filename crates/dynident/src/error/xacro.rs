@@ -1,16 +1,16 @@
-//! Why the macros of a robot file cannot be expanded.
+//! Errors of macro expansion.
 
 use dynident_system::RunError;
 use thiserror::Error;
 
-/// Why the macros of a robot file cannot be expanded.
+/// Reason why the macros of a robot file cannot be expanded.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum XacroError {
     /// No program may be started.
     #[error(
-        "the file contains macros that only the program xacro can expand. xacro runs Python code of the file, so that \
-         it needs permission, and nothing was started. If you trust the file, permit it (--allow-command; in Python \
+        "the file contains macros, which need the program xacro. xacro runs Python code of the file, so \
+         it needs permission; no program was started. If you trust the file, permit it (--allow-command; in Python \
          allow_command=True), or expand the file yourself and use the result:\n  {by_hand}"
     )]
     NotPermitted {
@@ -20,20 +20,20 @@ pub enum XacroError {
     /// The program failed, or was stopped.
     #[error("the macros of the file cannot be expanded: {source}{}", fix(source))]
     Program {
-        /// How.
+        /// The failure.
         #[from]
         source: RunError,
     },
-    /// The output of the program is no text.
+    /// The output of the program is not text.
     #[error("the macros of the file cannot be expanded: the output of xacro is not UTF-8 text")]
     NotText,
-    /// The file's path cannot be given to the program.
-    #[error("the path is not UTF-8 text, and cannot be given to xacro: rename the file")]
+    /// A file path that cannot be passed to the program.
+    #[error("the path is not UTF-8 text and cannot be passed to xacro: rename the file")]
     Path,
-    /// Arguments for a file that needs no program.
+    /// Arguments for a file without macros.
     #[error("the file contains no xacro macros: remove the xacro arguments ([robot] xacro, --xacro)")]
     NoMacros,
-    /// A name that cannot be the name of an argument.
+    /// An invalid argument name.
     #[error(
         "invalid xacro argument `{name}` = `{value}`: a name consists of ASCII letters, digits and `_-./` and begins with a letter or `_`"
     )]
@@ -51,7 +51,7 @@ pub enum XacroError {
     },
 }
 
-/// What to do about a failure.
+/// Fix for a failure.
 fn fix(failure: &RunError) -> &'static str {
     match failure {
         RunError::NotFound { .. } => {

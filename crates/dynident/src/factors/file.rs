@@ -1,4 +1,4 @@
-//! The file of factors, version 1.
+//! File format of factors, version 1.
 //!
 //! ```text
 //!     bytes                what
@@ -26,10 +26,8 @@ use std::path::PathBuf;
 
 const MAGIC: &[u8; 16] = b"DYNIDENT FACTORS";
 const VERSION: u32 = 1;
-/// Bytes before the head.
-const BEFORE_HEAD: usize = 32;
-/// Bytes of the hash.
-const HASH: usize = 32;
+const HEADER_START: usize = 32;
+const HASH_BYTES: usize = 32;
 
 #[derive(Serialize, Deserialize)]
 struct Head {
@@ -60,11 +58,11 @@ struct HeadLog {
 }
 
 impl Factors {
-    /// The factors as one file: versioned, with a hash at its end. About `joints × segments × (columns + 1)² × 4` bytes
-    /// for each log.
+    /// Serialises the factors to one file with a version and a hash. About `joints × segments × (columns + 1)² × 4`
+    /// bytes per log.
     ///
     /// # Errors
-    /// [`FactorsError::Header`] for a study that JSON cannot hold.
+    /// [`FactorsError::Header`] for a study that JSON cannot represent.
     pub fn to_bytes(&self) -> Result<Vec<u8>, FactorsError> {
         let cannot = |error: serde_json::Error| FactorsError::Header { problem: error.to_string() };
         let robot = self.study.robot.description.as_ref();
@@ -91,10 +89,10 @@ impl Factors {
         Ok(bytes)
     }
 
-    /// Reads what [`to_bytes`](Self::to_bytes) wrote.
+    /// Reads the format of [`to_bytes`](Self::to_bytes).
     ///
     /// # Errors
-    /// [`FactorsError`] for anything else: no such file, another version, a part of one, one that has changed.
+    /// [`FactorsError`] for another file, another version, a truncated or a corrupt file.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, FactorsError> {
         let (head, numbers) = parts(bytes)?;
         let unreadable = |problem: String| FactorsError::Header { problem };
@@ -111,13 +109,12 @@ impl Factors {
             logs.push(log_of(log, &mut rest, bytes.len())?);
         }
         if !rest.is_empty() {
-            return Err(unreadable(format!("{} bytes belong to no log", rest.len())));
+            return Err(unreadable(format!("{} surplus bytes after the last log", rest.len())));
         }
         Ok(Self::new(study, head.study_path, logs))
     }
 }
 
-/// Head and numbers of a file whose hash is right.
 fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), FactorsError> {
     if !bytes.starts_with(MAGIC) {
         return Err(FactorsError::Kind);
@@ -128,10 +125,10 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), FactorsError> {
     if version != VERSION {
         return Err(FactorsError::Version { found: version, known: VERSION });
     }
-    let length = bytes.get(24..BEFORE_HEAD).and_then(|word| word.try_into().ok()).map(u64::from_le_bytes);
-    let end = bytes.len().checked_sub(HASH).filter(|end| *end >= BEFORE_HEAD).ok_or_else(short)?;
+    let length = bytes.get(24..HEADER_START).and_then(|word| word.try_into().ok()).map(u64::from_le_bytes);
+    let end = bytes.len().checked_sub(HASH_BYTES).filter(|end| *end >= HEADER_START).ok_or_else(short)?;
     let length = length.and_then(|length| usize::try_from(length).ok()).ok_or_else(short)?;
-    let head_end = BEFORE_HEAD.checked_add(length).filter(|head_end| *head_end <= end).ok_or_else(short)?;
+    let head_end = HEADER_START.checked_add(length).filter(|head_end| *head_end <= end).ok_or_else(short)?;
     let first_number = head_end.next_multiple_of(8);
     if first_number > end {
         return Err(short());
@@ -139,7 +136,7 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), FactorsError> {
     if Sha256::digest(&bytes[..end])[..] != bytes[end..] {
         return Err(FactorsError::Hash);
     }
-    Ok((&bytes[BEFORE_HEAD..head_end], &bytes[first_number..end]))
+    Ok((&bytes[HEADER_START..head_end], &bytes[first_number..end]))
 }
 
 fn head_of(log: &FactorLog) -> HeadLog {
@@ -159,7 +156,7 @@ fn head_of(log: &FactorLog) -> HeadLog {
     }
 }
 
-/// The log that a head describes, its numbers taken off `rest`.
+/// The log of a header; removes its numbers from `rest`.
 fn log_of(head: HeadLog, rest: &mut &[u8], file_bytes: usize) -> Result<FactorLog, FactorsError> {
     let name = head.name;
     let mut factors = |shapes: &[FactorShape]| -> Result<Vec<SegmentedFactor>, FactorsError> {

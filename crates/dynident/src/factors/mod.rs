@@ -1,9 +1,9 @@
-//! **Logs as factors**: what many logs of a kind of robot say, in a form that is small, that can be put together in any
-//! order, and that a model is made from without the logs.
+//! **Logs as factors**: a small form of many logs of one type of robot, which can be merged in any order and identified
+//! without the logs.
 
 mod file;
 
-use crate::clock::{LAST_SECOND, utc_of_seconds};
+use crate::clock::{END_OF_RFC3339_S, utc_of_seconds};
 use crate::digest::hexadecimal;
 use crate::error::FactorsError;
 use crate::result::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
@@ -17,18 +17,17 @@ use std::time::UNIX_EPOCH;
 /// One log of [`Factors`].
 #[derive(Clone, Debug)]
 pub struct FactorLog {
-    /// The robot that it was recorded on, where there are several of one kind.
+    /// Identifier of the individual robot, for several robots of the same type.
     pub arm: Option<String>,
-    /// When it was recorded, seconds since 1970 began (UTC).
+    /// Time of recording, seconds since 1970-01-01 (UTC).
     pub recorded_at_s: Option<f64>,
-    /// SHA-256 of its numbers: two logs with the same one are one log.
+    /// SHA-256 of its numbers; equal hashes mean the same log.
     pub sha256: String,
     /// The factors.
     pub log: ReducedLog,
 }
 
 impl FactorLog {
-    /// A log with the hash of its numbers.
     pub(crate) fn new(arm: Option<String>, recorded_at_s: Option<f64>, log: ReducedLog) -> Self {
         let mut hash = Sha256::new();
         for factor in log.factors.iter().chain(log.noise.iter().flatten()) {
@@ -40,65 +39,62 @@ impl FactorLog {
         Self { arm, recorded_at_s, sha256: hexadecimal(&hash.finalize()), log }
     }
 
-    /// Bytes of its numbers.
+    /// Size of its numbers, bytes.
     pub fn numbers_bytes(&self) -> u64 {
         let factors = self.log.factors.iter().chain(self.log.noise.iter().flatten());
         factors.map(|factor| 8 * factor.shape().count().unwrap_or(0) as u64).sum()
     }
 
-    /// What logs are ordered by, so that no result depends on the order in which they came.
+    /// Sort key, so that results do not depend on the order of the logs.
     fn key(&self) -> (Option<&str>, i64, &str, &str) {
-        // Bits of a number that is not negative stand in the order of the numbers.
+        // Nonnegative floating-point numbers have the same order as their bits.
         let time = self.recorded_at_s.map_or(-1, |time| (time.max(0.0) + 0.0).to_bits().cast_signed());
         (self.arm.as_deref(), time, &self.log.name, &self.sha256)
     }
 }
 
-/// Reduced logs of one kind of robot, with all that makes a model of them: description, drives, filters, estimator.
+/// Reduced logs of one type of robot, with everything a model needs: robot description, drives, filters, estimator.
 ///
-/// Made by [`reduce()`](crate::reduce()), put together by [`merged`](Self::merged), kept as
-/// [`to_bytes`](Self::to_bytes), made into a model by [`identify_factors()`](crate::identify_factors()). Logs stand in
-/// an order of their own (robot, time, name, hash), so that the result is the same to the last bit however they came
-/// together.
+/// Created by [`reduce()`](crate::reduce()), merged by [`merged`](Self::merged), stored by
+/// [`to_bytes`](Self::to_bytes), identified by [`identify_factors()`](crate::identify_factors()). Logs are sorted
+/// (robot, time, name, hash), so the result is bit-identical for any order of merging.
 #[derive(Clone, Debug)]
 pub struct Factors {
-    /// Robot, drives, filters and estimator that all logs share; the description is in memory, and there is no log.
+    /// Common robot, drives, filters and estimator; the robot description is in memory, and there are no logs.
     pub(crate) study: Study,
-    /// What messages call the study.
     pub(crate) study_path: PathBuf,
-    /// In the order of their keys, none twice.
+    /// Sorted by key, without duplicates.
     logs: Vec<FactorLog>,
 }
 
 impl Factors {
-    /// Logs in their order.
     pub(crate) fn new(study: Study, study_path: PathBuf, logs: Vec<FactorLog>) -> Self {
-        Self { study, study_path, logs: in_order(logs) }
+        Self { study, study_path, logs: sorted_unique(logs) }
     }
 
-    /// The logs, by robot, time, name and hash.
+    /// The logs, sorted by robot, time, name and hash.
     pub fn logs(&self) -> &[FactorLog] {
         &self.logs
     }
 
-    /// Robot, drives, filters and estimator; without a log.
+    /// Robot, drives, filters and estimator; without logs.
     pub fn study(&self) -> &Study {
         &self.study
     }
 
-    /// What messages call the study.
+    /// Name of the study in messages.
     pub fn study_path(&self) -> &Path {
         &self.study_path
     }
 
-    /// The robots that logs name, in order; none for logs that name none.
+    /// The robots of the logs, sorted; `None` for logs without a robot.
     pub fn arms(&self) -> Vec<Option<&str>> {
         let mut arms: Vec<Option<&str>> = self.logs.iter().map(|log| log.arm.as_deref()).collect();
         arms.dedup();
         arms
     }
 
-    /// What there is to say of them as a file of so many bytes at `path`.
+    /// Summary of the factors as a file of `bytes` bytes at `path`.
     pub fn file(&self, path: &Path, bytes: u64) -> FactorsFile {
         let log = |log: &FactorLog| FactorsLog {
             name: log.log.name.clone(),
@@ -117,31 +113,31 @@ impl Factors {
         }
     }
 
-    /// Those logs alone that `is_wanted` says yes to.
+    /// The logs that satisfy `is_wanted`.
     #[must_use]
     pub fn only(&self, is_wanted: impl Fn(&FactorLog) -> bool) -> Self {
         let logs = self.logs.iter().filter(|log| is_wanted(log)).cloned().collect();
         Self { study: self.study.clone(), study_path: self.study_path.clone(), logs }
     }
 
-    /// All logs of several. The same log twice is one log, so that whoever reduced one a second time changes nothing;
-    /// their order is of no account.
+    /// Merges the logs of several parts in any order. Duplicate logs are used once, so a repeated reduction has no
+    /// effect.
     ///
     /// # Errors
-    /// [`FactorsError::Empty`] for nothing to merge, [`FactorsError::Unlike`] for another robot or other settings.
+    /// [`FactorsError::Empty`] without parts, [`FactorsError::Unlike`] for different robots or settings.
     pub fn merged(parts: impl IntoIterator<Item = Self>) -> Result<Self, FactorsError> {
         let mut parts = parts.into_iter();
         let mut all = parts.next().ok_or(FactorsError::Empty)?;
         let kind = all.kind()?;
         for part in parts {
-            is_one_kind(&kind, &part.kind()?)?;
+            check_same_kind(&kind, &part.kind()?)?;
             all.logs.extend(part.logs);
         }
-        all.logs = in_order(all.logs);
+        all.logs = sorted_unique(all.logs);
         Ok(all)
     }
 
-    /// What must be alike in factors that are put together.
+    /// Settings that must be equal in merged factors.
     fn kind(&self) -> Result<serde_json::Value, FactorsError> {
         let cannot = |error: serde_json::Error| FactorsError::Header { problem: error.to_string() };
         let mut kind = serde_json::to_value(&self.study).map_err(cannot)?;
@@ -153,8 +149,7 @@ impl Factors {
     }
 }
 
-/// That factors of two kinds can be put together: they are of one.
-fn is_one_kind(kind: &serde_json::Value, other: &serde_json::Value) -> Result<(), FactorsError> {
+fn check_same_kind(kind: &serde_json::Value, other: &serde_json::Value) -> Result<(), FactorsError> {
     if kind == other {
         return Ok(());
     }
@@ -163,27 +158,26 @@ fn is_one_kind(kind: &serde_json::Value, other: &serde_json::Value) -> Result<()
     Err(FactorsError::Unlike { sections: sections.unwrap_or_default() })
 }
 
-/// Logs by their keys, each once.
-fn in_order(mut logs: Vec<FactorLog>) -> Vec<FactorLog> {
+fn sorted_unique(mut logs: Vec<FactorLog>) -> Vec<FactorLog> {
     logs.sort_by(|a, b| a.key().cmp(&b.key()));
     let mut seen = HashSet::new();
     logs.retain(|log| seen.insert(log.sha256.clone()));
     logs
 }
 
-/// Seconds since 1970 began of a time in UTC: `2026-01-05T08:00:00Z`, `2026-01-05 08:00:00`, `2026-01-05`, or the
-/// seconds themselves; none for what is no such time.
+/// Seconds since 1970-01-01 of a time in UTC: `2026-01-05T08:00:00Z`, `2026-01-05 08:00:00`, `2026-01-05`, or the
+/// seconds; `None` for other texts.
 pub fn seconds_of(text: &str) -> Option<f64> {
     let text = text.trim();
     if let Ok(seconds) = text.parse::<f64>() {
-        return (0.0..LAST_SECOND).contains(&seconds).then_some(seconds);
+        return (0.0..END_OF_RFC3339_S).contains(&seconds).then_some(seconds);
     }
     let whole = if text.len() == "2026-01-05".len() { format!("{text}T00:00:00Z") } else { text.to_owned() };
     let at = humantime::parse_rfc3339_weak(&whole).ok()?;
     Some(at.duration_since(UNIX_EPOCH).ok()?.as_secs_f64())
 }
 
-/// The name alone: a file that many machines write says nothing of where it was written.
+/// The file name without its folder, because files from several computers must be equal.
 pub(crate) fn name_alone(path: &Path) -> PathBuf {
     path.file_name().map_or_else(|| path.to_owned(), PathBuf::from)
 }

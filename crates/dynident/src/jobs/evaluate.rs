@@ -1,4 +1,4 @@
-//! Dynamics for a table of states.
+//! `evaluate`: dynamics for a table of states.
 
 use crate::error::Error;
 use dynident_dynamics::{
@@ -9,7 +9,7 @@ use dynident_model::{INERTIAL_NAMES, Model};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What is computed for every state.
+/// Computed quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Torques from `q`, `dq`, `ddq`.
@@ -22,14 +22,13 @@ pub enum Quantity {
     CoriolisMatrix,
     /// Gravity torque from `q`.
     Gravity,
-    /// Its derivative by position from `q`, row by row.
+    /// Derivative of the gravity torque by position from `q`, row by row.
     GravityDerivative,
     /// Torque regressor from `q`, `dq`, `ddq`, row by row.
     Regressor,
 }
 
 impl Quantity {
-    /// Groups of columns that it needs.
     fn groups(self) -> &'static [&'static str] {
         match self {
             Self::InverseDynamics | Self::Regressor => &["q", "dq", "ddq"],
@@ -57,7 +56,7 @@ impl Quantity {
         }
     }
 
-    /// The values for one state, whose numbers are those of the groups in order.
+    /// Values for one state; `state` contains the groups in order.
     fn of_state<'w>(self, model: &Model, workspace: &'w mut Workspace, state: &[f64]) -> &'w [f64] {
         let dof = model.dof();
         let (q, rest) = state.split_at(dof);
@@ -73,19 +72,18 @@ impl Quantity {
     }
 }
 
-/// Computes `quantity` for every row of the CSV table `states` (header `q1..`, `dq1..`, `ddq1..`, `tau1..` as far as
-/// needed, in any order, SI units) and writes CSV with 17 significant digits to `out`. Returns the number of rows.
+/// Computes `quantity` for every row of the CSV table `states` (header `q1..`, `dq1..`, `ddq1..`, `tau1..` as required,
+/// in any order, SI units) and writes CSV with 17 significant digits to `out`. Returns the number of rows.
 ///
 /// # Errors
-/// If the table cannot be read, lacks a column, or holds something that is not a finite number; if bodies without
-/// inertial make the quantity meaningless; or if `out` cannot be written. Rows before a faulty one have then been
-/// written to `out`.
+/// If the table cannot be read, lacks a column, or contains a value that is not finite; if the inertials of a body are
+/// unknown; or if `out` cannot be written. Rows before a faulty row remain in `out`.
 pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn Write) -> Result<u64, Error> {
     let dof = model.dof();
     let unknown = model.bodies_without_prior();
     if !unknown.is_empty() && quantity != Quantity::Regressor {
         let message = format!(
-            "the robot's bodies {} have no inertial: their dynamics are unknown; add <inertial> or ask for the regressor",
+            "bodies {} have no inertial, so their dynamics are unknown: add <inertial>, or request the regressor",
             unknown.join(", ")
         );
         return Err(Error::States { path: states.to_owned(), line: 1, message });
@@ -126,7 +124,6 @@ pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn 
     Ok(rows)
 }
 
-/// Place in the table of every column that the quantity needs.
 fn column_places(
     header: &csv::StringRecord,
     states: &Path,

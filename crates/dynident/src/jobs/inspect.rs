@@ -1,4 +1,4 @@
-//! What a robot description says, and what is wrong with it.
+//! `inspect`: summary and audit of a robot description.
 
 use crate::error::Error;
 use crate::result::{
@@ -12,10 +12,10 @@ use dynident_model::{
 };
 use std::path::Path;
 
-/// What is known of the robot in addition to its description.
+/// Knowledge about the robot in addition to its description.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InspectSettings {
-    /// What all masses, the base's with them, should add up to, kg; by default what a comment of the file says.
+    /// Sum of all masses including the base, kg; by default that stated in a comment of the file.
     pub total_mass_kg: Option<f64>,
 }
 
@@ -27,18 +27,18 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
     inspect_with(path, &InspectSettings::default())
 }
 
-/// What became of a description's slips.
+/// Correction of a robot description.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MendedDescription {
-    /// The URDF with all corrections made and every other byte as it was.
+    /// The URDF with all corrections; all other bytes are unchanged.
     Urdf(String),
-    /// No slip was found whose numbers can be known.
+    /// No error with a known correction was found.
     NothingToMend,
-    /// A D-H table or an MJCF, in which no slips are looked for.
+    /// Not a URDF (D-H table, MJCF or SDF), which is not corrected.
     NoUrdf,
 }
 
-/// A URDF with the corrections made that [`inspect_with`] names.
+/// A URDF with the corrections that [`inspect_with`] lists.
 ///
 /// # Errors
 /// If the description cannot be read.
@@ -46,10 +46,10 @@ pub fn mended(path: &Path, settings: &InspectSettings) -> Result<MendedDescripti
     mended_robot(&load_robot(path, &LoadSettings::default())?, settings)
 }
 
-/// As [`mended`] of a description that is in memory.
+/// Like [`mended`] with a robot description in memory.
 ///
 /// # Errors
-/// A URDF whose numbers cannot be told apart.
+/// A URDF in which the numbers to correct are ambiguous.
 pub fn mended_robot(robot: &Robot, settings: &InspectSettings) -> Result<MendedDescription, Error> {
     let Some(slips) = slips_of(robot, settings)? else { return Ok(MendedDescription::NoUrdf) };
     if slips.stated == slips.corrected {
@@ -60,7 +60,7 @@ pub fn mended_robot(robot: &Robot, settings: &InspectSettings) -> Result<MendedD
         .map_err(|error| Error::Result { path: robot.path.clone(), message: error.to_string() })
 }
 
-/// The slips of a URDF; none for another description.
+/// Errors found in a URDF; `None` for other formats.
 fn slips_of(robot: &Robot, settings: &InspectSettings) -> Result<Option<Slips>, Error> {
     if robot.format != DescriptionFormat::Urdf {
         return Ok(None);
@@ -70,7 +70,7 @@ fn slips_of(robot: &Robot, settings: &InspectSettings) -> Result<Option<Slips>, 
     Ok(Some(found.map_err(fault)?))
 }
 
-/// As [`inspect`], with what is known in addition to the description.
+/// Like [`inspect`] with additional knowledge.
 ///
 /// # Errors
 /// If the description cannot be read.
@@ -78,10 +78,10 @@ pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspectio
     inspect_robot(&load_robot(path, &LoadSettings::default())?, settings)
 }
 
-/// As [`inspect_with`] of a description that is in memory.
+/// Like [`inspect_with`] with a robot description in memory.
 ///
 /// # Errors
-/// A URDF whose numbers cannot be told apart.
+/// A URDF in which the numbers to correct are ambiguous.
 pub fn inspect_robot(robot: &Robot, settings: &InspectSettings) -> Result<Inspection, Error> {
     let slips = slips_of(robot, settings)?.map_or_else(Vec::new, |slips| slips.found);
     let model = &robot.model;
@@ -100,7 +100,6 @@ pub fn inspect_robot(robot: &Robot, settings: &InspectSettings) -> Result<Inspec
     })
 }
 
-/// All joints of the tree.
 fn joint_summaries(model: &Model) -> Vec<JointSummary> {
     let one = |joint: &Joint| JointSummary {
         name: joint.name.clone(),
@@ -115,7 +114,6 @@ fn joint_summaries(model: &Model) -> Vec<JointSummary> {
     model.tree_joints().iter().map(one).collect()
 }
 
-/// All moving bodies.
 fn body_summaries(model: &Model) -> Vec<BodySummary> {
     let one = |body: &Body| {
         let prior = body.prior();
@@ -129,7 +127,7 @@ fn body_summaries(model: &Model) -> Vec<BodySummary> {
     model.bodies().iter().map(one).collect()
 }
 
-/// The base parameters of the rigid bodies, without torque terms.
+/// Base parameters of the rigid bodies, without torque terms.
 fn base_summary(model: &Model) -> BaseSummary {
     let settings = BaseParameterSettings::default();
     let base = BaseParameters::new(model, &[], &settings);
@@ -143,7 +141,6 @@ fn base_summary(model: &Model) -> BaseSummary {
     }
 }
 
-/// The findings of the audit and everything that the reader of the robot description reports.
 fn audit_entries(robot: &Robot) -> Vec<AuditEntry> {
     let mut entries: Vec<AuditEntry> = audit(&robot.model)
         .into_iter()
@@ -158,7 +155,7 @@ fn audit_entries(robot: &Robot) -> Vec<AuditEntry> {
         level: "info".to_owned(),
         check: "not-read".to_owned(),
         place: format!("line {}", unread.line),
-        what: format!("<{}> under <{}> was not read: misspelt, or given twice", unread.element, unread.parent),
+        what: format!("<{}> under <{}> was ignored: misspelt or duplicate", unread.element, unread.parent),
     }));
     entries.extend(robot.irregularities.iter().map(irregularity));
     entries.extend(robot.notices.iter().map(|notice| AuditEntry {
@@ -201,14 +198,14 @@ fn irregularity(found: &UrdfIrregularity) -> AuditEntry {
             "undeclared-prefix",
             line,
             format!(
-                "names begin with `{prefix}:`, which no xmlns:{prefix} declares: they are passed over; strict XML readers refuse the file"
+                "undeclared namespace prefix `{prefix}:` (no xmlns:{prefix}): its names are ignored; strict XML readers reject the file"
             ),
         ),
         UrdfIrregularity::UnknownMimic { line, joint, source_joint } => (
             "unknown-mimic",
             line,
             format!(
-                "joint `{joint}` mimics `{source_joint}`, which is no joint of this robot, and counts as free: fix the name or delete <mimic>"
+                "joint `{joint}` mimics the unknown joint `{source_joint}` and is treated as free: fix the name or delete <mimic>"
             ),
         ),
     };

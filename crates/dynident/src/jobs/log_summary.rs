@@ -1,4 +1,4 @@
-//! What is said of a log in a result.
+//! Summary of a log in a result.
 
 use crate::result::LogSummary;
 use dynident_identification::examination::{
@@ -7,7 +7,6 @@ use dynident_identification::examination::{
 use dynident_identification::rows::LogStatistics;
 use dynident_identification::{LogFactors, Recording};
 
-/// A log that was fitted to.
 pub(super) fn training_summary(
     recording: &Recording,
     factors: &LogFactors,
@@ -17,7 +16,6 @@ pub(super) fn training_summary(
     summary(recording, &factors.statistics, factors.nominal_agreement.clone(), delays, joints)
 }
 
-/// A log that was tested on.
 pub(super) fn held_out_summary(
     recording: &Recording,
     examination: &HeldOutExamination,

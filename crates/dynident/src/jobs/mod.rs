@@ -1,4 +1,4 @@
-//! The jobs of the command: each reads files, calls the crates below, and returns what is written.
+//! The jobs of the commands: each reads files, calls the lower crates, and returns the output.
 
 pub(crate) mod check;
 mod columns;

@@ -1,4 +1,4 @@
-//! The torque that a finished model asks for along a motion.
+//! Torque prediction of a model along a motion.
 
 use crate::error::Error;
 use crate::result::{LogSummary, ResultFile};
@@ -11,15 +11,15 @@ use dynident_online::{OnlineError, StartingPoint, Watch, WatchSettings};
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 
-/// Samples of one block: enough for full lanes, little enough for the cache.
-const BLOCK: usize = 128;
+/// Samples per block: enough for full lanes, small enough for the cache.
+const BLOCK_SAMPLES: usize = 128;
 
-/// A finished model that predicts torque.
+/// A torque predictor with the model of a result.
 ///
 /// The prediction of joint j in one sample is `τ̂_j = W_j θ`, with the base parameters θ of the physically consistent
-/// set where the result has one. Its 95 % band, `± t √(W_j V W_jᵀ + σ_j²)`, is for a torque that is filtered as in the
-/// fit: V is the covariance of the estimate, σ_j the standard deviation of the joint's filtered residual. Base
-/// parameters that no log excites have no variance in V: the band is none of motion that needs them.
+/// set if the result has one. Its 95 % band, `± t √(W_j V W_jᵀ + σ_j²)`, is for torque filtered as in the fit: V is the
+/// covariance of the estimate, σ_j the standard deviation of the joint's filtered residual. V contains no variance of
+/// unexcited base parameters, so the band is invalid for motion that needs them.
 #[derive(Clone, Debug)]
 pub struct TorquePredictor {
     model: RegressorModel,
@@ -27,25 +27,25 @@ pub struct TorquePredictor {
     covariance: DMatrix<f64>,
     joint_sigma: Vec<f64>,
     width: f64,
-    /// The lowest cut-off of the filters behind which residuals were measured, Hz.
+    /// Lowest cut-off of the filters before the residuals, Hz.
     band_hz: Option<f64>,
 }
 
-/// Torques along a motion, joint-major as the motion is, Nm (N).
+/// Torques along a motion, joint-major, Nm (N).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PredictedTorque {
-    /// The prediction.
+    /// Predicted torque.
     pub tau: Vec<f64>,
-    /// Half the width of its 95 % band.
+    /// Half-width of its 95 % band.
     pub half_width_95: Vec<f64>,
 }
 
 impl TorquePredictor {
-    /// The model of a result; messages call it `result_path`. `study` is the study that it was made with; `data` a
-    /// folder in which its robot is looked for as well.
+    /// Builds the predictor from a result; `result_path` is its name in messages. `study` is the study of the result;
+    /// its robot is also searched in the folder `data`.
     ///
     /// # Errors
-    /// If the result does not belong to the study's robot, or holds numbers that are not finite.
+    /// If the result does not belong to the study's robot, or contains values that are not finite.
     pub fn new(
         stored: &ResultFile,
         result_path: &Path,
@@ -61,11 +61,13 @@ impl TorquePredictor {
         let theta = stored.consistent_values(result_path)?.unwrap_or(free);
         let (rows, n) = (&stored.base_parameter_covariance, theta.len());
         if rows.len() != n || rows.iter().any(|row| row.len() != n || row.iter().any(|value| !value.is_finite())) {
-            return Err(wrong("base_parameter_covariance is not one finite number for each pair of base parameters"));
+            return Err(wrong(
+                "base_parameter_covariance does not contain one finite number per pair of base parameters",
+            ));
         }
         let joint_sigma: Vec<f64> = stored.joints.iter().map(|joint| joint.residual_std_nm).collect();
         if joint_sigma.len() != model.dof() || joint_sigma.iter().any(|sigma| !sigma.is_finite()) {
-            return Err(wrong("residual_std_nm is not one finite number for each joint"));
+            return Err(wrong("residual_std_nm does not contain one finite number per joint"));
         }
         let own = |log: &LogSummary| log.filter_cutoff_hz.unwrap_or(0.5 * log.filtered_rate_hz);
         let band_hz = stored.logs.iter().map(own).filter(|hz| *hz > 0.0).reduce(f64::min);
@@ -90,8 +92,8 @@ impl TorquePredictor {
         self.model.joint_names()
     }
 
-    /// A watch over the robot by this model: its reference are the base parameters that predict, with the covariance of
-    /// the estimate; residuals were measured behind the filter of the fit (`band_hz`, unless the settings have one).
+    /// Monitors the robot with this model: the reference is θ with the covariance of the estimate, and residuals are
+    /// filtered as in the fit (`band_hz`, unless the settings state it).
     ///
     /// # Errors
     /// As [`Watch::new`].
@@ -101,10 +103,10 @@ impl TorquePredictor {
         Watch::new(self.model.clone(), reference, &self.joint_sigma, &settings)
     }
 
-    /// The torque along `motion`, whose samples follow one another in time (friction with memory begins at rest).
+    /// Predicts the torque along `motion`, whose samples are consecutive (friction with memory starts at rest).
     ///
     /// # Panics
-    /// If the motion does not hold [`dof`](Self::dof) joints.
+    /// If the motion does not have [`dof`](Self::dof) joints.
     pub fn predict(&self, motion: &JointMotion<'_>) -> PredictedTorque {
         let (dof, samples, layout) = (self.dof(), motion.samples, self.model.layout());
         assert_eq!(motion.q.len(), dof * samples, "the motion needs {dof} joints");
@@ -112,7 +114,7 @@ impl TorquePredictor {
         let mut history = TermHistory::new(self.model.load_parameters.clone());
         let mut panels = Panels::default();
         let mut found = PredictedTorque { tau: vec![0.0; dof * samples], half_width_95: vec![0.0; dof * samples] };
-        // Of each joint's own columns.
+        // Covariance and values of each joint's columns.
         let own: Vec<(DMatrix<f64>, DVector<f64>)> = (0..dof)
             .map(|joint| {
                 let columns = layout.joint_columns(joint);
@@ -121,8 +123,8 @@ impl TorquePredictor {
                 (covariance, theta)
             })
             .collect();
-        for from in (0..samples).step_by(BLOCK) {
-            let count = BLOCK.min(samples - from);
+        for from in (0..samples).step_by(BLOCK_SAMPLES) {
+            let count = BLOCK_SAMPLES.min(samples - from);
             let part = |all: &[f64]| -> Vec<f64> {
                 all.chunks_exact(samples).flat_map(|joint| &joint[from..from + count]).copied().collect()
             };

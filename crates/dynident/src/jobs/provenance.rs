@@ -1,4 +1,4 @@
-//! What was read for a result, and one short name for it all.
+//! Provenance: input files of a result, and its identity.
 
 use crate::digest::hexadecimal;
 use crate::error::Error;
@@ -10,15 +10,13 @@ use sha2::{Digest, Sha256};
 use std::io::Read;
 use std::path::{Component, Path};
 
-/// Hexadecimal digits of an identity.
-const DIGITS: usize = 12;
-/// Read at once.
-const BLOCK: usize = 1 << 16;
+const IDENTITY_DIGITS: usize = 12;
+const BLOCK_BYTES: usize = 1 << 16;
 
-/// The provenance of a result of `study`: `read` are what else was read and what it is, each twice or once.
+/// Provenance of a result of `study`; `read` are the other inputs with their kinds, duplicates allowed.
 ///
 /// # Errors
-/// [`Error::File`] for one that cannot be read again.
+/// [`Error::File`] for a file that cannot be read again.
 pub(crate) fn provenance(
     study: &Study,
     study_path: &Path,
@@ -32,16 +30,16 @@ pub(crate) fn provenance(
         }
         inputs.push(read_input(what, source, folder)?);
     }
-    // A study may have been put together in memory, where the path is a name only.
+    // For a study built in memory the path is only a name.
     let own = if study_path.is_file() { Some(input("study", study_path, folder)?) } else { None };
     Ok(identified_by(study, own, inputs))
 }
 
-/// The provenance of a result that is made long after the study and the robot were read, from what was `begun` then and
-/// the files that were `read` since: the study and the robot may be other ones by now.
+/// Provenance of a result made long after study and robot were read: study and robot from `begun`, because the files
+/// may have changed, and the files in `read`.
 ///
 /// # Errors
-/// [`Error::File`] for one that cannot be read again.
+/// [`Error::File`] for a file that cannot be read again.
 pub(crate) fn later_provenance(
     study: &Study,
     study_path: &Path,
@@ -54,7 +52,6 @@ pub(crate) fn later_provenance(
     Ok(identified_by(study, begun.study.clone(), robot.chain(since).collect::<Result<_, _>>()?))
 }
 
-/// The provenance of a result of reduced logs.
 pub(crate) fn factors_provenance(factors: &Factors) -> Provenance {
     let robot = factors.study.robot.description.iter();
     let robot =
@@ -77,14 +74,14 @@ fn identified_by(study: &Study, own: Option<InputFile>, inputs: Vec<InputFile>) 
         identity.update(format!("\n{} {}", input.what, input.sha256));
     }
     let mut identity = hexadecimal(&identity.finalize());
-    identity.truncate(DIGITS);
+    identity.truncate(IDENTITY_DIGITS);
     Provenance { identity, version: version.to_owned(), command: None, content_sha256: None, study: own, inputs }
 }
 
-/// What is known of `source`, which was read as `what`, seen from `folder`.
+/// Describes `source` of the kind `what`, with a path relative to `folder`.
 ///
 /// # Errors
-/// [`Error::File`] for one that cannot be read again.
+/// [`Error::File`] for a file that cannot be read again.
 pub(crate) fn read_input(what: &str, source: &StudyInput, folder: &Path) -> Result<InputFile, Error> {
     Ok(match source {
         StudyInput::File(path) => input(what, path, folder)?,
@@ -98,7 +95,7 @@ pub(crate) fn read_input(what: &str, source: &StudyInput, folder: &Path) -> Resu
     })
 }
 
-/// [`provenance()`] of a motion that is designed, simulated or iterated, with what else was read.
+/// [`provenance()`] of a design, simulation or iteration, with further inputs.
 ///
 /// # Errors
 /// As [`provenance()`].
@@ -113,7 +110,6 @@ pub(crate) fn motion_provenance(
     provenance(study, study_path, &read)
 }
 
-/// Whether both are one file or one table.
 fn is_same(a: &StudyInput, b: &StudyInput) -> bool {
     match (a, b) {
         (StudyInput::File(a), StudyInput::File(b)) => a == b,
@@ -122,8 +118,8 @@ fn is_same(a: &StudyInput, b: &StudyInput) -> bool {
     }
 }
 
-/// [`provenance()`] beside a job, on a thread of its own if there may be more than one.
-pub(crate) fn beside<R>(
+/// Computes [`provenance()`] during a job, on a separate thread if more than one is permitted.
+pub(crate) fn concurrently<R>(
     threads: usize,
     provenance: impl FnOnce() -> Result<Provenance, Error> + Send,
     job: impl FnOnce() -> R,
@@ -141,8 +137,8 @@ pub(crate) fn beside<R>(
 
 fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {
     let cannot = |path: &Path, source| Error::File { path: path.to_owned(), source };
-    let (mut hash, mut block, mut bytes) = (Sha256::new(), vec![0; BLOCK], 0);
-    // The folder of a recording is its parts, one after the other.
+    let (mut hash, mut block, mut bytes) = (Sha256::new(), vec![0; BLOCK_BYTES], 0);
+    // A recording in a folder is hashed part by part.
     let parts = dynident_recording::log::files(path).map_err(|error| cannot(path, std::io::Error::other(error)))?;
     for part in parts {
         let mut file = dynident_files::open(&part).map_err(|error| cannot(&part, error))?;
@@ -156,15 +152,15 @@ fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {
         }
     }
     let sha256 = hexadecimal(&hash.finalize());
-    Ok(InputFile { what: what.to_owned(), file: seen_from(folder, path), bytes, sha256 })
+    Ok(InputFile { what: what.to_owned(), file: relative_path(folder, path), bytes, sha256 })
 }
 
-/// Of what is in memory: numbers as IEEE 754 of eight bytes, least first, row by row; texts as UTF-8.
+/// Describes data in memory: numbers as 8-byte IEEE 754, little-endian, row by row; texts as UTF-8.
 fn input_in_memory<B: AsRef<[u8]>>(what: &str, label: &str, parts: impl Iterator<Item = B>) -> InputFile {
-    let (mut hash, mut block, mut bytes) = (Sha256::new(), Vec::with_capacity(2 * BLOCK), 0);
+    let (mut hash, mut block, mut bytes) = (Sha256::new(), Vec::with_capacity(2 * BLOCK_BYTES), 0);
     for part in parts {
         block.extend_from_slice(part.as_ref());
-        if block.len() >= BLOCK {
+        if block.len() >= BLOCK_BYTES {
             hash.update(&block);
             bytes += block.len() as u64;
             block.clear();
@@ -175,8 +171,8 @@ fn input_in_memory<B: AsRef<[u8]>>(what: &str, label: &str, parts: impl Iterator
     InputFile { what: what.to_owned(), file: label.to_owned(), bytes, sha256: hexadecimal(&hash.finalize()) }
 }
 
-/// The way from a folder to a file, with `/`; the file's name alone where there is none (another drive).
-pub(crate) fn seen_from(folder: &Path, path: &Path) -> String {
+/// Relative path from a folder to a file, with `/`; only the file name if there is none (another drive).
+pub(crate) fn relative_path(folder: &Path, path: &Path) -> String {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let name = || path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let (Ok(from), Ok(to)) = (folder.canonicalize(), path.canonicalize()) else { return name() };
@@ -201,7 +197,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hashes_are_those_of_the_standard_and_paths_are_seen_from_the_study() {
+    fn hashes_are_those_of_the_standard_and_paths_are_relative_to_the_study() {
         let folder = tempfile::tempdir().unwrap();
         let study = folder.path().join("studies");
         std::fs::create_dir(&study).unwrap();
@@ -211,6 +207,6 @@ mod tests {
         let found = input("log", &file, &study).unwrap();
         assert_eq!(found.sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
         assert_eq!((found.bytes, found.file.as_str()), (3, "../abc.csv"));
-        assert_eq!(seen_from(folder.path(), &file), "abc.csv");
+        assert_eq!(relative_path(folder.path(), &file), "abc.csv");
     }
 }

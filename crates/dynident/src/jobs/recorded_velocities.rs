@@ -1,9 +1,9 @@
-//! The velocities that logs went through, as the nearest friction of a joint is fitted over them.
+//! Velocities in the logs, for the approximation of friction.
 
 use dynident_export::RecordedVelocity;
 use dynident_identification::rows::VelocityHistogram;
 
-/// Joint by joint the velocities of all logs, each of which has a histogram for each joint or none at all.
+/// Velocities of all logs per joint; a log has one histogram per joint, or none.
 pub(super) fn recorded_velocities<'a>(
     logs: impl Iterator<Item = &'a [VelocityHistogram]>,
     dof: usize,

@@ -1,10 +1,10 @@
-//! Logs to factors, and factors to a model: identification of many logs that need not lie in one place.
+//! `reduce`: logs to factors, and factors to a model, for logs in several places.
 
 use crate::clock::now;
 use crate::error::{Error, FactorsError};
 use crate::factors::{FactorLog, Factors, name_alone};
 use crate::inputs::InputFiles;
-use crate::jobs::identify::{IdentificationOutcome, Made, written};
+use crate::jobs::identify::{FitMetadata, IdentificationOutcome, build_outcome};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::factors_provenance;
 use crate::result::{ResultFile, Timings};
@@ -17,14 +17,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
-/// How logs are reduced.
+/// Settings of the reduction of logs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReduceSettings {
-    /// The robot that they were recorded on, where there are several of one kind.
+    /// Identifier of the individual robot, for several robots of the same type.
     pub arm: Option<String>,
-    /// When they were recorded, seconds since 1970 began (UTC).
+    /// Time of recording, seconds since 1970-01-01 (UTC).
     pub recorded_at_s: Option<f64>,
-    /// Segments kept of each log: error bars of few logs need many, of many logs one. Default 16.
+    /// Segments per log. Error bars need many segments if there are few logs, and one if there are many. Default 16.
     pub segments: usize,
 }
 
@@ -34,12 +34,11 @@ impl Default for ReduceSettings {
     }
 }
 
-/// Reduces the training logs of a study to factors, with the cut-off, the friction and the lag of `like` where a model
-/// says what the study leaves open: all logs of a fleet must be read alike.
+/// Reduces the training logs of a study to factors. Cut-off, friction and lag that the study does not state are those
+/// of `like`, because all logs of a fleet must be processed identically.
 ///
 /// # Errors
-/// Everything that [`Error`] names; [`IdentificationError::Reduce`] in it where cut-off or friction are left to the
-/// logs.
+/// Every variant of [`Error`]; [`IdentificationError::Reduce`] if cut-off or friction are not stated.
 pub fn reduce(
     study: &Study,
     study_path: &Path,
@@ -54,7 +53,7 @@ pub fn reduce(
     if let Some(file) = study.torque.iter().find_map(|torque| torque.table_file.as_ref()) {
         return Err(factors(FactorsError::Table { file: file.display().to_string() }));
     }
-    // A design makes no factors.
+    // A design is not used here.
     let undesigned = Study { design: None, ..study.clone() };
     if let Some(part) = undesigned.functions().into_iter().next() {
         return Err(factors(FactorsError::Function { part }));
@@ -73,7 +72,7 @@ pub fn reduce(
     Ok(Factors::new(kind, name_alone(study_path), reduced.into_iter().map(log).collect()))
 }
 
-/// What makes a model of factors, and nothing of where they were made.
+/// The parts of the study that a model from factors needs, without local paths.
 fn without_logs(study: &Study, robot: &StudyRobot) -> Study {
     let mut kind = study.clone();
     (kind.log, kind.format, kind.data, kind.source) = (Vec::new(), None, None, None);
@@ -86,9 +85,9 @@ fn without_logs(study: &Study, robot: &StudyRobot) -> Study {
     kind
 }
 
-/// The model that explains all logs of `factors`, as [`identify()`](crate::identify()) makes it of the logs themselves
-/// when cut-off, friction and lag are stated; without what only samples show (delays, torque over time, other readings
-/// of a doubtful log, held-out logs).
+/// Identifies the model of all logs of `factors`, as [`identify()`](crate::identify()) does from the logs with stated
+/// cut-off, friction and lag. Results that need samples are missing (delays, torque over time, study examination,
+/// held-out logs).
 ///
 /// # Errors
 /// As [`identify()`](crate::identify()).
@@ -97,7 +96,7 @@ pub fn identify_factors(factors: &Factors, options: &RunOptions<'_>) -> Result<I
     let (study, path) = (&factors.study, &factors.study_path);
     let robot = StudyRobot::new(study, path, &Folders::new(study, path, None))?;
     let settings = study.settings(path, &robot)?;
-    let logs = with_own_names(factors);
+    let logs = with_unique_names(factors);
     let named: Vec<&ReducedLog> = logs.iter().collect();
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
     let found = identify_reduced(&robot.parametric, &settings, &named, options.execution())
@@ -108,12 +107,12 @@ pub fn identify_factors(factors: &Factors, options: &RunOptions<'_>) -> Result<I
     let recordings = logs.iter().map(|log| Recording::without_samples(log.name.clone())).collect();
     let mut task = IdentificationTask::new(robot.parametric.clone(), recordings);
     task.settings = settings;
-    let made = Made { timings, provenance: factors_provenance(factors), is_payload: false };
-    written(study, path, &robot, &task, found, made)
+    let metadata = FitMetadata { timings, provenance: factors_provenance(factors), is_payload: false };
+    build_outcome(study, path, &robot, &task, found, metadata)
 }
 
-/// The part of the torque of every log of `factors` that a model leaves unexplained, percent of its root mean square:
-/// base parameters as they were written. None for a log without torque.
+/// Residual of each log of `factors` with a model's base parameters, percent of the root mean square torque. `None` for
+/// a log without torque.
 ///
 /// # Errors
 /// [`Error::Result`] for a model of another robot.
@@ -126,9 +125,9 @@ pub fn factors_errors(factors: &Factors, model: &ResultFile, path: &Path) -> Res
     reduced_errors(&robot.parametric, &theta, &logs).map_err(|error| in_study(error.into()))
 }
 
-/// The logs, each with a name that no other has: of those that share one, with digits of their hash behind it.
-fn with_own_names(factors: &Factors) -> Vec<ReducedLog> {
-    const DIGITS: usize = 8;
+/// The logs with unique names: duplicates get digits of their hash.
+fn with_unique_names(factors: &Factors) -> Vec<ReducedLog> {
+    const HASH_DIGITS: usize = 8;
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
     for log in factors.logs() {
         *seen.entry(&log.log.name).or_default() += 1;
@@ -136,7 +135,7 @@ fn with_own_names(factors: &Factors) -> Vec<ReducedLog> {
     let named = |log: &FactorLog| {
         let mut own = log.log.clone();
         if seen.get(&log.log.name[..]).is_some_and(|times| *times > 1) {
-            own.name = format!("{} ({})", own.name, &log.sha256[..DIGITS]);
+            own.name = format!("{} ({})", own.name, &log.sha256[..HASH_DIGITS]);
         }
         own
     };

@@ -1,4 +1,4 @@
-//! A simulated robot runs a study's trajectory under a controller.
+//! `simulate`: a simulated robot runs a study's trajectory under a controller.
 
 use crate::error::Error;
 use crate::inputs::InputFiles;
@@ -17,24 +17,23 @@ use std::path::Path;
 /// A finished simulation.
 #[derive(Clone, Debug)]
 pub struct Simulation {
-    /// What `truth.json` holds.
+    /// Content of `truth.json`.
     pub file: SimulationFile,
     /// The log: `t_s, q1.., tau1..`.
     pub log: String,
 }
 
 /// Runs a study's trajectory (`[iteration] trajectory`, or its `[design]`) on the robot of `[simulation]` under
-/// `[controller]` (joint PD by default), whose model is the description.
+/// `[controller]` (joint PD by default); the controller's model is the robot description.
 ///
 /// # Errors
-/// Files, study and settings. A run that stops early is a result.
+/// Invalid files, study or settings. A run that stops early is a result.
 pub fn simulate_study(
     study: &Study,
     study_path: &Path,
     options: &RunOptions<'_>,
     watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
 ) -> Result<Simulation, Error> {
-    // The robot, its controller, and the run.
     let simulation = study.simulation.clone().unwrap_or_default();
     let files = InputFiles::of(study, study_path, options.data.as_deref());
     let folders = Folders::new(study, study_path, options.data.as_deref());
@@ -53,7 +52,6 @@ pub fn simulate_study(
     let request = RunRequest { model: Some(&model), ..RunRequest::new(1, &reference, &controller) };
     let run = truth.robot.run(&request).map_err(Error::section(study_path, "simulation"))?;
 
-    // The truth beside it.
     let own = |values: &[f64], expressions: Vec<String>, units: Vec<String>| {
         let named = expressions.into_iter().zip(units).zip(values);
         named.map(|((expression, unit), &value)| ParameterTruth { expression, value, unit }).collect()

@@ -1,21 +1,21 @@
-//! A finished model against logs that were not used for its fit.
+//! `validate`: a model on logs that were not used for its fit.
 
 use crate::error::Error;
 use crate::inputs::InputFiles;
 use crate::jobs::log_summary::held_out_summary;
 use crate::jobs::options::{RunOptions, study_name};
-use crate::jobs::provenance::{read_input, seen_from};
+use crate::jobs::provenance::{read_input, relative_path};
 use crate::result::{InputFile, LogSummary, ResultFile, VALIDATION_SCHEMA, ValidationFile};
 use crate::study::{Folders, Study, StudyInput, StudyRobot};
 use dynident_identification::examination::{HeldOutExamination, ModelUnderTest, examine_held_out};
 use dynident_identification::{Logs, Role};
 use std::path::Path;
 
-/// Tests the model of a `result.json` on the logs of a study that have the role `validate`, or on all its logs if none
-/// has. A log that the model was fitted to is a problem of the file that comes back: it proves nothing.
+/// Validates the model of a `result.json` on the logs of a study with the role `validate`, or on all logs if no log has
+/// this role. A log that was used for the fit is listed in `problems` of the returned file.
 ///
 /// # Errors
-/// If the result does not belong to the study's robot, and everything that reading logs can give.
+/// If the result does not belong to the study's robot, or a log cannot be read.
 pub fn validate(
     result_path: &Path,
     study: &Study,
@@ -25,7 +25,7 @@ pub fn validate(
     validate_result(&ResultFile::read(result_path)?, result_path, study, study_path, options)
 }
 
-/// As [`validate()`] with a result that is in memory; messages call it `result_path`.
+/// Like [`validate()`] with a result in memory; `result_path` is its name in messages.
 ///
 /// # Errors
 /// As [`validate()`].
@@ -71,7 +71,7 @@ pub fn validate_result(
     let folder = study_path.parent().unwrap_or(Path::new(""));
     let summary = |log: &HeldOutExamination| {
         let mut summary = held_out_summary(&recordings[log.index], log, &joints);
-        summary.import.file = seen_from(folder, Path::new(&summary.import.file));
+        summary.import.file = relative_path(folder, Path::new(&summary.import.file));
         summary
     };
     let logs: Vec<LogSummary> = tested.iter().map(summary).collect();
@@ -87,7 +87,6 @@ pub fn validate_result(
     })
 }
 
-/// Problems of chosen logs that the model was fitted to.
 fn training_logs(
     stored: &ResultFile,
     study: &Study,
@@ -101,7 +100,7 @@ fn training_logs(
         let input = read_input("log", &StudyInput::from(study.log_source(folders, index)?), folder)?;
         if let Some(fitted) = fitted_to(stored, &input) {
             problems.push(format!(
-                "log `{}` is `{fitted}`, which the model was fitted to: its figures prove nothing; give a log of another run",
+                "log `{}` is the training log `{fitted}`, so this is no validation: use a log of another run",
                 study.log_name(index)
             ));
         }
@@ -109,8 +108,8 @@ fn training_logs(
     Ok(problems)
 }
 
-/// The name of the log with the content of `input` that a result was fitted to; none where it was not, and where parts
-/// of that file were held out.
+/// Name of the training log with the same content as `input`; `None` if there is no such log, or if parts of that file
+/// were held out.
 fn fitted_to<'a>(stored: &'a ResultFile, input: &InputFile) -> Option<&'a str> {
     let inputs = &stored.provenance.as_ref()?.inputs;
     let known = inputs.iter().find(|known| known.what == "log" && known.sha256 == input.sha256)?;

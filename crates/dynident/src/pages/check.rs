@@ -1,26 +1,25 @@
-//! What the examiner says in a page: its findings, and what robots that can exist leave of the torque.
+//! Page section of the study examination: findings and unexplained torque.
 
 use crate::result::{CheckFinding, ReadingResult, StudyCheck};
 use dynident_recording::Level;
 use dynident_report::{BarPlot, Heading, Report, Text, Tone};
 
-/// The section of a study's examination.
 pub(super) fn examination(page: &mut Report, check: &StudyCheck) {
     page.add(Heading::new("Study, robot and logs"));
     let mut text = Text::new(format!(
-        "The logs were read as under {} possible mistakes of the study (signs, orders, zeros, units, mounting), and each reading was \
-         explained by the best robot that can exist.",
+        "Dynident tested {} possible mistakes of the study (signs, orders, zeros, units, mounting). Each hypothesis was \
+         scored by the best physically consistent fit.",
         check.tried
     ));
     if check.findings.iter().all(|finding| finding.level != Level::Problem) {
-        text = text.point(Tone::Good, "no other reading explains them clearly better than the study as it is written");
+        text = text.point(Tone::Good, "no hypothesis explains the logs clearly better than the study as written");
     }
     for finding in &check.findings {
         text = text.point(tone(finding), finding.sentence());
     }
     page.add(text);
     if let Some(as_written) = &check.as_written {
-        page.add(left(&check.joints, as_written, check.best.as_ref()));
+        page.add(unexplained_torque(&check.joints, as_written, check.best.as_ref()));
     }
 }
 
@@ -32,18 +31,18 @@ fn tone(finding: &CheckFinding) -> Tone {
     }
 }
 
-/// What is left of each joint's torque, as written and as corrected.
-fn left(joints: &[String], as_written: &ReadingResult, best: Option<&ReadingResult>) -> BarPlot {
-    let title = "Torque that the best possible robot leaves";
-    let label = "left of the joint's torque, %";
+/// Unexplained torque of each joint, as written and with the correction.
+fn unexplained_torque(joints: &[String], as_written: &ReadingResult, best: Option<&ReadingResult>) -> BarPlot {
+    let title = "Unexplained torque with the best physically consistent fit";
+    let label = "unexplained torque of the joint, %";
     let shown = best.unwrap_or(as_written);
     let mut plot = BarPlot::new(title, label).note(if best.is_some() {
-        "bars: the logs read as corrected; marks: as the study is written. A mistake shows where the mark stands far to the right of the bar"
+        "bars: with the correction; marks: as written. A mark far to the right of its bar indicates a mistake"
     } else {
-        "root mean squares over a few hundred instants of the logs; friction and drives are fitted as well"
+        "root mean square over a few hundred samples of the logs; friction and drives are fitted too"
     });
     if best.is_some() {
-        plot = plot.reference_label("as the study is written");
+        plot = plot.reference_label("as written");
     }
     for (joint, name) in joints.iter().enumerate() {
         let value = shown.left_percent.get(joint).copied().unwrap_or(f64::NAN);

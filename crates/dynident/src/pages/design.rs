@@ -1,4 +1,4 @@
-//! Pictures of a finished design.
+//! Plots of a design.
 
 use crate::error::Error;
 use crate::result::DesignFile;
@@ -9,17 +9,16 @@ use dynident_excitation::optimisers::Generation;
 use dynident_model::{Model, Vec3};
 use dynident_report::{ArmPose, ColumnShape, FitnessPicture, MotionCurve, MotionPicture, PathPicture, Place};
 
-/// Poses that are drawn, both ends included.
-const POSES: usize = 9;
+const POSE_COUNT: usize = 9;
 
-/// Most points of a path: more than pixels show nothing.
-const MOST_POINTS: usize = 900;
+/// Maximum number of points of a path, limited by the resolution of the plot.
+const MAX_POINTS: usize = 900;
 
-/// Position, velocity, acceleration and, where the inertials are known, torque of every joint over
-/// time, limits dashed.
+/// Position, velocity, acceleration and, with known inertials, torque of every joint over time, with limits as dashed
+/// lines.
 ///
 /// # Errors
-/// A motion that cannot be drawn.
+/// A motion that cannot be plotted.
 pub(crate) fn preview(
     file: &DesignFile,
     limits: &Limits,
@@ -49,16 +48,15 @@ pub(crate) fn preview(
     Ok(picture.svg()?)
 }
 
-/// The tool's path and some poses of the arm in the base frame, from above and from the side, with
-/// floor, column and boxes. The tool is the frame farthest out on every last body.
+/// Tool path and some poses of the arm in the base frame, from above and from the side, with floor, column and boxes.
+/// The tool is the outermost frame on every last body.
 ///
 /// # Errors
-/// A motion that cannot be drawn.
+/// A motion that cannot be plotted.
 pub(crate) fn path(file: &DesignFile, limits: &Limits, model: &Model, motion: &Motion) -> Result<String, Error> {
     let title = format!("{}: {}, {} s", file.name, file.family, file.duration_s);
     let mut workspace = Workspace::new(model);
     let tools = tools(model);
-    // Places of the joints and of the tools at one sample, m.
     let mut places_at = |sample: usize| -> [Vec<Place>; 2] {
         let q: Vec<f64> = (0..motion.joints).map(|joint| motion.q[joint * motion.samples + sample]).collect();
         let placements = body_placements(model, &mut workspace, &q);
@@ -66,7 +64,7 @@ pub(crate) fn path(file: &DesignFile, limits: &Limits, model: &Model, motion: &M
         [joints.collect(), tools.iter().map(|(body, at)| placements[*body].point(*at).0).collect()]
     };
     let mut paths = vec![Vec::new(); tools.len()];
-    let step = motion.samples.div_ceil(MOST_POINTS).max(1);
+    let step = motion.samples.div_ceil(MAX_POINTS).max(1);
     for sample in (0..motion.samples).step_by(step).chain(motion.samples.checked_sub(1)) {
         let [_, places] = places_at(sample);
         paths.iter_mut().zip(places).for_each(|(path, place): (&mut Vec<Place>, _)| path.push(place));
@@ -79,7 +77,8 @@ pub(crate) fn path(file: &DesignFile, limits: &Limits, model: &Model, motion: &M
         ArmPose { rods, joints }
     };
     let last = motion.samples.saturating_sub(1);
-    let poses = (0..POSES).filter(|_| motion.samples > 0).map(|pose| pose_at(places_at(pose * last / (POSES - 1))));
+    let poses =
+        (0..POSE_COUNT).filter(|_| motion.samples > 0).map(|pose| pose_at(places_at(pose * last / (POSE_COUNT - 1))));
     let column = limits.column.as_ref();
     let picture = PathPicture {
         title: &title,
@@ -92,10 +91,10 @@ pub(crate) fn path(file: &DesignFile, limits: &Limits, model: &Model, motion: &M
     Ok(picture.svg()?)
 }
 
-/// Best and mean fitness by generation (the paper's Fig. 7); none for a search without generations.
+/// Best and mean fitness per generation (the paper's Fig. 7); `None` for a search without generations.
 ///
 /// # Errors
-/// A curve that cannot be drawn.
+/// A curve that cannot be plotted.
 pub(crate) fn fitness(file: &DesignFile, history: &[Generation]) -> Result<Option<String>, Error> {
     if history.is_empty() {
         return Ok(None);
@@ -107,7 +106,7 @@ pub(crate) fn fitness(file: &DesignFile, history: &[Generation]) -> Result<Optio
     Ok(Some(FitnessPicture { title: &title, best: &best, mean: &mean, optimum }.svg()?))
 }
 
-/// Every last body and the place on it of the link frame that stands farthest out.
+/// Every last body with the position of its outermost link frame.
 fn tools(model: &Model) -> Vec<(usize, Vec3)> {
     let last = |body: &usize| model.tree_joints().iter().all(|joint| joint.parent != Some(*body));
     let farthest = |body: usize| {

@@ -1,5 +1,6 @@
 //! `report.html` of an identification.
 
+use super::unit;
 use crate::error::Error;
 use crate::result::{
     BaseParameterResult, BodyResult, ErrorTermResult, JointFrictionResult, LogSummary, ResultFile, TermResult,
@@ -14,14 +15,13 @@ use dynident_identification::{DriveInertiaEstimate, Role};
 use dynident_recording::Level;
 use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone, short};
 
-/// Base parameters up to which their correlations are drawn.
-const MOST_CORRELATIONS: usize = 80;
+const MAX_CORRELATED_PARAMETERS: usize = 80;
 
-/// The page of a result, with torque over time: what [`IdentificationOutcome::report`](crate::IdentificationOutcome)
-/// gives, for who keeps only these two.
+/// The page of a stored result with torque over time, as
+/// [`IdentificationOutcome::report`](crate::IdentificationOutcome) returns it.
 ///
 /// # Errors
-/// [`Error::Report`], which would be a defect of this program.
+/// [`Error::Report`], which indicates a bug.
 pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<String, Error> {
     let mut page = Report::new(&r.name).subtitle(format!(
         "{}: {} joints, {} base parameters; estimator {}, error bars {}",
@@ -32,21 +32,21 @@ pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<Stri
         r.method.covariance
     ));
     if !r.problems.is_empty() {
-        let mut against = Text::new("What speaks against loading this model into a robot:");
+        let mut problems = Text::new("What speaks against loading this model into a robot:");
         for problem in &r.problems {
-            against = against.point(Tone::Bad, problem);
+            problems = problems.point(Tone::Bad, problem);
         }
-        page.add(against);
+        page.add(problems);
     }
-    page.add(figures(r));
-    page.add(judged_model(r));
+    page.add(key_figures(r));
+    page.add(model_description(r));
     if let Some(check) = &r.check {
         super::check::examination(&mut page, check);
     }
     page.add(Heading::new("Torque"));
-    page.add(errors(r));
+    page.add(error_table(r));
     for log in &r.validation {
-        page.add(held_out(log));
+        page.add(held_out_table(log));
     }
     super::forms::forms(&mut page, r);
     torques(&mut page, &r.robot.joints, traces, r.validation.iter().any(|log| log.physical.is_some()));
@@ -78,32 +78,27 @@ pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<Stri
     Ok(page.html()?)
 }
 
-/// A unit that is not broken, with raised exponents.
-fn unit(unit: &str) -> String {
-    unit.replace(' ', "\u{a0}").replace("^2", "²")
-}
-
 fn percent(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{}\u{a0}%", short(value, 3)))
 }
 
-fn figures(r: &ResultFile) -> KeyFigures {
+fn key_figures(r: &ResultFile) -> KeyFigures {
     let mut figures = KeyFigures::new();
     for log in r.validation.iter().take(3) {
         let prior = log.prior.as_ref().and_then(|prior| prior.relative_error_percent);
         let mut note = log.log.clone();
         if log.physical.is_some() {
-            note = format!("{note}; free fit {}", percent(log.model.relative_error_percent));
+            note = format!("{note}; unconstrained estimate {}", percent(log.model.relative_error_percent));
         }
         if prior.is_some() {
-            note = format!("{note}; description {}", percent(prior));
+            note = format!("{note}; robot description {}", percent(prior));
         }
-        figures = figures.figure("held-out torque error", percent(written(log).relative_error_percent), note);
+        figures = figures.figure("held-out torque error", percent(exported_report(log).relative_error_percent), note);
     }
     if r.validation.is_empty() {
-        figures = figures.judged("held-out torque error", "–", "no log was held out", Tone::Warning);
+        figures = figures.judged("held-out torque error", "–", "no held-out log", Tone::Warning);
     }
-    // A tick beside a problem would be read as all being well.
+    // A green mark next to a problem would be misleading.
     let good = if r.problems.is_empty() && r.method.is_settled() { Tone::Good } else { Tone::Plain };
     let all = r.base_parameters.len();
     let within = |percent: f64| {
@@ -112,39 +107,39 @@ fn figures(r: &ResultFile) -> KeyFigures {
     };
     let excited = r.base_parameters.iter().filter(|parameter| parameter.excited).count();
     let vague = excited - within(100.0).min(excited);
-    let mut known = vec![format!("{} to 10 %", within(10.0))];
+    let mut known = vec![format!("{} within 10 %", within(10.0))];
     if vague > 0 {
-        known.push(format!("{vague} with bars above their values"));
+        known.push(format!("{vague} with error bars larger than the value"));
     }
     if excited < all {
         known.push(format!("{} not excited", all - excited));
     }
     if !r.method.is_settled() {
-        known.push("NOT settled".to_owned());
+        known.push("NOT converged".to_owned());
     }
     let tone = if vague > 0 || excited < all || !r.method.is_settled() { Tone::Warning } else { good };
     let physical = if r.physical.consistent { ("yes", good) } else { ("no", Tone::Bad) };
     let fit = r.training.physical.as_ref().map_or(r.training.relative_error_percent, |own| own.relative_error_percent);
     figures
         .figure("error of the fit", percent(fit), format!("{} rows", r.training.samples))
-        .judged("parameters known to 30 %", format!("{} of {all}", within(30.0)), known.join("; "), tone)
+        .judged("parameters within 30 %", format!("{} of {all}", within(30.0)), known.join("; "), tone)
         .figure("condition number", short(r.method.condition_number_scaled, 3), "columns of unit length")
         .judged("physically consistent", physical.0, "", physical.1)
         .figure("time", format!("{} s", short(r.timings_s.total, 3)), "")
 }
 
-/// What is written is judged: the consistent set where there is one, else the estimate.
-fn written(log: &LogValidation) -> &ValidationReport {
+/// Errors of the exported model: the physically consistent set, or the estimate without one.
+fn exported_report(log: &LogValidation) -> &ValidationReport {
     log.physical.as_ref().unwrap_or(&log.model)
 }
 
-/// Which model the figures are of, and whether the logs tell it apart from the free fit.
-fn judged_model(r: &ResultFile) -> Text {
+/// Describes the model in the figures, and whether it differs significantly from the unconstrained estimate.
+fn model_description(r: &ResultFile) -> Text {
     let Some(fit) = &r.physical.fit else {
-        return Text::new("All figures are those of the estimate; no physically consistent set stands beside it.");
+        return Text::new("All figures use the unconstrained estimate, because there is no physically consistent set.");
     };
-    let figures = "Figures and plots of held-out logs are those of the physically consistent model, which is the one \
-                   that is written; the free fit stands beside it.";
+    let figures = "Figures and plots of held-out logs use the physically consistent model, which is the exported one; \
+                   the unconstrained estimate is listed for comparison.";
     let Some(test) = fit.difference else { return Text::new(figures) };
     let [parameters, rest] = test.degrees_of_freedom;
     let numbers = format!(
@@ -154,28 +149,28 @@ fn judged_model(r: &ResultFile) -> Text {
         short(test.f, 3),
         short(test.p_value, 2)
     );
-    let (tone, says) = if test.is_significant {
-        (Tone::Warning, "The logs tell the two apart: what is consistent does not explain all that they show")
+    let (tone, verdict) = if test.is_significant {
+        (Tone::Warning, "The difference is significant: no physically consistent model explains these logs completely")
     } else {
-        (Tone::Plain, "The logs do not tell the two apart")
+        (Tone::Plain, "The difference is not significant")
     };
-    Text::new(figures).point(tone, format!("{says} ({numbers})."))
+    Text::new(figures).point(tone, format!("{verdict} ({numbers})."))
 }
 
-/// Errors of the torque by joint, training and held-out logs side by side.
-fn errors(r: &ResultFile) -> Table {
+fn error_table(r: &ResultFile) -> Table {
     let mut columns = vec!["joint".to_owned(), "fit, Nm (N)".to_owned(), "fit, %".to_owned()];
     for log in &r.validation {
         columns.extend([format!("{}, Nm (N)", log.log), format!("{}, %", log.log)]);
     }
     let number = |value: Option<f64>| Cell::from(value.map_or_else(|| "–".to_owned(), |value| short(value, 3)));
-    let mut table = Table::new("Torque error by joint", columns)
-        .note("root mean square of measured less predicted filtered torque, and as part of the measured torque");
+    let mut table = Table::new("Torque error by joint", columns).note(
+        "root mean square of measured minus predicted filtered torque, absolute and relative to the measured torque",
+    );
     let joints = r.training.physical.as_ref().map_or(&r.training.joints, |own| &own.joints);
     for (j, joint) in joints.iter().enumerate() {
         let mut row = vec![Cell::from(&joint.name), number(Some(joint.rmse_nm)), number(joint.relative_error_percent)];
         for log in &r.validation {
-            let joint = &written(log).joints[j];
+            let joint = &exported_report(log).joints[j];
             row.extend([number(Some(joint.rmse_nm)), number(joint.relative_error_percent)]);
         }
         table = table.rows([row]);
@@ -183,13 +178,12 @@ fn errors(r: &ResultFile) -> Table {
     table
 }
 
-/// One held-out log: the estimate, the consistent set and the description.
-fn held_out(log: &LogValidation) -> Table {
+fn held_out_table(log: &LogValidation) -> Table {
     let sets = [
-        ("consistent set, as written", log.physical.as_ref()),
-        ("free fit", Some(&log.model)),
-        ("free fit, unfiltered torque", Some(&log.raw)),
-        ("the description's own", log.prior.as_ref()),
+        ("consistent set (exported)", log.physical.as_ref()),
+        ("unconstrained estimate", Some(&log.model)),
+        ("unconstrained estimate, unfiltered torque", Some(&log.raw)),
+        ("robot description", log.prior.as_ref()),
     ];
     let rows = sets.into_iter().filter_map(|(set, report)| {
         let report = report?;
@@ -208,29 +202,25 @@ fn held_out(log: &LogValidation) -> Table {
 
 fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace], is_consistent: bool) {
     for trace in traces.iter().rev() {
-        let role = if trace.role == Role::Validate { "held out" } else { "fitted to" };
+        let role = if trace.role == Role::Validate { "held out" } else { "training" };
         let part = if trace.cut || trace.role == Role::Identify { "; the first samples" } else { "" };
         let is_written = trace.role == Role::Validate && is_consistent;
-        let predicted_by = if is_written { "predicted" } else { "predicted by the free fit" };
+        let predicted_by = if is_written { "predicted" } else { "predicted by the unconstrained estimate" };
         let rows = trace.joints.iter().map(|joint| joint.measured_nm.len()).min().unwrap_or(0);
         let time: Vec<f64> = (0..rows).map(|row| row as f64 / trace.rate_hz).collect();
         for (name, joint) in joints.iter().zip(&trace.joints) {
             let (measured, predicted) = (joint.measured_nm[..rows].to_vec(), joint.predicted_nm[..rows].to_vec());
             page.add(
                 LinePlot::new(format!("{name}: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
-                    .note(format!(
-                        "filtered, {} rows a second{part}; gaps of the log are closed up",
-                        short(trace.rate_hz, 4)
-                    ))
+                    .note(format!("filtered, {} Hz{part}; gaps of the log are removed", short(trace.rate_hz, 4)))
                     .broad(predicted_by, predicted)
                     .line("measured", measured)
-                    .difference("measured less predicted", 1, 0),
+                    .difference("measured minus predicted", 1, 0),
             );
         }
     }
 }
 
-/// The base parameters with error bars, consistent set and description.
 fn base_table(page: &mut Report, r: &ResultFile) {
     let optional = |value: Option<f64>| Cell::from(value.map_or_else(String::new, |value| short(value, 5)));
     let row = |p: &BaseParameterResult| {
@@ -250,25 +240,24 @@ fn base_table(page: &mut Report, r: &ResultFile) {
     };
     let columns = [
         "expression",
-        "free fit",
+        "estimate",
         "± (95 %)",
         "± in %",
         "consistent set",
-        "description",
+        "robot description",
         "unit",
         "largest error source",
     ];
     page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
 }
 
-/// The largest source of a parameter's error with its share of the variance, in words.
 fn largest_error(p: &BaseParameterResult) -> String {
     let words = |(term, share): (&ErrorTermResult, f64)| format!("{} ({:.0} %)", term.name(), 100.0 * share);
     p.largest_error().map_or_else(String::new, words)
 }
 
 fn parameters(page: &mut Report, r: &ResultFile) {
-    // One picture a unit: bars of one scale.
+    // One plot per unit, with a common scale.
     let mut units: Vec<&str> = Vec::new();
     for parameter in &r.base_parameters {
         if !units.contains(&parameter.unit.as_str()) {
@@ -278,7 +267,7 @@ fn parameters(page: &mut Report, r: &ResultFile) {
     for of_unit in units {
         let mut plot = BarPlot::new(format!("Base parameters in {}", unit(of_unit)), unit(of_unit))
             .note("with 95 % error bars")
-            .reference_label("by the description");
+            .reference_label("robot description");
         for p in r.base_parameters.iter().filter(|parameter| parameter.unit == of_unit) {
             let half_width = p.excited.then_some(p.bar_95());
             plot = plot.bar(&p.expression, if p.excited { p.value } else { f64::NAN }, half_width, p.prior);
@@ -293,18 +282,20 @@ fn parameters(page: &mut Report, r: &ResultFile) {
     if !r.method.not_excited.is_empty() {
         let mut points = vec![(
             Tone::Warning,
-            format!("Not excited by the logs, held at the description's values: {}", r.method.not_excited.join(", ")),
+            format!(
+                "Not excited by the logs, fixed at the values of the robot description: {}",
+                r.method.not_excited.join(", ")
+            ),
         )];
         if !r.method.resting_joints.is_empty() {
-            let text =
-                format!("Not moved above the noise of the encoder by any log: {}", r.method.resting_joints.join(", "));
+            let text = format!("Not moved above encoder noise in any log: {}", r.method.resting_joints.join(", "));
             points.push((Tone::Warning, text));
         }
         page.add(Text { paragraphs: Vec::new(), points });
-        hanging(page, r);
+        conditional_estimates(page, r);
     }
     let n = r.base_parameters.len();
-    if (2..=MOST_CORRELATIONS).contains(&n) && r.base_parameter_covariance.len() == n {
+    if (2..=MAX_CORRELATED_PARAMETERS).contains(&n) && r.base_parameter_covariance.len() == n {
         let std = |i: usize| r.base_parameter_covariance[i][i].sqrt();
         let value = |i: usize, j: usize| r.base_parameter_covariance[i][j] / (std(i) * std(j));
         let values = (0..n).map(|i| (0..n).map(|j| value(i, j)).collect()).collect();
@@ -318,10 +309,10 @@ fn parameters(page: &mut Report, r: &ResultFile) {
     }
 }
 
-/// Estimates that hang on parameters at nominal.
-fn hanging(page: &mut Report, r: &ResultFile) {
+/// Estimates that depend on parameters fixed at nominal values.
+fn conditional_estimates(page: &mut Report, r: &ResultFile) {
     let rows = r.base_parameters.iter().filter(|p| !p.conditional_on.is_empty()).map(|p| {
-        let on = p.conditional_on.iter().map(|own| format!("{} ({} a unit)", own.on, short(own.per_unit, 3)));
+        let on = p.conditional_on.iter().map(|own| format!("{} ({} per unit)", own.on, short(own.per_unit, 3)));
         let with = p.half_width_95_with_nominal.map_or_else(String::new, |bar| short(bar, 3));
         vec![
             Cell::from(&p.symbol),
@@ -335,20 +326,16 @@ fn hanging(page: &mut Report, r: &ResultFile) {
     if rows.is_empty() {
         return;
     }
-    let columns = [
-        "parameter",
-        "free fit",
-        "± (95 %) if these are right",
-        "± (95 %) with what they may be wrong by",
-        "held at the description's value",
-    ];
-    page.add(Table::new("Estimates that hang on parameters not excited", columns).rows(rows));
+    let columns =
+        ["parameter", "estimate", "± (95 %) if these are exact", "± (95 %) with their uncertainty", "fixed at nominal"];
+    page.add(Table::new("Estimates that depend on unexcited parameters", columns).rows(rows));
 }
 
 fn friction(page: &mut Report, r: &ResultFile) {
-    let mut table = Table::new("", ["joint", "parameter", "value", "± (95 %)", "unit"])
-        .note("of the consistent set where there is one; an error bar where the parameter is identified on its own");
-    // A term that is identified on its own is a base parameter, which has the bar.
+    let mut table = Table::new("", ["joint", "parameter", "value", "± (95 %)", "unit"]).note(
+        "from the physically consistent set if there is one; error bars only for separately identified parameters",
+    );
+    // A separately identified term is a base parameter, which has the error bar.
     let bar = |term: &TermResult| {
         let base = r.base_parameters.iter().find(|p| Some(&p.expression) == term.base_parameter.as_ref());
         base.filter(|p| term.std.is_some() && p.excited).map_or_else(String::new, |p| short(p.half_width_95, 3))
@@ -369,12 +356,12 @@ fn friction(page: &mut Report, r: &ResultFile) {
             let constants: Vec<String> = joint.constants.iter().map(constant).collect();
             vec![Cell::from(&joint.joint), Cell::from(&joint.chosen), Cell::from(constants.join(", "))]
         };
-        let header = ["joint", "friction", "constants with their 95 % intervals (rad/s or m/s, and their powers)"];
-        page.add(Table::new("Friction that the logs chose", header).rows(r.friction_choice.iter().map(row)));
+        let header = ["joint", "friction", "constants with 95 % intervals (rad/s or m/s, and their powers)"];
+        page.add(Table::new("Selected friction", header).rows(r.friction_choice.iter().map(row)));
     }
 }
 
-/// Whether the logs show the inertia of the drives, with what the test found of each.
+/// Test for drive inertia, with the estimate of each joint.
 fn drives(page: &mut Report, r: &ResultFile) {
     let Some(choice) = &r.drive_inertia_choice else { return };
     let row = |drive: &DriveInertiaEstimate| {
@@ -382,15 +369,15 @@ fn drives(page: &mut Report, r: &ResultFile) {
         core::iter::once(Cell::from(&drive.joint)).chain(figures).collect::<Vec<_>>()
     };
     if !choice.drives.is_empty() {
-        let header = ["joint", "inertia of its drive, kg m² (kg)", "± (95 %)"];
-        let table = Table::new("Do the logs show the inertia of the drives?", header)
-            .note("by least squares with friction as stated, before anything else is chosen");
+        let header = ["joint", "drive inertia, kg m² (kg)", "± (95 %)"];
+        let table = Table::new("Test for drive inertia", header)
+            .note("least squares with stated friction, before any other selection");
         page.add(table.rows(choice.drives.iter().map(row)));
     }
     page.add(Text::new(format!("Drive inertia: {}.", choice.sentence())));
 }
 
-/// A constant of chosen friction, in words.
+/// A constant of selected friction as text.
 fn constant(own: &FrictionConstant) -> String {
     let [from, to] = own.interval_95;
     format!("{} {} {} ({} to {})", own.term, own.constant, short(own.value, 3), short(from, 2), short(to, 2))
@@ -407,7 +394,7 @@ fn lags(page: &mut Report, r: &ResultFile) {
         Some(vec![Cell::from(&joint.name), Cell::judged(short(1e3 * lag.lag_s, 3), tone), ms(lag.half_width_95_s)])
     });
     let table = Table::new("Lag of the torque behind the motion", ["joint", "lag, ms", "± (95 %), ms"])
-        .note("estimated together with the model, log by log, with what was taken off before; marked where the rest moves more torque than the model leaves unexplained")
+        .note("estimated with the model for each log, including the compensated part; marked if the remaining lag changes the torque by more than the residual")
         .rows(rows);
     page.add(table);
     if let Some(what) = r.method.torque_lag.sentence() {
@@ -415,11 +402,11 @@ fn lags(page: &mut Report, r: &ResultFile) {
     }
 }
 
-/// What the marks behind values of bodies mean.
-const MARKS: &str = "~: only in sums with others; =: not in any torque, as described";
+/// Meaning of the marks after values of bodies.
+const MARKS: &str = "~: identified only in sums; =: not identified, nominal value";
 
-/// The mark of a body's value, in the order of the ten parameters.
-fn mark(body: &BodyResult, parameter: usize) -> &'static str {
+/// Mark of a body's value, in the order of the ten parameters.
+fn source_mark(body: &BodyResult, parameter: usize) -> &'static str {
     match body.sources.map(|sources| sources[parameter]) {
         Some(ValueSource::Partly) => "\u{a0}~",
         Some(ValueSource::Nominal) => "\u{a0}=",
@@ -428,12 +415,12 @@ fn mark(body: &BodyResult, parameter: usize) -> &'static str {
 }
 
 fn bodies(page: &mut Report, r: &ResultFile) {
-    let mut verdict = Text::new(format!("The verdict is {}.", r.physical.note));
+    let mut verdict = Text::new(format!("Consistency is that {}.", r.physical.note));
     if r.physical.consistent {
         let tone = if r.problems.is_empty() && r.method.is_settled() { Tone::Good } else { Tone::Plain };
         verdict = verdict.point(tone, "every body, friction and drive is physically consistent");
     }
-    let failure = r.physical.failure.iter().map(|reason| format!("no consistent set: {reason}"));
+    let failure = r.physical.failure.iter().map(|reason| format!("no physically consistent set: {reason}"));
     for violation in r.physical.violations.iter().cloned().chain(failure) {
         verdict = verdict.point(Tone::Bad, violation);
     }
@@ -449,7 +436,7 @@ fn bodies(page: &mut Report, r: &ResultFile) {
     page.add(verdict);
     let rows = r.bodies.iter().map(|body| {
         let prior = body.prior.map_or_else(String::new, |prior| short(prior[0], 4));
-        let marked = |text: String, k: usize| Cell::from(text + mark(body, k));
+        let marked = |text: String, k: usize| Cell::from(text + source_mark(body, k));
         let bar = body.std.map_or_else(String::new, |std| short(HALF_WIDTH_95 * std[0], 3));
         let mut row = vec![Cell::from(&body.name), marked(short(body.mass_kg, 4), 0), bar.into(), prior.into()];
         row.extend((0..3).map(|k| body.com_m.map_or_else(|| Cell::from(""), |com| marked(short(com[k], 4), k + 1))));
@@ -458,16 +445,16 @@ fn bodies(page: &mut Report, r: &ResultFile) {
         row
     });
     let note = format!(
-        "± if the description is right within 30 %; centre of mass in the body's own frame; least eigenvalue of the pseudo-inertia; {MARKS}"
+        "± for 30 % uncertainty of the robot description; centre of mass in the body frame; smallest eigenvalue of the pseudo-inertia; {MARKS}"
     );
-    let columns = ["body", "mass, kg", "± (95 %), kg", "description, kg", "x, m", "y, m", "z, m", "least eigenvalue"];
+    let columns = ["body", "mass, kg", "± (95 %), kg", "nominal, kg", "x, m", "y, m", "z, m", "smallest eigenvalue"];
     page.add(Table::new("Bodies", columns).note(note).rows(rows));
     let rows = r.bodies.iter().map(|body| {
         let inertia = body.inertia_at_origin_kgm2.iter().enumerate();
-        let inertia = inertia.map(|(k, value)| Cell::from(short(*value, 4) + mark(body, k + 4)));
+        let inertia = inertia.map(|(k, value)| Cell::from(short(*value, 4) + source_mark(body, k + 4)));
         [Cell::from(&body.name)].into_iter().chain(inertia).collect()
     });
-    let note = format!("kg m², in the body's own frame, about its origin; {MARKS}");
+    let note = format!("kg m², in the body frame, about its origin; {MARKS}");
     let columns = ["body", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
     page.add(Table::new("Inertia of the bodies", columns).note(note).rows(rows));
     if let Some(found) = &r.possible_intervals {
@@ -475,14 +462,14 @@ fn bodies(page: &mut Report, r: &ResultFile) {
     }
 }
 
-/// How far every parameter could go.
+/// Intervals of all parameters.
 fn intervals(found: &[ParameterInterval]) -> Table {
     let end = |end: Option<f64>| Cell::from(end.map_or_else(|| "open".to_owned(), |end| short(end, 4)));
     let holder = |end: IntervalEnd| match end {
         IntervalEnd::Data => "data",
-        IntervalEnd::Constraint => "physics",
+        IntervalEnd::Constraint => "physical consistency",
         IntervalEnd::Open => "–",
-        IntervalEnd::Unsettled => "not settled",
+        IntervalEnd::Unsettled => "not converged",
     };
     let rows = found.iter().map(|interval| {
         vec![
@@ -496,10 +483,10 @@ fn intervals(found: &[ParameterInterval]) -> Table {
             holder(interval.held_by[1]).into(),
         ]
     });
-    let note = "every value in an interval belongs to a physically consistent set that the data do not reject at 95 %; the ends are held by the data, by what is physically consistent, or not at all";
+    let note = "every value in an interval belongs to a physically consistent set that the data do not reject at 95 %; each end is limited by the data, by physical consistency, or not at all";
     Table::new(
-        "How far each parameter could go",
-        ["parameter", "of", "unit", "best fit", "from", "to", "held below by", "held above by"],
+        "Possible intervals of the parameters",
+        ["parameter", "of", "unit", "best fit", "from", "to", "lower end limited by", "upper end limited by"],
     )
     .note(note)
     .rows(rows)
@@ -511,9 +498,9 @@ fn log_text(log: &LogSummary) -> Text {
     let cutoff =
         log.motion_cutoff_hz.map_or_else(String::new, |hz| format!(", positions filtered at {} Hz", short(hz, 3)));
     let mut text = Text::new(format!(
-        "{} ({}): {} rows at {} Hz{cutoff}{filter}, {} rows at {} Hz after it.",
+        "{} ({}): {} rows at {} Hz{cutoff}{filter}; {} filtered rows at {} Hz.",
         log.log,
-        if log.role == Role::Validate { "held out" } else { "fitted to" },
+        if log.role == Role::Validate { "held out" } else { "training" },
         log.import.rows,
         short(log.import.rate_hz, 5),
         log.filtered_rows,

@@ -1,8 +1,8 @@
 //! `report.html` of an iteration.
 
-use super::iteration_parameters::{found, parameters};
+use super::iteration_parameters::{add_parameters, identified_parameters};
 use super::iteration_remarks::{log_remarks, motion_remarks, run_remarks, unmet_conditions};
-use super::run_figures::{CURVES, error_in_bars, is_known, largest_error, last_good, run_name, worst};
+use super::run_figures::{MAX_CURVES, error_in_bars, is_known, largest_error, last_good, run_name, worst};
 use super::torque_check::torque_section;
 use crate::error::Error;
 use crate::result::{IterationRun, IterationsFile};
@@ -11,29 +11,27 @@ use dynident_iteration::robot::read_log_table;
 use dynident_report::{Cell, ConvergencePlot, Heading, KeyFigures, LinePlot, Report, Table, Tone, short};
 use dynident_simulation::Reference;
 
-/// Which trajectory of which run.
+/// A trajectory of a run.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RunName {
-    /// The run's number.
     pub(crate) run: usize,
-    /// The leg's number, where there are several.
+    /// Leg number, if there are several legs.
     pub(crate) leg: Option<usize>,
-    /// Place of the leg within the run, from 0.
+    /// Index of the leg within the run.
     pub(crate) place: usize,
 }
 
-/// How far a run was from its trajectory.
+/// Tracking error of a run.
 pub(crate) struct RunTrace {
     name: RunName,
-    /// Times of the trajectory, s.
+    /// Sample times of the trajectory, s.
     pub(crate) times_s: Vec<f64>,
-    /// For each joint the desired less the measured position at these times; NaN where the run had ended.
+    /// Desired minus measured position of each joint, rad (m); NaN after the end of the run.
     pub(crate) error: Vec<Vec<f64>>,
 }
 
 impl RunTrace {
-    /// From the log that was kept of the run. A log that cannot be read draws nothing: the page is to be written all
-    /// the same.
+    /// Reads the log of the run. An unreadable log gives an empty plot, so that the page can still be written.
     pub(crate) fn new(name: RunName, store: &IterationStore, reference: &Reference, joints: &[String]) -> Self {
         let log = if name.place == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", name.place + 1) };
         let (motion, rate_hz) = (reference.motion(), reference.rate_hz());
@@ -50,11 +48,11 @@ impl RunTrace {
     }
 }
 
-/// A value between two samples by a straight line; NaN after the last.
+/// Linear interpolation; NaN after the last sample.
 fn between(times_s: &[f64], values: &[f64], time_s: f64) -> f64 {
     let after = times_s.partition_point(|time| *time < time_s);
     match (after, times_s.get(after)) {
-        // Rounding of the last instant does not end a run.
+        // Tolerates rounding of the last sample time.
         (_, None) => times_s.last().filter(|last| time_s - **last < 1e-9).map_or(f64::NAN, |_| values[after - 1]),
         (0, Some(_)) => values[0],
         (_, Some(next)) => {
@@ -64,17 +62,16 @@ fn between(times_s: &[f64], values: &[f64], time_s: f64) -> f64 {
     }
 }
 
-/// What the computation took.
+/// Computing times.
 pub(crate) struct TimeSpent {
-    /// Until the first run: robot, base parameters, the trajectory's design; s.
+    /// Before the first run: robot, base parameters, trajectory design; s.
     pub(crate) before_runs_s: f64,
-    /// Everything but this page, s.
+    /// Total without this page, s.
     pub(crate) all_s: f64,
-    /// Runs that were made; others were there already.
+    /// Number of new runs.
     pub(crate) runs: usize,
 }
 
-/// The whole page.
 pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time: &TimeSpent) -> Result<String, Error> {
     let mut page = Report::new(&file.name).subtitle(format!("{} joints; {}", file.joints.len(), file.reason));
     page.add(figures(file));
@@ -89,11 +86,11 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
     tracking(&mut page, file, traces);
     page.add(Heading::new("Parameters"));
     if !file.base_parameters.is_empty() {
-        page.add(found(file));
+        page.add(identified_parameters(file));
     }
-    parameters(&mut page, file);
+    add_parameters(&mut page, file);
     page.add(Heading::new("Time"));
-    page.add(spent(file, time));
+    page.add(computing_times(file, time));
     Ok(page.html()?)
 }
 
@@ -105,7 +102,7 @@ fn figures(file: &IterationsFile) -> KeyFigures {
     };
     let rejected = file.runs.iter().filter(|run| !run.accepted).count();
     let of = if rejected == 0 { "none rejected".to_owned() } else { format!("{rejected} rejected") };
-    let mut figures = KeyFigures::new().judged("verdict", file.status.replace('-', " "), "", tone).judged(
+    let mut figures = KeyFigures::new().judged("result", file.status.replace('-', " "), "", tone).judged(
         "runs",
         file.runs.len().to_string(),
         of,
@@ -116,44 +113,49 @@ fn figures(file: &IterationsFile) -> KeyFigures {
         figures = figures.figure("tracking error, last run", format!("{} rad (m)", short(worst(last), 3)), note);
     }
     if let Some(improvement) = file.tracking_improvement {
-        figures = figures.figure("tracking better by", short(improvement, 3), "first to last good run");
+        figures = figures.figure("tracking improvement factor", short(improvement, 3), "first to last accepted run");
     }
     if let Some(error) = last_good(file).and_then(largest_error) {
-        figures = figures.figure("largest parameter error", short(error, 3), "last good run, against the truth");
+        figures =
+            figures.figure("largest parameter error", short(error, 3), "last accepted run, compared with the truth");
     }
     if let Some(ratio) = file.error_over_bound {
-        figures = figures.figure("error over the Cramér-Rao bound", short(ratio, 3), "root mean square, last good run");
+        figures = figures.figure(
+            "error relative to the Cramér-Rao bound",
+            short(ratio, 3),
+            "root mean square, last accepted run",
+        );
     }
     figures
 }
 
-/// What controlled a run, in words.
+/// Model of the controller of a run.
 fn model(run: &IterationRun) -> String {
     match (run.model_based, run.model_of_run) {
         (false, _) if run.stiffness == 1.0 => "none".to_owned(),
-        (false, _) => format!("none; stiffer {} times", short(run.stiffness, 3)),
-        (true, Some(of)) => format!("of run {of}"),
+        (false, _) => format!("none; gains times {}", short(run.stiffness, 3)),
+        (true, Some(of)) => format!("from run {of}"),
         (true, None) if run.damping < 1.0 => {
-            format!("{} of the step from the last good one", short(run.damping, 3))
+            format!("{} of the step from the last accepted model", short(run.damping, 3))
         }
-        (true, None) => "what was believed before".to_owned(),
+        (true, None) => "prior".to_owned(),
     }
 }
 
 fn runs(file: &IterationsFile) -> Table {
     let known = is_known(file);
-    let mut columns = vec!["run", "controller", "its model", "verdict", "tracking error, rad (m)", "widest bar"];
+    let mut columns = vec!["run", "controller", "model", "result", "tracking error, rad (m)", "largest error bar"];
     if known {
-        columns.extend(["largest error", "error in bars"]);
+        columns.extend(["largest error", "error in std"]);
     }
     let mut table = Table::new("", columns).note(if known {
-        "tracking: the largest of all joints; error in bars: root mean square over the parameters of error over error bar (one standard deviation)"
+        "tracking: largest of all joints; error in std: root mean square of parameter error divided by its standard deviation"
     } else {
-        "tracking: the largest of all joints; widest bar: one standard deviation"
+        "tracking: largest of all joints; largest error bar: one standard deviation"
     });
     let optional = |value: Option<f64>| Cell::from(value.map_or_else(|| "–".to_owned(), |value| short(value, 3)));
     for run in &file.runs {
-        let verdict = if run.accepted { ("good", Tone::Good) } else { ("rejected", Tone::Warning) };
+        let verdict = if run.accepted { ("accepted", Tone::Good) } else { ("rejected", Tone::Warning) };
         let widest = run.parameters.iter().filter_map(|parameter| parameter.std).reduce(f64::max);
         let mut row = vec![
             Cell::from(run_name(run)),
@@ -185,16 +187,16 @@ fn tracking(page: &mut Report, file: &IterationsFile, traces: &[RunTrace]) {
         let own: Vec<&RunTrace> = traces.iter().filter(|trace| trace.name.leg == leg).collect();
         let Some(longest) = own.iter().max_by_key(|trace| trace.times_s.len()) else { continue };
         for (joint, name) in file.joints.iter().enumerate() {
-            // A locked joint has no error to draw.
+            // A locked joint has no tracking error.
             if own.iter().all(|trace| trace.error[joint].iter().all(|error| *error == 0.0)) {
                 continue;
             }
             let of_leg = leg.map_or_else(String::new, |leg| format!(", leg {leg}"));
             let title = format!("{name}: tracking error{of_leg}");
-            let mut plot =
-                LinePlot::new(title, "t, s", "rad (m)", longest.times_s.clone()).note("desired less measured position");
-            // The first runs and the last: what lies between differs little from either.
-            let shown = |place: usize| place + 2 < CURVES || place + 2 >= own.len();
+            let mut plot = LinePlot::new(title, "t, s", "rad (m)", longest.times_s.clone())
+                .note("desired minus measured position");
+            // First and last runs; intermediate runs are similar.
+            let shown = |place: usize| place + 2 < MAX_CURVES || place + 2 >= own.len();
             for trace in own.iter().enumerate().filter(|(place, _)| shown(*place)).map(|(_, trace)| trace) {
                 let mut error = trace.error[joint].clone();
                 error.resize(longest.times_s.len(), f64::NAN);
@@ -205,11 +207,11 @@ fn tracking(page: &mut Report, file: &IterationsFile, traces: &[RunTrace]) {
     }
 }
 
-fn spent(file: &IterationsFile, time: &TimeSpent) -> Table {
+fn computing_times(file: &IterationsFile, time: &TimeSpent) -> Table {
     let duration = format!("{} s", short(file.duration_s, 4));
     let moved = format!("{} s", short(file.duration_s * file.runs.len() as f64, 4));
     let made = format!("{} runs and their identification", time.runs);
-    Table::new("", ["what", "time"]).rows([
+    Table::new("", ["step", "time"]).rows([
         vec![Cell::from("motion of one run"), Cell::from(duration)],
         vec!["motion of all runs".into(), moved.into()],
         vec!["computing: robot and trajectory".into(), format!("{} s", short(time.before_runs_s, 3)).into()],

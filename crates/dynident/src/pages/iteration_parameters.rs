@@ -1,17 +1,15 @@
-//! The parameters on the page of an iteration: run by run, against their error bars and the truth.
+//! Parameters on the page of an iteration, with error bars, run by run.
 
-use super::run_figures::{CURVES, error_in_bars, is_known, largest_error, last_good, run_name};
+use super::run_figures::{HALF_WIDTH_95, MAX_CURVES, error_in_bars, is_known, largest_error, last_good, run_name};
+use super::unit;
 use crate::result::{IterationParameter, IterationRun, IterationsFile};
 use dynident_report::{BarPlot, Cell, ConvergencePlot, Report, Table, Text, Tone, short};
 
-/// Half width of a 95 % error bar, in standard deviations.
-const HALF_WIDTH_95: f64 = 1.96;
-
-/// The base parameters by all good runs together.
-pub(super) fn found(file: &IterationsFile) -> Table {
-    let columns = ["parameter", "what it sums", "unit", "value", "± (95 %)", "of the consistent robot"];
-    let mut table = Table::new("The robot found, by all good runs together", columns)
-        .note("result.json has all of it with the bodies and friction, identification.html the torques; controller.json is the controller with this robot as its model");
+/// The base parameters from all accepted runs.
+pub(super) fn identified_parameters(file: &IterationsFile) -> Table {
+    let columns = ["parameter", "expression", "unit", "value", "± (95 %)", "consistent set"];
+    let mut table = Table::new("Identified parameters from all accepted runs", columns)
+        .note("result.json contains bodies and friction, identification.html the torques, controller.json the controller with this model");
     for one in &file.base_parameters {
         let bar = if one.excited { short(one.bar_95(), 3) } else { "not excited".to_owned() };
         table = table.rows([vec![
@@ -26,13 +24,8 @@ pub(super) fn found(file: &IterationsFile) -> Table {
     table
 }
 
-/// A unit that is not broken, with raised exponents.
-fn unit(unit: &str) -> String {
-    unit.replace(' ', "\u{a0}").replace("^2", "²")
-}
-
-/// Adds the parameters of all runs: errors, bars, values run by run, and a table.
-pub(super) fn parameters(page: &mut Report, file: &IterationsFile) {
+/// Adds the parameters of all runs: errors, error bars, values per run, and a table.
+pub(super) fn add_parameters(page: &mut Report, file: &IterationsFile) {
     let Some(last) = last_good(file) else {
         page.add(Text::new("No run determines the parameters."));
         return;
@@ -59,14 +52,14 @@ pub(super) fn parameters(page: &mut Report, file: &IterationsFile) {
             bars = bars.bar(&parameter.expression, value, half_width, truth);
         }
         page.add(bars);
-        for (part, some) in places.chunks(CURVES).enumerate() {
-            page.add(by_run(file, of_unit, some, part, places.len().div_ceil(CURVES), known));
+        for (part, some) in places.chunks(MAX_CURVES).enumerate() {
+            page.add(by_run(file, of_unit, some, part, places.len().div_ceil(MAX_CURVES), known));
         }
     }
     page.add(table(file, last, known));
 }
 
-/// How the errors of all parameters settle.
+/// Convergence of the parameter errors.
 fn settling_errors(page: &mut Report, file: &IterationsFile) {
     let of = |figure: &dyn Fn(&IterationRun) -> Option<f64>| -> Vec<f64> {
         file.runs.iter().map(|run| figure(run).unwrap_or(f64::NAN)).collect()
@@ -76,7 +69,7 @@ fn settling_errors(page: &mut Report, file: &IterationsFile) {
         (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
     };
     page.add(
-        ConvergencePlot::new("Parameter errors against the truth", "kg m, kg m², ..")
+        ConvergencePlot::new("Parameter errors", "kg m, kg m², ..")
             .log_y()
             .curve("largest", of(&largest_error))
             .curve("root mean square", of(&root_mean_square)),
@@ -92,16 +85,16 @@ fn settling_errors(page: &mut Report, file: &IterationsFile) {
             .collect();
         (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
     };
-    let mut relative = ConvergencePlot::new("The same, relative", "root mean square over the parameters")
+    let mut relative = ConvergencePlot::new("Relative parameter errors", "root mean square over the parameters")
         .log_y()
-        .curve("over its error bar", of(&error_in_bars));
+        .curve("relative to the standard deviation", of(&error_in_bars));
     if file.bound.is_some() {
-        relative = relative.curve("over the Cramér-Rao bound", of(&over_bound));
+        relative = relative.curve("relative to the Cramér-Rao bound", of(&over_bound));
     }
     page.add(relative);
 }
 
-/// Some parameters of one unit run by run: against the truth where it is known.
+/// Some parameters of one unit per run: values, or errors if the truth is known.
 fn by_run(
     file: &IterationsFile,
     of_unit: &str,
@@ -111,9 +104,9 @@ fn by_run(
     known: bool,
 ) -> ConvergencePlot {
     let number = if parts > 1 { format!(" ({} of {parts})", part + 1) } else { String::new() };
-    let what = if known { "Value less the truth" } else { "Value" };
+    let what = if known { "Error" } else { "Value" };
     let mut plot = ConvergencePlot::new(format!("{what}, {}{number}", unit(of_unit)), unit(of_unit))
-        .note("run by run, with 95 % error bars");
+        .note("per run, with 95 % error bars");
     for &place in places {
         let each: Vec<Option<&IterationParameter>> = file.runs.iter().map(|run| run.parameters.get(place)).collect();
         let determined = |parameter: &&IterationParameter| parameter.std.is_some();
@@ -133,13 +126,12 @@ fn by_run(
     plot
 }
 
-/// All values, run by run.
 fn table(file: &IterationsFile, last: &IterationRun, known: bool) -> Table {
     let mut columns = vec!["expression".to_owned(), "unit".to_owned()];
     columns.extend(file.runs.iter().map(|run| format!("run {}", run_name(run))));
     columns.push(format!("std, run {}", last.run));
     if known {
-        columns.extend(["truth".to_owned(), "error in bars".to_owned()]);
+        columns.extend(["truth".to_owned(), "error in std".to_owned()]);
     }
     if file.bound.is_some() {
         columns.push("bound".to_owned());
@@ -155,7 +147,7 @@ fn table(file: &IterationsFile, last: &IterationRun, known: bool) -> Table {
         row.push(optional(parameter.std));
         if known {
             let bars = parameter.error.zip(parameter.std.filter(|std| *std > 0.0)).map(|(error, std)| error / std);
-            // One of three hundred is beyond three bars by chance.
+            // About 0.3 % of the errors exceed three standard deviations by chance.
             let tone = if bars.is_some_and(|bars| bars.abs() > 3.0) { Tone::Warning } else { Tone::Plain };
             row.push(Cell::from(parameter.error.map_or_else(String::new, |e| short(parameter.value - e, 5))));
             row.push(Cell::judged(bars.map_or_else(|| "–".to_owned(), |bars| short(bars, 2)), tone));

@@ -1,23 +1,21 @@
-//! Remarks on the page of an iteration: on its runs, their motions and their logs.
+//! Remarks on runs, motions and logs for the page of an iteration.
 
 use super::run_figures::{last_good, run_name};
 use crate::result::{IterationRun, IterationsFile, UnmetCondition};
 use dynident_report::{Cell, Heading, Report, Table, Text, Tone, short};
 
-/// Explains the figures of held-out runs.
-const HELD_OUT: &str = "A motion that is never fitted, run under the controller with the newest model: how much of each joint's torque lies inside the 95 % band of what that model says. The verdict rests on the last.";
+/// Explains held-out runs.
+const HELD_OUT: &str = "Validation motion, run with the newest model in the controller: percentage of each joint's torque inside the 95 % band of the prediction. The result of the iteration uses the last one.";
 
-/// Explains the figures of forecasts.
-const FORECASTS: &str = "The worst bars: root mean square of the error bars along the ten directions that were known worst before the run, measured by the torque that they leave uncertain wherever the arm may be.";
+/// Explains forecasts.
+const FORECASTS: &str = "Largest error bars: root mean square of the error bars along the ten least known directions before the run, in terms of the torque uncertainty over the workspace.";
 
-/// Adds what prevents convergence, with what would help.
+/// Adds unmet conditions of convergence, with remedies.
 pub(super) fn unmet_conditions(page: &mut Report, file: &IterationsFile) {
-    let point =
-        |unmet: &UnmetCondition| (Tone::Warning, format!("{}. What would help: {}.", unmet.message, unmet.remedy));
-    section(page, "What is not met", file.unmet.iter().map(point).collect());
+    let point = |unmet: &UnmetCondition| (Tone::Warning, format!("{}. Remedy: {}.", unmet.message, unmet.remedy));
+    section(page, "Unmet conditions", file.unmet.iter().map(point).collect());
 }
 
-/// Adds rejected runs, lowered bandwidths and oscillations.
 pub(super) fn run_remarks(page: &mut Report, file: &IterationsFile) {
     let rejected = |run: &IterationRun| Some(format!("run {}: {}", run_name(run), run.reason.as_ref()?));
     list(page, of_runs(file, Tone::Warning, rejected));
@@ -26,16 +24,15 @@ pub(super) fn run_remarks(page: &mut Report, file: &IterationsFile) {
     list(page, lowered.into_iter().chain(oscillating).collect());
 }
 
-/// Adds forecasts, warm-ups and held-out motions.
 pub(super) fn motion_remarks(page: &mut Report, file: &IterationsFile) {
     let forecast = |run: &IterationRun| Some(format!("run {}: {}", run_name(run), run.forecast.as_ref()?.sentence()));
     let mut forecasts = of_runs(file, Tone::Plain, forecast);
     forecasts.extend(
         file.declined
             .iter()
-            .map(|forecast| (Tone::Plain, format!("a further run was not worth it: {}", forecast.sentence()))),
+            .map(|forecast| (Tone::Plain, format!("a further run was not worthwhile: {}", forecast.sentence()))),
     );
-    explained(page, "What the motions were to bring", FORECASTS, forecasts);
+    explained(page, "Forecasts of the motions", FORECASTS, forecasts);
     let warm_up = |run: &IterationRun| {
         Some(format!("before run {}: {}", run_name(run), run.warm_up.as_ref()?.sentence(&file.joints)))
     };
@@ -46,33 +43,31 @@ pub(super) fn motion_remarks(page: &mut Report, file: &IterationsFile) {
     explained(page, "The held-out motion", HELD_OUT, of_runs(file, Tone::Plain, held_out));
 }
 
-/// Adds offsets of single runs, the evidence of the last log, and the differentiators.
+/// Adds offsets of runs, the evidence of the last log, and the differentiators.
 pub(super) fn log_remarks(page: &mut Report, file: &IterationsFile) {
     let offsets = last_good(file).and_then(|run| run.run_offsets_sentence(&file.joints));
-    section(page, "Offsets of single runs", offsets.map(|sentence| (Tone::Plain, sentence)).into_iter().collect());
+    section(page, "Offsets of runs", offsets.map(|sentence| (Tone::Plain, sentence)).into_iter().collect());
     if let Some(shown) = last_shown(file) {
-        page.add(Heading::new("What the last log shows"));
+        page.add(Heading::new("Evidence of the last log"));
         page.add(shown);
     }
     let differentiator =
         |run: &IterationRun| Some(format!("run {}: {}", run_name(run), run.differentiator.as_ref()?.sentence()));
     let points = of_runs(file, Tone::Plain, differentiator);
-    section(page, "From positions to velocities and accelerations", points);
+    section(page, "Differentiation of positions", points);
 }
 
-/// A point for each run with something to report.
+/// One point for each run with a remark.
 fn of_runs(file: &IterationsFile, tone: Tone, point: impl Fn(&IterationRun) -> Option<String>) -> Vec<(Tone, String)> {
     file.runs.iter().filter_map(point).map(|point| (tone, point)).collect()
 }
 
-/// Adds points, if there are any.
 fn list(page: &mut Report, points: Vec<(Tone, String)>) {
     if !points.is_empty() {
         page.add(Text { paragraphs: Vec::new(), points });
     }
 }
 
-/// Adds points under a heading, if there are any.
 fn section(page: &mut Report, heading: &str, points: Vec<(Tone, String)>) {
     if !points.is_empty() {
         page.add(Heading::new(heading));
@@ -80,7 +75,6 @@ fn section(page: &mut Report, heading: &str, points: Vec<(Tone, String)>) {
     }
 }
 
-/// Adds points under a heading and an explanation, if there are any.
 fn explained(page: &mut Report, heading: &str, explanation: &str, points: Vec<(Tone, String)>) {
     if !points.is_empty() {
         page.add(Heading::new(heading));
@@ -88,25 +82,25 @@ fn explained(page: &mut Report, heading: &str, explanation: &str, points: Vec<(T
     }
 }
 
-/// Joint by joint what the verdict rests on, of the last run whose log shows it.
+/// Evidence per joint for the result of the iteration, from the last run that has it.
 fn last_shown(file: &IterationsFile) -> Option<Table> {
     let run = file.runs.iter().rfind(|run| run.evidence.is_some())?;
     let optional = |value: Option<String>| Cell::from(value.unwrap_or_else(|| "–".to_owned()));
     let columns = [
         "joint",
         "tracking error, rad (m)",
-        "its floor",
+        "expected error",
         "at the torque limit",
-        "torque after motion, ms",
-        "of it taken off, ms",
+        "torque lag, ms",
+        "compensated lag, ms",
         "predicted inside the 95 % band",
     ];
     let evidence = run.evidence.as_ref()?;
     let delay = evidence.feedback_delay_s.map_or_else(String::new, |delay_s| {
-        format!("; the tracking error is that of a controller which sees positions {} ms late", short(1e3 * delay_s, 3))
+        format!("; the tracking error corresponds to a feedback delay of {} ms", short(1e3 * delay_s, 3))
     });
     let mut table = Table::new(format!("Run {}", run_name(run)), columns).note(format!(
-        "floor: what noise, friction and delay explain, looked for where tracking is beyond the tolerance{delay}; predicted: by the model of the good runs before it",
+        "expected error: due to noise, friction and delay, computed if tracking exceeds the tolerance{delay}; predicted: with the model from earlier accepted runs",
     ));
     for (joint, (name, shown)) in file.joints.iter().zip(&evidence.joints).enumerate() {
         let lag = run.torque_lags.get(joint).copied().flatten();

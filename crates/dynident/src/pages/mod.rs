@@ -1,4 +1,4 @@
-//! The pages and pictures that people look at: what stands in each `report.html`, and beside a design.
+//! Contents of each `report.html`, and plots of designs.
 
 mod check;
 pub(crate) mod design;
@@ -11,3 +11,8 @@ mod payloads;
 mod provenance;
 mod run_figures;
 mod torque_check;
+
+/// Prevents line breaks in a unit and raises its exponents.
+fn unit(unit: &str) -> String {
+    unit.replace(' ', "\u{a0}").replace("^2", "²")
+}

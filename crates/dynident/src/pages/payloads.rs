@@ -4,7 +4,6 @@ use crate::result::ResultFile;
 use dynident_identification::payload::{Measured, PayloadResult};
 use dynident_report::{Cell, Heading, Report, Table, Text, Tone, short};
 
-/// The sections, as far as there is something to say.
 pub(crate) fn loads(page: &mut Report, r: &ResultFile) {
     if !r.payloads.is_empty() {
         page.add(Heading::new("Payloads"));
@@ -24,7 +23,7 @@ pub(crate) fn loads(page: &mut Report, r: &ResultFile) {
                 gain.reason.clone().unwrap_or_default().into(),
             ]
         });
-        let columns = ["joint", "Nm (N) per logged unit", "std", "95 %, ±", "not identified because"];
+        let columns = ["joint", "Nm (N) per logged unit", "std", "95 %, ±", "reason if not identified"];
         page.add(Table::new("Drive gains", columns).note("factors for torque.scale of the log's format").rows(rows));
     }
     if !r.offsets.is_empty() {
@@ -36,8 +35,8 @@ pub(crate) fn loads(page: &mut Report, r: &ResultFile) {
                 short(offset.std_nm, 3).into(),
             ]
         });
-        let table = Table::new("Offsets by log", ["joint", "log", "less the mean, Nm (N)", "std"]);
-        page.add(table.note("the base parameters hold the mean over the training logs").rows(rows));
+        let table = Table::new("Offsets by log", ["joint", "log", "deviation from the mean, Nm (N)", "std"]);
+        page.add(table.note("the base parameters contain the mean over the training logs").rows(rows));
     }
 }
 
@@ -59,7 +58,7 @@ fn payload_sections(page: &mut Report, payload: &PayloadResult) {
         vec![Cell::from(figure), of(|m| m.value), of(|m| m.std), of(|m| m.half_width_95), possible.into()]
     });
     let note = format!(
-        "in the frame of {}; inertia (kg m²) about the centre of mass; what the logs do not determine alone is –",
+        "in the frame of {}; inertia (kg m²) about the centre of mass; –: not separately identifiable",
         payload.link
     );
     let columns = ["", "estimate", "std", "95 %, ±", "consistent body"];
@@ -69,7 +68,7 @@ fn payload_sections(page: &mut Report, payload: &PayloadResult) {
         text = text.point(Tone::Warning, words.clone());
     }
     if let Some(reason) = &payload.failure {
-        text = text.point(Tone::Bad, format!("no consistent body: {reason}"));
+        text = text.point(Tone::Bad, format!("no physically consistent body: {reason}"));
     }
     page.add(text);
 }

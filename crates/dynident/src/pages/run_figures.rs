@@ -1,11 +1,14 @@
-//! Figures of the runs of an iteration, for its page.
+//! Figures of runs for the page of an iteration.
 
 use crate::result::{IterationRun, IterationsFile};
 
-/// Curves of one plot: more cannot be distinguished.
-pub(super) const CURVES: usize = 6;
+/// Half-width of a 95 % error bar, in standard deviations.
+pub(super) const HALF_WIDTH_95: f64 = 1.96;
 
-/// A run's number, with its leg where each leg has a separate iteration.
+/// Maximum number of distinguishable curves in a plot.
+pub(super) const MAX_CURVES: usize = 6;
+
+/// Run number, with its leg if each leg has a separate iteration.
 pub(super) fn run_name(run: &IterationRun) -> String {
     run.leg.map_or_else(|| run.run.to_string(), |leg| format!("{} of leg {leg}", run.run))
 }
@@ -15,7 +18,7 @@ pub(super) fn is_known(file: &IterationsFile) -> bool {
     file.runs.iter().flat_map(|run| &run.parameters).any(|parameter| parameter.error.is_some())
 }
 
-/// The last good run with an estimate.
+/// The last accepted run with an estimate.
 pub(super) fn last_good(file: &IterationsFile) -> Option<&IterationRun> {
     file.runs.iter().rev().find(|run| run.accepted && !run.parameters.is_empty())
 }
@@ -25,7 +28,7 @@ pub(super) fn worst(run: &IterationRun) -> f64 {
     run.max_tracking_error_rad.iter().fold(0.0, |most, error| most.max(*error))
 }
 
-/// Root mean square error of the parameters that a run determines, in standard deviations.
+/// Root mean square parameter error of a run, in standard deviations.
 pub(super) fn error_in_bars(run: &IterationRun) -> Option<f64> {
     let squares: Vec<f64> = run
         .parameters
@@ -36,7 +39,7 @@ pub(super) fn error_in_bars(run: &IterationRun) -> Option<f64> {
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
-/// Largest error of a parameter.
+/// Largest absolute parameter error.
 pub(super) fn largest_error(run: &IterationRun) -> Option<f64> {
     run.parameters.iter().filter_map(|parameter| parameter.error.map(f64::abs)).reduce(f64::max)
 }

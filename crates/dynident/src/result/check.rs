@@ -1,13 +1,13 @@
-//! What `check` prints, and `identify` keeps in its result: whether study, robot and logs fit together.
+//! Result of `check`, also part of the result of `identify`: consistency of study, robot and logs.
 
 use core::fmt::Write;
 use dynident_recording::Level;
 use serde::{Deserialize, Serialize};
 
-/// Name and version of the schema of what `check --json` prints.
+/// Name and version of the schema of `check --json`.
 pub const CHECK_SCHEMA: &str = "dynident/check/1";
 
-/// A study examined.
+/// Result of `check`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CheckFile {
@@ -15,23 +15,23 @@ pub struct CheckFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
-    /// What was found in the logs and by comparing readings of them.
+    /// Findings about the logs and from the comparison of hypotheses.
     pub check: StudyCheck,
 }
 
-/// Whether study, robot and logs fit together.
+/// Consistency of study, robot and logs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct StudyCheck {
-    /// What was found, the worst first.
+    /// Findings, the most serious first.
     pub findings: Vec<CheckFinding>,
-    /// Names of the joints, in the order of the readings.
+    /// Names of the joints, in the order of the hypothesis results.
     pub joints: Vec<String>,
-    /// The study as it is written; none where the readings could not be compared.
+    /// The study as written; null if the hypotheses could not be compared.
     pub as_written: Option<ReadingResult>,
-    /// The reading that explains the logs clearly better, if there is one.
+    /// The hypothesis that explains the logs clearly better, if there is one.
     pub best: Option<ReadingResult>,
-    /// Other readings that were tried.
+    /// Number of tested hypotheses.
     pub tried: usize,
 }
 
@@ -39,45 +39,45 @@ pub struct StudyCheck {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CheckFinding {
-    /// How much it matters.
+    /// Severity.
     pub level: Level,
-    /// What kind of mistake: `sign`, `order`, `offset`, `unit`, `coupling`, `lag`, `mounting`, `payload`,
-    /// `description`, `torque`, `limits`, `samples`, `rows` or `log`.
+    /// Kind of mistake: `sign`, `order`, `offset`, `unit`, `coupling`, `lag`, `mounting`, `payload`, `description`,
+    /// `torque`, `limits`, `samples`, `rows` or `log`.
     pub kind: String,
-    /// What, in a sentence that names joints.
+    /// Description, with the names of joints.
     pub what: String,
-    /// What speaks for it, in figures.
+    /// Evidence, with numbers.
     pub evidence: String,
-    /// What to write into the study; empty where no key mends it.
+    /// Corrections of the study; empty if no key corrects the mistake.
     pub write: Vec<StudyChange>,
-    /// Other explanations that these logs cannot tell from it.
+    /// Alternative explanations that these logs do not distinguish.
     pub or: Vec<String>,
 }
 
-/// A key of a study and its new value.
+/// A study key and its new value.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct StudyChange {
-    /// The table that it stands in: `format.torque`, `robot`, `[[log]] 2`.
+    /// Table of the key: `format.torque`, `robot`, `[[log]] 2`.
     pub table: String,
-    /// The line to write, as TOML.
+    /// The new line, as TOML.
     pub line: String,
 }
 
-/// How well a robot that can exist explains the logs in one reading of them.
+/// Score of one hypothesis: the best physically consistent fit to the logs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ReadingResult {
-    /// Percent of each joint's torque that no physically consistent robot explains (root mean squares).
+    /// Torque of each joint without explanation by a physically consistent robot, percent (root mean squares).
     pub left_percent: Vec<f64>,
-    /// Joints beyond their limits.
+    /// Joints that exceed their limits.
     pub beyond_limits: Vec<String>,
-    /// All evidence as one number, the less the better; a difference of 0.6 is clear.
+    /// Score from all evidence, lower is better; a difference of 0.6 is clear.
     pub score: f64,
 }
 
 impl StudyCheck {
-    /// Sentences for what would spoil an identification.
+    /// Findings that make an identification unreliable.
     pub fn problems(&self) -> impl Iterator<Item = String> + '_ {
         self.findings.iter().filter(|finding| finding.level == Level::Problem).map(CheckFinding::sentence)
     }
@@ -96,14 +96,14 @@ impl StudyChange {
 }
 
 impl CheckFinding {
-    /// What was found, why, and what to write, in one text.
+    /// Finding, evidence and corrections in one text.
     pub fn sentence(&self) -> String {
         let mut text = format!("{}: {}", self.what, self.evidence);
         for change in &self.write {
-            let _ = write!(text, "; under {} write `{}`", change.place(), change.line);
+            let _ = write!(text, "; in {} write `{}`", change.place(), change.line);
         }
         if !self.or.is_empty() {
-            let _ = write!(text, "; these logs cannot tell it from: {}", self.or.join("; or "));
+            let _ = write!(text, "; these logs do not distinguish it from: {}", self.or.join("; or "));
         }
         text
     }

@@ -1,4 +1,4 @@
-//! What `design.json` holds.
+//! Content of `design.json`.
 
 use super::provenance::Provenance;
 use crate::study::{FamilyChoice, WindowedProblem};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of [`DesignFile`].
 pub const DESIGN_SCHEMA: &str = "dynident/design/1";
 
-/// What `design` prints as JSON and writes as `design.json`.
+/// Output of `design` as JSON, also written as `design.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DesignFile {
@@ -17,99 +17,98 @@ pub struct DesignFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
-    /// Where it comes from; none in files of before it was written.
+    /// Provenance; null in files of earlier versions.
     #[serde(default)]
     pub provenance: Option<Provenance>,
     /// Joints in the order of all vectors.
     pub joints: Vec<String>,
-    /// The family; `given` for a trajectory or log that was only looked at.
+    /// The family; `given` for a trajectory or log that was checked.
     pub family: String,
-    /// The trajectory or log that was looked at; none for a search.
+    /// The checked trajectory or log; null for a search.
     pub given: Option<String>,
-    /// The family's settings, as a study would have them; none for a motion that was given.
+    /// Settings of the family, in the format of a study; null for a given motion.
     pub family_settings: Option<FamilyChoice>,
-    /// The family's parameters of the motion found; the motion is then moved to `start_posture`.
+    /// Parameters of the family; the resulting motion is then shifted to `start_posture`.
     pub parameters: Vec<f64>,
-    /// Where the study lets each joint start, rad (m): none for a joint that is free, empty where all are.
+    /// Fixed start position of each joint, rad (m): null for a free joint, empty if all are free.
     pub start_posture: Vec<Option<f64>>,
-    /// What looked for the motion; `none` for one that was given.
+    /// The optimiser; `none` for a given motion.
     pub optimiser: String,
     /// The criterion.
     pub criterion: String,
-    /// The criterion's figure, smaller is better; none where a parameter is not excited.
+    /// Value of the criterion, lower is better; null if a parameter is not excited.
     pub criterion_figure: Option<f64>,
     /// Condition number of the stacked base regressor, SI units, no weights.
     pub condition_number: Option<f64>,
     /// The same after division of each column by its norm.
     pub condition_number_scaled: Option<f64>,
-    /// `log det WᵀW` of the stacked base regressor: every torque noise 1 Nm (N).
+    /// `log det WᵀW` of the stacked base regressor, for a torque noise of 1 Nm (N).
     pub log_det: Option<f64>,
     /// `log det D` with the torque noise of the study.
     pub log_det_weighted: Option<f64>,
-    /// Base parameters, friction and drive included.
+    /// Number of base parameters, including friction and drives.
     pub base_columns: usize,
-    /// Seconds from rest to rest.
+    /// Duration, s.
     pub duration_s: f64,
-    /// Rate of the log that the figures count on, Hz.
+    /// Sample rate assumed for the figures, Hz.
     pub rate_hz: f64,
     /// Standard deviation of each joint's torque, Nm (N).
     pub torque_std_nm: Vec<f64>,
-    /// Whether every limit is kept, by the independent check.
+    /// Whether all limits are satisfied in the independent check.
     pub feasible: bool,
-    /// Rate of that check, Hz.
+    /// Sample rate of the check, Hz.
     pub check_rate_hz: f64,
-    /// What was checked: the motion itself, or how a given one was understood between its samples.
+    /// Checked data: the motion itself, or the interpolation of a given one.
     pub check_of: String,
-    /// Every limit, and how much of it the motion uses.
+    /// Every limit with its utilisation by the motion.
     pub limits: Vec<LimitReport>,
-    /// Error bars that this motion will give, or that a log gives, white torque noise assumed.
+    /// Predicted error bars for this motion or log, for white torque noise.
     pub forecast: Vec<ParameterForecast>,
-    /// The combinations of parameters that will be known worst, with the prior if there is one.
+    /// The least known combinations of parameters, including the prior.
     pub worst_directions: Vec<DirectionForecast>,
-    /// The strokes of a windowed design, their condition numbers and the optimum beside them.
+    /// Strokes of a windowed design, with condition numbers and the optimum.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub windowed: Option<WindowedFile>,
     /// Evaluations of criterion, limits and gradient.
     pub evaluations: usize,
-    /// Processor seconds, all threads together; none where the system does not say.
+    /// Processor time of all threads, s; null if the operating system does not report it.
     pub cpu_s: Option<f64>,
-    /// Seconds by the clock.
+    /// Elapsed time, s.
     pub seconds: f64,
-    /// Whether the search or its check was stopped before its end. A complete search with the same seed may find
-    /// another motion.
+    /// Whether the search or its check was stopped early. A complete search with the same seed may find another motion.
     #[serde(default)]
     pub stopped: bool,
     /// Seed of the random starts.
     pub seed: u64,
-    /// Why nothing feasible was found, and what would help; empty for a feasible motion.
+    /// Reasons for infeasibility with fixes; empty for a feasible motion.
     pub diagnosis: Vec<String>,
-    /// Limits that were assumed where study and description are silent, and the key that changes each.
+    /// Assumed limits that neither study nor robot description state, with the key that changes each.
     #[serde(default)]
     pub assumed: Vec<String>,
-    /// What no limit looks at: `feasible` says nothing about it.
+    /// Aspects without a limit, which `feasible` does not cover.
     #[serde(default)]
     pub not_checked: Vec<String>,
-    /// What was assumed where the study is silent.
+    /// Assumptions for values that the study does not state.
     pub notes: Vec<String>,
 }
 
-/// What will be known of one base parameter.
+/// Predicted error bar of one base parameter.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ParameterForecast {
-    /// Symbol of its column.
+    /// Symbol of the column.
     pub symbol: String,
-    /// What it sums.
+    /// Expression of the base parameter.
     pub expression: String,
     /// Unit.
     pub unit: String,
-    /// Expected standard deviation from the motion alone; none if the motion does not excite it.
+    /// Expected standard deviation from the motion alone; null if it is not excited.
     pub std: Option<f64>,
-    /// The same with what the prior knows; none without a prior.
+    /// Expected standard deviation including the prior; null without a prior.
     pub std_with_prior: Option<f64>,
     /// `std` in percent of the prior value.
     pub relative_std_percent: Option<f64>,
-    /// Value by the description.
+    /// Value in the robot description.
     pub prior: Option<f64>,
 }
 
@@ -117,30 +116,30 @@ pub struct ParameterForecast {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DirectionForecast {
-    /// How many times less is known in it than of a column that stood alone: `1 / √λ` of the correlation-scaled
+    /// Standard deviation in this direction relative to a single column: `1 / √λ` of the correlation-scaled
     /// information.
     pub inflation: f64,
-    /// Symbols of the columns that make it, the largest share first, and their shares.
+    /// Symbols of the main columns with their shares, the largest first.
     pub terms: Vec<(String, f64)>,
 }
 
-/// What `design.json` holds of a windowed design under `windowed`.
+/// Windowed design in `design.json` under `windowed`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WindowedFile {
-    /// Which joints move while others rest.
+    /// Sequence in which joints move.
     pub problem: WindowedProblem,
-    /// `gradient`, `cma-es`, `genetic`, or `given` where the study gives the strokes.
+    /// `gradient`, `cma-es`, `genetic`, or `given` for strokes in the study.
     pub optimiser: String,
-    /// H of equation 19: the sum of the condition numbers, with the penalty where a limit is broken.
+    /// H of equation 19: the sum of the condition numbers, plus penalties for violated limits.
     pub fitness: f64,
-    /// The sum of the condition numbers alone.
+    /// The sum of the condition numbers.
     pub condition_sum: f64,
-    /// H of the best strokes inside the limits, by exact gradients; none if nothing inside the limits was found.
+    /// H of the best strokes within the limits, from exact gradients; null if none were found.
     pub optimum: Option<f64>,
-    /// How far `condition_sum` is above it, percent (below zero only for strokes that break limits).
+    /// Excess of `condition_sum` over the optimum, percent (negative only for strokes that violate limits).
     pub above_optimum_percent: Option<f64>,
-    /// The strokes, in the order in which the joints move.
+    /// The strokes, in the order of the joints' motion.
     pub strokes: Vec<StrokeFile>,
     /// The strokes of the optimum.
     pub optimum_strokes: Vec<StrokeFile>,
@@ -164,7 +163,7 @@ pub struct StrokeFile {
     pub window_s: f64,
     /// Condition number of the window.
     pub condition_number: f64,
-    /// What the stroke makes of each limit, on the whole stroke and not only at samples.
+    /// Limits, evaluated on the whole stroke, not only at samples.
     pub limits: Vec<StrokeLimitFile>,
 }
 
@@ -172,25 +171,25 @@ pub struct StrokeFile {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct StrokeLimitFile {
-    /// What is bounded.
+    /// Limited quantity.
     pub quantity: StrokeQuantity,
-    /// Its peak; positions count from the offset. rad and s.
+    /// Peak value, rad and s; positions relative to the offset.
     pub value: f64,
-    /// What it must stay below.
+    /// Upper limit.
     pub limit: f64,
-    /// By how much it is exceeded, percent of the limit; negative inside.
+    /// Excess, percent of the limit; negative inside.
     pub excess_percent: f64,
-    /// Whether it is kept.
+    /// Whether the limit is satisfied.
     pub kept: bool,
 }
 
 impl WindowedFile {
-    /// Whether every stroke keeps its limits.
+    /// Whether every stroke satisfies its limits.
     pub fn kept(&self) -> bool {
         self.strokes.iter().flat_map(|stroke| &stroke.limits).all(|limit| limit.kept)
     }
 
-    /// Every broken limit in a sentence.
+    /// Messages about violated limits.
     pub(crate) fn sentences(&self) -> Vec<String> {
         let mut sentences = Vec::new();
         for stroke in &self.strokes {
@@ -203,7 +202,7 @@ impl WindowedFile {
                     StrokeQuantity::RestAcceleration => "acceleration at rest (rad/s\u{b2})",
                 };
                 sentences.push(format!(
-                    "The stroke of `{}`, {what}: {} where less than {} is allowed, {:.0} % too much.",
+                    "Stroke of `{}`, {what}: {} where less than {} is allowed, {:.0} % too much.",
                     stroke.joint,
                     digits(limit.value),
                     digits(limit.limit),
@@ -215,7 +214,7 @@ impl WindowedFile {
     }
 }
 
-/// Four decimals, or as many digits of a small number.
+/// Four decimals, or four significant digits of a small number.
 fn digits(value: f64) -> String {
     if value < 1e-2 { format!("{value:.3e}") } else { format!("{value:.4}") }
 }

@@ -4,7 +4,7 @@ use super::numbers::number;
 use dynident_identification::ErrorSource;
 use serde::{Deserialize, Serialize};
 
-/// The contribution of one source of error to a parameter's error bar.
+/// Contribution of one error source to a parameter's error bar.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ErrorTermResult {
@@ -17,7 +17,7 @@ pub struct ErrorTermResult {
 }
 
 impl ErrorTermResult {
-    /// The source in words.
+    /// Name of the source.
     pub fn name(&self) -> &'static str {
         match self.source {
             ErrorSource::Noise => "noise",

@@ -1,25 +1,25 @@
-//! What `evaluate` prints: the schema of its JSON.
+//! Output of `evaluate` as JSON.
 
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`EvaluationFile`].
 pub const EVALUATION_SCHEMA: &str = "dynident/evaluation/1";
 
-/// What `evaluate` prints as JSON.
+/// Output of `evaluate` as JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct EvaluationFile {
     /// [`EVALUATION_SCHEMA`].
     pub schema: String,
-    /// What was computed, as the command names it.
+    /// The computed quantity, by its name in the command.
     pub quantity: String,
     /// Degrees of freedom.
     pub dof: usize,
-    /// Rows of the table.
+    /// Number of rows.
     pub rows: u64,
-    /// Names of its columns.
+    /// Names of the columns.
     pub columns: Vec<String>,
-    /// The file that it was written to; none where `values` has it.
+    /// The output file; null if `values` contains the table.
     pub file: Option<String>,
     /// The table, row by row, SI units.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,23 +1,23 @@
-//! What `export` prints: the schema of its JSON.
+//! Output of `export` as JSON.
 
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`ExportFile`].
 pub const EXPORT_SCHEMA: &str = "dynident/export/1";
 
-/// What `export` prints as JSON.
+/// Output of `export` as JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ExportFile {
     /// [`EXPORT_SCHEMA`].
     pub schema: String,
-    /// The form, as the command names it.
+    /// The target, by its name in the command.
     pub target: String,
-    /// What the form does not hold, or holds differently, and what speaks against the model; a sentence each.
+    /// Parts of the model that the target does not represent or represents differently, and problems of the model.
     pub notes: Vec<String>,
-    /// The file that it was written to; none where `text` has it.
+    /// The output file; null if `text` contains the export.
     pub file: Option<String>,
-    /// What was written.
+    /// The exported text.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,
 }

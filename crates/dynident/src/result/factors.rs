@@ -1,38 +1,38 @@
-//! What `reduce` and `merge` print: the schema of their JSON.
+//! Output of `reduce` and `merge` as JSON.
 
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`FactorsFile`].
 pub const FACTORS_SCHEMA: &str = "dynident/factors/1";
 
-/// A file of factors that was written: logs reduced to what a fit needs of them.
+/// A factor file: logs reduced for identification.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FactorsFile {
     /// [`FACTORS_SCHEMA`].
     pub schema: String,
-    /// Where the factors stand.
+    /// The factor file.
     pub file: String,
-    /// Bytes of the file.
+    /// Size, bytes.
     pub bytes: u64,
-    /// The robot, as its description calls it.
+    /// Name of the robot in its description.
     pub robot: String,
-    /// Its logs, by robot, time, name and hash.
+    /// The logs, sorted by robot, time, name and hash.
     pub logs: Vec<FactorsLog>,
 }
 
-/// A log of which factors are left.
+/// A reduced log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FactorsLog {
-    /// What it is called.
+    /// Name.
     pub name: String,
-    /// The robot that it was recorded on, where there are several of one kind.
+    /// Identifier of the individual robot, for several robots of the same type.
     pub arm: Option<String>,
-    /// When it was recorded, UTC: `2026-01-05T08:00:00Z`.
+    /// Time of recording, UTC: `2026-01-05T08:00:00Z`.
     pub recorded_at: Option<String>,
-    /// Hash of its numbers: two logs with the same one are one log.
+    /// Hash of its numbers; equal hashes mean the same log.
     pub sha256: String,
-    /// Filtered rows that they stand for.
+    /// Number of filtered rows.
     pub rows: u64,
 }

@@ -1,25 +1,25 @@
-//! What `inspect` prints: the schema of its JSON.
+//! Output of `inspect` as JSON.
 
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`Inspection`].
 pub const INSPECTION_SCHEMA: &str = "dynident/inspection/1";
 
-/// What `inspect` prints as JSON.
+/// Output of `inspect` as JSON.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Inspection {
     /// [`INSPECTION_SCHEMA`].
     pub schema: String,
-    /// The robot's name.
+    /// Name of the robot.
     pub name: String,
     /// The file.
     pub file: String,
     /// Degrees of freedom.
     pub dof: usize,
-    /// Mass of the moving bodies with known inertials.
+    /// Mass of the moving bodies with known inertials, kg.
     pub moving_mass_kg: f64,
-    /// Gravity in the base frame.
+    /// Gravity in the base frame, m/s².
     pub gravity_m_s2: [f64; 3],
     /// Joints in the order of all vectors.
     pub joints: Vec<JointSummary>,
@@ -29,25 +29,25 @@ pub struct Inspection {
     pub base_parameters: BaseSummary,
     /// Findings of the audit.
     pub audit: Vec<AuditEntry>,
-    /// Slips that explain what is wrong with the inertials; `inspect --fix` makes their corrections.
+    /// Errors that explain problems of the inertials; `inspect --fix` corrects them.
     #[serde(default)]
     pub slips: Vec<SlipEntry>,
 }
 
-/// One slip in the inertials of a URDF.
+/// An error in the inertials of a URDF.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SlipEntry {
     /// `negated-moments`, `negated-products`, `row-major`, `lower-triangle`, `units`, `about-origin`, `defaults`,
-    /// `total-mass`, `twins`, or `unexplained` where none or several of them would explain the numbers.
+    /// `total-mass`, `twins`, or `unexplained` if the numbers have no or several explanations.
     pub slip: String,
-    /// The links it concerns.
+    /// Affected links.
     pub links: Vec<String>,
-    /// What it is, and what to do.
+    /// Description and fix.
     pub what: String,
-    /// Why it is believed, in numbers.
+    /// Evidence, with numbers.
     pub evidence: String,
-    /// The numbers that were meant; empty where they cannot be known.
+    /// Corrected numbers; empty if they are unknown.
     pub corrections: Vec<CorrectionEntry>,
 }
 
@@ -59,9 +59,9 @@ pub struct CorrectionEntry {
     pub link: String,
     /// `mass`, `x`, `y` or `z` of the centre of mass, `ixx`, `ixy`, `ixz`, `iyy`, `iyz` or `izz`.
     pub number: String,
-    /// As it stands.
+    /// Stated value.
     pub from: f64,
-    /// As it was meant.
+    /// Corrected value.
     pub to: f64,
 }
 
@@ -69,20 +69,20 @@ pub struct CorrectionEntry {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointSummary {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// `revolute`, `continuous` or `prismatic`.
     #[serde(rename = "type")]
     pub kind: String,
-    /// Body that it stands on; none for the base.
+    /// Parent body; null for the base.
     pub parent: Option<String>,
-    /// Lowest position, rad or m.
+    /// Lower position limit, rad or m.
     pub lower: Option<f64>,
-    /// Highest position, rad or m.
+    /// Upper position limit, rad or m.
     pub upper: Option<f64>,
-    /// Highest velocity, rad/s or m/s.
+    /// Velocity limit, rad/s or m/s.
     pub velocity: Option<f64>,
-    /// Highest torque, Nm or N.
+    /// Effort limit, Nm or N.
     pub effort: Option<f64>,
     /// The joint that it mimics.
     pub mimic: Option<String>,
@@ -92,13 +92,13 @@ pub struct JointSummary {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BodySummary {
-    /// Name of its own link.
+    /// Name of its main link.
     pub name: String,
-    /// Mass; none when no link of it has an inertial.
+    /// Mass, kg; null if none of its links has an inertial.
     pub mass_kg: Option<f64>,
-    /// Centre of mass in the body frame.
+    /// Centre of mass in the body frame, m.
     pub com_m: Option<[f64; 3]>,
-    /// All links lumped into it.
+    /// All links merged into it.
     pub links: Vec<String>,
 }
 
@@ -106,16 +106,16 @@ pub struct BodySummary {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BaseSummary {
-    /// How many.
+    /// Number.
     pub count: usize,
-    /// What each sums, every factor in the shortest form that reads back to the same number.
+    /// Expressions, with the shortest factors that convert back to the same number.
     pub expressions: Vec<String>,
-    /// Parameters that no motion can determine.
+    /// Unidentifiable parameters.
     pub unidentifiable: Vec<String>,
     /// Rank of the bodies' regressor at random states, by
-    /// [`numerical_rank_by_body`](dynident_dynamics::numerical_rank_by_body): the cross-check.
+    /// [`numerical_rank_by_body`](dynident_dynamics::numerical_rank_by_body), as a cross-check.
     pub numerical_rank: usize,
-    /// Smallest share of a column that counted as independent, largest that counted as dependent.
+    /// Smallest relative residual of an independent column, and largest of a dependent one.
     pub gap: [f64; 2],
 }
 
@@ -127,9 +127,9 @@ pub struct AuditEntry {
     pub level: String,
     /// Short name of the check.
     pub check: String,
-    /// Which link or joint.
+    /// The link or joint.
     #[serde(rename = "where")]
     pub place: String,
-    /// What, why it matters, and the fix.
+    /// Problem, consequence and fix.
     pub what: String,
 }

@@ -1,4 +1,4 @@
-//! What `iterations.json` holds.
+//! Content of `iterations.json`.
 
 use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
@@ -15,7 +15,7 @@ use std::path::Path;
 /// Schema of `iterations.json`.
 pub const ITERATIONS_SCHEMA: &str = "dynident/iterations/1";
 
-/// The status of an iteration that a stop ended.
+/// Status of an iteration that was stopped.
 pub const INTERRUPTED: &str = "interrupted";
 
 /// `iterations.json`.
@@ -26,62 +26,60 @@ pub struct IterationsFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
-    /// Where it comes from; none in files of before it was written.
+    /// Provenance; null in files of earlier versions.
     #[serde(default)]
     pub provenance: Option<Provenance>,
-    /// Whether everything is met that makes a success: see `unmet`.
+    /// Whether all conditions of convergence are met: see `unmet`.
     pub converged: bool,
-    /// `converged`, `settled` (nothing changes any more, but something is unmet), `runs-used-up`, `refused`, `waiting`
-    /// or `interrupted`.
+    /// `converged`, `settled` (no further change, but unmet conditions), `runs-used-up`, `refused`, `waiting` or
+    /// `interrupted`.
     pub status: String,
-    /// The status in words.
+    /// Explanation of the status.
     pub reason: String,
-    /// What is not met after the last run; empty if the iteration has converged, and in files of before it was written.
+    /// Unmet conditions after the last run; empty if the iteration has converged, and in files of earlier versions.
     #[serde(default)]
     pub unmet: Vec<UnmetCondition>,
-    /// Where motions are designed with what is known and everything is met: what a further run was expected to bring,
-    /// too little for one.
+    /// Forecast of a further run that was not worthwhile, if motions are redesigned and all conditions are met.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub declined: Option<RunForecast>,
     /// Names of the joints.
     pub joints: Vec<String>,
-    /// Joints whose loops are slower than `bandwidth_hz`, so that a late controller holds them; empty where the gains
-    /// are stated.
+    /// Joints whose loops are slower than `bandwidth_hz` for stability with delay; empty if the gains are stated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lowered_bandwidths: Vec<LoweredBandwidth>,
-    /// Length of each run, s; of legs one after another, of all of them once.
+    /// Duration of each run, s; for sequential legs, the sum over all legs.
     pub duration_s: f64,
     /// The runs.
     pub runs: Vec<IterationRun>,
-    /// Largest tracking error (mean over the joints) of the first good run over that of the last; none before there are
-    /// two.
+    /// Largest tracking error (mean over the joints) of the first accepted run divided by that of the last; null for
+    /// fewer than two runs.
     pub tracking_improvement: Option<f64>,
-    /// Root mean square over the parameters of the error of what the last good run says alone, in units of the
-    /// Cramér-Rao bound; for simulated robots with torque noise.
+    /// Root mean square parameter error of the last accepted run alone, relative to the Cramér-Rao bound; for simulated
+    /// robots with torque noise.
     pub error_over_bound: Option<f64>,
-    /// The Cramér-Rao bound of every parameter for one run of the first motion: white torque noise of the simulated
-    /// sensors at every recorded sample, exact positions.
+    /// Cramér-Rao bound of every parameter for one run of the first motion: white torque noise of the simulated sensors
+    /// at every recorded sample, exact positions.
     pub bound: Option<Vec<f64>>,
-    /// The base parameters by all good runs together, as in `result.json`; empty while runs are still being made.
+    /// The base parameters from all accepted runs, as in `result.json`; empty until the last run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub base_parameters: Vec<BaseParameterResult>,
-    /// Why there is no `result.json` although a run was good; none where there is one.
+    /// Reason for a missing `result.json` after an accepted run; null if it exists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_result: Option<String>,
-    /// All parameters of the last good physically consistent set: ten for each body, one for each term.
+    /// All parameters of the last accepted physically consistent set: ten per body, one per term.
     pub possible_parameters: Option<Vec<f64>>,
 }
 
 impl IterationsFile {
-    /// Reads what an iteration has written so far.
+    /// Reads the file of an iteration.
     ///
     /// # Errors
-    /// A file that cannot be read or is none of this version.
+    /// A file that cannot be read or has another version.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let bytes = read_result(path)?;
         let wrong = |message: String| Error::Result { path: path.to_owned(), message };
-        let file: Self =
-            serde_json::from_slice(&bytes).map_err(|error| wrong(format!("not what `iterate` writes: {error}")))?;
+        let file: Self = serde_json::from_slice(&bytes)
+            .map_err(|error| wrong(format!("not a file written by `iterate`: {error}")))?;
         if file.schema != ITERATIONS_SCHEMA {
             return Err(wrong(format!(
                 "schema `{}`, not `{ITERATIONS_SCHEMA}`: iterate again with this version",
@@ -91,11 +89,11 @@ impl IterationsFile {
         Ok(file)
     }
 
-    /// Which loops are slower than asked for, and what would make them faster.
+    /// Message about loops that are slower than requested, with the keys that change this.
     pub fn lowered_bandwidths_sentence(&self) -> Option<String> {
         let in_words = |model: &str| match model {
             "none" => "without a model",
-            "nominal" => "with the description's model",
+            "nominal" => "with the nominal model",
             _ => "with the newest model",
         };
         let mut each: Vec<String> = Vec::new();
@@ -106,31 +104,33 @@ impl IterationsFile {
         }
         (!each.is_empty()).then(|| {
             format!(
-                "Gains are lower than bandwidth_hz asks for, so that a controller which acts late holds the robot in \
-                 every posture of the motion and joints with light drives do not oscillate ({}); if sensors and drives \
-                 are faster, state rehearsal.delay_s, if drives are heavier, rehearsal.lightest_drive",
+                "Gains are lower than bandwidth_hz requests, so that the robot is stable with the assumed delay in \
+                 all postures of the motion and joints with light drives do not oscillate ({}); if sensors and drives \
+                 are faster, state rehearsal.delay_s; if drives are heavier, state rehearsal.lightest_drive",
                 each.join("; ")
             )
         })
     }
 
-    /// What the torque check of the last good run could not check; empty where it checked everything.
+    /// Limitations of the torque check of the last accepted run; empty if it checked everything.
     pub fn unchecked_torque(&self) -> Vec<String> {
         let Some(last) = self.runs.iter().rfind(|run| run.accepted) else { return Vec::new() };
-        let Some(check) = &last.torque_check else { return vec!["the logged against the commanded torque".to_owned()] };
+        let Some(check) = &last.torque_check else {
+            return vec!["the logged torque compared with the commanded torque".to_owned()];
+        };
         let alone = self.joints.iter().zip(&check.joints).filter(|(_, joint)| joint.row_scale.is_none());
         let alone: Vec<&str> = alone.map(|(name, _)| &**name).collect();
-        let common = "a torque scale that all joints share, because the drives close their own loop";
+        let common = "a common torque scale of all joints, because the drives have their own loop";
         let gains = format!(
-            "whether the drives of {} deliver the logged torque: their masses and inertias enter no other joint's torque \
-             clearly enough",
+            "whether the drives of {} deliver the logged torque: their masses and inertias do not affect other joints' \
+             torques enough",
             alone.join(", ")
         );
         let is_path_only = check.source == CommandSource::PathOnly;
         is_path_only.then(|| common.to_owned()).into_iter().chain((!alone.is_empty()).then_some(gains)).collect()
     }
 
-    /// Joints whose torque oscillates in the log of a run, a sentence for each.
+    /// Messages about joints whose torque oscillates in the log of a run.
     pub fn oscillation_sentences(&self) -> Vec<String> {
         let of_run = |run: &IterationRun| -> Vec<String> {
             let joints = run.evidence.iter().flat_map(|evidence| self.joints.iter().zip(&evidence.joints));
@@ -138,8 +138,8 @@ impl IterationsFile {
             let sentence = |(name, own): (&String, Oscillation)| {
                 format!(
                     "Torque of joint {name} oscillates at {:.0} Hz with an amplitude of {:.3} Nm (N) in {:.0} % of the \
-                     samples of run {}: a loop that is too fast for its inertia and its delay, or a drive that \
-                     switches; give this joint a lower bandwidth_hz or lower gains, and look at its torque",
+                     samples of run {}: the loop is too fast for its inertia and delay, or the drive \
+                     switches; give this joint a lower bandwidth_hz or lower gains, and check its torque",
                     own.frequency_hz,
                     own.amplitude,
                     100.0 * own.share,
@@ -151,7 +151,7 @@ impl IterationsFile {
         self.runs.iter().flat_map(of_run).collect()
     }
 
-    /// The state in one line: how it stands, runs, tracking, what is unmet.
+    /// Summary in one line: status, runs, tracking, unmet conditions.
     pub fn status_line(&self) -> String {
         let good = self.runs.iter().filter(|run| run.accepted).count();
         let last = self.runs.iter().rfind(|run| run.accepted);
@@ -160,65 +160,61 @@ impl IterationsFile {
             format!("; tracking {worst:.2e} rad (m)")
         });
         let unmet = if self.converged { String::new() } else { format!("; {} unmet", self.unmet.len()) };
-        format!("{}: {}; {good} good of {} runs{tracking}{unmet}", self.name, self.reason, self.runs.len())
+        format!("{}: {}; {good} of {} runs accepted{tracking}{unmet}", self.name, self.reason, self.runs.len())
     }
 }
 
-/// What the motion of a run was expected to bring by all that was known before it, and what came of it. Bars are those
-/// of the (at most) ten directions that were known worst, by the torque that they leave uncertain wherever the arm may
-/// be: their root mean square.
+/// Predicted and actual improvement by the motion of a run. Error bars are those of the (at most) ten least known
+/// directions, in terms of the torque uncertainty over the workspace: their root mean square.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunForecast {
-    /// Whether the motion is another than that of the good run before.
+    /// Whether the motion differs from that of the accepted run before.
     pub redesigned: bool,
-    /// Why it is not, although another was looked for.
+    /// Reason for repeating the motion although a new one was designed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// By how much the bars were to become narrower, percent.
+    /// Predicted reduction of the error bars, percent.
     pub gain_percent: f64,
-    /// The same with the motion of the good run before, once more.
+    /// The same for a repetition of the previous motion.
     pub repeat_gain_percent: f64,
-    /// By how much they did; none for a run that was not made or does not count.
+    /// Actual reduction; null for a run that was not made or was rejected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reached_gain_percent: Option<f64>,
-    /// The standard deviation expected of every base parameter after the run; none for what it will not determine.
+    /// Predicted standard deviation of every base parameter after the run; null for an undetermined one.
     pub std: Vec<Option<f64>>,
-    /// For each joint the largest torque along the motion by any model in the uncertainty (95 %), Nm (N).
+    /// Largest torque of each joint along the motion within the model uncertainty (95 %), Nm (N).
     pub largest_torque: Vec<f64>,
 }
 
 impl RunForecast {
-    /// In words: what the motion is, what it was to bring, and what came of it.
+    /// Motion, prediction and outcome as text.
     pub fn sentence(&self) -> String {
         let motion = match (&self.reason, self.redesigned) {
-            (_, true) => "another motion".to_owned(),
-            (Some(reason), false) => format!("the motion before ({reason})"),
-            (None, false) => "the motion before".to_owned(),
+            (_, true) => "new motion".to_owned(),
+            (Some(reason), false) => format!("repeated motion ({reason})"),
+            (None, false) => "repeated motion".to_owned(),
         };
         let reached = self.reached_gain_percent.map_or_else(String::new, |reached| match reached {
-            narrower if narrower >= 0.0 => format!(", and made them {narrower:.0} % narrower"),
-            wider => format!(", and made them {:.0} % wider", -wider),
+            narrower if narrower >= 0.0 => format!(", actual reduction {narrower:.0} %"),
+            wider => format!(", actual increase {:.0} %", -wider),
         });
-        let again = if self.redesigned {
-            format!(" (the motion before once more: {:.0} %)", self.repeat_gain_percent)
-        } else {
-            String::new()
-        };
-        format!("{motion}, which was to narrow the worst bars by {:.0} %{again}{reached}", self.gain_percent)
+        let again =
+            if self.redesigned { format!(" (a repetition: {:.0} %)", self.repeat_gain_percent) } else { String::new() };
+        format!("{motion}, predicted reduction of the largest error bars by {:.0} %{again}{reached}", self.gain_percent)
     }
 }
 
-/// Something that stands between an iteration and success.
+/// An unmet condition of convergence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct UnmetCondition {
-    /// What it is, with its numbers.
+    /// The condition with its numbers.
     #[serde(flatten)]
     pub shortfall: Shortfall,
-    /// The same in words.
+    /// Message.
     pub message: String,
-    /// What would help.
+    /// Remedy.
     pub remedy: String,
 }
 
@@ -226,103 +222,96 @@ pub struct UnmetCondition {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct IterationRun {
-    /// Its number, from 1.
+    /// Run number, from 1.
     pub run: usize,
-    /// Which leg it belongs to, from 1, where each has an iteration of its own; none otherwise.
+    /// Leg number, from 1, if each leg has a separate iteration; null otherwise.
     pub leg: Option<usize>,
     /// The controller.
     pub controller: String,
-    /// Whether it had a model.
+    /// Whether the controller had a model.
     pub model_based: bool,
-    /// Of which run the physically consistent set (or the estimate) was its model; none for the description, a step
-    /// between two runs' robots, or no model.
+    /// Run whose physically consistent set (or estimate) was the controller's model; null for the robot description, an
+    /// intermediate step, or no model.
     pub model_of_run: Option<usize>,
-    /// Share of the step from the last good parameters that was taken.
+    /// Fraction of the step from the last accepted parameters.
     pub damping: f64,
-    /// Factor of the gains of the controller without a model.
+    /// Factor on the gains of the controller without a model.
     pub stiffness: f64,
-    /// Whether it counts as good.
+    /// Whether the run was accepted.
     pub accepted: bool,
-    /// How the robot ended.
+    /// Outcome of the robot's run.
     pub outcome: String,
-    /// Why it does not count.
+    /// Reason for the rejection.
     pub reason: Option<String>,
-    /// For each joint the largest distance from the trajectory, rad (m).
+    /// Largest tracking error of each joint, rad (m).
     pub max_tracking_error_rad: Vec<f64>,
-    /// What the warm-up before it has shown; none where there was none.
+    /// Result of the warm-up before the run; null without a warm-up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub warm_up: Option<WarmUp>,
-    /// The run of the held-out motion after it, and how well the model that it gave predicts that; none where there was
-    /// none.
+    /// Held-out run after this run with the accuracy of the model's prediction; null without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOutRun>,
-    /// What it determines by itself.
+    /// Parameters from this run alone.
     pub parameters: Vec<IterationParameter>,
-    /// What all good runs up to this one determine together; empty for the first, for those that do not count, and
-    /// where runs are not pooled.
+    /// Parameters from all accepted runs so far; empty for the first run, for rejected runs, and without pooling.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pooled: Vec<IterationParameter>,
-    /// Where the good runs up to this one have constant torques of their own, by how much each deviates from their
-    /// mean; empty where they share one.
+    /// Deviation of the constant torques of each accepted run from their mean; empty if the runs share them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub run_offsets: Vec<RunOffset>,
-    /// What its log shows beside parameters, joint by joint; none where it did not get to its end.
+    /// Evidence from the log in addition to parameters, per joint; null for an incomplete run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
-    /// Whether its logged torque is the torque that its controller commanded; none where too little was recorded.
+    /// Comparison of logged and commanded torque; null if too little was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque_check: Option<TorqueCheck>,
-    /// What its motion was expected to bring, and what came of it; none where motions are not designed with what is
-    /// known, and where nothing was known.
+    /// Predicted and actual improvement by the motion; null without redesign or without earlier knowledge.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forecast: Option<RunForecast>,
-    /// The Cramér-Rao bound of a run along its motion where that is not the first's; for simulated robots with torque
-    /// noise.
+    /// Cramér-Rao bound of a run with this motion if it differs from the first; for simulated robots with torque noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bound: Option<Vec<f64>>,
-    /// By how much each joint's torque comes after the motion, by this run alone; none where the run does not
-    /// determine it or windows leave rows out, empty step by step.
+    /// Lag of each joint's torque behind the motion from this run alone; null if it is not identifiable or windows
+    /// exclude rows, empty for the step-by-step scheme.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_lags: Vec<Option<TorqueLag>>,
-    /// The way from positions to velocities and accelerations that the run chose, and the others; none where it was
-    /// stated.
+    /// The selected method for velocities and accelerations, with the alternatives; null if it was stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differentiator: Option<DifferentiatorChoice>,
 }
 
 impl IterationRun {
-    /// The largest constant torque that a run has of its own, in words, with the joints' names; none where runs share
-    /// theirs.
+    /// Message about the largest deviation of a run's constant torque; `None` if the runs share their offsets.
     pub fn run_offsets_sentence(&self, joints: &[String]) -> Option<String> {
         let largest = self.run_offsets.iter().max_by(|a, b| a.deviation.abs().total_cmp(&b.deviation.abs()))?;
         let RunOffset { run, joint, deviation, std } = largest;
         let name = joints.get(*joint).map_or("a joint", String::as_str);
         Some(format!(
-            "runs have constant torques of their own, most run {run} at {name}, {deviation:+.3} +- {:.3} Nm (95 %) off the mean of all: look for zeros of sensors that drift, or a cable that pulls",
+            "constant torques differ between runs, most in run {run} at {name}: {deviation:+.3} +- {:.3} Nm (95 %) from the mean: check for drift of the torque sensors' zero, or a cable that pulls",
             1.96 * std
         ))
     }
 
-    /// What is known after it: by all good runs together, or else by it alone.
+    /// Parameters known after this run: from all accepted runs, or from this run without pooling.
     pub fn known(&self) -> &[IterationParameter] {
         if self.pooled.is_empty() { &self.parameters } else { &self.pooled }
     }
 }
 
-/// One base parameter by one run.
+/// One base parameter of one run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct IterationParameter {
     /// Symbol of its column.
     pub symbol: String,
-    /// What it sums.
+    /// Expression.
     pub expression: String,
     /// Unit.
     pub unit: String,
     /// Value.
     pub value: f64,
-    /// Standard deviation; none where the run does not determine it.
+    /// Standard deviation; null if the run does not determine it.
     pub std: Option<f64>,
-    /// Value less the simulated robot's; none for a real one.
+    /// Value minus true value of the simulated robot; null for a real one.
     pub error: Option<f64>,
 }

@@ -1,11 +1,11 @@
-//! What `log` prints: the schema of its JSON.
+//! Output of `log` as JSON.
 
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`LogContents`].
 pub const LOG_SCHEMA: &str = "dynident/log/1";
 
-/// What a recording holds.
+/// Contents of a recording.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LogContents {
@@ -13,19 +13,19 @@ pub struct LogContents {
     pub schema: String,
     /// The file, or the folder of a rosbag2 recording.
     pub file: String,
-    /// What it is, by its content: `text`, `MCAP`, `Parquet` ..
+    /// Format, recognised by content: `text`, `MCAP`, `Parquet` ..
     pub format: String,
-    /// Its size, all parts together.
+    /// Total size of all parts, bytes.
     pub bytes: u64,
-    /// What was recorded together, each on its own clock: the topics of a bag, or one for the whole file.
+    /// Groups with a common clock: the topics of a bag, or one for the whole file.
     pub groups: Vec<LogGroupContents>,
-    /// Every column of numbers, in the order of the file.
+    /// All numeric columns, in the order of the file.
     pub channels: Vec<LogChannel>,
-    /// Where the file is cut off, if it is.
+    /// Position of a truncation, if any.
     pub truncated: Option<String>,
-    /// What it holds beside its channels, and why that is none, a sentence each.
+    /// Contents that are not exposed as channels, with reasons.
     pub notes: Vec<String>,
-    /// What a study could say of it, as TOML: a beginning, for a person to look at.
+    /// Draft of a study's `[format]` as TOML, to be checked by a person.
     pub study_format: String,
 }
 
@@ -33,15 +33,15 @@ pub struct LogContents {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LogGroupContents {
-    /// The topic; null where the file is one table.
+    /// The topic; null for a single table.
     pub name: Option<String>,
-    /// Rows: messages of a topic.
+    /// Number of rows, or messages of a topic.
     pub rows: u64,
-    /// The column of its time stamps; null where none is known.
+    /// The time column; null if unknown.
     pub time: Option<String>,
-    /// From the first stamp to the last.
+    /// Difference between the last and first time stamp, s.
     pub span_s: Option<f64>,
-    /// Steps by the span; holes of more than five mean steps are left out.
+    /// Mean sample rate, Hz; gaps of more than five mean steps are excluded.
     pub rate_hz: Option<f64>,
 }
 
@@ -49,20 +49,20 @@ pub struct LogGroupContents {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LogChannel {
-    /// What `columns` of a study calls it: its name, or its 0-based index.
+    /// Name for `columns` in a study: its name, or its 0-based index.
     pub name: String,
-    /// Number of its group in `groups`.
+    /// Index of its group in `groups`.
     pub group: usize,
-    /// The unit that its name says, or the format; null where neither does.
+    /// Unit from its name or the format; null if unknown.
     pub unit: Option<String>,
-    /// Rate of its group.
+    /// Sample rate of its group, Hz.
     pub rate_hz: Option<f64>,
-    /// Rows in which it has a value.
+    /// Number of finite values.
     pub samples: u64,
-    /// Rows in which it is empty, NaN or infinite.
+    /// Number of empty, NaN or infinite values.
     pub missing: u64,
-    /// Lowest and highest value; null where it has none.
+    /// Smallest and largest value; null without values.
     pub range: Option<[f64; 2]>,
-    /// Means of up to 48 equal parts of the recording, in order; null for a part without a value.
+    /// Means of up to 48 equal parts of the recording, in order; null for a part without values.
     pub course: Vec<Option<f64>>,
 }

@@ -1,5 +1,5 @@
-//! **What jobs write**: one type for each file, read back as it was written. Keys are added, never renamed, within a
-//! version of a schema.
+//! **Output files of jobs**: one type per file, for writing and reading. Within a version of a schema keys are added,
+//! never renamed.
 
 mod check;
 mod design;
@@ -44,9 +44,10 @@ pub use iterations::{
 };
 pub use log::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};
+pub use problems::ProblemSettings;
 pub use provenance::{InputFile, Provenance};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
-// Types of the crates below that the files contain.
+// Types of lower crates in these files.
 pub use dynident_excitation::check::LimitReport;
 pub use dynident_identification::ErrorSource;
 pub use dynident_iteration::{RobotFault, RobotStatus};

@@ -1,4 +1,4 @@
-//! What `new` prints: the schema of its JSON.
+//! Output of `new` as JSON.
 
 use super::{StudyChange, StudyCheck};
 use serde::{Deserialize, Serialize};
@@ -6,36 +6,36 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of [`NewStudyFile`].
 pub const NEW_STUDY_SCHEMA: &str = "dynident/new/1";
 
-/// A study that was written from a robot and its recordings.
+/// A study created from a robot and its recordings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct NewStudyFile {
     /// [`NEW_STUDY_SCHEMA`].
     pub schema: String,
-    /// Where the study stands.
+    /// Path of the study.
     pub file: String,
-    /// The study.
+    /// Text of the study.
     pub text: String,
-    /// What a person should look at before the study is believed; empty where nothing is left.
+    /// Points that a person should check before using the study; empty if there are none.
     pub unsure: Vec<Unsure>,
-    /// What an examination of the study found in the end; none where it could not be examined.
+    /// Result of the final examination; null if it was not possible.
     pub check: Option<StudyCheck>,
 }
 
-/// What a person should look at.
+/// A point that a person should check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Unsure {
-    /// The line of the study that may be wrong; none where it is no single one.
+    /// The line in question; null if it is not a single line.
     pub line: Option<StudyChange>,
-    /// What the examination would write there instead, where it names something but cannot tell it from other mistakes.
+    /// Alternatives proposed by the examination, which does not distinguish them from other mistakes.
     pub proposed: Vec<StudyChange>,
-    /// Why it may be wrong.
+    /// Reason for the doubt.
     pub reason: String,
 }
 
 impl Unsure {
-    /// Place and reason as a sentence.
+    /// Place and reason as text.
     pub fn sentence(&self) -> String {
         match &self.line {
             Some(change) => format!("{} `{}`: {}", change.place(), change.line, self.reason),

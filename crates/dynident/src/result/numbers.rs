@@ -1,4 +1,4 @@
-//! Numbers as JSON has them: what is not finite is written as null, and null is read as not a number.
+//! Numbers in JSON: values that are not finite are written as null, and null is read as NaN.
 
 use serde::{Deserialize, Deserializer};
 

@@ -1,18 +1,17 @@
-//! The hash by which a result that was edited or damaged is recognised.
+//! Hash that detects an edited or damaged result.
 
 use super::identification::ResultFile;
 use core::fmt::Write;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// The key of the hash in a result.
-pub(super) const PLACE: &str = "provenance.content_sha256";
+pub(super) const HASH_KEY: &str = "provenance.content_sha256";
 
 impl ResultFile {
-    /// Hashes the content and keeps the hash in `provenance`. To be called after the last change; `timings_s` and
-    /// `provenance.command` may change later. A result without provenance has no place for it.
+    /// Stores the hash of the content in `provenance`. Call it after the last change; `timings_s` and
+    /// `provenance.command` may change later. Has no effect without provenance.
     pub fn seal(&mut self) {
-        // A value that JSON cannot hold is reported when the file is written.
+        // An error is reported when the file is written.
         let hash = serde_json::to_value(&*self).ok().map(|content| content_sha256(&content));
         if let Some(provenance) = &mut self.provenance {
             provenance.content_sha256 = hash;
@@ -20,7 +19,7 @@ impl ResultFile {
     }
 }
 
-/// SHA-256 of a result's content in any layout, without the keys that may differ between equal results.
+/// SHA-256 of a result's content, independent of layout, without keys that may differ between equal results.
 pub(super) fn content_sha256(result: &Value) -> String {
     let mut content = result.clone();
     if let Some(all) = content.as_object_mut() {
@@ -37,7 +36,7 @@ pub(super) fn content_sha256(result: &Value) -> String {
     })
 }
 
-/// The hash that a result states.
+/// The stored hash of a result.
 pub(super) fn stated_sha256(result: &Value) -> Option<&str> {
     result.get("provenance")?.get("content_sha256")?.as_str()
 }

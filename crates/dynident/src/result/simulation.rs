@@ -1,4 +1,4 @@
-//! What `simulate` writes as `truth.json`.
+//! Content of `truth.json`, an output of `simulate`.
 
 use super::provenance::Provenance;
 use dynident_iteration::RobotStatus;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Schema of `truth.json`.
 pub const SIMULATION_SCHEMA: &str = "dynident/simulation/1";
 
-/// What `truth.json` holds.
+/// Content of `truth.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SimulationFile {
@@ -15,24 +15,24 @@ pub struct SimulationFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
-    /// Where it comes from; none in files of before it was written.
+    /// Provenance; null in files of earlier versions.
     #[serde(default)]
     pub provenance: Option<Provenance>,
     /// The controller.
     pub controller: String,
-    /// How the run ended.
+    /// Outcome of the run.
     pub status: RobotStatus,
-    /// Whether it reached the trajectory's end.
+    /// Whether it reached the end of the trajectory.
     pub done: bool,
     /// Names of the joints, in the order of the log's columns.
     pub joints: Vec<String>,
     /// Samples of the log.
     pub samples: usize,
-    /// Samples a second of the log.
+    /// Sample rate of the log, Hz.
     pub rate_hz: f64,
-    /// For each joint the largest true distance from the trajectory, rad (m).
+    /// Largest true tracking error of each joint, rad (m).
     pub max_tracking_error_rad: Vec<f64>,
-    /// For each joint how many samples had their torque cut to its limit.
+    /// Number of samples with saturated torque, per joint.
     pub saturated_samples: Vec<usize>,
     /// True bodies: ten parameters each.
     pub bodies: Vec<BodyTruth>,
@@ -43,21 +43,21 @@ pub struct SimulationFile {
     pub base_parameters: Vec<ParameterTruth>,
 }
 
-/// A body as it truly is.
+/// True parameters of a body.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BodyTruth {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the link frame's origin; kg, kg m, kg m².
     pub parameters: Vec<f64>,
 }
 
-/// A parameter as it truly is.
+/// A true parameter.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ParameterTruth {
-    /// What it is.
+    /// Expression.
     pub expression: String,
     /// Value.
     pub value: f64,

@@ -1,33 +1,32 @@
-//! Whether the numbers of a result can be those of a robot.
+//! Plausibility of the numbers in a result.
 
 use super::identification::{BodyResult, ResultFile};
 use dynident_model::InertialParameters;
 use dynident_model::urdf::MAX_MAGNITUDE;
 
-/// Largest base parameter: a mass times the square of a length, each at most [`MAX_MAGNITUDE`].
+/// Largest base parameter: a mass times a squared length, each at most [`MAX_MAGNITUDE`].
 const MAX_BASE_PARAMETER: f64 = MAX_MAGNITUDE * MAX_MAGNITUDE * MAX_MAGNITUDE;
 
-/// Parts of a body's numbers that are written twice agree to this share of the larger: they are the same up to the
-/// rounding of a quotient.
-const AGREEMENT: f64 = 1e-9;
+/// Relative tolerance for redundant numbers of a body, which may differ by rounding of a quotient.
+const MAX_RELATIVE_ROUNDING: f64 = 1e-9;
 
 impl ResultFile {
-    /// Checks that lists belong together, that no number is beyond what a description may hold, that what a body states
-    /// twice is the same, and that bodies are physically consistent where `physical.consistent` promises it.
+    /// Checks list lengths, magnitudes, redundant numbers of bodies, and physical consistency if `physical.consistent`
+    /// is true.
     ///
     /// # Errors
-    /// What is wrong, with its place and the fix.
+    /// The problem, with its place and the fix.
     pub(super) fn require_sound_numbers(&self) -> Result<(), String> {
         let count = self.base_parameters.len();
         let rows = &self.base_parameter_covariance;
         if !rows.is_empty() && (rows.len() != count || rows.iter().any(|row| row.len() != count)) {
             return Err(format!(
-                "base_parameter_covariance is not {count} rows of {count} numbers, one for each base parameter: {FIX}"
+                "base_parameter_covariance does not have {count} rows of {count} numbers, one per base parameter: {FIX}"
             ));
         }
         for (place, parameter) in self.base_parameters.iter().enumerate() {
             for (key, value) in [("value", Some(parameter.value)), ("physical", parameter.physical)] {
-                // What is not a number is refused where it is used.
+                // Values that are not finite are rejected where they are used.
                 if let Some(value) = value.filter(|value| value.abs() > MAX_BASE_PARAMETER) {
                     return Err(too_large(&format!("base_parameters[{place}].{key}"), value));
                 }
@@ -56,7 +55,7 @@ impl ResultFile {
     }
 }
 
-/// The fix for a damaged result.
+/// Fix for a damaged result.
 const FIX: &str = "the file was edited or damaged; identify again";
 
 fn too_large(place: &str, value: f64) -> String {
@@ -70,7 +69,7 @@ impl BodyResult {
         }
         let inertial = InertialParameters(self.parameters);
         let com = inertial.com_m().map(|com| com.0);
-        let same = |a: f64, b: f64| (a - b).abs() <= AGREEMENT * a.abs().max(b.abs());
+        let same = |a: f64, b: f64| (a - b).abs() <= MAX_RELATIVE_ROUNDING * a.abs().max(b.abs());
         let all_same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| same(*a, *b));
         let other = if !same(self.mass_kg, inertial.mass_kg()) {
             Some("mass_kg")
@@ -87,11 +86,11 @@ impl BodyResult {
             return Err(format!("{place}: {key} does not match parameters: {FIX}"));
         }
         let least = inertial.pseudo_inertia().symmetric_eigenvalues().min();
-        // Another computer rounds otherwise.
+        // Another computer may round differently.
         let rounding = f64::EPSILON * self.parameters.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         if is_consistent && !(inertial.mass_kg() > 0.0 && least > -16.0 * rounding) {
             return Err(format!(
-                "{place}: mass {} kg, least eigenvalue of the pseudo-inertia {least:e}; physical.consistent promises that both are positive: {FIX}",
+                "{place}: mass {} kg, smallest eigenvalue of the pseudo-inertia {least:e}; both must be positive because physical.consistent is true: {FIX}",
                 inertial.mass_kg()
             ));
         }

@@ -1,7 +1,7 @@
-//! A finished model, read back from `result.json`: what later jobs take from it.
+//! Reads a model from `result.json` for later jobs.
 
 use super::identification::{RESULT_SCHEMA, ResultFile};
-use super::seal::{PLACE, content_sha256, stated_sha256};
+use super::seal::{HASH_KEY, content_sha256, stated_sha256};
 use crate::error::{Error, StudyError};
 use crate::inputs::read_result;
 use crate::study::{JointDrive, Study};
@@ -14,17 +14,17 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::path::Path;
 
-/// Whether a result may be used whose content is not what was written.
+/// Whether edited results are accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Edits {
     Refused,
     Accepted,
 }
 
-/// Reads the keys of `T` from a result of `identify`, of this version's schema; all others may be there or not.
+/// Reads the keys of `T` from a result of `identify` with this version's schema; other keys are ignored.
 ///
 /// # Errors
-/// A file that cannot be read, is no result, is one of another version, or was edited or damaged.
+/// A file that cannot be read, is not a result, has another version, or was edited or damaged.
 pub(crate) fn read_part<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
     let bytes = read_result(path)?;
     part_of(&bytes, path, Edits::Refused)
@@ -50,7 +50,7 @@ fn part_of<T: DeserializeOwned>(bytes: &[u8], path: &Path, edits: Edits) -> Resu
         let content: Value = serde_json::from_slice(bytes).map_err(not_a_result)?;
         if stated_sha256(&content).is_some_and(|stated| stated != content_sha256(&content)) {
             return Err(wrong(format!(
-                "its content does not match {PLACE}: the file was edited or damaged; identify again, or call `export` or `validate` with --accept-edited if you trust the changes"
+                "the content does not match {HASH_KEY}: the file was edited or damaged; identify again, or call `export` or `validate` with --accept-edited if you trust the changes"
             )));
         }
     }
@@ -61,27 +61,27 @@ impl ResultFile {
     /// Reads a result of `identify`.
     ///
     /// # Errors
-    /// A file that cannot be read, is no result, is one of another version, was edited or damaged, or holds numbers
-    /// that no result has.
+    /// A file that cannot be read, is not a result, has another version, was edited or damaged, or contains implausible
+    /// numbers.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let bytes = read_result(path)?;
         Self::parse(&bytes, path)
     }
 
-    /// Reads a result of `identify` that somebody may have edited: its content is not compared with its hash. Numbers
-    /// that no result has are refused all the same.
+    /// Reads a result of `identify` that may have been edited: its hash is not checked. Implausible numbers are still
+    /// rejected.
     ///
     /// # Errors
-    /// As [`read`](Self::read), but for the hash.
+    /// As [`read`](Self::read), except for the hash.
     pub fn read_edited(path: &Path) -> Result<Self, Error> {
         let bytes = read_result(path)?;
         Self::checked(&bytes, path, Edits::Accepted)
     }
 
-    /// Reads the text of a result of `identify`; messages call it `path`.
+    /// Reads a result of `identify` from text; `path` is its name in messages.
     ///
     /// # Errors
-    /// A text that is no result, is one of another version, was edited or damaged, or holds numbers that no result has.
+    /// A text that is not a result, has another version, was edited or damaged, or contains implausible numbers.
     pub fn parse(text: &[u8], path: &Path) -> Result<Self, Error> {
         Self::checked(text, path, Edits::Refused)
     }
@@ -99,8 +99,7 @@ impl ResultFile {
         Ok(stored)
     }
 
-    /// The study with the drive inertia that was seen, the friction that was chosen and the lag that was taken off when
-    /// the model was made.
+    /// The study with the drive inertia, friction and lag that were selected for the model.
     pub(crate) fn as_fitted(&self, study: &Study) -> Study {
         let mut study = study.clone();
         if study.motion.torque_lag_s.is_none() {
@@ -120,20 +119,20 @@ impl ResultFile {
         study
     }
 
-    /// The cut-off of the motion that it was made with.
+    /// Cut-off of the motion, Hz.
     pub(crate) fn cutoff_hz(&self) -> Option<f64> {
         self.method.motion.differentiator.cutoff_hz()
     }
 
-    /// The cut-off whose band its held-out figures are for, where the fit has another.
+    /// Cut-off of the band of held-out figures, if it differs from that of the fit, Hz.
     pub(crate) fn motion_hz(&self) -> Option<f64> {
         self.method.motion_hz
     }
 
-    /// Its base parameters, which must be those of `model`.
+    /// The base parameters, which must match those of `model`.
     ///
     /// # Errors
-    /// Other base parameters, values that are not finite.
+    /// Different base parameters, or values that are not finite.
     pub(crate) fn base_values(&self, path: &Path, model: &ParametricModel) -> Result<Vec<f64>, Error> {
         let wrong = |message: String| Error::Result { path: path.to_owned(), message };
         let expressions = model.base().expressions();
@@ -148,12 +147,12 @@ impl ResultFile {
         for (stored, expression) in self.base_parameters.iter().zip(&expressions) {
             if stored.expression != *expression {
                 return Err(wrong(format!(
-                    "base parameter `{}` where the study's robot has `{expression}`: use the study that the result was made with",
+                    "base parameter `{}`, but the study's robot has `{expression}`: use the study that the result was made with",
                     stored.expression
                 )));
             }
             if !stored.value.is_finite() {
-                return Err(wrong(format!("the value of `{expression}` is not a finite number")));
+                return Err(wrong(format!("the value of `{expression}` is not finite")));
             }
             values.push(stored.value);
         }
@@ -161,7 +160,7 @@ impl ResultFile {
         Ok(values)
     }
 
-    /// That declared torques follow what they followed when the result was made: their symbols do not say it.
+    /// Checks that declared torques have the same functions as in the result; equal symbols do not guarantee this.
     fn require_laws(&self, path: &Path, model: &ParametricModel) -> Result<(), Error> {
         for term in model.terms() {
             let (Some(function), symbol) = (term.state_function(), term.symbol()) else { continue };
@@ -170,7 +169,7 @@ impl ResultFile {
             let own = function.description();
             if law != own {
                 let message = format!(
-                    "torque `{symbol}` was `{law}`, and the study says `{own}`: use the study that the result was made with"
+                    "torque `{symbol}` was `{law}`, but is `{own}` in the study: use the study that the result was made with"
                 );
                 return Err(Error::Result { path: path.to_owned(), message });
             }
@@ -178,65 +177,65 @@ impl ResultFile {
         Ok(())
     }
 
-    /// The base parameters of its physically consistent set, where it has one.
+    /// The base parameters of the physically consistent set, if there is one.
     ///
     /// # Errors
     /// Values that are not finite.
     pub(crate) fn consistent_values(&self, path: &Path) -> Result<Option<Vec<f64>>, Error> {
         let values: Option<Vec<f64>> = self.base_parameters.iter().map(|stored| stored.physical).collect();
         if values.as_ref().is_some_and(|values| values.iter().any(|value| !value.is_finite())) {
-            let message = "a physical value of a base parameter is not a finite number".to_owned();
+            let message = "a physical value of a base parameter is not finite".to_owned();
             return Err(Error::Result { path: path.to_owned(), message });
         }
         Ok(values)
     }
 
-    /// The model with the load and the gains that it was made with.
+    /// The model with its load parameters and gains.
     ///
     /// # Errors
-    /// Loads or gains that do not belong to `model`.
+    /// Load parameters or gains that do not match `model`.
     pub(crate) fn regressor_model(&self, path: &Path, model: &ParametricModel) -> Result<RegressorModel, Error> {
         let wrong = |message: &str| Error::Result { path: path.to_owned(), message: message.to_owned() };
         if let Some(load) = &self.method.load_parameters
             && (load.len() != self.base_parameters.len() || load.iter().any(|value| !value.is_finite()))
         {
-            return Err(wrong("load_parameters are not one finite number per base parameter: identify again"));
+            return Err(wrong("load_parameters does not contain one finite number per base parameter: identify again"));
         }
         let torque_gains: Vec<f64> = self.drive_gains.iter().flatten().map(|stored| stored.gain).collect();
         let usable = torque_gains.iter().all(|gain| gain.is_finite());
         if !(torque_gains.is_empty() || torque_gains.len() == model.dof() && usable) {
-            return Err(wrong("drive_gains are not one finite number for each joint: identify again"));
+            return Err(wrong("drive_gains does not contain one finite number per joint: identify again"));
         }
         let load_parameters = self.method.load_parameters.clone();
         Ok(RegressorModel { parametric: model.clone(), load_parameters, torque_gains })
     }
 
-    /// The arm whose payloads are looked for.
+    /// The known arm for payload identification.
     ///
     /// # Errors
-    /// [`Error::Result`] if it is another robot's, or has no usable covariance.
+    /// [`Error::Result`] for another robot, or without a usable covariance.
     pub(crate) fn known_arm(&self, path: &Path, model: &ParametricModel, refit: Refit) -> Result<KnownArm, Error> {
         let wrong = |message: &str| Error::Result { path: path.to_owned(), message: message.to_owned() };
         let values = self.base_values(path, model)?;
         let (rows, n) = (&self.base_parameter_covariance, values.len());
         if rows.len() != n || rows.iter().any(|row| row.len() != n || row.iter().any(|value| !value.is_finite())) {
             return Err(wrong(
-                "base_parameter_covariance is not one finite number for each pair of base parameters: identify the arm again with this version",
+                "base_parameter_covariance does not contain one finite number per pair of base parameters: identify the arm again with this version",
             ));
         }
         if self.drive_gains.is_some() {
             return Err(wrong(
-                "the arm was found with unknown gains: write them as torque.scale of the format and identify it again",
+                "the arm was identified with unknown gains: write them as torque.scale of the format and identify it again",
             ));
         }
         let covariance = DMatrix::from_fn(n, n, |row, column| rows[row][column]);
         KnownArm::new(values, covariance, refit, self.cutoff_hz()).map_err(|error| wrong(&error.to_string()))
     }
 
-    /// What payloads add to the base parameters.
+    /// Contributions of payloads to the base parameters.
     ///
     /// # Errors
-    /// Payloads that do not belong to `model`, or that a log carries and nobody knows.
+    /// Payloads that do not match `model`, or an unknown payload of a log.
     pub(crate) fn payloads(
         &self,
         path: &Path,
@@ -251,14 +250,16 @@ impl ResultFile {
             let values = &payload.base_parameters_added;
             if values.len() != model.layout().columns().len() || values.iter().any(|value| !value.is_finite()) {
                 let name = &payload.name;
-                return Err(wrong(format!("payload `{name}`: not one finite number per base parameter")));
+                return Err(wrong(format!(
+                    "payload `{name}`: base_parameters_added does not contain one finite number per base parameter"
+                )));
             }
             added.push((payload.name.clone(), values.clone()));
         }
         for name in study.log.iter().filter_map(|log| log.payload.as_ref()) {
             if added.iter().all(|(known, _)| known != name) {
                 return Err(wrong(format!(
-                    "payload `{name}`, which a [[log]] carries, is not among its payloads: give its mass_kg and com_m in the study, or identify it"
+                    "unknown payload `{name}` of a [[log]]: give its mass_kg and com_m in the study, or identify it"
                 )));
             }
         }
@@ -266,13 +267,13 @@ impl ResultFile {
     }
 }
 
-/// What payloads add to the base parameters: those of the result, and those that the study knows.
+/// Contributions of payloads to the base parameters: identified and known ones.
 pub(crate) struct StoredPayloads {
     added: Vec<(String, Vec<f64>)>,
 }
 
 impl StoredPayloads {
-    /// The base parameters that explain a log with this payload.
+    /// Base parameters for a log with this payload.
     pub(crate) fn base_values(&self, carried: Option<&String>, theta: &[f64]) -> Vec<f64> {
         let added = self.added.iter().find(|(name, _)| Some(name) == carried);
         theta.iter().enumerate().map(|(k, value)| value + added.map_or(0.0, |(_, added)| added[k])).collect()

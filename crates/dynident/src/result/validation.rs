@@ -1,4 +1,4 @@
-//! What `validate` prints: the schema of its JSON.
+//! Output of `validate` as JSON.
 
 use super::identification::LogSummary;
 use dynident_identification::examination::LogValidation;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of [`ValidationFile`].
 pub const VALIDATION_SCHEMA: &str = "dynident/validation/1";
 
-/// What `validate` prints as JSON.
+/// Output of `validate` as JSON.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ValidationFile {
@@ -15,12 +15,12 @@ pub struct ValidationFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
-    /// Figures by log.
+    /// Figures per log.
     pub validation: Vec<LogValidation>,
-    /// What the importer found.
+    /// Import findings.
     pub logs: Vec<LogSummary>,
-    /// Everything that speaks against the figures, a sentence each: logs that the model was fitted to, problems of the
-    /// logs. Where there are any, the command exits with status 1.
+    /// Reasons against the figures: training logs, problems of the logs. If there are any, the command exits with
+    /// status 1.
     #[serde(default)]
     pub problems: Vec<String>,
 }

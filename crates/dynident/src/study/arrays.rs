@@ -1,8 +1,8 @@
-//! Arrays of a length that is known: one value too many is an error.
+//! Arrays with a fixed length: a surplus value is an error.
 
 use serde::Deserialize;
 
-/// An array of `N` values and no more: serde by itself ignores what follows.
+/// Serde alone ignores surplus values.
 fn counted<T, const N: usize, E: serde::de::Error>(values: Vec<T>) -> Result<[T; N], E> {
     let found = values.len();
     values.try_into().map_err(|_| E::custom(format!("{found} values where {N} are expected")))

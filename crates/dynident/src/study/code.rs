@@ -1,11 +1,11 @@
-//! Code that stands in a study in memory: what a caller tries out in place of what the study file offers.
+//! Code of the caller in a study in memory.
 
 use dynident_excitation::families::{FamilyError, FunctionFamily, FunctionFamilySettings, MotionFunction};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Code of a section that names it, or none where the study was read from a file. Equal to itself and its clones alone,
-/// and never written.
+/// Code of a section, `None` in a study that was read from a file. Equal only to itself and its clones; never
+/// serialised.
 pub struct Code<T: ?Sized>(pub Option<Arc<T>>);
 
 impl<T: ?Sized> Default for Code<T> {
@@ -42,16 +42,17 @@ impl<T: ?Sized> core::fmt::Debug for Code<T> {
     }
 }
 
-/// `family = { kind = "function", .. }`: a family that is a caller's own code.
+/// `family = { kind = "function", .. }`: a family that is code of the caller.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FunctionChoice {
-    /// What the function is called; the code itself is given by the program that has it.
+    /// Name of the function; the calling program provides its code.
     pub function: String,
     /// Free parameters of each joint, 1 to 1000.
     pub parameters: usize,
-    /// Whether the motion is linear in the parameters, zero at zero, so that gradients are exact; false by default.
+    /// Whether the motion is linear in the parameters and zero for zero parameters, which gives exact gradients; false
+    /// by default.
     #[serde(default)]
     pub linear: bool,
     /// The code.
@@ -62,7 +63,7 @@ pub struct FunctionChoice {
 impl FunctionChoice {
     pub(super) fn family(&self, joints: usize, duration_s: f64) -> Result<FunctionFamily, FamilyError> {
         let Some(code) = &self.code.0 else {
-            let problem = "no file holds code: give it from the program that has it";
+            let problem = "no file holds code: set it in the calling program";
             return Err(FamilyError::Function { name: self.function.clone(), problem });
         };
         let Self { parameters, linear, .. } = *self;

@@ -8,7 +8,7 @@ use dynident_model::terms::Coupling;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How a Coulomb step looks near zero velocity.
+/// Shape of the Coulomb step near zero velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -21,41 +21,42 @@ pub enum CoulombChoice {
     Smooth,
 }
 
-/// `[drive]`: the laws of every joint, and exceptions by joint.
+/// `[drive]`: friction and drives of all joints, with exceptions by joint.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct DriveSection {
-    /// Inertia of rotor and gear as seen from the joint: where torque is measured at the link it does not show. By
-    /// default `identify` lets the logs say whether it does, and the other commands have none.
+    /// Whether a joint has drive inertia (rotor and gear, seen from the joint); torque measured at the link does not
+    /// include it. By default `identify` tests this with the logs, and the other commands assume none.
     pub drive_inertia: Option<bool>,
     /// Viscous friction. On by default.
     pub viscous: bool,
     /// Coulomb friction. `"smooth"` by default.
     pub coulomb: CoulombChoice,
-    /// Width of the smooth step, rad/s or m/s. By default 0.02 rad/s (m/s) of an arm of 1.2 m, and of other robots as
-    /// much in their own seconds, which go by their length and gravity: 0.017 rad/s for a UR10, 0.033 for a TX40.
+    /// Width of the smooth step, rad/s or m/s. By default 0.02 rad/s (m/s) for an arm of 1.2 m, scaled by length and
+    /// gravity for other robots: 0.017 rad/s for a UR10, 0.033 for a TX40.
     pub coulomb_width: Option<f64>,
-    /// Velocity below which the sign counts as zero, rad/s or m/s; 0 by default.
+    /// Velocity below which the sign is zero, rad/s or m/s; 0 by default.
     pub coulomb_dead_band: f64,
     /// A constant torque. On by default.
     pub offset: bool,
     /// Whether training logs share their offsets (`"shared"`, the default).
     pub offsets: OffsetChoice,
-    /// Who says what a unit of logged torque is worth. The format (`"stated"`) by default.
+    /// Source of the torque gains (Nm per unit of logged torque). Those of the format (`"stated"`) by default.
     pub gains: GainChoice,
-    /// How well stated gains are known: one standard deviation in percent of each, independent from joint to joint. It
-    /// goes into the error bars of payloads. By default they count as exact.
+    /// Standard deviation of the stated gains, percent of each, independent between joints. The error bars of payloads
+    /// include it. By default the gains are exact.
     pub gain_std_percent: Option<f64>,
     /// Further laws of friction. None by default.
     #[serde(rename = "laws")]
     pub terms: Vec<FrictionTerm>,
-    /// Whether the keys above say which friction there is (`"stated"`), or the training logs (`"auto"`). By default
-    /// `identify` lets the logs choose where no key above states friction, and the other commands take the keys.
+    /// Whether the keys above define the friction model (`"stated"`) or Dynident selects it with the training logs
+    /// (`"auto"`). By default `identify` selects it unless a key above states friction, and the other commands use the
+    /// keys.
     pub friction: Option<FrictionChoice>,
-    /// Where the logs choose: the largest variance inflation with which Coulomb friction may differ by direction,
-    /// beside gravity, offset and all other columns. By default `iterate` takes 10, so that no parameter is hardly
-    /// known, and the other commands have no limit.
+    /// Largest variance inflation, caused by all other columns, at which the selection may give Coulomb friction a
+    /// separate value per direction. By default 10 in `iterate`, so that every parameter is well determined, and no
+    /// limit in the other commands.
     pub most_inflation: Option<f64>,
     /// Exceptions, by joint name.
     pub joints: BTreeMap<String, JointDrive>,
@@ -81,27 +82,27 @@ impl Default for DriveSection {
     }
 }
 
-/// What one joint has in place of `[drive]`.
+/// Exceptions of one joint from `[drive]`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct JointDrive {
-    /// In place of `drive.drive_inertia`.
+    /// Overrides `drive.drive_inertia`.
     pub drive_inertia: Option<bool>,
-    /// In place of `drive.viscous`.
+    /// Overrides `drive.viscous`.
     pub viscous: Option<bool>,
-    /// In place of `drive.coulomb`.
+    /// Overrides `drive.coulomb`.
     pub coulomb: Option<CoulombChoice>,
-    /// In place of `drive.coulomb_width`.
+    /// Overrides `drive.coulomb_width`.
     pub coulomb_width: Option<f64>,
-    /// In place of `drive.coulomb_dead_band`.
+    /// Overrides `drive.coulomb_dead_band`.
     pub coulomb_dead_band: Option<f64>,
-    /// In place of `drive.offset`.
+    /// Overrides `drive.offset`.
     pub offset: Option<bool>,
-    /// In place of `drive.laws`.
+    /// Overrides `drive.laws`.
     #[serde(rename = "laws")]
     pub terms: Option<Vec<FrictionTerm>>,
-    /// In place of `drive.friction`.
+    /// Overrides `drive.friction`.
     pub friction: Option<FrictionChoice>,
 }
 
@@ -124,19 +125,18 @@ pub struct CouplingSection {
     /// Cross viscous friction. On by default.
     #[serde(default = "yes")]
     pub viscous: bool,
-    /// Coulomb friction on the drive's own velocity; by default as `drive.coulomb`.
+    /// Coulomb friction on the velocity of this drive; by default as `drive.coulomb`.
     #[serde(default)]
     pub coulomb: Option<CoulombChoice>,
 }
 
 impl DriveSection {
-    /// Whether this joint's drive has inertia, where a key says so.
+    /// Stated drive inertia of this joint; `None` if no key states it.
     pub(crate) fn drive_inertia_of(&self, joint: &str) -> Option<bool> {
         self.joints.get(joint).and_then(|own| own.drive_inertia).or(self.drive_inertia)
     }
 
-    /// Who says which friction this joint has, where a key does; `None` where all keys of friction, the joint's and
-    /// those of all joints, are as they are by default.
+    /// Stated source of this joint's friction model; `None` if all friction keys have their default values.
     pub(crate) fn friction_of(&self, joint: &str) -> Option<FrictionChoice> {
         let own = self.joints.get(joint);
         if let Some(choice) = own.and_then(|own| own.friction).or(self.friction) {
@@ -194,7 +194,7 @@ impl CouplingSection {
             return Err(StudyError::Numbers {
                 key: "ratios".to_owned(),
                 values: self.ratios.to_vec(),
-                expected: "numbers of 1e-6 to 1e6 in size, positive or negative",
+                expected: "numbers with an absolute value of 1e-6 to 1e6",
             });
         }
         if self.joints[0] == self.joints[1] {

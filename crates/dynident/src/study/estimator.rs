@@ -1,4 +1,4 @@
-//! `[estimator]`: how the parameters are estimated, and how far they are trusted.
+//! `[estimator]`: estimation method and error bars.
 
 use super::Code;
 use super::physical::PhysicalChoice;
@@ -11,37 +11,37 @@ use dynident_identification::estimators::{
 };
 use serde::{Deserialize, Serialize};
 
-/// How base parameters are estimated.
+/// Estimation method for the base parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
-    /// Weighted least squares, or instrumental variables where noise in the regressor biases it and the logs' own
-    /// smoother motion makes strong instruments.
+    /// Weighted least squares; instrumental variables if noise in the regressor biases the estimate and the smoothed
+    /// motion of the logs makes strong instruments.
     #[default]
     Auto,
-    /// Ordinary least squares: every joint's newton metre counts alike.
+    /// Ordinary least squares: equal weight for all joints.
     Ordinary,
-    /// Weighted least squares: every joint counts by its own noise.
+    /// Weighted least squares: each joint is weighted by its residual variance.
     Weighted,
-    /// Generalised least squares: errors of the joints at one instant are correlated.
+    /// Generalised least squares: errors of different joints at one instant are correlated.
     Generalized,
-    /// Iteratively reweighted with Huber's weights: rows far off count less.
+    /// Iteratively reweighted least squares with Huber's weights: outliers get smaller weights.
     Huber,
-    /// Iteratively reweighted with Tukey's weights: rows far off do not count.
+    /// Iteratively reweighted least squares with Tukey's weights: large outliers get zero weight.
     Tukey,
-    /// Reweighted by the noise around every row: noisy stretches of a joint count less.
+    /// Reweighted by the local noise level of each row.
     NoiseWeighted,
     /// Instrumental variables: noise in the regressor does not bias the estimate.
     Instrumental,
-    /// A caller's own function of the rows: no file holds its code.
+    /// The caller's function of the rows; a study file cannot contain its code.
     Function,
-    /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
+    /// Maximum likelihood for periodic motion: the variation between periods gives the noise of motion and torque.
     MaximumLikelihood,
-    /// Motion and parameters together: noise of positions and torques weighed against each other. The motion is a
-    /// smoothing spline, or, with `periods`, a Fourier series.
+    /// Estimates motion and parameters together from noisy positions and torques. The motion is a smoothing spline, or
+    /// a Fourier series if `periods` is given.
     Simultaneous,
-    /// Regression on the motion of the simulated closed loop: no measured position enters the regressor.
+    /// Regression on the motion of the simulated closed loop: measured positions do not enter the regressor.
     Didim,
     /// The simulated closed loop's torque fitted to the measured one (closed-loop input error).
     Clie,
@@ -50,7 +50,7 @@ pub enum EstimatorMethod {
 }
 
 impl EstimatorMethod {
-    /// Whether it is least squares on the rows of the logs, or begins with it.
+    /// Whether it is least squares on the rows of the logs, or starts with it.
     pub(crate) fn is_least_squares(self) -> bool {
         match self {
             Self::Auto
@@ -98,44 +98,43 @@ impl EstimatorMethod {
 pub struct EstimatorSection {
     /// The method; `"auto"` by default.
     pub method: EstimatorMethod,
-    /// What the function of `method = "function"` is called; its code is given by the program that has it.
+    /// Function name for `method = "function"`; the calling program provides the code.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub function: Option<String>,
     /// The code of `function`.
     #[serde(skip)]
     pub code: Code<dyn EstimatorRule>,
-    /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each
-    /// time segment by the fit without it, by default.
+    /// Method of the covariance for error bars; `"jackknife"` by default, which accounts for coloured residuals: each
+    /// time segment is predicted by a fit without it.
     pub covariance: CovarianceMethod,
-    /// Whether the bodies, friction and drives written are those of a physically consistent set that fit the logs best
-    /// (true by default), or the set nearest to the description that has exactly the estimated base parameters. A table
-    /// in place of `true` says what else is known of the bodies.
+    /// Whether exported bodies, friction and drives are the physically consistent set with the best fit to the logs
+    /// (true by default), or the set nearest to the robot description that has exactly the estimated base parameters. A
+    /// table in place of `true` adds constraints on the bodies.
     pub physical: PhysicalChoice,
-    /// Intervals for every parameter of bodies and laws over all physically consistent robots that the data do not
-    /// reject; some thousand physical fits, so not by default. Needs `physical`.
+    /// Whether to compute intervals of every body and friction parameter over all physically consistent robots that the
+    /// data do not reject. This needs some thousand fits; false by default. Needs `physical`.
     pub intervals: bool,
-    /// When a column counts as excited.
+    /// Rank decision: thresholds for excited columns.
     pub rank: RankSettings,
-    /// How logs are cut into segments for the covariance.
+    /// Segmentation of the logs for the covariance.
     pub segments: SegmentSettings,
-    /// Hold parameters that the data hardly determine at zero; not by default.
+    /// Fixes poorly determined parameters at zero; off by default.
     pub essential: Option<EssentialSettings>,
-    /// Instruments for `method = "auto"` and `"instrumental"`. With another method they only test whether noise in the
-    /// regressor biases least squares, which `"weighted"` and `"ordinary"` do by default.
+    /// Instruments for `method = "auto"` and `"instrumental"`. With other methods they only test whether noise in the
+    /// regressor biases least squares; `"weighted"` and `"ordinary"` run this test by default.
     pub instruments: Option<InstrumentSettings>,
-    /// How `method = "noise-weighted"` finds the noise around a row.
+    /// Local noise estimate for `method = "noise-weighted"`.
     pub noise_levels: NoiseLevels,
-    /// The repeated motion of `method = "maximum-likelihood"`; of `"simultaneous"` where the motion is a Fourier
-    /// series.
+    /// Period of the motion for `method = "maximum-likelihood"`, and for `"simultaneous"` with a Fourier series.
     pub periods: PeriodSettings,
-    /// The motion of `method = "simultaneous"` where it is not said to repeat.
+    /// Spline motion for `method = "simultaneous"` without `periods`.
     pub spline: SplineMotionSettings,
-    /// How the loop is simulated for `method = "didim"`, `"clie"` and `"cloe"`.
+    /// Simulation of the closed loop for `method = "didim"`, `"clie"` and `"cloe"`.
     pub simulated: SimulatedSection,
 }
 
 impl EstimatorSection {
-    /// What all estimators share, with weighted least squares.
+    /// Settings shared by all estimators.
     pub(crate) fn common(&self) -> EstimationSettings {
         let mut settings = EstimationSettings::default();
         settings.examine_exogeneity = matches!(self.method, EstimatorMethod::Ordinary | EstimatorMethod::Weighted);
@@ -147,8 +146,7 @@ impl EstimatorSection {
         settings
     }
 
-    /// The estimator that `method` names, with its settings; `simulated` is asked for the closed loop where it needs
-    /// one.
+    /// Builds the estimator of `method` with its settings; `simulated` provides the closed loop if needed.
     pub(crate) fn estimator(
         &self,
         simulated: impl FnOnce() -> Result<Box<SimulatedLoopSettings>, Error>,
@@ -175,12 +173,12 @@ impl EstimatorSection {
         })
     }
 
-    /// Whether `method = "simultaneous"` is told that the motion is a Fourier series.
+    /// Whether `method = "simultaneous"` models the motion as a Fourier series.
     fn has_series(&self) -> bool {
         self.periods.period_s.is_some() || self.periods.harmonics.is_some()
     }
 
-    /// Whether the method cannot do without the motion that was commanded.
+    /// Whether the method requires the commanded motion.
     pub(crate) fn needs_commanded_motion(&self) -> bool {
         match self.method {
             EstimatorMethod::MaximumLikelihood => self.periods.period_s.is_none(),
@@ -219,7 +217,7 @@ impl EstimatorSection {
         self.simulated.validate().map_err(StudyError::at("[estimator.simulated]"))?;
         self.physical.validate().map_err(StudyError::at("[estimator.physical]"))?;
         if self.intervals && self.physical.settings().is_none() {
-            let fix = "they are of physically consistent parameters: take out physical = false";
+            let fix = "intervals need physically consistent parameters: remove physical = false";
             return Err(StudyError::conflict("estimator.intervals = true", fix));
         }
         self.segments.validate().map_err(StudyError::at("[estimator.segments]"))?;

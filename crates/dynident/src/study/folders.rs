@@ -1,19 +1,20 @@
-//! Where a study's files lie.
+//! Folders of a study's files.
 
 use super::Study;
 use crate::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Where a study's files lie: the folder that the user named, then the study file's own, then the study's `data`.
+/// Search path for a study's files: the folder from the command line, then the study file's folder, then the study's
+/// `data`.
 #[derive(Clone, Debug)]
 pub struct Folders {
-    /// What the user named.
+    /// The folder from the command line.
     named: Option<PathBuf>,
     candidates: Vec<PathBuf>,
 }
 
 impl Folders {
-    /// The folders of the study in `study_path`; `data` is what the user named on the command line.
+    /// Search path of the study in `study_path`; `data` is the folder from the command line.
     pub fn new(study: &Study, study_path: &Path, data: Option<&Path>) -> Self {
         let own = study_path.parent().map_or_else(PathBuf::new, Path::to_owned);
         let mut candidates: Vec<PathBuf> = data.map(Path::to_owned).into_iter().collect();
@@ -22,11 +23,11 @@ impl Folders {
         Self { named: data.map(Path::to_owned), candidates }
     }
 
-    /// The first folder that holds `file`.
+    /// Finds the first folder that contains `file`.
     ///
     /// # Errors
-    /// If the folder that the user named is none, and if no folder holds it; the message names all that were tried, and
-    /// the study's source if it says one.
+    /// If the folder from the command line does not exist, or if no folder contains the file; the message lists all
+    /// paths tried, and the study's source if stated.
     pub fn find(&self, file: &Path, source: Option<&str>) -> Result<PathBuf, Error> {
         if let Some(folder) = self.named.as_ref().filter(|folder| !folder.is_dir()) {
             let source = std::io::Error::from(std::io::ErrorKind::NotADirectory);

@@ -1,4 +1,4 @@
-//! Friction in the study file: who chooses the laws, and what is wrong with one that is stated.
+//! Friction in the study file.
 
 use crate::error::{Expected, StudyError};
 use dynident_model::terms::StatedFault;
@@ -6,16 +6,16 @@ use serde::{Deserialize, Serialize};
 
 pub use dynident_model::terms::FrictionTerm;
 
-/// Who says which friction a joint has.
+/// Source of a joint's friction model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum FrictionChoice {
-    /// The study's keys.
+    /// The keys of the study.
     #[default]
     Stated,
-    /// Cross-validation inside the training logs. The keys `offset` and `drive_inertia` stay in force; what else is
-    /// stated is one of the candidates.
+    /// Cross-validation within the training logs. `offset` and `drive_inertia` stay in force; the stated friction is
+    /// one of the candidates.
     Auto,
 }
 

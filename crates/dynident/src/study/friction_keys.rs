@@ -1,12 +1,12 @@
-//! From torque terms back to the keys of a study that state them.
+//! Converts torque terms to the study keys that state them.
 
 use super::friction::{FrictionChoice, FrictionTerm};
 use super::{CoulombChoice, JointDrive};
 use dynident_model::terms::{CoulombShape, JointProperty, StepRole, TorqueTerm};
 
 impl JointDrive {
-    /// The keys of `[drive.joints.NAME]` that state these terms of a joint's friction, and no others. Drive inertia and
-    /// offset are left to the other keys.
+    /// The keys of `[drive.joints.NAME]` that state exactly these friction terms. Drive inertia and offset have
+    /// separate keys.
     pub fn stating(terms: &[TorqueTerm]) -> Self {
         let mut drive = Self {
             viscous: Some(false),
@@ -36,7 +36,7 @@ impl JointDrive {
             (Some(JointProperty::Friction), Some(CoulombShape::Smooth { width })) => {
                 (self.coulomb, self.coulomb_width) = (Some(CoulombChoice::Smooth), Some(width));
             }
-            // The step by direction is the joint's, which has a key of its own.
+            // The width of the directional step is set by the joint's key `coulomb_width`.
             (_, Some(CoulombShape::Smooth { width })) if term.kind().step_role() == StepRole::Joint => {
                 self.coulomb_width = Some(width);
             }
@@ -58,7 +58,6 @@ mod tests {
     };
     use std::path::Path;
 
-    /// What is stored of a chosen friction gives that friction again, with none of its constants a default.
     #[test]
     fn keys_state_the_terms_that_they_came_from() {
         let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/ur10.urdf");

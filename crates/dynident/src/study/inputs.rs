@@ -1,11 +1,11 @@
-//! What a study's results are made from.
+//! Inputs of a study's results.
 
 use super::{Folders, Study, StudyLogSource, StudyRobot};
 use dynident_model::Robot;
 use dynident_recording::MemoryLog;
 use std::path::PathBuf;
 
-/// One thing that a result is made from.
+/// One input of a result.
 #[derive(Clone, Debug)]
 pub(crate) enum StudyInput {
     /// A file.
@@ -25,12 +25,12 @@ impl From<StudyLogSource> for StudyInput {
     }
 }
 
-/// Inputs, each with what it is.
+/// Inputs, each with its kind.
 type NamedInputs = Vec<(&'static str, StudyInput)>;
 
 impl Study {
-    /// What a motion is designed, simulated or iterated from, with what each is: the robot's description, the result
-    /// behind a prior, tables of torque, trajectories.
+    /// Inputs of `design`, `simulate` and `iterate`: robot description, result of the prior, torque tables,
+    /// trajectories.
     pub(crate) fn motion_inputs(&self, folders: &Folders) -> NamedInputs {
         let robot = match &self.robot.description {
             Some(robot) => Some(StudyInput::Description(robot.clone())),
@@ -48,7 +48,6 @@ impl Study {
         robot.map(|robot| ("robot", robot)).into_iter().chain(files).chain(self.table_inputs(folders)).collect()
     }
 
-    /// The description that `robot` was made from.
     pub(crate) fn robot_input(&self, robot: &StudyRobot) -> StudyInput {
         match &self.robot.description {
             Some(description) => StudyInput::Description(description.clone()),
@@ -56,7 +55,7 @@ impl Study {
         }
     }
 
-    /// The tables of torque that a model is made with, as far as they exist.
+    /// The existing torque tables of the model.
     pub(crate) fn table_inputs(&self, folders: &Folders) -> NamedInputs {
         let files = self.torque.iter().filter_map(|torque| torque.table_file.as_ref());
         files.filter_map(|file| Some(("torque", StudyInput::File(folders.find(file, None).ok()?)))).collect()

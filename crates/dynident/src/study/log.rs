@@ -12,39 +12,39 @@ use std::path::PathBuf;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LogSection {
-    /// The main file; of samples in memory, what they are called.
+    /// The main file; for samples in memory, their name.
     pub file: PathBuf,
-    /// The samples themselves, in place of a file's: a table whose columns `format` explains. Not written.
+    /// The samples, in place of a file: a table whose columns `format` describes. Not serialised.
     #[serde(skip)]
     pub samples: Option<MemoryLog>,
-    /// What it is called in reports; the file's name by default.
+    /// Name in reports; the file name by default.
     #[serde(default)]
     pub name: Option<String>,
-    /// What it is for; to identify by default.
+    /// Use of the log; `identify` by default.
     #[serde(default)]
     pub role: Role,
-    /// Its own format, in place of the study's.
+    /// Format of this log, in place of the study's.
     #[serde(default)]
     pub format: Option<LogFormat>,
-    /// The motion that was commanded, in place of the differentiator's own; for differentiators that need it.
+    /// The commanded motion, in place of that of the differentiator.
     #[serde(default)]
     pub reference: Option<ReferenceSettings>,
-    /// The `[[payload]]` that it was recorded with, by name; none by default.
+    /// Name of the `[[payload]]` carried during the recording; no payload by default.
     #[serde(default)]
     pub payload: Option<String>,
-    /// In place of the format's `rows`.
+    /// Overrides `rows` of the format.
     #[serde(default, deserialize_with = "exactly")]
     pub rows: Option<[u64; 2]>,
-    /// In place of the format's `fraction`.
+    /// Overrides `fraction` of the format.
     #[serde(default, deserialize_with = "exactly")]
     pub fraction: Option<[f64; 2]>,
-    /// In place of the format's `time_range_s`.
+    /// Overrides `time_range_s` of the format.
     #[serde(default, deserialize_with = "exactly")]
     pub time_range_s: Option<[f64; 2]>,
-    /// Beside the format's `drop_rows`.
+    /// Added to `drop_rows` of the format.
     #[serde(default)]
     pub drop_rows: Vec<[u64; 2]>,
-    /// Beside the format's `drop_time_s`.
+    /// Added to `drop_time_s` of the format.
     #[serde(default)]
     pub drop_time_s: Vec<[f64; 2]>,
 }

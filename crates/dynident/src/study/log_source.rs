@@ -1,4 +1,4 @@
-//! Where the samples of a study's log are: in a file or in memory.
+//! Source of a log's samples: a file or memory.
 
 use dynident_recording::{Log, LogFormat, LogSource, MemoryLog};
 use fnv::FnvHasher;
@@ -6,17 +6,17 @@ use std::hash::Hasher;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-/// Where the samples of a study's log are.
+/// Source of a log's samples.
 #[derive(Clone, Debug)]
 pub(crate) enum StudyLogSource {
-    /// In a file, which was found.
+    /// An existing file.
     File(PathBuf),
     /// In memory.
     Memory(MemoryLog),
 }
 
 impl StudyLogSource {
-    /// Its samples as a log of `joints`.
+    /// Opens the samples as a log of `joints`.
     pub(crate) fn log(&self, format: LogFormat, joints: &[String]) -> Log {
         match self {
             Self::File(path) => Log::file(path, format, joints),
@@ -24,7 +24,7 @@ impl StudyLogSource {
         }
     }
 
-    /// What messages call it.
+    /// Name in messages.
     pub(crate) fn path(&self) -> PathBuf {
         match self {
             Self::File(path) => path.clone(),
@@ -32,8 +32,8 @@ impl StudyLogSource {
         }
     }
 
-    /// Whether both hold the same samples: one file or copies of it, one table or equal ones. A file that cannot be
-    /// read is left to its reader.
+    /// Whether both contain the same samples: one file or copies of it, one table or equal ones. False if a file cannot
+    /// be read, which its reader reports.
     pub(crate) fn has_content_of(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::File(a), Self::File(b)) => same_file_content(a, b),
@@ -45,7 +45,7 @@ impl StudyLogSource {
     }
 }
 
-/// Whether two files hold the same bytes: the same file, or one of the same length and hash.
+/// Whether two files have equal contents: the same path, or equal length and hash.
 fn same_file_content(a: &Path, b: &Path) -> bool {
     if let (Ok(a), Ok(b)) = (a.canonicalize(), b.canonicalize())
         && a == b
@@ -56,7 +56,7 @@ fn same_file_content(a: &Path, b: &Path) -> bool {
     length(a).is_some() && length(a) == length(b) && hash(a).is_some_and(|one| Some(one) == hash(b))
 }
 
-/// FNV-1a of a file's bytes, 64 bits; none if it cannot be read.
+/// FNV-1a hash of a file's bytes, 64 bits; `None` if the file cannot be read.
 fn hash(path: &Path) -> Option<u64> {
     let mut file = BufReader::with_capacity(1 << 16, dynident_files::open(path).ok()?);
     let mut hasher = FnvHasher::default();

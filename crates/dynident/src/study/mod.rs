@@ -55,7 +55,7 @@ use dynident_simulation::ControllerSettings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// A study, as written in TOML. Unknown keys are errors, so that a slip of the pen does not silently change a fit.
+/// A study, as written in TOML. Unknown keys are errors, so that a typing error cannot silently change a fit.
 ///
 /// ```
 /// let study = dynident::Study::parse(
@@ -84,13 +84,13 @@ use std::path::{Path, PathBuf};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Study {
-    /// What the study is called in reports; the file's name by default.
+    /// Name in reports; the file name by default.
     #[serde(default)]
     pub name: Option<String>,
-    /// Where the recordings can be had.
+    /// Source of the recordings (for example a URL).
     #[serde(default)]
     pub source: Option<String>,
-    /// Folder of the recordings, relative to the study file, used unless the command line names one.
+    /// Folder of the recordings, relative to the study file; a folder on the command line has priority.
     #[serde(default)]
     pub data: Option<PathBuf>,
     /// The robot.
@@ -98,48 +98,61 @@ pub struct Study {
     /// Friction, offsets and drive inertia.
     #[serde(default)]
     pub drive: DriveSection,
-    /// Drives that turn with two joints.
+    /// Drives coupled to two joints.
     #[serde(default)]
     pub coupling: Vec<CouplingSection>,
-    /// Springs, counterbalances, cables: torques by positions and velocities.
+    /// Springs, counterbalances, cables: torques as functions of positions and velocities.
     #[serde(default)]
     pub torque: Vec<TorqueSection>,
-    /// What logs were recorded with.
+    /// Payloads of the logs.
     #[serde(default)]
     pub payload: Vec<PayloadSection>,
-    /// An arm that is known already.
+    /// An arm identified earlier.
     #[serde(default)]
     pub arm: Option<ArmSection>,
-    /// How all logs are written; a log may have its own `format`.
+    /// Format of all logs; a log may state its own `format`.
     #[serde(default)]
     pub format: Option<LogFormat>,
-    /// From positions to velocities and accelerations.
+    /// Method for velocities and accelerations.
     #[serde(default)]
     pub motion: MotionSettings,
-    /// The low-pass and decimation that torque and regressor go through alike.
+    /// Low-pass filter and decimation, applied to torque and regressor.
     #[serde(default)]
     pub parallel_filter: ParallelFilterSettings,
     /// The estimator.
     #[serde(default)]
     pub estimator: EstimatorSection,
-    /// The excitation trajectory that `design` looks for.
+    /// Excitation trajectory of `design`.
     #[serde(default)]
     pub design: Option<DesignSection>,
-    /// The controller of `simulate`, and of `iterate` once there is a model.
+    /// The controller of `simulate`, and of `iterate` with an identified model.
     #[serde(default)]
     pub controller: Option<ControllerSettings>,
     /// The robot that `simulate` and `iterate` simulate.
     #[serde(default)]
     pub simulation: Option<SimulationSection>,
-    /// How `iterate` goes about it.
+    /// Settings of `iterate`.
     #[serde(default)]
     pub iteration: Option<IterationSection>,
-    /// The logs; only `design` needs none.
+    /// The logs; only `design` works without logs.
     #[serde(default)]
     pub log: Vec<LogSection>,
 }
 
-/// What TOML cannot say is not said.
+/// Checks that no earlier entry of a list has this name.
+fn check_unique<'a>(
+    list: &str,
+    name: &str,
+    mut earlier: impl Iterator<Item = &'a str>,
+    fix: &'static str,
+) -> Result<(), StudyError> {
+    if earlier.any(|other| other == name) {
+        return Err(StudyError::Twice { what: list.to_owned(), name: name.to_owned(), fix });
+    }
+    Ok(())
+}
+
+/// TOML has no null.
 fn drop_nulls(value: &mut serde_json::Value) {
     match value {
         serde_json::Value::Object(entries) => {
@@ -179,8 +192,8 @@ impl Study {
     /// Reads a study from its text; `path` is only named in messages.
     ///
     /// # Errors
-    /// If the text is no TOML, a key is unknown or of the wrong kind, or sections contradict each other; the message
-    /// names file, line and column.
+    /// If the text is not valid TOML, a key is unknown or has the wrong type, or sections conflict; the message
+    /// contains file, line and column.
     pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         if text.trim().is_empty() {
@@ -196,8 +209,8 @@ impl Study {
         Ok(study)
     }
 
-    /// Builds a study from JSON with the keys of the TOML, null for one that is not there; `path` is named in messages,
-    /// and files are looked for beside it.
+    /// Builds a study from JSON with the keys of the TOML, null for a missing one. `path` appears in messages, and
+    /// files are searched relative to it.
     ///
     /// # Errors
     /// As [`parse`](Study::parse), without line and column.
@@ -210,15 +223,16 @@ impl Study {
         Ok(study)
     }
 
-    /// The study as TOML, with every key that has a value. Samples and descriptions in memory are only named.
+    /// The study as TOML, with every key that has a value. Samples and descriptions in memory are represented by their
+    /// names.
     ///
     /// # Errors
-    /// [`StudyError::Toml`] for a number that TOML does not have.
+    /// [`StudyError::Toml`] for a number that TOML cannot represent.
     pub fn to_toml(&self) -> Result<String, StudyError> {
         toml::to_string(self).map_err(|error| StudyError::Toml { problem: error.to_string() })
     }
 
-    /// That there is a log, as fitting and testing need; a study for `design` may have none.
+    /// Checks that there is a log; a study for `design` may have none.
     pub(crate) fn require_log(&self, path: &Path) -> Result<(), Error> {
         if self.log.is_empty() {
             let fix = "name at least one log with `file = \"...\"`";
@@ -227,7 +241,6 @@ impl Study {
         Ok(())
     }
 
-    /// That there is a log to fit to.
     pub(crate) fn require_training_log(&self, path: &Path) -> Result<(), Error> {
         self.require_log(path)?;
         if !self.log.iter().any(|log| log.role == Role::Identify) {
@@ -237,12 +250,12 @@ impl Study {
         Ok(())
     }
 
-    /// Places of the logs with this role.
+    /// Indices of the logs with this role.
     pub(crate) fn logs_of_role(&self, role: Role) -> Vec<usize> {
         (0..self.log.len()).filter(|&index| self.log[index].role == role).collect()
     }
 
-    /// The parts that are a caller's own code, each with the name of its function: a study with such is no file's.
+    /// Parts that are code of the caller, each with its function name; a study file cannot contain them.
     pub fn functions(&self) -> Vec<String> {
         let mut found = Vec::new();
         for torque in &self.torque {
@@ -273,33 +286,18 @@ impl Study {
         self.drive.validate()?;
         self.check_temperature()?;
         for (index, coupling) in self.coupling.iter().enumerate() {
-            if self.coupling[..index].iter().any(|other| other.name == coupling.name) {
-                return Err(StudyError::Twice {
-                    what: "coupling".to_owned(),
-                    name: coupling.name.clone(),
-                    fix: "give each drive a name of its own",
-                });
-            }
+            let earlier = self.coupling[..index].iter().map(|other| &other.name[..]);
+            check_unique("coupling", &coupling.name, earlier, "give each drive a unique name")?;
             coupling.validate().map_err(StudyError::at(format!("coupling `{}`", coupling.name)))?;
         }
         for (index, torque) in self.torque.iter().enumerate() {
-            if self.torque[..index].iter().any(|other| other.name == torque.name) {
-                return Err(StudyError::Twice {
-                    what: "torque".to_owned(),
-                    name: torque.name.clone(),
-                    fix: "give each a name of its own",
-                });
-            }
+            let earlier = self.torque[..index].iter().map(|other| &other.name[..]);
+            check_unique("torque", &torque.name, earlier, "give each a unique name")?;
             torque.validate().map_err(StudyError::at(format!("torque `{}`", torque.name)))?;
         }
         for (index, payload) in self.payload.iter().enumerate() {
-            if self.payload[..index].iter().any(|other| other.name == payload.name) {
-                return Err(StudyError::Twice {
-                    what: "payload".to_owned(),
-                    name: payload.name.clone(),
-                    fix: "give each a name of its own",
-                });
-            }
+            let earlier = self.payload[..index].iter().map(|other| &other.name[..]);
+            check_unique("payload", &payload.name, earlier, "give each a unique name")?;
             payload.validate().map_err(StudyError::at(format!("payload `{}`", payload.name)))?;
         }
         self.robot.validate()?;
@@ -311,7 +309,7 @@ impl Study {
         self.estimator.validate()
     }
 
-    /// That friction which depends on the temperature is asked for where it can be had.
+    /// Checks that temperature-dependent friction is stated and the estimator supports it.
     fn check_temperature(&self) -> Result<(), StudyError> {
         let terms =
             self.drive.joints.values().filter_map(|own| own.terms.as_ref()).chain([&self.drive.terms]).flatten();
@@ -322,22 +320,22 @@ impl Study {
         if own.chain([self.drive.friction]).any(|choice| choice == Some(FrictionChoice::Auto)) {
             return Err(StudyError::conflict(
                 "drive.friction = \"auto\" with the law `temperature`",
-                "let the logs choose friction without it, then state what they chose beside it",
+                "select friction without it first, then state the selected friction together with `temperature`",
             ));
         }
         if self.estimator.method == EstimatorMethod::Instrumental || self.estimator.instruments.is_some() {
             return Err(StudyError::conflict(
-                "drive.laws: `temperature` does not go with instruments",
-                "use another estimator.method and leave out estimator.instruments",
+                "drive.laws: `temperature` cannot be used with instruments",
+                "use another estimator.method and remove estimator.instruments",
             ));
         }
         Ok(())
     }
 
-    /// The format of log number `index`, with its own range in force.
+    /// Format of log number `index`, with the log's own range.
     ///
     /// # Panics
-    /// If there is no such log. That every log has a format was checked when the study was read.
+    /// If there is no such log; `parse` has checked that every log has a format.
     pub fn format_of(&self, index: usize) -> LogFormat {
         let log = &self.log[index];
         let mut format = log.format.clone().or_else(|| self.format.clone()).expect("checked when the study was read");
@@ -349,8 +347,8 @@ impl Study {
         format
     }
 
-    /// What log number `index` is called: its name, or its file's, with its range so that two parts of one file can be
-    /// distinguished.
+    /// Name of log number `index`: the stated name, or that of its file with its range, which distinguishes parts of
+    /// one file.
     ///
     /// # Panics
     /// If there is no such log.

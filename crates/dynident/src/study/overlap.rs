@@ -1,4 +1,4 @@
-//! A log that the model is fitted to proves nothing when the model is tested on it.
+//! Checks that validation logs contain no training data.
 
 use super::Study;
 use super::log_source::StudyLogSource;
@@ -8,9 +8,9 @@ use dynident_recording::LogFormat;
 use dynident_recording::log::LogSamples;
 
 impl Study {
-    /// No sample is both fitted to and tested on: two logs of different roles are not the same file (nor copies of one)
-    /// with rows in common, nor is one the other's samples saved once more. `sources` are where their samples are,
-    /// `recordings` the same as logs.
+    /// Checks that no sample is used for both fit and validation: two logs with different roles must not be the same
+    /// file (or copies) with common rows, nor contain the same samples in another file. `sources` and `recordings` are
+    /// the study's logs.
     ///
     /// # Errors
     /// [`StudyError::Overlap`] and [`StudyError::SameSamples`] with the names of both logs.
@@ -18,7 +18,7 @@ impl Study {
         let held_out_logs = self.logs_of_role(Role::Validate);
         let training_logs = self.logs_of_role(Role::Identify);
         let names = |logs: [usize; 2]| logs.map(|index| self.log_name(index));
-        // Pairs of which only the samples can tell.
+        // Pairs of different files, whose samples have to be compared.
         let mut others = Vec::new();
         for &held_out in &held_out_logs {
             for &training in &training_logs {
@@ -31,18 +31,18 @@ impl Study {
             }
         }
 
-        // Each log is read once. One that cannot be read is left to its reader.
+        // Each log is read once. A log that cannot be read is reported later by its reader.
         let read = |index: usize| match &recordings[index].samples {
             Samples::Log(log) => LogSamples::read(log).ok().flatten(),
             Samples::Motion(_) => None,
         };
-        let is_of = |index: usize| others.iter().any(|pair| pair.contains(&index));
+        let is_needed = |index: usize| others.iter().any(|pair| pair.contains(&index));
         let tests: Vec<(usize, LogSamples)> = held_out_logs
             .iter()
-            .filter(|&&index| is_of(index))
+            .filter(|&&index| is_needed(index))
             .filter_map(|&index| Some((index, read(index)?)))
             .collect();
-        for &training in training_logs.iter().filter(|&&index| !tests.is_empty() && is_of(index)) {
+        for &training in training_logs.iter().filter(|&&index| !tests.is_empty() && is_needed(index)) {
             let Some(fitted) = read(training) else { continue };
             for (held_out, tested) in tests.iter().filter(|(held_out, _)| others.contains(&[training, *held_out])) {
                 if let Some(shared) = fitted.shared_with(tested) {
@@ -56,8 +56,8 @@ impl Study {
     }
 }
 
-/// Whether two parts of one file have rows in common, or could have: parts by rows, by fraction and by time cannot be
-/// compared before the file is read.
+/// Whether two parts of one file have, or may have, common rows: ranges by rows, fraction and time cannot be compared
+/// before the file is read.
 fn may_share_rows(a: &LogFormat, b: &LogFormat) -> bool {
     let common = |a: [f64; 2], b: [f64; 2]| a[0] < b[1] && b[0] < a[1];
     let rows = |rows: [u64; 2]| rows.map(|row| row as f64);

@@ -1,4 +1,4 @@
-//! `[[payload]]` and `[arm]`: what the arm carries in which log, and an arm that is known already.
+//! `[[payload]]` and `[arm]`: payloads of the logs, and an arm identified earlier.
 
 use super::arrays::exactly;
 use crate::error::StudyError;
@@ -7,53 +7,52 @@ use dynident_model::{InertialParameters, Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// `[[payload]]`: something that some logs were recorded with, at a link of the robot. A `[[log]]` carries it by its
-/// name. Without `mass_kg` it is estimated; with `mass_kg` and `com_m` it is known; with
-/// `mass_kg` alone, as from a balance, the rest is estimated.
+/// `[[payload]]`: a load at a link of the robot during some recordings. A `[[log]]` refers to it by name. Without
+/// `mass_kg` all its parameters are estimated; with `mass_kg` and `com_m` it is known; with `mass_kg` alone (weighed on
+/// a scale) the rest is estimated.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PayloadSection {
-    /// What logs call it.
+    /// Name that logs refer to.
     pub name: String,
-    /// The link that it is fixed to: its mass, centre of mass and inertia are in that link's frame.
+    /// The link that it is fixed to; the payload's parameters are in the frame of this link.
     pub link: String,
-    /// Its mass, where it is known.
+    /// Mass, if known.
     #[serde(default)]
     pub mass_kg: Option<f64>,
-    /// Its centre of mass in the link's frame, where it is known.
+    /// Centre of mass in the link's frame, if known.
     #[serde(default, deserialize_with = "exactly")]
     pub com_m: Option<[f64; 3]>,
-    /// Its inertia about its centre of mass, axes of the link's frame: xx, xy, xz, yy, yz, zz. Zero by default, which
-    /// is a point mass.
+    /// Inertia about its centre of mass, in the axes of the link's frame: xx, xy, xz, yy, yz, zz. Zero (a point mass)
+    /// by default.
     #[serde(default, deserialize_with = "exactly")]
     pub inertia_at_com_kgm2: Option<[f64; 6]>,
 }
 
-/// `[arm]`: the arm by an earlier identification. Only payloads are estimated then, and the arm's error bars go into
-/// theirs.
+/// `[arm]`: the arm from an earlier identification. Only payloads are estimated then; their error bars include those of
+/// the arm.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ArmSection {
     /// The earlier `result.json`, of the same robot with the same drives.
     pub result: PathBuf,
-    /// What is fitted again; nothing by default.
+    /// Parameters of the arm that are estimated again; none by default.
     #[serde(default)]
     pub refit: Refit,
 }
 
-/// A body's pseudo-inertia may be this much negative, beside its largest entry: rounding of a thin body's inertia in
-/// print.
-const ROUNDING: f64 = 1.0e-6;
+/// Smallest eigenvalue of a pseudo-inertia, relative to its largest entry: rounding in published values of thin bodies.
+const MAX_RELATIVE_ROUNDING: f64 = 1.0e-6;
 
 impl PayloadSection {
-    /// Its mass, where that is all that is known.
+    /// Mass of a payload of which only the mass is known.
     pub(crate) fn known_mass_kg(&self) -> Option<f64> {
         self.mass_kg.filter(|_| self.com_m.is_none())
     }
 
-    /// Its ten parameters in the link's frame, where it is known.
+    /// The ten parameters of a known payload in the link's frame.
     pub(crate) fn known(&self) -> Option<InertialParameters> {
         let [xx, xy, xz, yy, yz, zz] = self.inertia_at_com_kgm2.unwrap_or_default();
         let inertia = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
@@ -73,16 +72,18 @@ impl PayloadSection {
             (Some(_), Some(_), _) => {}
             _ => {
                 return Err(StudyError::conflict(
-                    "what is known of it",
-                    "a known payload has mass_kg and com_m (and inertia_at_com_kgm2 unless it is a point), one to estimate has none of them or a positive mass_kg alone",
+                    "incomplete payload",
+                    "give mass_kg and com_m for a known payload (and inertia_at_com_kgm2 unless it is a point mass); give none of them, or only a positive mass_kg, to estimate it",
                 ));
             }
         }
         let Some(known) = self.known() else { return Ok(()) };
         let pseudo_inertia = known.pseudo_inertia();
-        if known.mass_kg() <= 0.0 || pseudo_inertia.symmetric_eigenvalues().min() < -ROUNDING * pseudo_inertia.amax() {
+        if known.mass_kg() <= 0.0
+            || pseudo_inertia.symmetric_eigenvalues().min() < -MAX_RELATIVE_ROUNDING * pseudo_inertia.amax()
+        {
             return Err(StudyError::conflict(
-                "no body has this mass and inertia",
+                "mass and inertia are not physically consistent",
                 "the mass must be positive and no moment about the centre of mass larger than the sum of the other two",
             ));
         }

@@ -1,11 +1,11 @@
-//! `[estimator.physical]`: whether the robot written is a consistent one, and what is known of its bodies.
+//! `[estimator.physical]`: physically consistent fit and constraints on the bodies.
 
 use dynident_estimation::consistent::PhysicalError;
 use dynident_identification::consistent::ConsistencySettings;
 use serde::de::value::MapAccessDeserializer;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// `true`, `false`, or a table of [`ConsistencySettings`], which stands for `true`.
+/// `true`, `false`, or a table of [`ConsistencySettings`], which implies `true`.
 ///
 /// ```
 /// use dynident::study::{EstimatorSection, PhysicalChoice};
@@ -19,9 +19,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum PhysicalChoice {
-    /// With the defaults, or not at all.
+    /// On with the defaults, or off.
     Switch(bool),
-    /// With what is known of the robot.
+    /// On with constraints on the robot.
     Known(Box<ConsistencySettings>),
 }
 
@@ -32,7 +32,7 @@ impl Default for PhysicalChoice {
 }
 
 impl PhysicalChoice {
-    /// The settings of the fit; none when it is switched off.
+    /// The settings of the fit; `None` if it is switched off.
     pub fn settings(&self) -> Option<ConsistencySettings> {
         match self {
             Self::Switch(true) => Some(ConsistencySettings::default()),
@@ -53,7 +53,7 @@ impl<'de> Deserialize<'de> for PhysicalChoice {
         impl<'de> serde::de::Visitor<'de> for Visitor {
             type Value = PhysicalChoice;
             fn expecting(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-                f.write_str("true, false, or a table of what is known of the bodies")
+                f.write_str("true, false, or a table of constraints on the bodies")
             }
             fn visit_bool<E>(self, switch: bool) -> Result<Self::Value, E> {
                 Ok(PhysicalChoice::Switch(switch))

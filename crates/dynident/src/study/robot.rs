@@ -1,4 +1,4 @@
-//! `[robot]`: which robot, and how it stands.
+//! `[robot]`: robot description and installation.
 
 use super::arrays::exactly;
 use crate::error::StudyError;
@@ -8,83 +8,82 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// `[robot]`: which robot, and how it stands.
+/// `[robot]`: robot description and installation.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RobotSection {
-    /// URDF, MJCF, SDF, or D-H table in TOML; of a description in memory, what it is called.
+    /// URDF, MJCF, SDF, or D-H table in TOML; for a description in memory, its name.
     pub file: PathBuf,
-    /// The description itself, in place of the file's. Not written.
+    /// The robot description, in place of the file. Not serialised.
     #[serde(skip)]
     pub description: Option<Box<Robot>>,
-    /// Arguments of the program `xacro`, which expands a file with macros if it is permitted (`--allow-command`): `{
-    /// ur_type = "ur5e" }` is `xacro FILE ur_type:=ur5e`.
+    /// Arguments of the program `xacro`, which expands a file with macros if permitted (`--allow-command`): `{ ur_type
+    /// = "ur5e" }` runs `xacro FILE ur_type:=ur5e`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub xacro: BTreeMap<String, String>,
     /// Time limit of the program `xacro`, s. Default 30.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub xacro_limit_s: Option<f64>,
-    /// The joints that the log holds, in the order of its columns; every other joint is locked. By default all joints
-    /// of the description that `lock` does not name, in the order of the tree.
+    /// The joints in the log, in the order of its columns; every other joint is locked. By default all joints of the
+    /// robot description that `lock` does not name, in the order of the tree.
     #[serde(default)]
     pub joints: Option<Vec<String>>,
-    /// Joints that are held, and where (rad, m).
+    /// Locked joints with their positions (rad, m).
     #[serde(default)]
     pub lock: BTreeMap<String, f64>,
-    /// Links that are not there: a link fixed to another alone, one that moves with a joint with everything on it.
+    /// Links to remove from the robot description: a fixed link alone, a moving link with its whole subtree.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drop: Vec<String>,
-    /// Joints that follow others, beside those of which the description says so.
+    /// Joints that follow others, in addition to those of the robot description.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub follow: Vec<FollowSection>,
-    /// Closed chains: where two links of the tree meet.
+    /// Closed chains: pairs of links that meet.
     #[serde(default, rename = "loop", skip_serializing_if = "Vec::is_empty")]
     pub loops: Vec<LoopSection>,
-    /// Gravitational acceleration in the world, m/s²; (0, 0, -9.81), or the MJCF's or D-H table's own, by default.
+    /// Gravitational acceleration in the world, m/s²; by default (0, 0, -9.81), or that of the MJCF or D-H table.
     #[serde(default, deserialize_with = "exactly")]
     pub gravity_m_s2: Option<[f64; 3]>,
-    /// How the base is mounted in the world: roll, pitch, yaw about fixed axes, rad.
+    /// Orientation of the base in the world: roll, pitch, yaw about fixed axes, rad.
     #[serde(default, deserialize_with = "exactly")]
     pub base_rpy_rad: Option<[f64; 3]>,
-    /// The same in degrees; give one of the two.
+    /// The same in degrees; give only one of the two.
     #[serde(default, deserialize_with = "exactly")]
     pub base_rpy_deg: Option<[f64; 3]>,
 }
 
-/// `[[robot.follow]]`: a joint without a degree of freedom of its own.
+/// `[[robot.follow]]`: a joint that follows others and has no degree of freedom.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FollowSection {
     /// The joint.
     pub joint: String,
-    /// The joints that it follows, and its velocity per velocity of each.
+    /// The joints that it follows, with its velocity per velocity of each.
     pub joints: BTreeMap<String, f64>,
-    /// Its position where those stand at zero, rad or m.
+    /// Position when the followed joints are at zero, rad or m.
     #[serde(default)]
     pub offset: f64,
 }
 
-/// `[[robot.loop]]`: a closed chain of the parallelogram kind, cut at a joint that the description does not hold.
+/// `[[robot.loop]]`: a closed chain (parallelogram), cut at a joint that the robot description does not contain.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LoopSection {
     /// The two links that meet.
     pub links: [String; 2],
-    /// Where: a point in the frame of each link, m.
+    /// The meeting point in the frame of each link, m.
     pub points_m: [[f64; 3]; 2],
-    /// The joints of the chain without drives: what they follow is found from the geometry.
+    /// The joints of the chain without drives; Dynident computes the joints they follow from the geometry.
     pub passive: Vec<String>,
 }
 
-/// Largest component of gravity, beyond which numbers run away. Robots in millimetres have 9810, and in milliseconds a
-/// thousandth of a thousandth of it.
+/// Largest component of gravity, against overflow. Robots in millimetres have 9810; other units of time give larger
+/// values.
 const MAX_GRAVITY_M_S2: f64 = 1e9;
 
 impl FollowSection {
-    /// What the joint follows.
     pub(super) fn mimic(&self) -> Mimic {
         let source =
             |(joint, multiplier): (&String, &f64)| MimicSource { joint: joint.clone(), multiplier: *multiplier };
@@ -93,14 +92,13 @@ impl FollowSection {
 }
 
 impl LoopSection {
-    /// Where the chain is cut.
     pub(super) fn closure(&self) -> LoopClosure {
         LoopClosure { links: self.links.clone(), points_m: self.points_m, passive: self.passive.clone() }
     }
 }
 
 impl RobotSection {
-    /// How the program `xacro` is called.
+    /// Arguments and time limit of the program `xacro`.
     pub fn xacro_settings(&self) -> XacroSettings {
         let limit_s = self.xacro_limit_s.unwrap_or(XacroSettings::DEFAULT_LIMIT_S);
         XacroSettings { arguments: self.xacro.clone(), limit_s }
@@ -113,7 +111,7 @@ impl RobotSection {
             return Err(StudyError::Numbers {
                 key: "robot.gravity_m_s2".to_owned(),
                 values: gravity.to_vec(),
-                expected: "finite numbers in m/s^2, at most 1e9 in size",
+                expected: "finite numbers in m/s^2, with an absolute value of at most 1e9",
             });
         }
         self.xacro_settings().validate()?;

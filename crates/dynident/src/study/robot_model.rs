@@ -1,5 +1,4 @@
-//! The robot of a study: its description, and the parametric model with joints locked, gravity and torque terms in
-//! force.
+//! The robot of a study: robot description and parametric model, with locked joints, gravity and torque terms.
 
 use super::torque::declared_terms;
 use super::{CoulombChoice, CouplingSection, DriveSection, Folders, JointDrive, LoopSection, Study};
@@ -13,20 +12,20 @@ use dynident_model::{LoopClosure, Model, ModelError, Robot, Vec3, has_xacro_macr
 use dynident_system::ProgramPermission;
 use std::path::Path;
 
-/// A study's robot: its description, and what the study makes of it.
+/// A study's robot: robot description and parametric model.
 #[derive(Clone, Debug)]
 pub struct StudyRobot {
-    /// The description as read.
+    /// The robot description as read.
     pub robot: Robot,
-    /// The model with joints locked, gravity and base in force, its torque terms, base parameters and nominal values.
+    /// Model with locked joints, gravity, base orientation, torque terms, base parameters and nominal values.
     pub parametric: ParametricModel,
     /// Joint names in the order of the log's columns.
     pub log_joints: Vec<String>,
 }
 
 impl Study {
-    /// Expands the study's robot file if it has xacro macros, with the program `xacro`, and keeps the expanded
-    /// description in memory: jobs start no program. Other robot files are left for the job to read.
+    /// Expands a robot file with xacro macros by the program `xacro` and keeps the result in memory, because jobs do
+    /// not start programs. Other robot files are left unread.
     ///
     /// # Errors
     /// As [`load_robot`].
@@ -40,7 +39,7 @@ impl Study {
         if self.robot.description.is_some() {
             return Ok(());
         }
-        // A file that cannot be read is reported by the job.
+        // The job reports a file that cannot be read.
         let Ok(path) = Folders::new(self, study_path, data).find(&self.robot.file, None) else { return Ok(()) };
         if has_xacro_macros(&path).unwrap_or(false) {
             let settings = LoadSettings { xacro: self.robot.xacro_settings(), programs, is_stopped };
@@ -51,11 +50,11 @@ impl Study {
 }
 
 impl StudyRobot {
-    /// Builds the robot that a study describes. No program is started: a robot file with xacro macros has to be
-    /// expanded before, by [`Study::expand_robot`].
+    /// Builds the study's robot. It starts no program: [`Study::expand_robot`] must have expanded a file with xacro
+    /// macros.
     ///
     /// # Errors
-    /// If the description cannot be read or contains macros, or names in the study are not in it.
+    /// If the robot description cannot be read or contains macros, or the study refers to an unknown link or joint.
     pub fn new(study: &Study, study_path: &Path, folders: &Folders) -> Result<Self, Error> {
         let robot = if let Some(robot) = &study.robot.description {
             (**robot).clone()
@@ -65,7 +64,7 @@ impl StudyRobot {
         };
         let in_study = Error::study::<ModelError>(study_path);
 
-        // How it stands in the world.
+        // Gravity and base.
         let mut model = robot.model.clone();
         if let Some([x, y, z]) = study.robot.gravity_m_s2 {
             model = model.with_gravity(Vec3([x, y, z])).map_err(&in_study)?;
@@ -75,14 +74,14 @@ impl StudyRobot {
             model = model.with_base_orientation(roll, pitch, yaw).map_err(&in_study)?;
         }
 
-        // What hangs on it, and what its joints follow.
+        // Removed links, followers and closed chains.
         model = model.without_links(&study.robot.drop).map_err(&in_study)?;
         let loops: Vec<LoopClosure> = study.robot.loops.iter().map(LoopSection::closure).collect();
         let passive = loops::followers(&model, &loops).map_err(Error::study(study_path))?;
         let stated = study.robot.follow.iter().map(|own| (own.joint.clone(), own.mimic()));
         model = model.with_followers(&stated.chain(passive).collect::<Vec<_>>()).map_err(&in_study)?;
 
-        // Which joints move.
+        // Moving joints.
         let known: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
         let unknown =
             |joint: &str| in_study(ModelError::UnknownJoint { joint: joint.to_owned(), known: known.clone() });
@@ -129,7 +128,7 @@ impl StudyRobot {
         self.parametric.model()
     }
 
-    /// Torque terms beside the rigid bodies.
+    /// Torque terms in addition to the rigid bodies.
     pub fn terms(&self) -> &[TorqueTerm] {
         self.parametric.terms()
     }
@@ -149,18 +148,17 @@ impl StudyRobot {
         self.parametric.nominal()
     }
 
-    /// Base parameters by the description's own inertials, damping and friction; `None` while a moving body's inertial
-    /// is unknown.
+    /// Nominal base parameters from the inertials, damping and friction of the robot description; `None` if the
+    /// inertials of a moving body are unknown.
     pub fn nominal_base(&self) -> Option<&[f64]> {
         self.parametric.nominal_base()
     }
 }
 
-/// The torque terms that `[drive]` and `[[coupling]]` ask for: of each joint, then of drives that turn with
-/// two.
+/// The torque terms of `[drive]` and `[[coupling]]`: those of each joint, then those of coupled drives.
 ///
 /// # Errors
-/// A joint that the model does not have.
+/// An unknown joint.
 pub(super) fn torque_terms(
     drive: &DriveSection,
     coupling: &[CouplingSection],
@@ -213,7 +211,7 @@ pub(crate) fn drive_choice(drive: &DriveSection, model: &Model, joint: usize) ->
     }
 }
 
-/// The step of friction that is no Coulomb friction: the joint's Coulomb step, or a smooth one where it has none.
+/// Step for the further friction laws: the joint's Coulomb step, or a smooth step without Coulomb friction.
 pub(crate) fn friction_step(drive: &DriveSection, model: &Model, joint: usize) -> CoulombShape {
     let default = JointDrive::default();
     let own = drive.joints.get(&model.joints()[joint].name).unwrap_or(&default);
@@ -221,7 +219,7 @@ pub(crate) fn friction_step(drive: &DriveSection, model: &Model, joint: usize) -
     drive_choice(drive, model, joint).coulomb.unwrap_or_else(smooth)
 }
 
-/// The width of a joint's smooth step, rad/s (m/s): the key's, or that of a usual arm in the robot's own units.
+/// Width of a joint's smooth step, rad/s (m/s): the stated value, or the default of a 1.2 m arm scaled to this robot.
 fn width(drive: &DriveSection, own: &JointDrive, model: &Model, joint: usize) -> f64 {
     let usual = || model.own_scale().velocity(model.joints()[joint].turns(), CoulombShape::USUAL_WIDTH);
     own.coulomb_width.or(drive.coulomb_width).unwrap_or_else(usual)

@@ -1,22 +1,22 @@
-//! `[estimator.simulated]`: how the loop is simulated for `method = "didim"`, `"clie"` and `"cloe"`.
+//! `[estimator.simulated]`: simulation of the closed loop for `method = "didim"`, `"clie"` and `"cloe"`.
 
 use dynident_estimation::{EstimationError, SimulatedSettings};
 use dynident_identification::estimators::SimulationStart;
 use serde::{Deserialize, Serialize};
 
-/// `[estimator.simulated]`. Rate, integrator, velocities and delays of the feedback, start and torque limits of the
-/// loop are those of `[simulation]`; noise is not simulated.
+/// `[estimator.simulated]`. The sample rate, integrator, velocities and delays of the feedback, start and torque limits
+/// are those of `[simulation]`; noise is not simulated.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulatedSection {
-    /// Where the iteration begins; at what is nearer to the record by default.
+    /// Start of the iteration; by default the candidate nearest to the recording.
     pub start: SimulationStart,
-    /// Length of a step, in error bars over all directions, at which the iteration ends; 1e-3 by default.
+    /// Step length, in error bars over all directions, at which the iteration ends; 1e-3 by default.
     pub tolerance: f64,
-    /// Most steps; 30 by default.
+    /// Maximum number of steps; 30 by default.
     pub max_iterations: usize,
-    /// Step of the differences of CLIE and CLOE, relative to each parameter's size; 1e-4 by default.
+    /// Finite difference step of CLIE and CLOE, relative to each parameter; 1e-4 by default.
     pub difference: f64,
 }
 

@@ -1,4 +1,4 @@
-//! `[simulation]`: the robot that is simulated, where it differs from its description, its sensors and limits.
+//! `[simulation]`: deviations of the simulated robot from its description, sensors and limits.
 
 use super::drive::{CouplingSection, DriveSection};
 use super::robot_model::{StudyRobot, torque_terms};
@@ -14,11 +14,11 @@ use nalgebra::Matrix4;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Spread of the lengths of a body whose mass is off by one: mass distributions differ in shape as well, by a third of
-/// that.
-const SHAPE_SHARE: f64 = 1.0 / 3.0;
+/// Relative spread of a body's lengths per relative spread of its mass: a third, so that the mass distributions also
+/// differ in shape.
+const LENGTH_SPREAD_PER_MASS_SPREAD: f64 = 1.0 / 3.0;
 
-/// `[simulation]`, all of it optional: a robot as described, without friction, with perfect sensors.
+/// `[simulation]`; every key is optional. By default a robot as described, without friction, with perfect sensors.
 ///
 /// ```
 /// let section: dynident::study::SimulationSection = toml::from_str(
@@ -31,16 +31,16 @@ const SHAPE_SHARE: f64 = 1.0 / 3.0;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulationSection {
-    /// Samples a second of the controller; 1000 by default.
+    /// Sample rate of the controller, Hz; 1000 by default.
     pub rate_hz: f64,
-    /// By how many percent the bodies differ from the description: every mass is that much larger or smaller, and
-    /// lengths within bodies by up to a third of it; always consistent bodies. 0 by default.
+    /// Deviation of the bodies from the robot description, percent: every mass is larger or smaller by this, and
+    /// lengths within bodies by up to a third of it. Bodies stay physically consistent. 0 by default.
     pub off_percent: f64,
-    /// The laws that the joints truly have, with the keys of `[drive]`: friction that the study's model does not know.
-    /// By default those of the study.
+    /// True friction of the joints, with the keys of `[drive]`; it may differ from the study's model. By default that
+    /// of the study.
     pub drive: Option<DriveSection>,
-    /// Viscous friction of the joints, Nm s/rad (N s/m); 0 by default. It is there if `drive` has it, as are the
-    /// following.
+    /// Viscous friction of the joints, Nm s/rad (N s/m); 0 by default. Used only if `drive` has this term, as are the
+    /// following three.
     pub viscous: PerJoint,
     /// Coulomb friction, Nm (N); 0 by default.
     pub coulomb: PerJoint,
@@ -48,24 +48,24 @@ pub struct SimulationSection {
     pub drive_inertia: PerJoint,
     /// Constant torques, Nm (N); 0 by default.
     pub offset: PerJoint,
-    /// Parameters of laws by their symbols (`fs1 = 2.0`), in place of the above.
+    /// Parameters of terms by their symbols (`fs1 = 2.0`); these override the keys above.
     #[serde(rename = "laws")]
     pub terms: BTreeMap<String, f64>,
-    /// Standard deviation of the joints' true places from the described ones, m; 0 by default.
+    /// Standard deviation of the true joint positions (geometry) from the robot description, m; 0 by default.
     pub length_std_m: f64,
-    /// The same of their axes, rad.
+    /// Standard deviation of the joint axes, rad.
     pub angle_std_rad: f64,
-    /// How the robot is integrated; semi-implicit Euler with one step a sample by default.
+    /// Integrator; semi-implicit Euler with one step per sample by default.
     pub integrator: Integrator,
-    /// Where a run starts; on the reference by default.
+    /// Start of a run; on the reference by default.
     pub start: Start,
-    /// Whether torques are cut at the description's effort limits; true by default.
+    /// Whether torques saturate at the effort limits of the robot description; true by default.
     pub effort_limits: bool,
-    /// Further limits, in place of the description's.
+    /// Limits that override those of the robot description.
     pub limits: RunLimits,
     /// Sensors; perfect by default.
     pub sensors: SensorSettings,
-    /// Seed of what differs from the description; 1 by default. Noise has its own in `sensors`.
+    /// Seed of the deviations from the robot description; 1 by default. Noise has a separate seed in `sensors`.
     pub seed: u64,
 }
 
@@ -99,19 +99,19 @@ pub struct SimulatedTruth {
     pub robot: SimulatedRobot,
     /// Its bodies.
     pub model: Model,
-    /// The laws of its joints.
+    /// The terms of its joints.
     pub terms: Vec<TorqueTerm>,
-    /// All parameters: ten for each body, one for each law.
+    /// All parameters: ten per body, one per term.
     pub parameters: Vec<f64>,
-    /// The same in the base parameters that the study looks for: of laws that the robot does not have, zero.
+    /// The same as base parameters of the study's model; terms that the robot does not have are zero.
     pub base_values: Vec<f64>,
 }
 
 impl SimulationSection {
-    /// Checks the numbers for so many joints.
+    /// Checks the settings for `joints` joints.
     ///
     /// # Errors
-    /// The first key that is wrong, and what it may be.
+    /// The first invalid key, with its valid range.
     pub fn validate(&self, joints: usize) -> Result<(), StudyError> {
         Expected::Range(1e-3, 1e6).check("rate_hz", self.rate_hz)?;
         Expected::Range(0.0, 90.0).check("off_percent", self.off_percent)?;
@@ -124,7 +124,7 @@ impl SimulationSection {
         Ok(self.loop_settings(None).validate(joints)?)
     }
 
-    /// How runs are made, with the effort limits of `model`.
+    /// Settings of a simulated run, with the effort limits of `model`.
     pub(crate) fn loop_settings(&self, model: Option<&Model>) -> LoopSettings {
         let mut limits = self.limits.clone();
         if let Some(model) = model.filter(|_| self.effort_limits && limits.torque.is_none()) {
@@ -139,11 +139,10 @@ impl SimulationSection {
         }
     }
 
-    /// The robot that a robot's description becomes; `coupling` are the study's drives that turn with two joints.
+    /// Builds the simulated robot from a study's robot; `coupling` are the study's coupled drives.
     ///
     /// # Errors
-    /// Numbers that do not fit, bodies without inertials, laws without a parameter, a robot that cannot be
-    /// simulated.
+    /// Invalid numbers, bodies without inertials, terms without a parameter, a robot that cannot be simulated.
     pub fn truth(&self, coupling: &[CouplingSection], robot: &StudyRobot) -> Result<SimulatedTruth, StudyError> {
         let described = robot.model();
         let terms = match &self.drive {
@@ -157,7 +156,7 @@ impl SimulationSection {
         self.validate(described.dof())?;
         let unknown = described.bodies_without_prior();
         if !unknown.is_empty() {
-            let fix = "a simulation needs them: give them in the description";
+            let fix = "a simulation needs inertials: add them to the robot description";
             return Err(StudyError::NoInertials { bodies: unknown.into_iter().map(str::to_owned).collect(), fix });
         }
         let bodies = self.bodies(described);
@@ -177,7 +176,7 @@ impl SimulationSection {
                         (Some(JointProperty::Friction), _) => Some(self.coulomb.of(joint)),
                         (Some(JointProperty::DriveInertia), _) => Some(self.drive_inertia.of(joint)),
                         (None, TermAction::Constant) => Some(self.offset.of(joint)),
-                        // Springs have the description's value, above.
+                        // The value of a spring in the robot description was used above.
                         (Some(JointProperty::Stiffness), _)
                         | (
                             None,
@@ -204,13 +203,13 @@ impl SimulationSection {
             place.map_or(0.0, |place| term_parameters[place])
         };
         let of_bodies = model.parameter_vector();
-        let looked_for = of_bodies.iter().copied().chain(robot.terms().iter().map(of_law)).collect::<Vec<f64>>();
-        let base_values = robot.base().values(&looked_for);
+        let sought = of_bodies.iter().copied().chain(robot.terms().iter().map(of_law)).collect::<Vec<f64>>();
+        let base_values = robot.base().values(&sought);
         let parameters = [of_bodies, term_parameters].concat();
         Ok(SimulatedTruth { robot: simulated, model, terms, parameters, base_values })
     }
 
-    /// The bodies as they truly are. The pseudo-inertia P becomes s D P D with a diagonal D: still a mass distribution.
+    /// True bodies. The pseudo-inertia P becomes s D P D with a diagonal D, which keeps it physically consistent.
     fn bodies(&self, model: &Model) -> Vec<InertialParameters> {
         let mut random = Random::new(self.seed);
         let off = 0.01 * self.off_percent;
@@ -218,7 +217,7 @@ impl SimulationSection {
             let sign = if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
             let mut stretch = Matrix4::identity();
             for axis in 0..3 {
-                stretch[(axis, axis)] = 1.0 + SHAPE_SHARE * random.uniform(-off, off);
+                stretch[(axis, axis)] = 1.0 + LENGTH_SPREAD_PER_MASS_SPREAD * random.uniform(-off, off);
             }
             let p = (1.0 + sign * off) * stretch * inertial.pseudo_inertia() * stretch;
             // From second moments back to inertia: I = tr(S) 1 - S.

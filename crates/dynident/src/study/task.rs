@@ -1,5 +1,4 @@
-//! From a study to what is identified: the recordings with their files, the estimator with its settings, joints whose
-//! friction is chosen.
+//! From a study to an identification task: recordings, estimator settings, joints with friction selection.
 
 use super::friction::FrictionChoice;
 use super::log_source::StudyLogSource;
@@ -19,12 +18,11 @@ impl Study {
     /// The study's identification with its robot: recordings, payloads, settings.
     ///
     /// # Errors
-    /// Files that are in none of the study's folders, a controller or a commanded motion that does not fit the robot.
+    /// Missing files, a controller or commanded motion that does not match the robot.
     pub fn task(&self, path: &Path, robot: &StudyRobot, folders: &Folders) -> Result<IdentificationTask, Error> {
         self.task_with(self.settings(path, robot)?, robot, folders)
     }
 
-    /// The same with settings that are made already.
     pub(crate) fn task_with(
         &self,
         settings: IdentificationSettings,
@@ -38,12 +36,10 @@ impl Study {
         Ok(task)
     }
 
-    /// Where the samples of all logs are.
     pub(crate) fn log_sources(&self, folders: &Folders) -> Result<Vec<StudyLogSource>, Error> {
         (0..self.log.len()).map(|index| self.log_source(folders, index)).collect()
     }
 
-    /// Where the samples of log number `index` are.
     pub(crate) fn log_source(&self, folders: &Folders, index: usize) -> Result<StudyLogSource, Error> {
         match &self.log[index].samples {
             Some(samples) => Ok(StudyLogSource::Memory(samples.clone())),
@@ -51,7 +47,6 @@ impl Study {
         }
     }
 
-    /// The logs whose samples are in `sources`.
     pub(crate) fn recordings(
         &self,
         robot: &StudyRobot,
@@ -61,7 +56,6 @@ impl Study {
         sources.iter().enumerate().map(|(index, source)| self.recording(robot, folders, index, source)).collect()
     }
 
-    /// Log number `index`, whose samples are in `source`.
     pub(crate) fn recording(
         &self,
         robot: &StudyRobot,
@@ -79,7 +73,6 @@ impl Study {
         Ok(recording)
     }
 
-    /// What logs were recorded with.
     pub(crate) fn payloads(&self) -> Vec<Payload> {
         let payload = |section: &super::PayloadSection| Payload {
             name: section.name.clone(),
@@ -90,8 +83,8 @@ impl Study {
         self.payload.iter().map(payload).collect()
     }
 
-    /// The motion that was commanded in log number `index`, its joints in the model's order: the log's own `reference`,
-    /// or the differentiator's; `None` if neither is given.
+    /// Commanded motion of log number `index`, in the order of the model's joints: the log's `reference`, or that of
+    /// the differentiator; `None` if neither is given.
     fn commanded(&self, robot: &StudyRobot, folders: &Folders, index: usize) -> Result<Option<Reference>, Error> {
         let own = self.log[index].reference.as_ref();
         let Some(settings) = own.or_else(|| self.motion.differentiator.reference()) else { return Ok(None) };
@@ -108,14 +101,14 @@ impl Study {
         };
         let found = reference.joints();
         if found != dof {
-            let problem =
-                format!("it moves {found} joints, the robot has {dof}: give one for each, in the robot's order");
+            let problem = format!(
+                "the reference moves {found} joints, but the robot has {dof}: give one column per joint, in the robot's order"
+            );
             return Err(filter(FilterError::Reference { problem }));
         }
         Ok(Some(reference))
     }
 
-    /// Filters, estimator, what is known of the bodies, whose friction is chosen.
     pub(crate) fn settings(&self, path: &Path, robot: &StudyRobot) -> Result<IdentificationSettings, Error> {
         let mut settings = IdentificationSettings::default();
         settings.motion = self.motion.clone();
@@ -133,12 +126,11 @@ impl Study {
         Ok(settings)
     }
 
-    /// The experiment of estimators that simulate the closed loop: `[controller]`, `[simulation]` and
-    /// `[estimator.simulated]`.
+    /// Closed loop for estimators that simulate it: `[controller]`, `[simulation]` and `[estimator.simulated]`.
     fn simulated_loop(&self, path: &Path, robot: &StudyRobot) -> Result<SimulatedLoopSettings, Error> {
         let method = format!("estimator.method = \"{}\"", self.estimator.method.name());
         let Some(controller) = &self.controller else {
-            let fix = "it needs the controller that drove the robot, [controller] (kind and gains); where it is not known, take method = \"instrumental\"";
+            let fix = "this estimator needs the robot's controller: give [controller] (kind and gains); if it is unknown, set method = \"instrumental\"";
             return Err(Error::study(path)(StudyError::conflict(method, fix)));
         };
         let dof = robot.model().dof();
@@ -163,19 +155,18 @@ impl Study {
         })
     }
 
-    /// Joints whose drive inertia no key states.
     fn unstated_drives(&self, robot: &StudyRobot) -> Vec<String> {
         let names = robot.model().joints().iter().map(|joint| &joint.name);
         names.filter(|name| self.drive.drive_inertia_of(name).is_none()).cloned().collect()
     }
 
-    /// Joints without drive inertia although no key states that they have none, with the reason.
+    /// Joints without drive inertia that neither a key states nor a test checks, with the reason.
     pub(crate) fn drive_inertia_untested(&self, robot: &StudyRobot) -> Option<DriveInertiaChoice> {
         let (reason, joints) = (self.why_drives_are_untested()?, self.unstated_drives(robot));
         (!joints.is_empty()).then(|| DriveInertiaChoice::untested(joints, reason))
     }
 
-    /// Why the logs are not asked for drive inertia that no key states; `None` where they are.
+    /// Reason why unstated drive inertia is not tested; `None` if it is.
     fn why_drives_are_untested(&self) -> Option<&'static str> {
         let method = self.estimator.method;
         if self.arm.is_some() {
@@ -183,12 +174,12 @@ impl Study {
         } else if method.is_least_squares() || method == EstimatorMethod::Instrumental {
             None
         } else {
-            Some("with this estimator [drive] drive_inertia says it")
+            Some("with this estimator, [drive] drive_inertia states it")
         }
     }
 
-    /// The joints whose friction the training logs choose: those of which a key says so, and by default all others
-    /// whose friction no key states, unless something else in the study stands against it.
+    /// The joints with friction selection: those with `friction = "auto"`, and by default those without a friction key,
+    /// unless the study rules selection out.
     fn friction_searches(&self, robot: &StudyRobot) -> Vec<FrictionSearch> {
         let by_default = self.why_friction_is_stated().is_none();
         let is_chosen = |name: &str| match self.drive.friction_of(name) {
@@ -206,7 +197,7 @@ impl Study {
         model.joints().iter().enumerate().filter(|(_, joint)| is_chosen(&joint.name)).map(search).collect()
     }
 
-    /// Joints whose friction is left as it is by default although no key states it, with the reason.
+    /// Joints without a friction key whose friction is not selected, with the reason.
     pub(crate) fn friction_as_stated(&self, robot: &StudyRobot) -> Vec<JointFriction> {
         let Some(reason) = self.why_friction_is_stated() else { return Vec::new() };
         let names = robot.model().joints().iter().map(|joint| &joint.name);
@@ -216,15 +207,15 @@ impl Study {
             .collect()
     }
 
-    /// Why the logs do not choose friction that no key states; `None` where they do.
+    /// Reason why friction without a key is not selected; `None` if it is.
     fn why_friction_is_stated(&self) -> Option<&'static str> {
         let estimator = &self.estimator;
         if self.arm.is_some() {
             Some("a known arm has the friction of its result")
         } else if !(estimator.method.is_least_squares() || estimator.method == EstimatorMethod::Instrumental) {
-            Some("with this estimator it is not chosen unless friction = \"auto\" says so")
+            Some("with this estimator, friction is selected only with friction = \"auto\"")
         } else if estimator.physical.settings().is_some_and(|knowledge| !knowledge.terms.is_empty()) {
-            Some("[estimator.physical] says what is known of its parameters")
+            Some("[estimator.physical] constrains friction parameters")
         } else {
             None
         }

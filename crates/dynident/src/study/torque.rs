@@ -1,4 +1,4 @@
-//! `[[torque]]`: torques of positions and velocities that the study declares: springs, counterbalances, cables.
+//! `[[torque]]`: declared torques as functions of positions and velocities: springs, counterbalances, cables.
 
 use super::{Code, Folders, Study};
 use crate::error::{Error, StudyError};
@@ -12,11 +12,11 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Largest file of a table, bytes: 200 points are far less.
-const MOST_TABLE_BYTES: u64 = 1 << 20;
+/// Largest table file, bytes; 200 points need far less.
+const MAX_TABLE_BYTES: u64 = 1 << 20;
 
-/// `[[torque]]`: `coefficient · f(q, dq)` on one joint, with a coefficient to be found. What the drive has to give: a
-/// spring that pulls back to `q0` is `q - q0`.
+/// `[[torque]]`: `coefficient · f(q, dq)` on one joint, with an unknown coefficient. The sign is that of the drive's
+/// torque: a spring that pulls back to `q0` is `q - q0`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -35,16 +35,16 @@ pub struct TorqueSection {
     /// The same points in a file: CSV with a column of positions and one of torques.
     #[serde(default)]
     pub table_file: Option<PathBuf>,
-    /// The name of a caller's own function of positions and velocities; its code is given by the program that has it.
+    /// Name of the caller's function of positions and velocities; the calling program provides the code.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub function: Option<String>,
     /// The code of `function`.
     #[serde(skip)]
     pub code: Code<dyn TorqueLaw>,
-    /// What the coefficient is thought to be: the prior's, and that of the robot which `simulate` simulates.
+    /// Expected value of the coefficient: used in the prior, and in the robot that `simulate` simulates.
     #[serde(default)]
     pub nominal: Option<f64>,
-    /// Unit of the coefficient, free text; by default `Nm` of an expression and `1` of a table.
+    /// Unit of the coefficient, free text; by default `Nm` for an expression and `1` for a table.
     #[serde(default)]
     pub unit: Option<String>,
 }
@@ -52,7 +52,8 @@ pub struct TorqueSection {
 impl TorqueSection {
     pub(crate) fn validate(&self) -> Result<(), StudyError> {
         if !Declared::is_symbol(&self.name) {
-            let fix = "give a letter and then letters, digits and `_`, at most 60: it stands among the parameters";
+            let fix =
+                "give a letter and then letters, digits and `_`, at most 60 characters: it becomes a parameter name";
             return Err(StudyError::conflict(format!("name `{}`", self.name), fix));
         }
         let given: Vec<&'static str> = [
@@ -78,10 +79,10 @@ impl TorqueSection {
         Ok(())
     }
 
-    /// The law that is a caller's own code; it may follow all joints.
+    /// The law with code of the caller; it may depend on all joints.
     fn own_law(&self, name: &str, joints: usize) -> Result<DeclaredLaw, StudyError> {
         let code = self.code.0.as_ref().ok_or_else(|| {
-            let fix = "no file holds code: give it from the program that has it, or an expression";
+            let fix = "no file holds code: set it in the calling program, or give an expression";
             StudyError::conflict(format!("function = \"{name}\""), fix)
         })?;
         Ok(DeclaredLaw::Function(TorqueFunction::new(name, (0..joints).collect(), Arc::clone(code))))
@@ -133,7 +134,7 @@ impl TorqueSection {
 /// The terms of the study's `[[torque]]`.
 ///
 /// # Errors
-/// A joint that the model does not have, an expression or a table that cannot be read.
+/// An unknown joint, an invalid expression, or an unreadable table.
 pub(super) fn declared_terms(
     study: &Study,
     study_path: &Path,
@@ -148,12 +149,12 @@ pub(super) fn declared_terms(
     study.torque.iter().map(of_section).collect()
 }
 
-/// A table of two columns; a first line that holds no numbers is a header.
+/// Reads a table of two columns; a first line without numbers is a header.
 fn read_table(path: &Path) -> Result<TorqueTable, Error> {
     let cannot = |source| Error::File { path: path.to_owned(), source };
     let at = |line: u64, message: String| Error::States { path: path.to_owned(), line, message };
     let file = dynident_files::open(path).map_err(cannot)?;
-    if file.metadata().map_err(cannot)?.len() > MOST_TABLE_BYTES {
+    if file.metadata().map_err(cannot)?.len() > MAX_TABLE_BYTES {
         return Err(at(1, "larger than 1 MiB: a table of torque has at most 200 points".to_owned()));
     }
     let mut reader = csv::ReaderBuilder::new()
@@ -161,7 +162,7 @@ fn read_table(path: &Path) -> Result<TorqueTable, Error> {
         .trim(csv::Trim::All)
         .flexible(true)
         .comment(Some(b'#'))
-        .from_reader(file.take(MOST_TABLE_BYTES));
+        .from_reader(file.take(MAX_TABLE_BYTES));
     let mut points = Vec::new();
     for (place, record) in reader.records().enumerate() {
         let record = record.map_err(|error| at(error.position().map_or(1, csv::Position::line), error.to_string()))?;

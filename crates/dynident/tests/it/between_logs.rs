@@ -1,8 +1,8 @@
-//! Error bars that hold on another day: what varies between logs is part of them.
+//! Error bars that are valid on another day: they include the variation between logs.
 use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
 
-/// Mean χ² per friction parameter of what a fit to three logs says of a fourth day, and by how much the logs were found
-/// to differ; friction of each log off its mean by `spread` (standard deviation, a share of itself).
+/// Mean χ² per friction parameter of a fit to three logs, evaluated on a fourth day, and the detected difference
+/// between logs; the friction of each log deviates from its mean by `spread` (relative standard deviation).
 fn of_another_day(spread: f64, runs: u64) -> (f64, f64) {
     let folder = tempfile::tempdir().unwrap();
     let description = repository("examples/robots/paper_2r.toml");
@@ -45,7 +45,7 @@ fn of_another_day(spread: f64, runs: u64) -> (f64, f64) {
             largest.extend(own.largest_error().map(|(term, _)| term.name()));
         }
         assert!(spread == 0.0 || largest.contains(&"differences between logs"), "run {run}: {largest:?}");
-        // The robot's drives have none, and friction that is another every day must not look like it.
+        // The drives have no inertia, and friction that varies daily must not be mistaken for it.
         let drives = result.drive_inertia_choice.as_ref().unwrap();
         assert!(!drives.seen && drives.standard_deviations.is_some(), "run {run}: {}", drives.sentence());
         differing += result.method.between_logs.unwrap().friction.unwrap() / runs as f64;
@@ -61,11 +61,11 @@ fn of_another_day(spread: f64, runs: u64) -> (f64, f64) {
 
 #[test]
 fn friction_of_another_day_is_inside_its_bars() {
-    // Some 80 squares whose k comes from 18 differences each: the mean is 1 to some 0.3, and a k that is too small by
-    // chance makes it larger.
+    // About 80 squares with a factor k from 18 differences each: the mean is 1 within about 0.3; a k that is too small
+    // by chance increases it.
     let (chi_square, differing) = of_another_day(0.1, 14);
     assert!((0.6..=1.8).contains(&chi_square) && differing > 2.0, "{chi_square} {differing}");
-    // The same friction every day: the bars are those of one day's noise, k is 1 but for chance.
+    // With constant friction, k is 1 within chance and the error bars include only noise.
     let (chi_square, differing) = of_another_day(0.0, 8);
     assert!((0.4..=1.5).contains(&chi_square) && (0.7..=1.3).contains(&differing), "{chi_square} {differing}");
 }

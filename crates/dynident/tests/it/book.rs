@@ -1,6 +1,6 @@
-//! The book: every code block has a kind that something checks, every TOML block is read by what it is meant for,
-//! every page is linked and every link leads somewhere, those of README, ARCHITECTURE and CONTRIBUTING too. Rust
-//! blocks run as documentation tests (`src/book.rs`). The studies and robots of `examples/` are read, too.
+//! Tests of the book: the kind of every code block is known, TOML blocks are parsed, pages and links exist, also those
+//! of README, ARCHITECTURE and CONTRIBUTING. Rust blocks run as documentation tests (`src/book.rs`). The studies and
+//! robots of `examples/` are parsed, too.
 
 use dynident::Study;
 use dynident::study::EstimatorSection;
@@ -12,7 +12,6 @@ fn docs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs")
 }
 
-/// Names and texts of the Markdown files of a folder, in order.
 fn pages(folder: &Path) -> Vec<(String, String)> {
     let mut pages: Vec<(String, String)> = std::fs::read_dir(folder)
         .unwrap()
@@ -26,9 +25,7 @@ fn pages(folder: &Path) -> Vec<(String, String)> {
 }
 
 struct Block {
-    /// `page:line` of the opening fence.
     place: String,
-    /// The fence's info string.
     info: String,
     text: String,
 }
@@ -55,7 +52,7 @@ fn blocks(page: &str, text: &str) -> Vec<Block> {
     blocks
 }
 
-/// Reads a TOML block by what its info string says it is.
+/// Parses a TOML block as the kind in its info string.
 fn read(kind: &str, rest: &[&str], text: &str) -> Result<(), String> {
     let error = |error: &dyn std::fmt::Display| error.to_string();
     match kind {
@@ -120,7 +117,6 @@ fn every_code_block_is_of_a_kind_that_is_checked() {
                     "{}: name the page in .ci/python.sh, so that its Python runs",
                     block.place
                 ),
-                // Equations, pictures, output; commands.
                 ["text" | "sh"] => {}
                 ["rust"] => assert!(
                     include_str!("../../src/book.rs").contains(&format!("\"{page}\"")),
@@ -134,7 +130,6 @@ fn every_code_block_is_of_a_kind_that_is_checked() {
     assert!(read_blocks >= 10, "only {read_blocks} TOML blocks were found");
 }
 
-/// Targets of Markdown links outside code blocks.
 fn links(text: &str) -> Vec<&str> {
     let mut inside = false;
     let mut links = Vec::new();
@@ -152,7 +147,7 @@ fn links(text: &str) -> Vec<&str> {
 fn the_readmes_studies_are_read() {
     let readme = std::fs::read_to_string(docs().join("../README.md")).unwrap();
     for block in blocks("README.md", &readme).iter().filter(|block| block.info.starts_with("toml")) {
-        // Indented under a list: TOML does not mind.
+        // The block is indented under a list, which TOML permits.
         read("study", &[], &block.text).unwrap_or_else(|error| panic!("{}: {error}", block.place));
     }
 }
@@ -163,7 +158,7 @@ fn every_page_is_in_the_summary_and_every_link_leads_somewhere() {
     let pages = pages(&source);
     for (page, text) in &pages {
         for link in links(text) {
-            // An empty link in the summary is a chapter that is not written yet.
+            // An empty link in the summary is a planned chapter.
             let outside =
                 link.starts_with("https://") || link.starts_with('#') || (page == "SUMMARY.md" && link.is_empty());
             let file = link.split('#').next().unwrap_or(link);
@@ -177,7 +172,7 @@ fn every_page_is_in_the_summary_and_every_link_leads_somewhere() {
     }
 }
 
-/// What README shows of Rust is part of an example that runs.
+/// The Rust code in README must be part of a tested example.
 #[test]
 fn the_readmes_rust_is_an_example_of_the_crate() {
     let readme = std::fs::read_to_string(docs().join("../README.md")).unwrap();
@@ -185,8 +180,8 @@ fn the_readmes_rust_is_an_example_of_the_crate() {
     let example: Vec<&str> = source.lines().filter_map(|line| line.strip_prefix("//! ")).collect();
     let shown = blocks("README.md", &readme);
     let lines = shown.iter().filter(|block| block.info == "rust").flat_map(|block| block.text.lines());
-    let strange: Vec<&str> = lines.filter(|line| !line.is_empty() && !example.contains(line)).collect();
-    assert!(strange.is_empty(), "not in the example of dynident-identification: {strange:#?}");
+    let missing: Vec<&str> = lines.filter(|line| !line.is_empty() && !example.contains(line)).collect();
+    assert!(missing.is_empty(), "not in the example of dynident-identification: {missing:#?}");
 }
 
 #[test]
@@ -197,7 +192,7 @@ fn links_and_paths_of_the_guides_lead_somewhere() {
         let (links, paths) = (links(&text), text.split('`').filter(|word| word.starts_with("crates/")));
         for target in links.into_iter().chain(paths) {
             let file = target.split('#').next().unwrap_or(target);
-            // A file that is still to be written stands in a folder that is there.
+            // The folder of a planned file must exist.
             let there = if file.contains("NAME") { Path::new(file).parent().unwrap() } else { Path::new(file) };
             assert!(target.starts_with("https://") || root.join(there).exists(), "{guide}: `{target}` leads nowhere");
         }

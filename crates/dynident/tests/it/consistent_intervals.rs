@@ -1,4 +1,4 @@
-//! Intervals over all physically consistent robots hold the truth of a simulated arm, and nothing inconsistent.
+//! Intervals over all physically consistent robots contain the truth of a simulated arm.
 use crate::common::repository;
 use dynident::estimation::consistent::IntervalEnd;
 use dynident::{RunOptions, Silent, Study, identify};
@@ -16,7 +16,7 @@ fn they_hold_the_truth_and_nothing_inconsistent() {
     let path = repository("examples/ur10_simulated.toml");
     let mut study = Study::load(&path).unwrap();
     study.estimator.intervals = true;
-    // The simulated friction's own step: a model that is not the truth has intervals that do not hold it.
+    // The width of the simulated friction step: with a wrong model the intervals need not contain the truth.
     study.drive.coulomb_width = Some(0.01);
     let options = RunOptions { data: None, threads: 2, progress: &Silent };
     let found = identify(&study, &path, &options).unwrap().result;
@@ -31,7 +31,6 @@ fn they_hold_the_truth_and_nothing_inconsistent() {
         if !holds(truth[&interval.symbol]) {
             missed.push(&interval.symbol);
         }
-        // Masses, moments of inertia, friction and drive inertia are positive whatever the data say.
         let positive = ["m", "Ixx", "Iyy", "Izz", "fv", "fc", "Ia"].iter().any(|kind| {
             interval.symbol.strip_prefix(kind).is_some_and(|rest| rest.chars().all(|c| c.is_ascii_digit()))
         });
@@ -40,13 +39,13 @@ fn they_hold_the_truth_and_nothing_inconsistent() {
         }
         assert!(interval.held_by.iter().all(|end| *end != IntervalEnd::Unsettled), "{interval:?}");
     }
-    // 84 parameters, of which a twentieth is expected outside: more than ten would be a chance of one in a thousand if
-    // they were independent.
+    // 84 parameters, of which 5 % are expected outside; more than ten would have a probability of 0.001 for independent
+    // parameters.
     assert!(missed.len() <= 10, "{missed:?}");
-    // What turns about a vertical axis only says nothing of the first link's mass.
+    // Rotation about a vertical axis does not determine the mass of the first link.
     let first_mass = intervals.iter().find(|interval| interval.symbol == "m1").unwrap();
     assert_eq!(first_mass.held_by[1], IntervalEnd::Open, "{first_mass:?}");
-    // Physical consistency can only narrow the interval of a base parameter.
+    // Physical consistency can only shrink the interval of a base parameter.
     let friction = intervals.iter().find(|interval| interval.symbol == "fv3").unwrap();
     let usual = found.base_parameters.iter().find(|parameter| parameter.symbol == "fv3").unwrap();
     let width = friction.upper.unwrap() - friction.lower.unwrap();

@@ -1,5 +1,5 @@
-//! Possible robots through a study: what is known of the bodies, contradictions by name, the torque's sign by physics
-//! alone; essential parameters and the torque's band.
+//! Physically consistent fits through a study: constraints on bodies, contradictions, the sign of the torque; essential
+//! parameters and the torque band.
 use crate::common::{Job, Motion, Random, Truth, format, header, plain, recordings, repository, write_log};
 use dynident::model::load_robot;
 use dynident::{IdentificationOutcome, RunOptions, Silent, Study, identify};
@@ -17,7 +17,6 @@ fn arm() -> std::path::PathBuf {
     repository("robots/planar2r.urdf")
 }
 
-/// The arm with its own bodies.
 fn one_log(folder: &Path) {
     let truth = Truth::near(&arm(), 0.0, false);
     write_log(&folder.join("log.csv"), &truth, &Motion::new(2, 1), (200.0, 10.0), &header(2), plain);
@@ -28,7 +27,7 @@ fn what_is_known_of_bodies_holds() {
     let folder = tempfile::tempdir().unwrap();
     one_log(folder.path());
     let found = |further: &str| Job::new(folder.path(), &study(&arm(), further)).identify();
-    // Base parameters say nothing of the second mass alone (1.5 kg by the description), so all of these fit.
+    // Base parameters do not determine the second mass (nominal 1.5 kg), so all of these are possible.
     let free = found("");
     let mass = |found: &IdentificationOutcome, body: usize| found.result.bodies[body].mass_kg;
     for prior in ["entropic", "constant-pullback", "euclidean"] {
@@ -45,8 +44,8 @@ fn what_is_known_of_bodies_holds() {
         assert!((4.5 - 1e-9..=5.0 + 1e-9).contains(&total), "{prior}: {total}");
         let com = known.result.bodies[1].com_m.unwrap();
         assert!((0.05 - 1e-9..=0.3 + 1e-9).contains(&com[0]), "{prior}: {com:?}");
-        // What the data determine is as before: noise-free torque, so the fit's own floor of 1e-4 of the torque is all
-        // that may be given up.
+        // Identifiable values are unchanged: the torque has no noise, so only the floor of the fit, 1e-4 of the torque,
+        // is lost.
         let (a, b) = (&known.result.base_parameters, &free.result.base_parameters);
         for (a, b) in a.iter().zip(b) {
             let (a, b) = (a.physical.unwrap(), b.physical.unwrap());
@@ -66,7 +65,7 @@ fn contradictions_name_link_and_constraint() {
     one_log(folder.path());
     let failure = |further: &str| {
         let found = Job::new(folder.path(), &study(&arm(), further)).identify();
-        // The estimate is there all the same; a URDF is not.
+        // The estimate exists, but not the URDF.
         assert!(found.urdf.is_none() && found.estimate.values.iter().all(|value| value.is_finite()));
         let reason = found.result.physical.failure.unwrap();
         assert!(found.result.no_urdf.unwrap().contains(&reason));
@@ -126,13 +125,12 @@ fn a_description_that_is_no_body_is_named() {
     let found = Job::new(folder.path(), &study(Path::new("odd.urdf"), "")).identify();
     let named = &found.result.physical.impossible_priors;
     assert!(named.len() == 1 && named[0].contains("link2"), "{named:?}");
-    // A prior of the user's own stands in for it.
+    // The stated prior replaces it.
     let own = "[estimator.physical.bodies.link2]\nprior = [1.5, 0.3, 0.0, 0.0, 0.002, 0.0, 0.0, 0.081, 0.0, 0.081]";
     let found = Job::new(folder.path(), &study(Path::new("odd.urdf"), own)).identify();
     assert!(found.result.physical.impossible_priors.is_empty() && found.urdf.is_some());
 }
 
-/// A robot description without any inertial.
 fn bare(path: &Path) -> String {
     let original = load_robot(path).unwrap().text;
     let (mut bare, mut rest) = (String::new(), &original[..]);
@@ -143,7 +141,6 @@ fn bare(path: &Path) -> String {
     bare + rest
 }
 
-/// Whether the logs of a result are called reversed by physical consistency.
 fn called_reversed(found: &IdentificationOutcome) -> bool {
     let sign = found.result.physical.sign.unwrap();
     let said = found.result.problems.iter().any(|problem| problem.contains("opposite sign"));
@@ -168,8 +165,8 @@ fn physics_alone_tells_the_sign_of_the_torque() {
     }
 }
 
-/// KUKA's FRI convention: the torque is that of the load on the drive. The log hardly excites the arm, and the
-/// description's inertials are thrown away.
+/// KUKA's FRI convention: the torque is that of the load on the drive. The log has little excitation, and the inertials
+/// of the robot description are removed.
 #[test]
 fn the_lbr_med_torque_is_reversed_by_physics_alone() {
     let Some(data) = recordings() else { return };
@@ -195,7 +192,7 @@ fn the_lbr_med_torque_is_reversed_by_physics_alone() {
 fn essential_parameters_and_the_torques_band_through_a_study() {
     let folder = tempfile::tempdir().unwrap();
     let mut truth = Truth::near(&arm(), 0.05, false);
-    // Nothing to be found: these go.
+    // Parameters with a true value of zero.
     truth.drive.iter_mut().for_each(|drive| drive[3] = 0.0);
     let sigma = [0.4, 0.2];
     let mut random = Random(6);
@@ -221,8 +218,8 @@ fn essential_parameters_and_the_torques_band_through_a_study() {
         let parameter = found.result.base_parameters.iter().find(|p| p.expression == entry.name).unwrap();
         assert!(parameter.value == 0.0 && parameter.std == 0.0, "{parameter:?}");
     }
-    // 6000 rows: the share inside 95 % has a deviation of 0.28 %; four of them, and what the noise's own uncertainty
-    // adds.
+    // 6000 rows: the standard deviation of the coverage is 0.28 %; the limit is four of these plus the uncertainty of
+    // the noise.
     assert_eq!(found.result.torque_band.len(), 2);
     for (band, sigma) in found.result.torque_band.iter().zip(sigma) {
         assert!((band.coverage_percent - 95.0).abs() < 1.5, "{band:?}");

@@ -1,5 +1,4 @@
-//! A palletising arm with two closed chains, from logs to a model: `examples/palletizer.toml`, of which the truth is
-//! known.
+//! A palletising arm with two closed chains, from logs to a model: `examples/palletizer.toml` with known truth.
 
 use super::common::repository;
 use dynident::study::Folders;
@@ -18,7 +17,7 @@ fn a_palletising_arm_is_identified_from_the_logs_of_its_drives() {
     let found = identify(&study, &path, &RunOptions { data: None, threads: 2, progress: &Silent }).unwrap();
     let result = &found.result;
     assert_eq!((result.joints.len(), result.bodies.len()), (4, 8));
-    // 1 Nm of noise on torques of about 180 Nm is 0.6 %; friction by a sign and 125 Hz leave about as much again.
+    // 1 Nm of noise on torques of about 180 Nm is 0.6 %; sign friction and 125 Hz add about as much.
     let held_out = result.validation[0].model.relative_error_percent.unwrap();
     assert!(held_out < 2.0, "{held_out} %");
     let truth: Value =
@@ -29,7 +28,7 @@ fn a_palletising_arm_is_identified_from_the_logs_of_its_drives() {
         let theirs = truth.iter().find(|theirs| theirs["expression"] == own.expression.as_str()).unwrap();
         (own.value - theirs["value"].as_f64().unwrap()).abs() <= own.half_width_95
     });
-    // Of 40 at 95 %, four outside happen in one of ten robots.
+    // Of 40 intervals with 95 %, four miss for one in ten robots.
     assert!(inside.count() >= 36);
 }
 

@@ -1,4 +1,4 @@
-//! Springs and counterbalances through studies: put into logs by hand, declared, found, tested, simulated, exported.
+//! Springs and counterbalances in studies: declared, identified, validated, simulated, exported.
 use crate::common::{Job, Motion, Random, Truth, assert_reads_back, repository};
 use core::ops::ControlFlow;
 use dynident::export::Target;
@@ -7,18 +7,16 @@ use std::fmt::Write;
 use std::path::Path;
 
 const RATE_HZ: f64 = 125.0;
-/// Nm of torque noise.
+/// Torque noise, Nm.
 const NOISE: f64 = 0.3;
 const COUNTERBALANCE: f64 = -35.0;
 const SPRING: f64 = 4.0;
 
-/// Torque of the spring at the shoulder by position: soft, then stiff.
 fn spring(q: f64) -> f64 {
     q + 0.4 * q * q * q
 }
 
-/// A UR10 near its description with a counterbalance at the elbow and a spring at the shoulder, both written out by
-/// hand.
+/// A UR10 near its description with a counterbalance at the elbow and a spring at the shoulder.
 fn write_log(path: &Path, seconds: f64, seed: u64) {
     let truth = Truth::near(&repository("robots/ur10.urdf"), 0.2, false);
     let (motion, mut random) = (Motion::new(6, seed), Random(seed));
@@ -38,7 +36,6 @@ fn write_log(path: &Path, seconds: f64, seed: u64) {
     std::fs::write(path, text + "\n").unwrap();
 }
 
-/// The spring's curve as a workshop would measure it.
 fn write_table(path: &Path) {
     let mut text = "position_rad,torque_nm\n# measured by hand\n".to_owned();
     for k in -30..=30 {
@@ -60,7 +57,7 @@ const DECLARED: &str = r#"
     unit = "of the table"
 "#;
 
-/// The friction of one joint is chosen; that of all would take long.
+/// Friction is selected for one joint only, to save time.
 const AUTO: &str = "[drive]\nfriction = \"stated\"\njoints.elbow_joint.friction = \"auto\"";
 
 fn study(torques: &str) -> String {
@@ -87,7 +84,7 @@ fn a_counterbalance_and_a_spring_are_found_within_their_bars() {
         let base = found.result.base_parameters.iter().find(|one| one.symbol == name).unwrap();
         println!("{name}: {} +- {} (95 %), truth {truth}", base.value, base.half_width_95);
         assert_eq!((&*base.unit, &*base.expression), (unit, name));
-        // Four standard deviations; and a bar that says something.
+        // Four standard deviations, and a meaningful error bar.
         assert!((base.value - truth).abs() < 4.0 * base.std, "{name}: {} +- {}", base.value, base.std);
         assert!(base.std < 0.2 * truth.abs(), "{name}: {} +- {}", base.value, base.std);
         let joint = found.result.joints.iter().find(|joint| joint.terms.iter().any(|term| term.symbol == name));
@@ -106,11 +103,11 @@ fn a_counterbalance_and_a_spring_are_found_within_their_bars() {
     let [with, without] = [&found, &Job::new(folder.path(), &study("[drive]\nfriction = \"stated\"")).identify()]
         .map(|found| found.result.validation[0].model.rmse_nm);
     println!("held-out rmse {with} Nm with the declarations, {without} Nm without");
-    // The noise and a tenth; without, what no rigid body holds of 4 (0.4 q³ and more).
+    // Noise plus 10 %; without the declared torque, the non-rigid part of 4 Nm remains (0.4 q³ and more).
     assert!(with < 1.1 * NOISE, "{with}");
     assert!(without > 3.0 * with, "{without} and {with}");
 
-    // From the file the model is the same, and another study is not silently taken.
+    // The table file gives the same model, and a different study is rejected.
     let path = folder.path().join("result.json");
     std::fs::write(&path, serde_json::to_string(&found.result).unwrap()).unwrap();
     let again = validate(&path, &job.study, &job.path, &Job::options(1)).unwrap();
@@ -126,10 +123,10 @@ fn a_counterbalance_and_a_spring_are_found_within_their_bars() {
     let declared = DECLARED.replace("q + 0.3", "q + 0.2");
     let moved = Job::new(folder.path(), &study(&format!("[drive]\nfriction = \"stated\"\n{declared}")));
     let refused = validate(&path, &moved.study, &moved.path, &Job::options(1)).unwrap_err().to_string();
-    assert!(refused.contains("`counterbalance` was `sin(q3 + 0.3)`, and the study says `sin(q3 + 0.2)`"), "{refused}");
+    assert!(refused.contains("`counterbalance` was `sin(q3 + 0.3)`, but is `sin(q3 + 0.2)`"), "{refused}");
 }
 
-/// What the logs choose of friction leaves declared torques alone.
+/// Friction selection does not change declared torques.
 #[test]
 fn friction_is_chosen_beside_declared_torques() {
     let folder = tempfile::tempdir().unwrap();
@@ -140,7 +137,7 @@ fn friction_is_chosen_beside_declared_torques() {
     assert!(found.result.validation[0].model.rmse_nm < 1.1 * NOISE);
 }
 
-/// A design goes where a stop that is felt beyond 0.8 rad alone can be told.
+/// A design moves into the region where the spring acts (beyond 0.8 rad).
 #[test]
 fn designs_look_for_declared_torques() {
     let folder = tempfile::tempdir().unwrap();
@@ -164,7 +161,7 @@ fn designs_look_for_declared_torques() {
     assert_reads_back(&designed.file);
     let forecast = designed.file.forecast.iter().find(|one| one.expression == "stop").unwrap();
     println!("{forecast:?}");
-    // Nm/rad² per Nm of noise: a motion that stays off the stop tells nothing.
+    // Nm/rad² per Nm of noise: a motion outside of this region does not determine the coefficient.
     assert!(forecast.std.unwrap() < 0.2, "{forecast:?}");
 }
 
@@ -172,7 +169,6 @@ const PENDULUM: &str = r#"<robot name="pendulum"><link name="base"/>
 <link name="rod"><inertial><origin xyz="0.2 0.01 0.1"/><mass value="3"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.05" iyz="0" izz="0.05"/></inertial></link>
 <joint name="hinge" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/><limit lower="-2" upper="3" effort="100" velocity="4"/></joint></robot>"#;
 
-/// A pendulum's study that simulates it and identifies it.
 fn pendulum(folder: &Path, torque: &str) -> String {
     std::fs::write(folder.join("pendulum.urdf"), PENDULUM).unwrap();
     let motion = Motion::new(1, 3);
@@ -218,7 +214,7 @@ fn simulated(folder: &Path, torque: &str) -> Job {
     job
 }
 
-/// A spring in a simulated loop is the one that is found: the plant adds what the regressor's column says.
+/// The simulated spring equals the regressor's column.
 #[test]
 fn what_is_simulated_is_found() {
     let folder = tempfile::tempdir().unwrap();
@@ -226,12 +222,12 @@ fn what_is_simulated_is_found() {
     let base = found.result.base_parameters.iter().find(|one| one.symbol == "spring").unwrap();
     println!("spring {} +- {} (95 %)", base.value, base.half_width_95);
     assert_eq!(base.prior, Some(6.0));
-    // Differentiated positions without noise: what filters leave is below a hundredth.
+    // Positions without noise: the filters leave an error below 0.01.
     assert!((base.value - 6.0).abs() < 4.0 * base.std + 0.06, "{} +- {}", base.value, base.std);
 }
 
-/// `sin(q + 0.3)` at a joint that stands still in the world is the weight of its link: nothing tells the two apart, so
-/// the weight takes what the nominal coefficient leaves, and the result says so.
+/// `sin(q + 0.3)` at a joint with a horizontal axis coincides with the weight of its link: the coefficient stays
+/// nominal, the weight takes the difference, and the result reports this.
 #[test]
 fn a_torque_that_is_gravity_already_is_said_and_not_fitted() {
     let folder = tempfile::tempdir().unwrap();
@@ -241,7 +237,7 @@ fn a_torque_that_is_gravity_already_is_said_and_not_fitted() {
     let [sentence] = &found.result.method.coincident[..] else { panic!("{:?}", found.result.method) };
     assert!(sentence.contains("spring") && sentence.contains("hinge"), "{sentence}");
     assert!(sentence.contains("of mx1, mz1 already") && sentence.contains("stays near its nominal 3;"), "{sentence}");
-    // The sums are known all the same: mx = 0.6 kg m falls as -g mx cos(q), mz = 0.3 kg m as -g mz sin(q).
+    // The sums are identifiable: mx = 0.6 kg m contributes -g mx cos(q), mz = 0.3 kg m -g mz sin(q).
     let of = |symbol: &str| found.result.base_parameters.iter().find(|one| one.symbol == symbol).unwrap();
     let [x, z] = [of("mx1"), of("mz1")];
     let (g, phase) = (9.81, 0.3_f64);
@@ -253,8 +249,8 @@ fn a_torque_that_is_gravity_already_is_said_and_not_fitted() {
     // The consistent set is the one nearest to all nominal values.
     let term = found.result.joints[0].terms.iter().find(|term| term.symbol == "spring").unwrap();
     assert!(term.std.is_none() && (term.value - 3.0).abs() < 0.3, "{term:?}");
-    // So it is at the shoulder of an arm on a level floor, where products of inertia take back what the weight would do
-    // to the joint before, but not at its elbow.
+    // The same applies at the shoulder of a level arm, where products of inertia compensate the reaction on the
+    // previous joint, but not at its elbow.
     let torque = |joint: &str| {
         let torque = format!("[[torque]]\nname = \"balance\"\njoint = \"{joint}\"\nexpression = \"sin(q + 0.3)\"");
         Job::new(folder.path(), &study(&torque)).robot()
@@ -279,7 +275,7 @@ fn what_cannot_be_is_said_with_its_place() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     simulated(here, "expression = \"q\"\nnominal = 1.0");
-    // The log goes from about -1.5 to 1.5 rad.
+    // The log covers about -1.5 to 1.5 rad.
     let message = refused(here, "table = [[-0.2, 1.0], [0.2, 2.0]]");
     assert!(message.contains("log `log`") && message.contains(" s: torque spring = table of q1"), "{message}");
     assert!(message.contains("hinge at ") && message.contains("widen the table"), "{message}");
@@ -315,7 +311,7 @@ fn what_cannot_be_is_said_with_its_place() {
     let unknown = Job::new(here, &pendulum(here, "expression = \"q\"").replace("\"hinge\"", "\"knee\""));
     let message = identify(&unknown.study, &unknown.path, &Job::options(1)).unwrap_err().to_string();
     assert!(message.contains("torque `spring`") && message.contains("knee") && message.contains("hinge"), "{message}");
-    // A simulation needs a coefficient.
+    // A simulation needs the coefficient.
     let job = Job::new(here, &pendulum(here, "expression = \"q\""));
     let run = simulate_study(&job.study, &job.path, &Job::options(1), &|_| ControlFlow::Continue(()));
     let message = run.map(|_| ()).unwrap_err().to_string();

@@ -1,5 +1,5 @@
-//! Arms with nothing but their description: no motion that is called feasible touches the floor or the arm itself. The
-//! referee is points on the surface of one shape that stand in another, and shares nothing with search and check.
+//! Arms without stated limits: a feasible motion never touches the floor or the arm itself. The referee tests surface
+//! points of each shape against the others, independent of search and check.
 
 use crate::common::Job;
 use core::f64::consts::TAU;
@@ -16,7 +16,6 @@ use std::path::Path;
 const SMALL: &str =
     "duration_s = 6.0\nsearch = { starts = 2, rounds = 0, evaluations_per_start = 80, polish_evaluations = 120 }";
 
-/// A joint and the link that it carries.
 struct Part {
     kind: &'static str,
     at: [f64; 3],
@@ -30,7 +29,6 @@ fn xyz([x, y, z]: [f64; 3]) -> String {
     format!("{x} {y} {z}")
 }
 
-/// A chain of parts on a base.
 fn urdf(base: &str, parts: &[Part]) -> String {
     let mut text = format!("<robot name=\"arm\"><link name=\"base\">{base}</link>");
     for (k, part) in parts.iter().enumerate() {
@@ -58,7 +56,6 @@ const Z: [f64; 3] = [0.0, 0.0, 1.0];
 const Y: [f64; 3] = [0.0, 1.0, 0.0];
 const X: [f64; 3] = [1.0, 0.0, 0.0];
 
-/// An arm with boxes or cylinders for links, its size by the seed.
 fn arm(seed: u64, size: f64) -> String {
     let mut random = Random::new(seed);
     let axes = [Z, Y, Y, Z, Y, Z];
@@ -129,7 +126,6 @@ fn leg(seed: u64) -> String {
     )
 }
 
-/// Points on the surface of a shape, in its own frame.
 fn surface(geometry: &CollisionGeometry) -> Vec<Vec3> {
     let steps = |count: i32| (-count..=count).map(move |k| f64::from(k) / f64::from(count));
     match geometry {
@@ -170,7 +166,6 @@ fn inside(geometry: &CollisionGeometry, p: Vec3) -> bool {
     }
 }
 
-/// The shapes of a robot with their bodies and points.
 struct Referee<'a> {
     model: &'a Model,
     shapes: Vec<(Option<usize>, &'a CollisionShape, Vec<Vec3>)>,
@@ -184,7 +179,7 @@ impl<'a> Referee<'a> {
         Self { model, shapes: shapes.map(|(index, shape)| (index, shape, surface(&shape.geometry))).collect() }
     }
 
-    /// Pairs of shapes that touch, and the lowest point of what moves.
+    /// Touching pairs of shapes, and the lowest point of the moving shapes.
     fn look(&self, q: &[f64]) -> (Vec<[usize; 2]>, f64) {
         let mut workspace = Workspace::new(self.model);
         let placements = body_placements(self.model, &mut workspace, q);
@@ -221,7 +216,7 @@ fn designed(folder: &Path, description: &str) -> DesignOutcome {
     design_study(&study, &path, &Job::options(1), |_| ControlFlow::Continue(())).unwrap()
 }
 
-/// Designs, and looks whether the motion touches anything. Returns what must not be.
+/// Designs a motion and returns its contacts.
 fn faults(name: &str, description: &str) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let outcome = designed(folder.path(), description);
@@ -247,7 +242,7 @@ fn faults(name: &str, description: &str) -> Vec<String> {
     faults
 }
 
-/// One arm, SCARA and leg every day; fifteen arms, five of long reach, five SCARAs and five legs in a long run.
+/// One arm, SCARA and leg by default; fifteen arms, five with long reach, five SCARAs and five legs in a long run.
 #[test]
 fn motions_touch_neither_floor_nor_arm() {
     let mut arms =
@@ -262,7 +257,7 @@ fn motions_touch_neither_floor_nor_arm() {
     assert!(faults.is_empty(), "{faults:#?}");
 }
 
-/// The referee sees what there is to see: without the defaults a motion does touch.
+/// The referee detects contacts: without the defaults a motion does touch.
 #[test]
 fn without_the_defaults_a_motion_is_not_called_clear_of_anything() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,11 +1,9 @@
-//! Every way in which a study can ask for a design that makes no sense has a message that names the place, before any
-//! search.
+//! Invalid designs are rejected before any search, with a message that names the place.
 use crate::common::{Job, repository};
 use core::ops::ControlFlow;
 use dynident::{Study, check_log, check_trajectory, design_study};
 use std::path::Path;
 
-/// A UR10 study with the given text of `[design]`.
 fn text(design: &str) -> String {
     let joints = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
         .map(|joint| format!("{{ joint = \"{joint}_joint\", acceleration = 10.0 }}"));
@@ -16,7 +14,7 @@ fn text(design: &str) -> String {
     )
 }
 
-/// What a study is refused with, when read or when designed for.
+/// Error message when a study is read or designed.
 fn refusal(folder: &Path, text: &str) -> String {
     let path = folder.join("study.toml");
     let study = match Study::parse(text, &path) {
@@ -47,7 +45,8 @@ fn a_start_that_cannot_be_is_named() {
     ] {
         assert_named(folder.path(), &text(&format!("start_posture = {start}")), names);
     }
-    // Stretched out level, gravity alone breaks a weak shoulder: a whole posture is asked for every limit.
+    // With the arm stretched out, gravity alone exceeds the limit of a weak shoulder: a complete posture is checked
+    // against every limit.
     let weak = text("start_posture = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]")
         .replace("shoulder_lift_joint\",", "shoulder_lift_joint\", torque = 20.0,");
     assert_named(folder.path(), &weak, &["start_posture", "torque", "shoulder_lift_joint"]);
@@ -94,7 +93,7 @@ fn families_that_cannot_be_are_named() {
     }
 }
 
-/// Rows of a table of six joints at rest, but for what `change` does to a row's fields.
+/// Rows of a table of six joints at rest, modified by `change`.
 fn table(header: &str, rows: usize, change: impl Fn(usize, &mut Vec<String>)) -> String {
     let columns = header.split(',').count();
     let mut text = format!("{header}\n");
@@ -187,7 +186,7 @@ fn a_prior_that_does_not_fit_is_named() {
         ("{}".to_owned(), &["result.json", "line 1"][..]),
         ("{\"schema\": \"dynident/result/9\", \"base_parameters\": []}".to_owned(), &["dynident/result/9"]),
         (result(&["Izz1", "Izz9"]).to_string(), &["result.json", "Izz9", "same robot"]),
-        (result(&["Izz1"]).to_string(), &["result.json", "does not hold", "same robot"]),
+        (result(&["Izz1"]).to_string(), &["result.json", "missing or duplicate", "same robot"]),
     ] {
         std::fs::write(folder.path().join("result.json"), contents).unwrap();
         assert_named(folder.path(), &study, names);
@@ -211,7 +210,7 @@ fn a_trajectory_or_log_that_is_none_is_named() {
         + "[format]\ntime = { column = \"t\" }\nposition = { columns = \"q{1..6}\" }\ntorque = { columns = \"tau{1..6}\" }\n[[log]]\nfile = \"a.csv\"\nname = \"twin\"\n[[log]]\nfile = \"b.csv\"\nname = \"twin\"\n";
     let study = Study::parse(&logged, &path).unwrap();
     for (name, named) in
-        [("third", "no log is called `third`"), ("twin", "2 logs are called"), ("a.csv", "a.csv is in none")]
+        [("third", "unknown log `third`"), ("twin", "2 logs have the name"), ("a.csv", "a.csv is in none")]
     {
         let error = check_log(&study, &path, name, &Job::options(1)).unwrap_err();
         assert!(error.to_string().contains(named), "{error}");

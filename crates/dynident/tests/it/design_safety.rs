@@ -1,5 +1,5 @@
-//! "Feasible" is meant: torque of friction and drives, turns of joints without stops, the envelope of an iteration, and
-//! a search that ends when it is asked to.
+//! Feasible motions respect torque of friction and drives, turns of continuous joints and the envelope of an iteration,
+//! and a search can be stopped.
 
 use crate::common::Job;
 use core::f64::consts::PI;
@@ -16,10 +16,9 @@ use dynident::{
 };
 use std::path::Path;
 
-/// A small search, which is enough for what is looked at here.
+/// A small search, sufficient for these tests.
 const SEARCH: &str = "[design.search]\nstarts = 1\nrounds = 0\nevaluations_per_start = 200\npolish_evaluations = 200\nsearch_samples = 64\n";
 
-/// Two joints in a vertical plane with `limit` and `dynamics` of the first.
 fn two_joints(kind: &str, limit: &str, dynamics: &str) -> String {
     let link = |name: &str| {
         format!(
@@ -48,8 +47,8 @@ fn designed(folder: &Path, robot: &str, design: &str) -> DesignOutcome {
     design_study(&study, &path, &Job::options(2), |_| ControlFlow::Continue(())).unwrap()
 }
 
-/// The first joint's friction may take 28 of its 34 Nm. The torque of the design stays below. It is computed here by
-/// Newton and Euler, with the friction of the description added.
+/// Friction of the first joint may take 28 of its 34 Nm. The torque of the design, computed here by Newton-Euler plus
+/// friction, stays below the limit.
 #[test]
 fn friction_of_the_description_is_part_of_the_torque_limit() {
     let folder = tempfile::tempdir().unwrap();
@@ -72,11 +71,11 @@ fn friction_of_the_description_is_part_of_the_torque_limit() {
     let report = |file: &dynident::result::DesignFile, joint: &str| {
         file.limits.iter().find(|own| own.kind == LimitKind::Torque && own.joint == joint).unwrap().worst_ratio
     };
-    // The file says the same; at rest, where friction may hold either way, it says the worse.
+    // The file contains the same; at rest, with undetermined friction, the worse case.
     let used = report(&outcome.file, "first");
     assert!(used * 34.0 >= with_friction - 1e-6 && used <= 1.0 + 1e-6, "{used} {with_friction}");
     assert!(with_friction > 1.3 * rigid_alone && used > 0.9, "it binds: {with_friction} {rigid_alone} {used}");
-    // What is included, and what is not: the second joint has no friction, neither has a drive's inertia.
+    // The second joint has no friction, and neither joint has drive inertia.
     let included = outcome.file.notes.iter().find(|note| note.contains("torque limits include")).unwrap();
     assert!(included.contains("coulomb torque of first") && included.contains("viscous torque of first"), "{included}");
     let left = |joint: &str| format!("{joint} {:.0} %", 100.0 * (1.0 - report(&outcome.file, joint)).max(0.0));
@@ -84,7 +83,7 @@ fn friction_of_the_description_is_part_of_the_torque_limit() {
     let (friction, inertia) = (of("torque of friction"), of("torque of drive inertia"));
     assert!(!friction.contains("first") && friction.contains(&left("second")), "{friction}");
     assert!(inertia.contains(&left("first")) && inertia.contains(&left("second")), "{inertia}");
-    // The same motion is refused where friction is twice as large.
+    // The same motion is infeasible with doubled friction.
     let stronger = robot.replace(r#"damping="10""#, r#"damping="20""#);
     std::fs::write(folder.path().join("robot.urdf"), stronger).unwrap();
     let (times, motion) = outcome.sampled(500.0);
@@ -101,13 +100,12 @@ fn friction_of_the_description_is_part_of_the_torque_limit() {
     assert!(!checked.file.feasible && report(&checked.file, "first") > 1.2);
 }
 
-/// A table in which both joints stand at a posture.
 fn still(posture: &str) -> String {
     let rows = ["0", "0.01", "0.02"].map(|t| format!("{t},{posture},0,0,0,0\n"));
     format!("t_s,q1,q2,dq1,dq2,ddq1,ddq2\n{}", rows.concat())
 }
 
-/// A torque that the study declares is part of the limit, one without a value is named.
+/// A declared torque is part of the limit; one without a value is reported.
 #[test]
 fn declared_torques_are_part_of_the_torque_limit() {
     let folder = tempfile::tempdir().unwrap();
@@ -126,12 +124,12 @@ fn declared_torques_are_part_of_the_torque_limit() {
     };
     let (without, is_named) = used("");
     let (with, is_named_still) = used("nominal = -20.0");
-    // Gravity pulls the arm down, which is towards positive angles: the spring of -20 (q - 0.5) = -10 Nm adds to it.
+    // Gravity pulls the arm towards positive angles: the spring of -20 (q - 0.5) = -10 Nm adds to it.
     assert!((with - without - 10.0).abs() < 1e-6, "{with} {without}");
     assert!(is_named && !is_named_still);
 }
 
-/// A known load that the motion carries is part of the torque limit.
+/// The torque limit includes a known payload.
 #[test]
 fn a_payload_is_part_of_the_torque_limit() {
     let folder = tempfile::tempdir().unwrap();
@@ -151,7 +149,7 @@ fn a_payload_is_part_of_the_torque_limit() {
         let file = checked(design, known).unwrap().file;
         file.limits.iter().find(|own| own.kind == LimitKind::Torque && own.joint == "first").unwrap().worst_ratio * 34.0
     };
-    // 1.2 kg on an arm of 0.4 + 0.3 m, stretched out level.
+    // 1.2 kg on a stretched arm of 0.4 + 0.3 m.
     let more = used("payload = \"weight\"") - used("");
     assert!((more - 1.2 * 9.81 * 0.7).abs() < 1e-9, "{more}");
     let error = checked("payload = \"other\"", known).unwrap_err().to_string();
@@ -160,7 +158,7 @@ fn a_payload_is_part_of_the_torque_limit() {
     assert!(error.contains("com_m"), "{error}");
 }
 
-/// With 3 rad/s in 30 s a joint without stops could go round and round.
+/// With 3 rad/s for 30 s a continuous joint could turn many times.
 #[test]
 fn a_joint_without_stops_stays_within_a_turn_of_its_start() {
     let folder = tempfile::tempdir().unwrap();
@@ -175,7 +173,7 @@ fn a_joint_without_stops_stays_within_a_turn_of_its_start() {
         assert!(outcome.file.feasible && outcome.file.assumed.iter().any(|line| line.contains("continuous_turns")));
         assert!(!outcome.file.stopped && (start.is_empty() || first[0] == 20.0));
     }
-    // The key switches it off, and that is listed.
+    // The key disables the assumption, and this is listed.
     let design = "duration_s = 6.0\ntorque_std_nm = 1.0\ndefaults.continuous_turns = 0.0";
     std::fs::write(folder.path().join("robot.urdf"), robot).unwrap();
     let text = format!("[robot]\nfile = \"robot.urdf\"\n[design]\n{design}\n");
@@ -185,11 +183,11 @@ fn a_joint_without_stops_stays_within_a_turn_of_its_start() {
     assert!(ended.file.not_checked.iter().any(|line| line.contains("position of first")), "{:?}", ended.file);
 }
 
-/// Whoever watches may end the work in every part of it; then few questions are asked, and the check is coarser.
+/// A stop request ends every part of the design; the check is then coarser.
 #[test]
 fn a_design_ends_in_every_part_of_it() {
     let folder = tempfile::tempdir().unwrap();
-    // Friction alone is more than the drives give: no motion is possible, and changes of limits are looked for.
+    // Friction alone exceeds the drives' torque, so limit changes are searched.
     let robot = two_joints("revolute", r#"lower="-2.5" upper="2.5" velocity="2" effort="0.5""#, r#"friction="1""#);
     std::fs::write(folder.path().join("robot.urdf"), robot).unwrap();
     let search = SEARCH.replace("starts = 1", "starts = 2");
@@ -206,7 +204,7 @@ fn a_design_ends_in_every_part_of_it() {
             if ended.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
         .unwrap();
-        assert!(ended.load(Ordering::SeqCst), "{round} was never come to");
+        assert!(ended.load(Ordering::SeqCst), "{round} was never reached");
         assert!(outcome.file.stopped, "{round}: design.json does not record that it was stopped");
         assert!(asked.load(Ordering::SeqCst) <= 20, "{round}: {asked:?}");
         let whole_hz = outcome.robot.model().own_scale().round_hertz(10_000.0);
@@ -222,7 +220,6 @@ fn a_design_ends_in_every_part_of_it() {
     }
 }
 
-/// Three joints: about the vertical, and two that lean forward.
 fn three_joints() -> String {
     let link = |name: &str, mass: f64| {
         format!(
@@ -249,7 +246,7 @@ fn three_joints() -> String {
     .concat()
 }
 
-/// The tool, 0.4 m along the last link, and the last joint by their own formulas.
+/// Positions of the tool (0.4 m along the last link) and the last joint, by separate formulas.
 fn places([a1, a2, a3]: [f64; 3]) -> [[f64; 3]; 2] {
     let at = |reach: f64, z: f64| [reach * a1.cos(), reach * a1.sin(), z];
     let (elbow, z) = (0.5 * a2.sin(), 0.3 + 0.5 * a2.cos());
@@ -259,7 +256,7 @@ fn places([a1, a2, a3]: [f64; 3]) -> [[f64; 3]; 2] {
 const LOWER: [f64; 3] = [-0.7, -0.7, 0.2];
 const UPPER: [f64; 3] = [0.7, 0.7, 1.0];
 
-/// The first motion, the next ones and the held-out one keep the workspace that runs are stopped at.
+/// The first, further and held-out motions respect the workspace of the envelope.
 #[test]
 fn no_motion_of_an_iteration_leaves_its_envelope() {
     let folder = tempfile::tempdir().unwrap();
@@ -340,7 +337,7 @@ postures = 50
             }
         }
     }
-    // A tenth of the tracking error, 0.02 rad, on an arm of 0.9 m: some millimetres to centimetres are free, and the
-    // motion uses the box.
+    // A tenth of the tracking error, 0.02 rad, on an arm of 0.9 m leaves some mm to cm; the motion uses the rest of the
+    // box.
     assert!(nearest > 2e-3 && nearest < 0.1, "{nearest}");
 }

@@ -1,15 +1,15 @@
-//! Priors, start postures, tasks, joined families and the check of given motions, each against what must hold.
+//! Priors, start postures, tasks, joined families and the check of given motions.
 use crate::common::{Job, Motion, Truth, assert_reads_back, header, plain, repository, write_log};
 use core::ops::ControlFlow;
 use dynident::excitation::export::{Sampled, trajectory_csv, waypoints_csv};
 use dynident::{DesignOutcome, StudyRobot, check_log, check_trajectory, design_study};
 use std::path::Path;
 
-/// A search of some hundred evaluations: what is asked here does not need the best motion.
+/// A search of some hundred evaluations; these tests do not need the optimum.
 const SMALL: &str =
     "search = { starts = 4, rounds = 0, evaluations_per_start = 1000, polish_evaluations = 500, search_samples = 64 }";
 
-/// The first three joints of a UR10, whose limits are the description's and none assumed: small and quick.
+/// The first three joints of a UR10 with the limits of the robot description only.
 fn job(folder: &Path, design: &str, further: &str) -> Job {
     let joints = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint"];
     let limits = joints.map(|joint| format!("{{ joint = \"{joint}\", acceleration = 10.0 }}"));
@@ -47,10 +47,9 @@ fn a_motion_starts_and_ends_where_the_study_says() {
         for (joint, start) in expected.into_iter().enumerate() {
             let q = &motion.q[motion.of(joint)];
             if let Some(start) = start {
-                // Exact at the start; the series comes back up to the rounding of some terms below 10.
+                // Exact at the start; the series returns with the rounding of some terms below 10.
                 assert!(q[0] == start && (q[times.len() - 1] - start).abs() < 1e-12);
             }
-            // It does move.
             assert!(q.iter().any(|at| (at - q[0]).abs() > 0.05));
         }
     }
@@ -63,10 +62,10 @@ fn ladders_postures_and_joined_families_are_designed() {
     let outcome = designed(&job(folder.path(), family, ""));
     assert!(outcome.file.feasible, "{:?}", outcome.file.diagnosis);
     assert_eq!((&outcome.file.family[..], outcome.file.duration_s), ("joined", 40.0));
-    // Three joints: 7 numbers of the series, 2 of the ladder, 4 of the postures.
+    // Three joints: 7 parameters of the series, 2 of the ladder, 4 of the postures.
     assert_eq!(outcome.file.parameters.len(), 3 * (7 + 2 + 4));
     assert!(outcome.file.forecast.iter().all(|p| p.std.is_some()));
-    // (40 - 3) s / 5 shares = 7.4 s: the last posture is held over the last 7.4 · 0.5 / 4 s.
+    // (40 - 3) s / 5 shares = 7.4 s: the last posture is held for the last 7.4 · 0.5 / 4 s.
     let (times, motion) = outcome.sampled(100.0);
     let held = times.iter().position(|time| *time > 40.0 - 0.92).unwrap();
     assert!((0..3).all(|joint| motion.dq[motion.of(joint)][held..].iter().all(|speed| speed.abs() < 1e-9)));
@@ -74,8 +73,8 @@ fn ladders_postures_and_joined_families_are_designed() {
     assert_eq!((&settings["kind"], &settings["parts"][1]["kind"]), (&"joined".into(), &"friction-ladder".into()));
 }
 
-/// The prior of an earlier run: its standard deviations are never beaten by less knowledge, and the limits of much and
-/// of little data are right.
+/// The prior of an earlier run: standard deviations with the prior are never larger than without, and the limits for
+/// much and for little data are correct.
 #[test]
 fn a_result_is_a_prior_for_the_next_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -102,11 +101,11 @@ fn a_result_is_a_prior_for_the_next_run() {
         std::fs::write(folder.path().join("result.json"), result.to_string()).unwrap();
     };
     write(&result);
-    // With noise of 1e6 Nm the motion determines nothing: what is known is the prior.
+    // With noise of 1e6 Nm the motion adds no information.
     let deaf = job(folder.path(), "torque_std_nm = 1e6\nprior = { result = \"result.json\" }", "");
     let [_, known] = stds(&designed(&deaf));
     for (found, parameter) in known.iter().zip(&identified.result.base_parameters) {
-        // Covariance to information and back: conditions of some millions of correlations leave 1e-6.
+        // From covariance to information and back: condition numbers of about 1e6 leave 1e-6.
         assert!(
             (found - parameter.std).abs() < 1e-4 * parameter.std,
             "{}: {found} {}",
@@ -119,7 +118,7 @@ fn a_result_is_a_prior_for_the_next_run() {
         let slack = 1.0 + 1e-6;
         assert!(*both <= alone * slack && *both <= parameter.std * slack, "{}", parameter.symbol);
     }
-    // The order in the file does not matter, as all is found by symbol.
+    // The order in the file is irrelevant, because parameters are matched by symbol.
     result["provenance"].as_object_mut().unwrap().remove("content_sha256").unwrap();
     let parameters = result["base_parameters"].as_array_mut().unwrap();
     parameters.reverse();
@@ -131,7 +130,7 @@ fn a_result_is_a_prior_for_the_next_run() {
     write(&result);
     let [_, again] = stds(&designed(&deaf));
     assert!(again.iter().zip(&known).all(|(a, b)| (a - b).abs() < 1e-6 * b));
-    // A covariance that is none, and one of another size.
+    // An invalid covariance, and one with the wrong size.
     result["base_parameter_covariance"][0][1] = 1e9.into();
     write(&result);
     let refused = |job: &Job| {
@@ -145,15 +144,15 @@ fn a_result_is_a_prior_for_the_next_run() {
     write(&result);
     assert!(refused(&deaf).contains("`another`"), "{}", refused(&deaf));
 
-    // The same log, judged: its rate, all samples, no search.
+    // Check of the same log: its rate, all samples, no search.
     let checked = check_log(&first.study, &first.path, "run", &Job::options(1)).unwrap();
     assert_eq!(
         (&checked.file.family[..], checked.file.given.as_deref(), checked.file.evaluations),
         ("given", Some("run"), 0)
     );
     assert!((checked.file.check_rate_hz - 100.0).abs() < 1e-6 && (checked.file.duration_s - 29.99).abs() < 0.1);
-    // White noise of 1 Nm on every sample is what the fit saw: its white error bars are the forecast's with that noise,
-    // but for the estimated noise of 3,000 samples (a few percent) and the parallel filter, which leaves nearly all.
+    // White noise of 1 Nm: the fit's white error bars equal the forecast, apart from the estimated noise of 3,000
+    // samples (a few percent) and the parallel filter.
     let white = job(folder.path(), "torque_std_nm = 1.0", log);
     let checked = check_log(&white.study, &white.path, "run", &Job::options(1)).unwrap();
     for (forecast, parameter) in checked.file.forecast.iter().zip(&identified.result.base_parameters) {
@@ -162,7 +161,7 @@ fn a_result_is_a_prior_for_the_next_run() {
     }
 }
 
-/// The CAD prior by its definition, from the robot's own base map written out.
+/// The CAD prior, computed directly from the robot's base parameter map.
 #[test]
 fn the_description_is_a_prior() {
     let folder = tempfile::tempdir().unwrap();
@@ -193,12 +192,11 @@ fn the_description_is_a_prior() {
         for (column, index) in robot.base().dependent().iter().enumerate() {
             variance += (robot.base().regrouping()[(place, column)] * std[*index]).powi(2);
         }
-        // Sums of squares, an inverse of moderate condition and back.
         assert!((found - variance.sqrt()).abs() < 1e-4 * found, "{place}: {found} {}", variance.sqrt());
     }
 }
 
-/// A trajectory that was designed, written and checked again has the design's own figures; waypoints alone nearly so.
+/// A designed trajectory that is written and checked again has the same figures; waypoints alone nearly so.
 #[test]
 fn a_written_trajectory_is_judged_as_the_design_was() {
     let folder = tempfile::tempdir().unwrap();
@@ -217,30 +215,28 @@ fn a_written_trajectory_is_judged_as_the_design_was() {
     assert!(near(found.condition_number, own.condition_number, 1e-6) && near(found.log_det, own.log_det, 1e-9));
     assert!(near(found.criterion_figure, own.criterion_figure, 1e-9));
     for (a, b) in found.limits.iter().zip(&own.limits) {
-        // The spline between samples of 100 Hz of harmonics up to half a hertz.
+        // The spline between samples at 100 Hz, for harmonics up to 0.5 Hz.
         assert!(
             (a.kind, &a.joint) == (b.kind, &b.joint) && (a.worst_ratio - b.worst_ratio).abs() < 1e-5,
             "{a:?} {b:?}"
         );
     }
-    // Broken limits are found, and named.
     let mut fast = job.study.clone();
     fast.design.as_mut().unwrap().limits.joints[2].acceleration = Some(0.01);
     let broken = check_trajectory(&fast, &job.path, &path, &Job::options(1)).unwrap().file;
     assert!(!broken.feasible && broken.diagnosis.join(" ").contains("elbow_joint"), "{:?}", broken.diagnosis);
-    // Positions alone, under the joints' names.
     std::fs::write(&path, waypoints_csv(&sampled).unwrap()).unwrap();
     let way = check_trajectory(&job.study, &job.path, &path, &Job::options(1)).unwrap().file;
     assert!(way.notes.iter().any(|note| note.contains("derived from the positions")), "{:?}", way.notes);
-    // The differentiator's low-pass and its ends change velocities a little: error bars within a tenth.
+    // The low-pass filter and its ends change velocities slightly: error bars within 10 %.
     for (a, b) in way.forecast.iter().zip(&own.forecast) {
         assert!((a.std.unwrap() / b.std.unwrap() - 1.0).abs() < 0.1, "{}", a.symbol);
     }
 }
 
-/// The figure of V-optimality is the mean squared prediction error: for the task that is the motion itself, the number
-/// of parameters over the number of samples (tr D⁻¹D / N).
-/// Searches with other seeds that a comparison of two criteria rests on.
+/// V-optimality is the mean squared prediction error: for the same motion as the task, the number of parameters divided
+/// by the number of samples (tr D⁻¹D / N).
+/// Number of seeds for a comparison of two criteria.
 const SEARCHES: u64 = 12;
 
 #[test]
@@ -257,17 +253,16 @@ fn prediction_on_a_task() {
     let checked = check_trajectory(&study.study, &study.path, &path, &Job::options(1)).unwrap().file;
     let expected = checked.base_columns as f64 / times.len() as f64;
     assert_eq!(checked.criterion, "prediction");
-    // The trajectory's Coulomb step is smooth in both. Conditions of D of some 1e6 leave 1e-8.
+    // The Coulomb step of the trajectory is smooth in both; condition numbers of D of about 1e6 leave 1e-8.
     assert!(
         (checked.criterion_figure.unwrap() / expected - 1.0).abs() < 1e-6,
         "{:?} {expected}",
         checked.criterion_figure
     );
-    // Designed for another task, in which the elbow stands still, a motion predicts it better than the one that was
-    // designed for all parameters alike, at the same effort of search. (Of its own torque a motion that is best for all
-    // parameters is the best predictor there is: Kiefer and Wolfowitz, Canad. J. Math. 12 (1960) 363.) So short
-    // searches end in one optimum or another, and in which goes by the processor's rounding: the mean over them is
-    // below one by three of its standard errors.
+    // A motion designed for a task in which the elbow rests predicts this task better than a D-optimal motion with the
+    // same search effort. (For its own torque, the D-optimal motion is the best predictor: Kiefer and Wolfowitz, Canad.
+    // J. Math. 12 (1960) 363.) Short searches end in different local optima, depending on rounding; the mean over them
+    // is below one by three standard errors.
     let ratios: Vec<f64> = (1..=SEARCHES)
         .map(|seed| {
             let [mut start, mut study] =

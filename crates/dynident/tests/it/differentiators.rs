@@ -1,5 +1,5 @@
-//! `identify` by every differentiator: noise-free logs of a known robot give the truth back where the differentiator is
-//! exact for the motion, and nearly where it is not.
+//! `identify` with every differentiator: noise-free logs give the true parameters, exactly if the differentiator is
+//! exact for the motion, otherwise approximately.
 use crate::common::{Job, Motion, Truth, assert_recovered, header, plain, repository, write_log};
 use dynident::dynamics::Workspace;
 use dynident::recording::LogisticPath;
@@ -7,7 +7,7 @@ use dynident::{Error, identify};
 use std::fmt::Write;
 use std::path::Path;
 
-/// At 100 Hz and 25 s: whole multiples of nothing, so that nothing is exact by accident.
+/// Sample rate, Hz, and duration, s: not multiples of the motion's period, so that no result is exact by accident.
 const CLOCK: (f64, f64) = (100.0, 25.0);
 
 fn ur10() -> String {
@@ -18,7 +18,7 @@ fn truth() -> Truth {
     Truth::near(&repository("robots/ur10.urdf"), 0.2, false)
 }
 
-/// The motion `lead_s` ahead, as `design` writes a trajectory.
+/// Writes the motion `lead_s` ahead, as `design` does.
 fn write_reference(path: &Path, motion: &Motion, lead_s: f64) {
     let mut text = "t_s".to_owned();
     for name in ["q", "dq", "ddq"] {
@@ -32,7 +32,6 @@ fn write_reference(path: &Path, motion: &Motion, lead_s: f64) {
     std::fs::write(path, text + "\n").unwrap();
 }
 
-/// A study with one log of the UR10 by the given differentiator.
 fn study(differentiator: &str, further: &str) -> String {
     format!(
         r#"
@@ -60,16 +59,16 @@ fn ways_that_are_exact_for_the_motion_give_the_truth_back() {
     write_reference(&folder.path().join("same.csv"), &motion, 0.0);
     write_reference(&folder.path().join("ahead.csv"), &motion, 0.04);
     for (differentiator, tolerance) in [
-        // The motion is five harmonics of 0.13 Hz: rounding and the condition number remain, as with differences of
-        // order eight.
+        // The motion is five harmonics of 0.13 Hz: only rounding and the condition number remain, as with differences
+        // of order eight.
         ("method = \"fourier-fit\", base_hz = 0.13, harmonics = 5, trend = false", 1e-6),
-        // Nothing deviates; quintics between samples are exact at the samples.
+        // No deviation; quintics are exact at the samples.
         (
             "method = \"deviation\", reference = \"same.csv\", smoother = { method = \"butterworth\", cutoff_hz = 0.3 }",
             1e-6,
         ),
-        // The lag lies between samples: quintics of a 0.65 Hz motion at 100 Hz err by (0.04)⁴/100 = 3e-8 of its
-        // acceleration, the lag by 1e-9 s.
+        // The lag lies between samples: quintics of a 0.65 Hz motion at 100 Hz have a relative error of (0.04)⁴/100 =
+        // 3e-8 in acceleration, the lag 1e-9 s.
         ("method = \"time-warp\", reference = \"ahead.csv\"", 1e-4),
         (
             "method = \"deviation\", max_lag_s = 0.2, reference = \"ahead.csv\", smoother = { method = \"butterworth\", cutoff_hz = 0.3 }",
@@ -88,8 +87,8 @@ fn ways_that_filter_come_near() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
     write_log(&folder.path().join("log.csv"), &truth, &Motion::new(6, 1), CLOCK, &header(6), plain);
     for (differentiator, percent) in [
-        // What a differentiator takes from motions up to 0.65 Hz: a delay of 2.6/(2π 20) s, so ωδ up to 8 %, of torques
-        // of which most is gravity; a cut-off from the data for the others.
+        // Effect of a differentiator on motion up to 0.65 Hz: a delay of 2.6/(2π 20) s gives ωδ up to 8 % of torques
+        // that are mostly gravity; the others use an automatic cut-off.
         ("method = \"low-pass\", cutoff_hz = 20.0", 5.0),
         ("method = \"frequency-domain\"", 1.0),
         ("method = \"smoothed-differences\", window = 11", 1.0),
@@ -103,8 +102,8 @@ fn ways_that_filter_come_near() {
     }
 }
 
-/// The torque through the same causal filter is as late as the motion: what remains is that friction and rigid bodies
-/// are not linear in the state.
+/// The same causal filter delays torque and motion equally; the remaining error is due to the nonlinearity of friction
+/// and rigid bodies.
 #[test]
 fn smoothing_the_torque_alike_takes_the_delay_out() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
@@ -114,11 +113,11 @@ fn smoothing_the_torque_alike_takes_the_delay_out() {
         let job = Job::new(folder.path(), &study(differentiator, &format!("trim_s = 2.0\n{further}")));
         job.identify().result.training.relative_error_percent.unwrap()
     };
-    // 42 ms late at 10 Hz: ωδ is up to 0.17. In the second case the lag is nought, and the filter's gain at 0.65 Hz one
-    // to 1e-9; a lag of the nonlinear terms is of second order in (ωδ)².
+    // 42 ms delay at 10 Hz: ωδ up to 0.17. The second filter has no delay, and its gain at 0.65 Hz is 1 within 1e-9;
+    // the delay of nonlinear terms is of second order in ωδ.
     let (late, alike) = (error("torque_lag_s = 0.0"), error("smooth_torque = true\ntorque_lag_s = 0.0"));
     assert!(alike < 0.2 * late, "{late} % and {alike} %");
-    // Left to the logs the lag of the motion is found as one of the torque, and taken off.
+    // With an unstated lag, the delay of the motion is found as a torque lag and compensated.
     let found = error("smooth_torque = false");
     assert!(found < 0.2 * late, "{late} % and {found} %");
 }
@@ -165,10 +164,10 @@ fn a_log_has_its_own_reference_and_joints_their_own_order() {
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
     assert_recovered(&found, &truth.base_values(&job.robot()), 1e-4);
-    // Errors of 1e-4 of the parameters at most.
+    // Parameter errors of at most 1e-4.
     assert!(found.result.validation[0].model.relative_error_percent.unwrap() < 0.01);
 
-    // The first log's reference for both: the second does not follow it, and that is said by name.
+    // With the reference of the first log for both, the second log does not follow it and is named.
     let wrong = text.replace("reference = { file = \"ref2.csv\", start_s = -0.29 }\n", "");
     let job = Job::new(folder.path(), &wrong);
     let worse = match identify(&job.study, &job.path, &Job::options(1)) {
@@ -191,10 +190,10 @@ fn a_way_without_its_reference_is_refused_by_name() {
     let missing = message("method = \"deviation\", reference = \"nowhere.csv\"");
     assert!(missing.contains("nowhere.csv"), "{missing}");
     let one = "method = \"logistic-map\", reference = { joints = [{ amplitude = 1.0, omega = 1.0, offset = 0.0, period_s = 40.0 }] }";
-    assert!(message(one).contains("it moves 1 joints, the robot has 6"), "{}", message(one));
+    assert!(message(one).contains("the reference moves 1 joints, but the robot has 6"), "{}", message(one));
 }
 
-/// The paper's arm on the paper's strokes, both joints late: the map is exact under a pure lag.
+/// The paper's arm with the paper's strokes, both joints delayed: the map is exact for a pure delay.
 #[test]
 fn the_papers_map_identifies_the_planar_arm_through_a_lag() {
     let folder = tempfile::tempdir().unwrap();
@@ -239,7 +238,7 @@ fn the_papers_map_identifies_the_planar_arm_through_a_lag() {
     );
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    // Outside the strokes the velocity is the reference's, wrong by up to 1e-3 of its peak beside the splices; friction
-    // is a step of 0.02 rad/s wide.
+    // Outside of the strokes the velocity is that of the reference, with errors up to 1e-3 of its peak near the
+    // splices; the friction step is 0.02 rad/s wide.
     assert_recovered(&found, &truth.base_values(&job.robot()), 1e-2);
 }

@@ -21,7 +21,6 @@ fn loaded(truth: &Truth, link: &str) -> Truth {
     Truth { model: truth.model.with_inertials(&inertials).unwrap(), ..truth.clone() }
 }
 
-/// Currents `(τ + noise)/g`.
 fn currents<'a>(gains: &'a [f64], sigma: f64, random: &'a mut Random) -> impl FnMut(&[f64], &[f64]) -> Vec<f64> + 'a {
     let mut error = vec![0.0; gains.len()];
     move |q, tau| {
@@ -69,7 +68,7 @@ fn gains_of_six_joints_without_noise() {
         assert!(gain.identified && (gain.gain / truth - 1.0).abs() < 1e-6, "{gain:?}");
     }
     assert_recovered(&found, &truth.base_values(&job.robot()), 1e-5);
-    // Held out, in newton metres: the joints' torque as it is.
+    // Held-out torque in Nm.
     let held_out = &found.result.validation[0];
     assert!(held_out.model.relative_error_percent.unwrap() < 1e-3, "{:?}", held_out.model.relative_error_percent);
     let stored = folder.path().join("result.json");
@@ -77,7 +76,7 @@ fn gains_of_six_joints_without_noise() {
     let tested = validate(&stored, &job.study, &job.path, &Job::options(1)).unwrap();
     assert_reads_back(&tested);
     assert!((tested.validation[0].model.rmse_nm - held_out.model.rmse_nm).abs() < 1e-9);
-    // Without a log that carries nothing there is nothing to compare with.
+    // Without a log without payload there is no comparison.
     let text = study(&robot, "tool0", 6, "").replace("{ file = \"empty.csv\" },", "");
     let job = Job::new(folder.path(), &text);
     let refused = dynident::identify(&job.study, &job.path, &Job::options(1)).unwrap_err().to_string();
@@ -112,10 +111,10 @@ fn intervals_hold_the_gains() {
             intervals += 1;
         }
     }
-    // 80 intervals give 95 % to 2.4 %, two of a run are correlated: three of these below.
+    // 80 intervals give 95 % within 2.4 %, two of a run are correlated: three of these below.
     let share = inside as f64 / intervals as f64;
     assert!((0.87..=1.0).contains(&share), "{share}");
-    // Not drawn to zero: errors of 0.5 Nm on a weight's 50 Nm.
+    // Not biased to zero: errors of 0.5 Nm for a torque of 50 Nm.
     assert!(worst < 0.05, "{worst}");
 }
 

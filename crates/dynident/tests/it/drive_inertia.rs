@@ -1,4 +1,4 @@
-//! Whether the torque holds the inertia of the drives is the logs' to say: simulated arms with and without it.
+//! Test for drive inertia, on simulated arms with and without it.
 use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
 use dynident::model::terms::TorqueTerm;
 use dynident::result::ResultFile;
@@ -6,12 +6,11 @@ use dynident::validate;
 use dynident_identification::{Execution, Logs, choose_drive_inertia};
 use std::path::Path;
 
-/// Standard deviation of the torque's noise, Nm, and of the positions', rad.
+/// Standard deviation of torque noise, Nm, and position noise, rad.
 const NOISE: (f64, f64) = (0.2, 1.0e-5);
-/// Logs of each kind.
+/// Number of logs of each kind.
 const SEEDS: u64 = 20;
 
-/// A log of 20 s at 100 Hz with noise.
 fn write_noisy(path: &Path, truth: &Truth, seed: u64) {
     let (mut random, dof) = (Random(1000 + seed), truth.drive.len());
     let noisy = |q: &[f64], tau: &[f64]| {
@@ -21,7 +20,6 @@ fn write_noisy(path: &Path, truth: &Truth, seed: u64) {
     write_log(path, truth, &Motion::new(dof, seed), (100.0, 20.0), &header(dof), noisy);
 }
 
-/// A study that names files and columns, and what `drive` states.
 fn job(folder: &Path, description: &Path, dof: usize, drive: &str) -> Job {
     let columns = format(dof).split("[format]").nth(1).map(|columns| format!("[format]{columns}")).unwrap();
     let description = description.display().to_string();
@@ -29,7 +27,7 @@ fn job(folder: &Path, description: &Path, dof: usize, drive: &str) -> Job {
     Job::new(folder, &text)
 }
 
-/// The test's figure for a study, and the drives that it is about.
+/// Test statistic of a study, and the number of tested drives.
 fn tested(job: &Job) -> (f64, usize) {
     let robot = job.robot();
     let folders = dynident::Folders::new(&job.study, &job.path, None);
@@ -43,8 +41,8 @@ fn tested(job: &Job) -> (f64, usize) {
     (choice.standard_deviations.unwrap(), choice.drives.len())
 }
 
-/// What is there is found, and what is not there is a standard normal figure: of forty some 5 % chance that one is
-/// beyond three, for which the daily seeds are fixed.
+/// Existing drive inertia is found; without it the statistic is standard normal. Of 40 values one exceeds 3 with a
+/// probability of 5 %, so the seeds are fixed.
 #[test]
 fn drives_are_found_where_they_are() {
     let folder = tempfile::tempdir().unwrap();
@@ -57,7 +55,7 @@ fn drives_are_found_where_they_are() {
                 write_noisy(&folder.path().join("log.csv"), &truth, 1 + seed);
                 let job = job(folder.path(), &description, truth.drive.len(), "");
                 let (figure, drives) = tested(&job);
-                // The inertia of the first axes' drives joins with that of their links.
+                // The inertia of the first axes' drives is regrouped with that of their links.
                 assert_eq!(drives, apart, "{robot}");
                 assert_eq!(figure >= 3.0, has_drives, "{robot}, seed {seed}: {figure}");
                 if !has_drives {
@@ -66,8 +64,8 @@ fn drives_are_found_where_they_are() {
             }
         }
     }
-    // Mean and mean square of standard normal figures: within four of their own deviations. Bars are on the safe side
-    // and residuals of a smooth step that is nearly right are small, so the square may be less.
+    // Mean and mean square of standard normal values: within four standard deviations. Error bars are conservative, so
+    // the square may be smaller.
     let count = figures.len() as f64;
     let mean = figures.iter().sum::<f64>() / count;
     let square = figures.iter().map(|figure| figure * figure).sum::<f64>() / count;
@@ -75,7 +73,7 @@ fn drives_are_found_where_they_are() {
     assert!(square < 1.0 + 4.0 * (2.0 / count).sqrt(), "{square}: {figures:?}");
 }
 
-/// Files and columns are enough: the same model as where the key states it, which a test and an export read back.
+/// Files and columns are sufficient: the model equals that with a stated key, also in validation and export.
 #[test]
 fn what_the_logs_say_is_what_a_key_would() {
     let folder = tempfile::tempdir().unwrap();
@@ -92,11 +90,11 @@ fn what_the_logs_say_is_what_a_key_would() {
         assert!(stated.result.drive_inertia_choice.is_none());
         let values = |result: &ResultFile| serde_json::to_value(&result.base_parameters).unwrap();
         assert_eq!(values(&found.result), values(&stated.result));
-        // A key against the logs is obeyed.
+        // A stated key has priority over the logs.
         let against = own(&format!("friction = \"stated\", drive_inertia = {}", !has_drives)).identify();
         assert_ne!(against.result.base_parameters.len(), found.result.base_parameters.len());
 
-        // The finished model is tested by the study that says nothing.
+        // A study without the key validates the finished model.
         let result = folder.path().join("result.json");
         std::fs::write(&result, serde_json::to_string(&found.result).unwrap()).unwrap();
         let job = own("friction = \"stated\"");
@@ -108,7 +106,7 @@ fn what_the_logs_say_is_what_a_key_would() {
     }
 }
 
-/// One joint cannot tell its drive from its link.
+/// With one joint, drive and link inertia are not distinguishable.
 #[test]
 fn what_cannot_be_tested_says_why() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,19 +1,18 @@
-//! Estimators that come back to the logs: by the noise around each row, by the periods of a repeated motion; and what
-//! each of them says of logs that cannot carry a model.
+//! Estimators that read the logs again: local noise and periods; and their messages for unsuitable logs.
 use crate::common::{Job, Motion, Random, Truth, header, repository, write_log};
 use dynident::{Error, IdentificationOutcome, identify};
 use std::fmt::Write;
 use std::path::Path;
 
 const CLOCK: (f64, f64) = (250.0, 16.0);
-/// The motion's slowest sine has 0.13 Hz: 1923.08 samples, so that periods do not begin on samples.
+/// The lowest frequency is 0.13 Hz: 1923.08 samples, so that periods do not start on samples.
 const PERIOD_S: f64 = 1.0 / 0.13;
 
 fn arm() -> std::path::PathBuf {
     repository("robots/planar2r.urdf")
 }
 
-/// The arm without Coulomb friction: its step is no small signal for the noise of these tests.
+/// The arm without Coulomb friction, whose step is not small compared with the noise here.
 fn truth() -> Truth {
     let mut truth = Truth::near(&arm(), 0.1, false);
     truth.drive.iter_mut().for_each(|drive| drive[2] = 0.0);
@@ -44,7 +43,7 @@ fn run(folder: &Path, text: &str) -> Result<IdentificationOutcome, Error> {
     identify(&job.study, &job.path, &Job::options(1))
 }
 
-/// Root mean square of the errors in units of `bars`.
+/// Root mean square error in units of `bars`.
 fn score(found: &IdentificationOutcome, truth: &[f64], bars: &[f64]) -> f64 {
     let squares = (0..truth.len()).map(|i| ((found.estimate.values[i] - truth[i]) / bars[i]).powi(2));
     (squares.sum::<f64>() / truth.len() as f64).sqrt()
@@ -53,7 +52,7 @@ fn score(found: &IdentificationOutcome, truth: &[f64], bars: &[f64]) -> f64 {
 #[test]
 fn rows_count_by_the_noise_around_them() {
     let (folder, truth, mut random, mut row) = (tempfile::tempdir().unwrap(), truth(), Random(3), 0);
-    // The second half is fifty times as loud as the first.
+    // The second half has fifty times the noise.
     write_log(&folder.path().join("log.csv"), &truth, &Motion::new(2, 1), CLOCK, &header(2), |q, tau| {
         row += 1;
         let sigma = if row < 2000 { 0.02 } else { 1.0 };
@@ -69,16 +68,16 @@ fn rows_count_by_the_noise_around_them() {
     let levels = found.result.noise_levels.as_ref().unwrap();
     assert!(levels.iter().all(|[least, most]| *least < 0.1 && *most > 1.0), "{levels:?}");
     assert!(plain.result.noise_levels.is_none());
-    // Half the rows at 0.02 in place of all at a root mean square of 0.7: 0.02 · √2 / 0.7 = 4 % of the error; both are
+    // Half of the rows with noise 0.02 in place of all rows with 0.7 rms: 0.02 · √2 / 0.7 = 4 % of the error; both are
     // random.
     let (reweighted, weighted) =
         (score(&found, &values, &plain.estimate.std), score(&plain, &values, &plain.estimate.std));
     assert!(reweighted < 0.2 * weighted, "{reweighted} and {weighted}");
-    // Error bars are its own, and honest: nine squares or so.
+    // Its error bars are valid: about nine squares.
     assert!(score(&found, &values, &found.estimate.std) < 2.0);
 }
 
-/// Ten periods with noise of positions whose second derivative below 30 Hz is as large as the motion's own.
+/// Ten periods with position noise whose second derivative below 30 Hz is as large as that of the motion.
 fn write_periods(folder: &Path, truth: &Truth, periods: f64) {
     let mut random = Random(8);
     write_log(&folder.join("log.csv"), truth, &Motion::new(2, 3), (250.0, periods * PERIOD_S), &header(2), |q, tau| {
@@ -100,9 +99,9 @@ fn periods_tell_the_noise_and_undo_its_bias() {
     let values = truth.base_values(&job.robot());
     let fit = found.result.periodic.as_ref().unwrap();
     assert_eq!(fit.periods, [10]);
-    // Noise of positions below 30 of 125 Hz: half its deviation.
+    // Position noise below 30 of 125 Hz: half of its standard deviation.
     assert!(fit.motion_std.iter().all(|std| (2e-4..3.5e-4).contains(&std[0])), "{:?}", fit.motion_std);
-    // The cost is χ²: its deviation is √(2/n), below 5 % for 800 and more; four of them.
+    // The cost is χ²: standard deviation √(2/n), below 5 % for 800 and more; four of these.
     let degrees_of_freedom = fit.degrees_of_freedom as f64;
     assert!(
         (fit.cost / degrees_of_freedom - 1.0).abs() < 4.0 * (2.0 / degrees_of_freedom).sqrt() + 0.1,
@@ -111,12 +110,11 @@ fn periods_tell_the_noise_and_undo_its_bias() {
     );
     let bars = &found.estimate.std;
     let (likely, weighted) = (score(&found, &values, bars), score(&plain, &values, bars));
-    // Nine squares of mean one: below 1.8 by four deviations.
+    // Nine squares with mean one: below 1.8 by four standard deviations.
     assert!(likely < 1.8, "{likely}");
     assert!(weighted > 3.0 * likely, "{weighted} and {likely}");
 }
 
-/// Ten periods of the arm with Coulomb friction.
 fn write_periods_with_friction(folder: &Path, seed: u64, (position, torque): (f64, f64)) -> Truth {
     let truth = Truth::near(&arm(), 0.1, false);
     let mut random = Random(seed);
@@ -136,14 +134,13 @@ fn study_with_friction(method: &str, cutoff_hz: f64) -> String {
 fn periods_of_an_arm_with_dry_friction_give_its_parameters() {
     let folder = tempfile::tempdir().unwrap();
     let truth = write_periods_with_friction(folder.path(), 8, (1e-7, 1e-3));
-    // Nearly four times the motion's highest frequency, of which the two-way filter then takes nothing; friction
-    // reverses within samples, which is far faster, and must pass the same filter in torque and regressor.
+    // The cut-off is nearly four times the highest frequency of the motion; friction reverses within samples, so torque
+    // and regressor must pass the same filter.
     let text = study_with_friction("maximum-likelihood", 2.4) + &format!("periods.period_s = {PERIOD_S}");
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
     let values = truth.base_values(&job.robot());
-    // What a step of friction loses between samples of the smoothed speed is below a percent of it, and some parameters
-    // are a tenth of the friction.
+    // Sampling a friction step loses below 1 % of it, but some parameters are a tenth of the friction.
     crate::common::assert_recovered(&found, &values, 0.05);
 }
 
@@ -164,7 +161,7 @@ fn intervals_from_periods_hold_the_truth_with_dry_friction() {
                 usize::from((found.estimate.values[column] - truth).abs() <= found.estimate.half_width_95[column]);
         }
     }
-    // 95 % of a hundred: below 86 % by four deviations.
+    // 95 % of a hundred: below 86 % by four standard deviations.
     let share = inside as f64 / f64::from(all);
     assert!(share >= 0.86, "{inside} of {all}");
 }
@@ -198,8 +195,8 @@ fn the_period_may_come_from_the_commanded_motion() {
     assert!(backwards.contains("[estimator.periods]") && backwards.contains("-1"), "{backwards}");
 }
 
-/// Positions with noise of 2 mrad: at the motion's highest frequency, 0.65 Hz, that is 0.03 rad/s² of the motion's own
-/// few, and far more behind a filter that must let the motion through.
+/// Positions with noise of 2 mrad: 0.03 rad/s² at the highest frequency of the motion, 0.65 Hz, and much more behind a
+/// filter that passes the motion.
 fn write_noisy(folder: &Path, name: &str, truth: &Truth, seed: u64, seconds: f64) {
     let mut random = Random(seed);
     write_log(&folder.join(name), truth, &Motion::new(2, seed), (250.0, seconds), &header(2), |q, tau| {
@@ -222,7 +219,7 @@ fn motion_and_parameters_together_find_the_truth_within_their_bars() {
     let series = found.result.series.as_ref().unwrap();
     assert_eq!((series.len(), series[0].torque_autoregression.len()), (2, 2));
     for log in series {
-        // The motion has five harmonics; what the cut-off lets through beyond them costs a little, and biases nothing.
+        // The motion has five harmonics; passing higher frequencies increases variance slightly, without bias.
         assert!((5..=12).contains(&log.harmonics), "{log:?}");
         assert_eq!(log.samples_of_row, (250.0 * PERIOD_S / (60.0 * log.harmonics as f64)) as usize);
         // Means of n samples have noise smaller by √n.
@@ -231,15 +228,16 @@ fn motion_and_parameters_together_find_the_truth_within_their_bars() {
     }
     let bars = &found.estimate.std;
     let together = score(&found, &values, bars);
-    // Nine squares of mean one: below 1.8 by four deviations.
+    // Nine squares with mean one: below 1.8 by four standard deviations.
     assert!(together < 1.8, "{together}");
 }
 
-/// Without a period the motion is a spline: nothing is known of it, and of a log with a gap both pieces count.
+/// Without a period the motion is a spline; both pieces of a log with a gap are used.
 #[test]
 fn motion_and_parameters_of_any_log_find_the_truth() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
-    // A tenth of the noise of the other tests: with all of it the spline's band is wider than the motion's.
+    // A tenth of the noise of the other tests, because with more noise the spline's band is wider than that of the
+    // motion.
     let (path, mut random) = (folder.path().join("log.csv"), Random(3));
     write_log(&path, &truth, &Motion::new(2, 3), (250.0, 16.0), &header(2), |q, tau| {
         let q: Vec<f64> = q.iter().map(|q| q + 2e-4 * random.normal()).collect();
@@ -255,10 +253,10 @@ fn motion_and_parameters_of_any_log_find_the_truth() {
     assert!(found.result.series.is_none() && spline.cost <= spline.cost_at_start);
     assert_eq!(spline.logs.len(), 1);
     for joint in &spline.logs[0].joints {
-        // σ of 3800 samples is known to 1.2 %, and what the spline takes of them is estimated: four of these.
+        // σ from 3800 samples has an uncertainty of 1.2 %, and the spline's share is estimated: four of these.
         assert!((joint.position_std / 2e-4 - 1.0).abs() < 0.05, "{joint:?}");
     }
-    // Beside least squares behind its filters, in the bars of that: the same noise makes both miss.
+    // Compared with filtered least squares, in its error bars, because the same noise affects both.
     let plain = Job::new(folder.path(), &study("weighted", "")).identify();
     let (together, alone) = (score(&found, &values, &plain.estimate.std), score(&plain, &values, &plain.estimate.std));
     assert!(together < 1.5 * alone, "{together} and {alone}");
@@ -289,7 +287,7 @@ fn logs_without_a_series_are_refused_with_the_fix() {
     assert!(gap.contains("has a gap") && gap.contains("time_range_s"), "{gap}");
 }
 
-/// Studies of the new methods on any log that `write` makes; the simulated ones follow `reference.csv`.
+/// Studies of the new methods on a log from `write`; the simulated ones follow `reference.csv`.
 fn with_each_new_method(
     folder: &Path,
     reference: &dyn Fn(f64) -> [[f64; 2]; 3],
@@ -312,7 +310,7 @@ fn with_each_new_method(
     }
 }
 
-/// A log of the arm on a motion, with a little noise of the torque so that there is something to weigh.
+/// A log of the arm with a little torque noise for the weights.
 fn write_motion(folder: &Path, rows: usize, motion: &dyn Fn(f64) -> [[f64; 2]; 3]) {
     let truth = truth();
     let mut workspace = dynident::dynamics::Workspace::new(&truth.model);
@@ -328,7 +326,7 @@ fn write_motion(folder: &Path, rows: usize, motion: &dyn Fn(f64) -> [[f64; 2]; 3
     std::fs::write(folder.join("log.csv"), text + "\n").unwrap();
 }
 
-/// Two sines of one second.
+/// Two sines with a period of 1 s.
 fn both(t: f64) -> [[f64; 2]; 3] {
     let w = core::f64::consts::TAU;
     let sine = |amplitude: f64, times: f64, phase: f64| {
@@ -372,8 +370,7 @@ fn a_joint_that_does_not_move_leaves_its_parameters_named() {
         let found = outcome.unwrap_or_else(|error| panic!("{method}: {error}"));
         finite(&found);
         if ["didim", "clie", "cloe"].contains(&method) {
-            // The simulated joint gives way a little under the other's motion, so that its parameters are determined
-            // after all, badly.
+            // The simulated joint yields slightly, so its parameters are determined, but poorly.
             return;
         }
         assert_eq!(found.result.method.status, "not-all-excited", "{method}");
@@ -394,7 +391,7 @@ fn a_robot_at_rest_tells_its_gravity_and_names_the_rest() {
         let found = outcome.unwrap_or_else(|error| panic!("{method}: {error}"));
         finite(&found);
         if ["didim", "clie", "cloe"].contains(&method) {
-            // The simulated robot sags, as this log's does not: whatever comes of it is no complete estimate.
+            // The simulated robot sags, unlike the log, so the estimate is not complete.
             assert_ne!(found.result.method.status, "complete", "{method}");
             return;
         }

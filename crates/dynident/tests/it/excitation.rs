@@ -1,4 +1,4 @@
-//! Joints at rest whose encoders have noise: what noise makes up is not taken for information.
+//! Resting joints with encoder noise: noise is not treated as excitation.
 
 use crate::common::{Job, Motion, Random, Truth, header, repository};
 use dynident::IdentificationOutcome;
@@ -8,18 +8,18 @@ use dynident::result::BaseParameterResult;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Samples a second, and seconds, of the logs.
+/// Sample rate, Hz, and duration, s.
 const CLOCK: (f64, f64) = (125.0, 20.0);
 const DOF: usize = 6;
-/// Noise of every joint's torque, Nm.
+/// Torque noise of every joint, Nm.
 const TORQUE_NOISE: f64 = 0.2;
-/// Base parameters that a motion of so many joints (as [`moving`] orders them) excites: the rank of the regressor of
-/// the motion without noise, gravity at one posture where none moves.
+/// Excited base parameters per number of moving joints (in the order of [`moving`]): the rank of the regressor without
+/// noise, and gravity at one posture without motion.
 const EXCITED: [usize; DOF + 1] = [6, 26, 46, 48, 50, 52, 54];
-/// Posture of the joints that rest.
+/// Posture of the resting joints.
 const POSTURE: [f64; DOF] = [0.4, -0.9, 1.1, 0.3, -0.7, 0.2];
 
-/// A log of a motion in which only the joints `moving` move.
+/// A log in which only the joints `moving` move.
 fn log(path: &Path, truth: &Truth, moving: &[usize], position_noise: f64, seed: u64) {
     let (mut workspace, mut random) = (Workspace::new(&truth.model), Random(seed));
     let (motion, mut text) = (Motion::new(DOF, seed), format!("{}\n", header(DOF)));
@@ -51,7 +51,7 @@ fn job(folder: &Path) -> Job {
     Job::new(folder, &text)
 }
 
-/// Root mean square of the torque that a URDF gets wrong on a motion of all joints, over the torque's own noise.
+/// Root mean square torque error of a URDF on a motion of all joints, relative to the torque noise.
 fn held_out(model: &Model, truth: &Truth) -> f64 {
     let (mut workspace, mut of_truth) = (Workspace::new(model), Workspace::new(&truth.model));
     let motion = Motion::new(DOF, 99);
@@ -70,16 +70,16 @@ fn held_out(model: &Model, truth: &Truth) -> f64 {
     (squares / (samples * DOF) as f64).sqrt()
 }
 
-/// What one log says: the study's job with what is known of the truth.
+/// Result of one log with the truth.
 struct Cell {
     found: IdentificationOutcome,
     expected: Vec<f64>,
-    /// What nominal and written URDF get wrong on a motion of all joints, Nm.
+    /// Torque error of the nominal and written URDF on a motion of all joints, Nm.
     held_out: [f64; 2],
 }
 
 impl Cell {
-    /// Joints `moving` of a UR10 with encoders of this noise; masses up to 30 % from the description's.
+    /// A UR10 with moving joints `moving` and this encoder noise; masses up to 30 % from the description.
     fn new(noise: f64, moving: &[usize]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let description = repository("robots/ur10.urdf");
@@ -98,7 +98,8 @@ impl Cell {
         self.found.result.base_parameters.iter().filter(|parameter| parameter.excited).count()
     }
 
-    /// How much farther from the truth each estimate is than the nominal value, in half widths of its 99 % interval.
+    /// Excess distance of each estimate from the truth over that of the nominal value, in half-widths of its 99 %
+    /// interval.
     fn harm(&self) -> Vec<f64> {
         let of = |(parameter, truth): (&BaseParameterResult, &f64)| {
             let [now, then] = [parameter.value, parameter.prior.unwrap()].map(|value| (value - truth).abs());
@@ -109,14 +110,14 @@ impl Cell {
     }
 }
 
-/// The joints that move, so many of them: spread over the arm.
+/// Indices of `count` moving joints, distributed over the arm.
 fn moving(count: usize) -> Vec<usize> {
     (0..count).map(|place| (place * 5 + 1) % DOF).collect()
 }
 
 #[test]
 fn noise_at_rest_is_no_excitation() {
-    // Without noise the counts are the rank by exact dependence alone.
+    // Without noise the count is the rank from exact dependence.
     let cells: Vec<(f64, usize)> = if dynident_testing::count(1, 2) == 1 {
         vec![(1e-5, 0), (1e-4, 1), (1e-5, 6)]
     } else {
@@ -129,14 +130,14 @@ fn noise_at_rest_is_no_excitation() {
         let status = if count == DOF { "complete" } else { "not-all-excited" };
         assert_eq!(result.method.status, status, "{place}");
         assert_eq!(cell.excited(), EXCITED[count], "{place}: {:?}", result.method.not_excited);
-        // At most one in a hundred lies outside of a 99 % interval: of 54 one, and none far outside.
+        // At most 1 % is outside of a 99 % interval: one of 54, and none far outside.
         let harm = cell.harm();
         let outside = harm.iter().filter(|harm| **harm > 1.0).count();
         assert!(outside <= 1 && harm.iter().all(|harm| *harm < 2.0), "{place}: {harm:?}");
         let [nominal, written] = cell.held_out;
         assert!(written <= nominal.hypot(TORQUE_NOISE), "{place}: {written} instead of {nominal} Nm");
         let hanging = result.base_parameters.iter().filter(|parameter| !parameter.conditional_on.is_empty()).count();
-        assert_eq!(hanging == 0, count == DOF, "{place}: {hanging} estimates hang on nominal values");
+        assert_eq!(hanging == 0, count == DOF, "{place}: {hanging} estimates depend on nominal values");
         let rests = result.method.resting_joints.len();
         assert_eq!(rests, DOF - count, "{place}: {:?}", result.method.resting_joints);
     }

@@ -1,4 +1,5 @@
-//! Logs as factors: the model of the logs, files that are refused whole, merging without an order.
+//! Logs as factors: the model equals that of the logs, corrupt files are rejected, and merging does not depend on
+//! order.
 
 use crate::common::repository;
 use dynident::{
@@ -12,7 +13,7 @@ fn options() -> RunOptions<'static> {
     RunOptions { data: None, threads: 2, progress: &Silent }
 }
 
-/// The UR10 of the examples with all that makes rows stated.
+/// The UR10 example with all settings of rows stated.
 fn study() -> (Study, PathBuf) {
     let path = repository("examples/ur10_simulated.toml");
     let mut study = Study::load(&path).unwrap();
@@ -42,13 +43,13 @@ fn the_model_of_factors_is_that_of_the_logs() {
     assert_eq!(of_factors.inertials, of_logs.inertials);
     assert_eq!(of_factors.result.training.relative_error_percent, of_logs.result.training.relative_error_percent);
     assert!(of_factors.urdf.is_some() && of_factors.result.provenance.is_some());
-    // The training error, from the triangles: a root of sums of squares.
+    // Training error from the triangular factors, as a root of sums of squares.
     let own = factors_errors(&factors, &of_factors.result, Path::new("result.json")).unwrap();
     let expected = of_logs.result.training.relative_error_percent.unwrap();
     assert!((own[0].unwrap() - expected).abs() < 1e-9 * expected, "{own:?} {expected}");
 }
 
-/// A head or numbers that were changed on purpose, with the hash made anew: an error or a model, never a panic.
+/// Changed headers or numbers with a valid hash: an error or a model, never a panic.
 #[test]
 fn forged_files_do_no_harm() {
     let whole = reduced(2).to_bytes().unwrap();
@@ -63,7 +64,7 @@ fn forged_files_do_no_harm() {
     let mut refused = 0;
     for _ in 0..300 {
         let mut forged = contents.to_vec();
-        // The words before the head, and what of the head speaks of shapes, more often than all else.
+        // Bytes before the header, and shapes in it, are changed more often than the rest.
         let places = [forged.len(), 64, 4000.min(forged.len())];
         let below = places[draw(3)];
         for _ in 0..=draw(3) {

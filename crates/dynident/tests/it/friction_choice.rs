@@ -1,4 +1,4 @@
-//! Friction that is known is put into the logs of a two-joint arm: cross-validation must find which it was.
+//! Selection of friction by cross-validation, for a two-joint arm with known friction.
 use crate::common::{Job, Random};
 use dynident::Folders;
 use dynident::dynamics::{Workspace, inverse_dynamics};
@@ -17,19 +17,19 @@ const ARM: &str = r#"<robot name="arm"><link name="base"/>
 <joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
 <joint name="elbow" type="continuous"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/></joint></robot>"#;
 
-/// Nm of torque noise: a hundredth of the friction.
+/// Torque noise, Nm: 1 % of the friction.
 const NOISE: f64 = 0.02;
 const STEP: f64 = 0.02;
-/// Logs whose intervals are counted.
+/// Number of logs for coverage.
 const SEEDS: u64 = 10;
 
-/// A log of `rows` rows at 200 Hz; `moving` scales the elbow's motion, `stribeck` is its extra friction near rest at a
-/// velocity of 0.08 rad/s.
+/// A log of `rows` rows at 200 Hz; `moving` scales the elbow's motion, `stribeck` is its additional friction near rest
+/// with a velocity of 0.08 rad/s.
 fn write_log(path: &Path, arm: &Path, rows: usize, moving: f64, stribeck: f64, seed: u64) {
     write_loaded_log(path, arm, (rows, seed), moving, (stribeck, 0.0));
 }
 
-/// The same with dry friction of the shoulder that grows by the share `load` of what its gear carries.
+/// The same with dry friction of the shoulder that increases by `load` per unit of gear load.
 fn write_loaded_log(path: &Path, arm: &Path, (rows, seed): (usize, u64), moving: f64, (stribeck, load): (f64, f64)) {
     let model = load_robot(arm).unwrap().model;
     let (mut workspace, mut random) = (Workspace::new(&model), Random(seed));
@@ -86,11 +86,11 @@ fn the_friction_that_was_put_in_is_chosen_and_the_model_can_be_tested_again() {
     assert_eq!(shoulder.chosen, "viscous + coulomb", "{shoulder:?}");
     assert!(elbow.chosen.contains("stribeck"), "{elbow:?}");
     let terms = elbow.drive.as_ref().unwrap().terms.clone().unwrap();
-    // 0.08 lies between 0.05 and 0.1 of the grid: a tenth is far less than the grid's step, and more than the noise.
+    // 0.08 lies between 0.05 and 0.1 of the grid: the tolerance of 10 % is far below the grid step and above the noise.
     let near =
         |term: &FrictionTerm| matches!(term, FrictionTerm::Stribeck(own) if (own.speed / 0.08 - 1.0).abs() < 0.1);
     assert!(terms.iter().any(near), "{terms:?}");
-    // The noise, and a tenth of it for constants that are not quite those of the truth.
+    // Noise plus 10 % for inexact constants.
     assert!(found.result.validation[0].model.rmse_nm < 1.1 * NOISE, "{:?}", found.result.validation[0].model);
     let plain = job_with_stated(folder.path()).identify();
     assert!(plain.result.validation[0].model.rmse_nm > 3.0 * NOISE);
@@ -98,14 +98,14 @@ fn the_friction_that_was_put_in_is_chosen_and_the_model_can_be_tested_again() {
     let path = folder.path().join("result.json");
     std::fs::write(&path, serde_json::to_string(&found.result).unwrap()).unwrap();
     let again = validate(&path, &job.study, &job.path, &Job::options(1)).unwrap();
-    // Numbers pass through text without loss.
+    // Numbers are converted to text and back without loss.
     assert!((again.validation[0].model.rmse_nm - found.result.validation[0].model.rmse_nm).abs() < 1e-12);
     let threads = dynident::identify(&job.study, &job.path, &Job::options(2)).unwrap();
     assert_eq!(threads.estimate.values, found.estimate.values);
 }
 
-/// Whether the logs tell the written model from the estimate is a question of the torque's noise alone: both have the
-/// chosen constants, and what is unknown of them says nothing of a difference.
+/// The difference between the written model and the estimate depends on torque noise only: both have the same selected
+/// constants, whose uncertainty is irrelevant here.
 #[test]
 fn what_is_unknown_of_constants_does_not_blunt_the_test_of_the_written_model() {
     let folder = tempfile::tempdir().unwrap();
@@ -121,12 +121,12 @@ fn what_is_unknown_of_constants_does_not_blunt_the_test_of_the_written_model() {
     let stated = job(folder.path(), &lines).identify();
     let [of_chosen, of_stated] =
         [&chosen, &stated].map(|found| found.result.physical.fit.as_ref().unwrap().difference.unwrap().f);
-    // The same rows and columns; a twentieth for constants that the search left a step away from their best.
+    // The same rows and columns; 5 % for constants that the search left one step from the optimum.
     assert!((of_chosen / of_stated - 1.0).abs() < 0.05, "{of_chosen} and {of_stated}");
 }
 
-/// What no key states the logs choose; a key that says how the step looks is a statement; and where the study stands
-/// against a choice the reason is in the result.
+/// Unstated friction is selected; a key for the step's shape is a statement; if the study rules out a selection, the
+/// result has the reason.
 #[test]
 fn friction_is_chosen_by_default_where_no_key_states_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -141,7 +141,7 @@ fn friction_is_chosen_by_default_where_no_key_states_it() {
     assert!(choice("friction = \"stated\"").is_empty() && choice("coulomb_width = 0.03").is_empty());
     let elbow_stated = choice("joints.elbow.viscous = true");
     assert!(elbow_stated.len() == 1 && elbow_stated[0].joint == "shoulder", "{elbow_stated:?}");
-    // A single log has no offset that differs from its own.
+    // A single log has no separate offset.
     assert_eq!(text(&by_default), text(&choice("offsets = \"per-log\"")));
     let refused = choice("[estimator.physical]\nlaws = { fv1 = [0.5, 1.5] }");
     assert_eq!(refused.len(), 2);
@@ -205,8 +205,7 @@ fn stated_terms_are_fitted_and_bad_constants_refused() {
     }
 }
 
-/// Constants that the logs choose are unknowns of the fit: their intervals hold the truth, and so do those of the
-/// friction that hangs on them.
+/// Selected constants are unknowns of the fit: their intervals, and those of dependent friction, contain the truth.
 #[test]
 fn bars_hold_what_is_unknown_of_the_constants() {
     let folder = tempfile::tempdir().unwrap();
@@ -230,23 +229,23 @@ fn bars_hold_what_is_unknown_of_the_constants() {
         };
         parameters.extend(truth.iter().filter_map(of_truth));
     }
-    // One joint of ten may have chosen friction by direction.
+    // One joint of ten may have directional friction.
     let seeds = SEEDS as usize;
     assert!(constants.len() >= 18 * seeds / 10 && parameters.len() >= 36 * seeds / 10, "{constants:?} {parameters:?}");
-    // Of 20 intervals that hold 95 % of the time fewer than 16 do once in 400 times, of 40 fewer than 34 once in 300.
+    // Of 20 intervals with 95 %, fewer than 16 contain the truth once in 400 times; of 40, fewer than 34 once in 300.
     let share = |held: &[bool]| held.iter().filter(|held| **held).count() as f64 / held.len() as f64;
     assert!(share(&constants) >= 0.8 && share(&parameters) >= 0.85, "{} {}", share(&constants), share(&parameters));
 }
 
-/// A fit to logs whose friction was chosen before, by the same logs, has the bars of the fit that chose it: what is
-/// unknown of the constants is in both.
+/// A fit with friction that was selected earlier from the same logs has the same error bars, because both include the
+/// uncertainty of the constants.
 #[test]
 fn bars_hold_what_is_unknown_of_constants_that_were_chosen_before() {
     bars_with_constants_chosen_before(0.0);
 }
 
-/// The load that friction depends on is known by then: without it, what it does passed for noise, and what the
-/// constants add to the bars was several times too much.
+/// The constants are estimated with the known load; without it, load-dependent friction would increase their error bars
+/// several times.
 #[test]
 fn bars_hold_no_more_than_that_where_friction_depends_on_the_load() {
     bars_with_constants_chosen_before(0.1);
@@ -286,10 +285,10 @@ fn bars_with_constants_chosen_before(load: f64) {
     assert!(dry.len() >= 2, "{:?}", with.training.problem.columns());
     for symbol in &dry {
         let [of_chosen, with, without] = [&chosen, &with, &without].map(|found| bar(found, symbol));
-        // The lag and the last step of the constants differ a little between the two.
+        // The lag and the last step of the constants differ slightly.
         assert!((with / of_chosen - 1.0).abs() < 0.15, "{symbol}: {with} with, {of_chosen} where it was chosen");
         assert!(without < with, "{symbol}: {without} without, {with} with");
     }
     let narrowed = dry.iter().filter(|symbol| bar(&without, symbol) < 0.7 * bar(&with, symbol)).count();
-    assert!(narrowed > 0, "no bar hangs on the constants");
+    assert!(narrowed > 0, "no error bar depends on the constants");
 }

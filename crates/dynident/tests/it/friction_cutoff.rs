@@ -1,4 +1,4 @@
-//! Friction that the study's terms lack is noise to the first prediction of the cut-off: it must not hide itself.
+//! Unmodelled friction is noise in the first prediction of the cut-off, which must not hide it.
 
 use crate::common::{Job, Random};
 use dynident::dynamics::{Workspace, inverse_dynamics};
@@ -16,17 +16,17 @@ const SCARA: &str = r#"<robot name="scara"><link name="base"/>
 <link name="l4"><inertial><origin xyz="0.03 0.01 -0.03"/><mass value="0.8"/><inertia ixx="0.00048" ixy="0" ixz="0" iyy="0.00091" iyz="0" izz="0.00091"/></inertial></link></robot>"#;
 
 const DOF: usize = 4;
-/// Viscous friction, Coulomb friction forwards and backwards, drive inertia of each joint.
+/// Viscous friction, Coulomb friction forward and backward, drive inertia of each joint.
 const DRIVES: [[f64; 4]; DOF] =
     [[4.0, 3.5, 2.5, 0.9], [2.5, 2.3, 1.7, 0.4], [40.0, 14.0, 10.0, 8.0], [0.2, 0.35, 0.25, 0.02]];
-/// Middle of each joint's motion and its largest excursion, rad (m).
+/// Centre and amplitude of each joint's motion, rad (m).
 const STROKE: [[f64; 2]; DOF] = [[0.0, 1.6], [0.0, 1.7], [-0.075, 0.08], [0.0, 2.0]];
 const RATE_HZ: f64 = 1000.0;
 const LENGTH_S: f64 = 15.0;
 const HARMONICS: usize = 6;
 const STEP: f64 = 0.01;
 
-/// Six harmonics of a tenth of a hertz, other ones for every seed; half a hundredth of each joint's friction as noise.
+/// Six harmonics of 0.1 Hz with a random phase per seed; noise is 0.5 % of each joint's friction.
 fn write_log(path: &Path, model: &Model, seed: u64) {
     let (mut workspace, mut random) = (Workspace::new(model), Random(seed));
     let waves: Vec<[[f64; 2]; HARMONICS]> =
@@ -61,8 +61,8 @@ fn write_log(path: &Path, model: &Model, seed: u64) {
     std::fs::write(path, text).unwrap();
 }
 
-/// Friction was chosen at 2.4 Hz, where no joint showed that it is asymmetric. Of a SCARA like it the model's torque
-/// was 1.3 % off on another motion, where a cut-off of 14 Hz set by hand left 0.04.
+/// At a cut-off of 2.4 Hz no joint shows asymmetric friction. On a similar SCARA the torque error on another motion was
+/// 1.3 %, compared with 0.04 % at a manual cut-off of 14 Hz.
 #[test]
 fn friction_that_the_study_lacks_does_not_hide_itself() {
     let folder = tempfile::tempdir().unwrap();
@@ -74,6 +74,6 @@ fn friction_that_the_study_lacks_does_not_hide_itself() {
                 [format]\ntime = { column = \"t\" }\nposition = { columns = \"q{1..4}\" }\ntorque = { columns = \"tau{1..4}\" }\n";
     let found = Job::new(folder.path(), text).identify().result;
     let chosen: Vec<&String> = found.friction_choice.iter().map(|joint| &joint.chosen).collect();
-    // Of the first two the offset says nearly as much.
+    // For the first two joints the offset explains nearly as much.
     assert!(chosen[2..].iter().all(|chosen| chosen.contains("asymmetric coulomb")), "{chosen:?}");
 }

@@ -1,4 +1,4 @@
-//! A study whose robot and samples lie in memory, and what is done with a result in memory.
+//! Studies with robot and samples in memory, and jobs on results in memory.
 
 use crate::common::repository;
 use dynident::dynamics::ParametricModel;
@@ -15,7 +15,7 @@ fn options() -> RunOptions<'static> {
     RunOptions { data: None, threads: 2, progress: &Silent }
 }
 
-/// The UR10 of the examples with stated friction, which takes no search, and stated drives.
+/// The UR10 example with stated friction and drives, which needs no selection.
 fn study() -> (Study, PathBuf) {
     let path = repository("examples/ur10_simulated.toml");
     let mut text = std::fs::read_to_string(&path).unwrap();
@@ -35,7 +35,6 @@ fn table(path: &Path) -> MemoryLog {
     MemoryLog::columns(&path.file_name().unwrap().to_string_lossy(), Some(names), columns).unwrap()
 }
 
-/// The same with all of it in memory.
 fn carried(study: &Study, path: &Path) -> Study {
     let mut carried = study.clone();
     let folders = Folders::new(study, path, None);
@@ -58,7 +57,7 @@ fn samples_in_memory_give_the_bits_of_the_files() {
         for key in ["timings_s", "provenance", "logs", "robot", "name"] {
             value.as_object_mut().unwrap().remove(key).unwrap();
         }
-        // The errors that it predicts go by the number of rows, which of a text file is known about.
+        // The predicted errors depend on the number of rows, which is only estimated for a text file.
         value["method"].as_object_mut().unwrap().remove("cutoff").unwrap();
         value
     };
@@ -70,7 +69,7 @@ fn samples_in_memory_give_the_bits_of_the_files() {
     let different: Vec<&String> = a.keys().filter(|key| a[*key] != b[*key]).collect();
     assert!(different.is_empty() && a.len() == b.len(), "{different:?}");
 
-    // What it was made from is said by hash: the description's is the file's own.
+    // The provenance contains hashes; that of the robot description equals that of the file.
     let [a, b] = [&of_files.result, &in_memory.result].map(|result| result.provenance.as_ref().unwrap());
     let hash = |inputs: &[dynident::result::InputFile], what: &str| -> Vec<String> {
         inputs.iter().filter(|input| input.what == what).map(|input| input.sha256.clone()).collect()
@@ -130,7 +129,7 @@ fn a_result_in_memory_predicts_and_is_tested() {
     ];
     assert_eq!(serde_json::to_value(&by_file).unwrap(), serde_json::to_value(&in_memory).unwrap());
 
-    // The prediction is the torque of the bodies and terms that are written.
+    // The prediction is the torque of the exported bodies and terms.
     let predictor = TorquePredictor::new(&stored, &file, &study, &path, None).unwrap();
     let (samples, joints) = (300, predictor.dof());
     let at = |shift: f64| -> Vec<f64> { (0..samples * joints).map(|k| (0.37 * k as f64 + shift).sin()).collect() };
@@ -167,7 +166,7 @@ fn a_result_in_memory_predicts_and_is_tested() {
             let columns = model.layout().joint_columns(joint);
             let tau: f64 = columns.iter().zip(panels.joint(joint)).map(|(&column, entry)| theta[column] * entry).sum();
             let predicted = predicted.tau[joint * samples + sample];
-            // The base parameters stand in the result with all their digits; bodies are rounded sums of them.
+            // Base parameters have all digits in the result; bodies are sums with rounding.
             assert!((predicted - tau).abs() < 1e-6 * (1.0 + tau.abs()), "joint {joint}: {predicted} and {tau}");
         }
     }

@@ -1,14 +1,13 @@
-//! Files that jobs read: one that changes during the job is an error, and so is one that is no regular file.
+//! Input files: a file that changes during the job, or that is not a regular file, is an error.
 
 use crate::common::{Job, Motion, Truth, format, header, plain, repository, write_log};
 use dynident::{Error, Progress, ReduceSettings, RunOptions, Study, check, identify, reduce, validate_result};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A job that is run with some options, and its error.
 type RunJob<'a> = &'a dyn Fn(&RunOptions<'_>) -> Option<Error>;
 
-/// Does something once, when a job has begun to read logs.
+/// Runs an action once, when a job starts to read logs.
 struct Once<'a> {
     done: AtomicBool,
     what: &'a (dyn Fn() + Sync),
@@ -32,7 +31,6 @@ impl Progress for Once<'_> {
     fn end(&self) {}
 }
 
-/// A study of two logs, with its robot in the same folder.
 fn job(folder: &Path) -> Job {
     std::fs::copy(repository("robots/planar2r.urdf"), folder.join("arm.urdf")).unwrap();
     let truth = Truth::near(&folder.join("arm.urdf"), 0.1, true);
@@ -53,8 +51,8 @@ fn replace(path: &Path) {
     std::fs::rename(&other, path).unwrap();
 }
 
-/// The parameters of one content never come with the hash of another: whichever file is replaced, in every job that
-/// reads logs, and before the job as long as one likes.
+/// Parameters never come with the hash of another file content: a changed file is an error in every job that reads
+/// logs.
 #[test]
 fn a_file_that_is_replaced_during_a_job_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
@@ -82,12 +80,12 @@ fn a_file_that_is_replaced_during_a_job_is_an_error() {
             let error = run(name, work, Some(file)).unwrap_or_else(|| panic!("{name}: {file}"));
             let Error::Changed { path } = &error else { panic!("{name}, {file}: {error}") };
             assert_eq!(path.file_name().unwrap(), file, "{name}");
-            assert!(error.to_string().contains("changed while it was read; wait"), "{error}");
+            assert!(error.to_string().contains("changed while it was read; run"), "{error}");
         }
     }
 }
 
-/// A pipe without a writer would block for ever.
+/// A pipe without a writer would block forever.
 #[cfg(unix)]
 #[test]
 fn a_pipe_in_the_place_of_any_file_is_refused() {

@@ -1,11 +1,11 @@
-//! Instruments from another source than the log: the seam for simulated motions.
+//! Instruments from an external source, for example a simulated motion.
 use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
 use dynident::estimation::HausmanVerdict;
 use dynident::identification::estimators::{EstimatorError, InstrumentSource};
 use dynident::identify_with_instruments;
 use dynident::recording::MotionBlock;
 
-/// The motion that the log was made from, as a perfect simulation would give it.
+/// The true motion, like a perfect simulation.
 struct TrueMotion {
     motion: Motion,
     begun: usize,
@@ -50,7 +50,7 @@ fn a_simulated_motion_undoes_the_bias_of_noisy_positions() {
     );
     let job = Job::new(folder.path(), &text);
     let values = truth.base_values(&job.robot());
-    // Left to itself the program would take instruments of its own.
+    // By default Dynident would use instruments from the log.
     let plain = Job::new(folder.path(), &("estimator.method = \"weighted\"\n".to_owned() + &text)).identify();
     let mut source = TrueMotion { motion: Motion::new(6, 1), begun: 0 };
     let found = identify_with_instruments(&job.study, &job.path, &Job::options(1), &mut source).unwrap();
@@ -58,17 +58,16 @@ fn a_simulated_motion_undoes_the_bias_of_noisy_positions() {
     let noise = found.result.noise_in_regressor.as_ref().unwrap();
     assert_eq!(noise.hausman.verdict, HausmanVerdict::RejectLeastSquares, "{:?}", noise.hausman);
     assert_eq!(noise.instrument_cutoff_hz, None);
-    // Errors in units of the instruments' own error bars, over all base parameters: about one where these are honest.
-    // Noise of 1e-3 rad at 30 Hz is some 7 rad/s² of acceleration, several times the motion's own: least squares loses
-    // most of the inertias.
+    // Errors in units of the instruments' error bars are about one if these are valid. Noise of 1e-3 rad at 30 Hz is
+    // about 7 rad/s² of acceleration, several times that of the motion: least squares underestimates most inertias.
     let error = |found: &dynident::IdentificationOutcome, bars: &[f64]| {
         let sum: f64 = (0..values.len()).map(|i| ((found.estimate.values[i] - values[i]) / bars[i]).powi(2)).sum();
         (sum / values.len() as f64).sqrt()
     };
     let bars = &found.estimate.std;
     let (by_instruments, by_least_squares) = (error(&found, bars), error(&plain, bars));
-    // 54 squares of mean one: their root mean square is within 0.6 to 1.4 by four deviations; the jackknife is
-    // cautious.
+    // 54 squares with mean one: their root mean square is within 0.6 to 1.4 by four standard deviations; the jackknife
+    // is conservative.
     assert!(by_instruments < 1.6, "{by_instruments}");
     assert!(by_least_squares > 3.0 * by_instruments, "{by_least_squares} and {by_instruments}");
 }

@@ -1,4 +1,4 @@
-//! `[iteration] home`: what a study says of where its robot waits.
+//! `[iteration] home`: home posture, approach paths, held-out motion and warm-up.
 
 use crate::common::repository;
 use core::ops::ControlFlow;
@@ -31,7 +31,6 @@ fn study(folder: &Path, design: &str, iteration: &str) -> String {
     )
 }
 
-/// The columns `q1, q2` of a log.
 fn positions(log: &Path) -> Vec<[f64; 2]> {
     let text = std::fs::read_to_string(log).unwrap();
     let row = |line: &str| -> Vec<f64> { line.split(',').map(|field| field.parse().unwrap()).collect() };
@@ -49,7 +48,7 @@ fn a_study_says_where_its_robot_waits() {
     assert_eq!(approach[0], [0.6, -0.3]);
     let last = back[back.len() - 1];
     assert!((last[0] - 0.6).abs() < 0.02 && (last[1] + 0.3).abs() < 0.02, "{last:?}");
-    // The log of the run is that of the motion alone.
+    // The log of the run contains only the motion.
     let motion = positions(&run.join("log.csv"));
     assert!(motion.len() == 1501 && (motion[0][1] - 0.5).abs() < 0.02, "{}", motion.len());
     // At a fifth of 5 rad/s, and of 62.5 rad/s^2 (full speed after 0.2 rad) for 0.8 rad: 1.875 · 0.8 / 1 s.
@@ -59,11 +58,11 @@ fn a_study_says_where_its_robot_waits() {
     assert!(positions(&run.join("approach_log.csv")).len() < approach.len());
 }
 
-/// The limits of `[design]` hold on the way, and what is wrong is said before anything is run.
+/// The limits of `[design]` apply to the approach, and errors are reported before any run.
 #[test]
 fn what_is_wrong_with_a_home_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    // The tip hangs at -0.4 sin(2.4) - 0.5 sin(1.2) = -0.74 m half-way.
+    // Half-way the tip is at -0.4 sin(2.4) - 0.5 sin(1.2) = -0.74 m.
     let floor = "[design.limits]\nfloor = { height_m = -0.7, points = [{ link = \"link2\", at_m = [0.4, 0.0, 0.0] }] }";
     let home = "home = [2.4, 0.0]";
     let free = iterated(folder.path(), &study(folder.path(), "", home)).unwrap();
@@ -74,7 +73,7 @@ fn what_is_wrong_with_a_home_is_said() {
         .into_iter()
         .map(|[a, b]| -0.5 * a.sin() - 0.4 * (a + b).sin())
         .fold(f64::INFINITY, f64::min);
-    // The controller is some mrad off the way.
+    // The tracking error is some mrad.
     assert!(lowest > -0.71, "{lowest}");
     let high = floor.replace("-0.7", "-0.2");
     let refused = iterated(folder.path(), &study(folder.path(), &high, "home = [1.0, 0.0]")).unwrap();
@@ -92,14 +91,14 @@ fn what_is_wrong_with_a_home_is_said() {
     assert!(error.contains("approach_speed"), "{error}");
     let error = wrong("home = [0.2, 0.1]\nleg = [{ hold = { joint1 = 0.0 } }]");
     assert!(error.contains("locked = false"), "{error}");
-    // A person behind a folder is not asked for passes.
+    // There is no warm-up with a robot behind a folder.
     let error = wrong(
         "warm_up_s = 60.0\nmodel_free = { kind = \"joint-pd\", kp = 400.0, kd = 40.0 }\nrobot = { kind = \"folder\", folder = \"exchange\" }",
     );
-    assert!(error.contains("warm_up_s") && error.contains("without a log"), "{error}");
+    assert!(error.contains("warm_up_s") && error.contains("before you record"), "{error}");
 }
 
-/// A motion that is never fitted judges the model, tests the robot that is found, and is told of.
+/// The held-out motion validates the model and the identified robot, and is reported.
 #[test]
 fn a_held_out_motion_judges_and_tests() {
     let folder = tempfile::tempdir().unwrap();
@@ -129,7 +128,7 @@ fn a_held_out_motion_judges_and_tests() {
     let tested = result["logs"].as_array().unwrap().iter().find(|log| log["role"] == "validate").unwrap();
     assert!(tested["import"]["file"].as_str().unwrap().ends_with("out/runs/held_out_1/log.csv"), "{tested}");
     let wrong = |held_out: &str| iterated(folder.path(), &with(held_out)).unwrap_err().to_string();
-    // Nothing says of which kind another motion might be.
+    // Without a design no other motion can be designed.
     let text = with("{}").replace("[design.defaults]\nfloor = false\n", "");
     let error = iterated(folder.path(), &text).unwrap_err().to_string();
     assert!(error.contains("held_out.trajectory") && error.contains("[design]"), "{error}");
@@ -141,13 +140,13 @@ fn a_held_out_motion_judges_and_tests() {
     assert!(error.contains("one motion"), "{error}");
 }
 
-/// A warm-up is in the result and on the page: how often, and what friction took.
+/// The warm-up is in the result and on the page, with the number of passes and the change of friction.
 #[test]
 fn a_warm_up_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let text = study(folder.path(), "", "warm_up_s = 5.0").replace("rate_hz = 500.0", "rate_hz = 500.0\nviscous = 1.0");
     let file = iterated(folder.path(), &text).unwrap();
-    // The motion lasts three seconds.
+    // The motion lasts 3 s.
     let shown = file.runs[0].warm_up.as_ref().unwrap();
     assert!(shown.passes == 2 && shown.lost_power_w[0] > 0.0, "{shown:?}");
     assert!(shown.change_percent().unwrap().abs() < 0.1);

@@ -1,4 +1,4 @@
-//! Legs with joints held, from a study: the same as the library, bit for bit.
+//! Legs with held joints in a study: bit-identical to the library.
 use crate::common::repository;
 use core::ops::ControlFlow;
 use dynident::{Error, IterationWatch, IterationsFile, RunOptions, Silent, Study, design_study, iterate_study};
@@ -21,7 +21,7 @@ fn iterated(study: &Study, path: &Path, out: &Path) -> Result<IterationsFile, Er
     iterate_study(study, path, out, true, &options(), &mut watch)
 }
 
-/// The strokes of the design, one leg each, put together by hand.
+/// The strokes of the design as separate legs.
 fn by_library(study: &Study, path: &Path) -> Vec<Vec<RunRecord>> {
     let outcome = design_study(study, path, &options(), |_| ControlFlow::Continue(())).unwrap();
     let model = outcome.robot.model().clone();
@@ -95,24 +95,24 @@ fn legs_one_after_another_are_the_librarys() {
         assert_eq!(values, record.estimate.as_ref().unwrap().values);
         assert_eq!(run.max_tracking_error_rad, record.max_tracking_error_rad);
     }
-    // All six parameters in the end, those of joint 2 with the error bars that its own leg gave them.
+    // All six parameters at the end; those of joint 2 with the error bars of its own leg.
     let last = file.runs[file.runs.len() - 1].known();
     let of_first = file.runs.iter().rfind(|run| run.leg == Some(1)).unwrap();
     for (parameter, before) in last.iter().zip(of_first.known()) {
         assert!(parameter.error.unwrap().abs() < 1e-6, "{parameter:?}");
         assert!(parameter.std.is_some() && (before.std.is_none() || parameter.std == before.std));
     }
-    // The locked joint stays where it is.
+    // The locked joint does not move.
     assert!(file.runs.iter().all(|run| run.max_tracking_error_rad[usize::from(run.leg != Some(1))] == 0.0));
     assert!(out.path().join("leg_2/runs/run_1/log.csv").is_file());
-    // A second call finds everything.
+    // A second call reuses all runs.
     let again = iterated(&study, &path, out.path()).unwrap();
     assert_eq!(serde_json::to_string(&again).unwrap(), serde_json::to_string(&file).unwrap());
     let page = std::fs::read_to_string(out.path().join("report.html")).unwrap();
     assert!(page.contains("joint2: tracking error, leg 1") && page.contains("1 of leg 2"));
 }
 
-/// Both legs in every run: one identification from both logs.
+/// Both legs in every run, with one identification from both logs.
 #[test]
 fn legs_together_are_one_run() {
     let path = repository("examples/iterate_paper_2r_legs.toml");
@@ -131,7 +131,7 @@ fn legs_that_make_no_sense_are_refused_with_the_place() {
     let text = std::fs::read_to_string(&path).unwrap();
     let out = tempfile::tempdir().unwrap();
     for (from, to, what) in [
-        ("hold = { joint1 = 0.0 }", "hold = { elbow = 0.0 }", "leg 1: hold: there is no joint `elbow`"),
+        ("hold = { joint1 = 0.0 }", "hold = { elbow = 0.0 }", "leg 1: hold: unknown joint `elbow`"),
         ("hold = { joint2 = 0.0 }", "hold = { joint1 = 0.0, joint2 = 0.0 }", "leg 2: hold: all joints are held"),
         ("hold = { joint1 = 0.0 }", "hold = { joint1 = nan }", "leg 1: hold.joint1 = NaN"),
         (

@@ -1,4 +1,4 @@
-//! A recording says the same in whichever format it comes.
+//! A recording gives the same result in every format.
 use crate::common::{Job, repository};
 use dynident::{LogContents, identify, log_contents};
 use std::fmt::Write as _;
@@ -10,7 +10,7 @@ const START_NS: i64 = 1_790_000_000_123_456_789;
 /// A row: nanoseconds after the start, positions, torques.
 type Row = (i64, [f64; 2], [f64; 2]);
 
-/// A motion of two joints with torques that a pendulum could ask for, and noise; stamps that jitter.
+/// A motion of two joints with plausible torques and noise; jittering time stamps.
 fn rows(seed: u64) -> Vec<Row> {
     let mut random = crate::common::Random(seed);
     (0..1200)
@@ -31,10 +31,10 @@ fn rows(seed: u64) -> Vec<Row> {
         .collect()
 }
 
-/// sensor_msgs/JointState in CDR, little-endian, written out by hand; the upper joint stands first in every third.
+/// sensor_msgs/JointState in CDR, little-endian; the upper joint is first in every third message.
 fn joint_state(row: &Row, at: usize) -> Vec<u8> {
     fn align(bytes: &mut Vec<u8>, size: usize) {
-        // Counted from behind the four bytes of the encoding.
+        // Alignment is relative to the end of the 4-byte encapsulation header.
         while !(bytes.len() - 4).is_multiple_of(size) {
             bytes.push(0);
         }
@@ -87,7 +87,7 @@ fn write_bag(path: &Path, rows: &[Row]) {
 fn write_csv(path: &Path, rows: &[Row]) {
     let mut text = "t,q1,q2,tau1,tau2\n".to_owned();
     for row in rows {
-        // Stamps count from the first one.
+        // Time stamps are relative to the first one.
         let t = (row.0 - rows[0].0) as f64 / 1e9;
         writeln!(text, "{t:?},{:?},{:?},{:?},{:?}", row.1[0], row.1[1], row.2[0], row.2[1]).unwrap();
     }
@@ -151,9 +151,9 @@ fn what_a_recording_holds_is_said_and_leads_to_a_study() {
     assert!(bag.study_format.contains(efforts), "{}", bag.study_format);
     let elbow = bag.channels.iter().find(|channel| channel.name == "/joint_states.position[elbow]").unwrap();
     assert_eq!((elbow.unit.as_deref(), elbow.samples, elbow.missing), (Some("rad"), 40, 0));
-    // The elbow moves as 0.7 cos 5t, until 0.39 s.
+    // The elbow moves as 0.7 cos 5t until 0.39 s.
     assert!(elbow.range.unwrap()[1] == 0.7 && (elbow.range.unwrap()[0] - 0.7 * 1.95_f64.cos()).abs() < 1e-12);
-    // What is proposed is a format that is read.
+    // The proposed format can be parsed.
     for (file, joints) in
         [("two_clocks.mcap", 2), ("packed.mat", 2), ("table.csv.gz", 2), ("bag", 2), ("packed.npz", 2)]
     {

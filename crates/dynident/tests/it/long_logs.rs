@@ -1,4 +1,4 @@
-//! A long log of an arm whose friction is known: an excerpt chooses, and all rows make the numbers.
+//! A long log of an arm with known friction: selection uses an excerpt, the estimate uses all rows.
 use crate::common::{Job, Random};
 use dynident::IdentificationOutcome;
 use dynident::dynamics::{Workspace, inverse_dynamics};
@@ -27,17 +27,17 @@ fraction = [0.95, 1.0]
 role = "validate"
 "#;
 
-/// Samples a second, and how many: well above what an excerpt is made of.
+/// Sample rate, Hz, and number of samples: well above the size of an excerpt.
 const RATE_HZ: f64 = 1000.0;
 const ROWS: usize = 450_000;
-/// Standard deviation of the torque's noise, Nm.
+/// Standard deviation of the torque noise, Nm.
 const NOISE: f64 = 0.1;
 /// Viscous friction of both joints, Nm s/rad.
 const VISCOUS: [f64; 2] = [1.0, 0.8];
-/// Coulomb friction, Nm, and the velocity at which the step has 0.76 of its height, rad/s.
+/// Coulomb friction, Nm, and the velocity at which the step reaches 76 %, rad/s.
 const COULOMB: [f64; 2] = [2.0, 1.0];
 const STEP: f64 = 0.02;
-/// What the elbow has more near rest, Nm, and where 1/e of it is left, rad/s.
+/// Stribeck friction of the elbow: amplitude, Nm, and velocity of its decay to 1/e, rad/s.
 const STRIBECK: (f64, f64) = (1.5, 0.08);
 
 fn job(folder: &std::path::Path) -> Job {
@@ -76,8 +76,7 @@ fn value(found: &IdentificationOutcome, symbol: &str) -> (f64, f64) {
     own.map_or_else(|| panic!("no {symbol} among {}", all()), |own| (own.value, own.half_width_95))
 }
 
-/// Friction, its constants and the numbers are those that were put in, by every row of the log, for any number of
-/// threads.
+/// Friction, its constants and all parameters have the true values, from all rows, for any number of threads.
 #[test]
 fn a_long_log_is_chosen_from_by_an_excerpt_and_fitted_by_all_rows() {
     let folder = tempfile::tempdir().unwrap();
@@ -92,29 +91,30 @@ fn a_long_log_is_chosen_from_by_an_excerpt_and_fitted_by_all_rows() {
 
     let [shoulder, elbow] = &one.result.friction_choice[..] else { panic!("two joints") };
     assert_eq!(shoulder.chosen, "viscous + coulomb", "{shoulder:?}");
-    // At the motion's own rate the elbow's friction is told from a plain step by little; that it is more is told.
+    // At the motion's own rate the elbow's friction is hard to distinguish from a plain step, but its additional part
+    // is found.
     assert_ne!(elbow.chosen, "viscous + coulomb", "{elbow:?}");
-    // All rows count: at the filtered rate there are more than an excerpt of 200,000 rows could give.
+    // All rows are used: at the filtered rate there are more than an excerpt of 200,000 rows would give.
     let log = &one.result.logs[0];
     let rows = (0.95 * ROWS as f64).round();
     assert_eq!(log.import.rows, rows as u64);
     assert!(log.filtered_rows as f64 > 0.9 * rows / RATE_HZ * log.filtered_rate_hz, "{}", log.filtered_rows);
 
-    // Within twice the 95 % bars, which chance leaves in one of 10,000, or a thousandth for what the step's shape adds.
+    // Within twice the 95 % error bars, which chance exceeds in 1 of 10,000 cases, or 0.001 for the shape of the step.
     for (symbol, truth) in [("fv1", VISCOUS[0]), ("fc1", COULOMB[0])] {
         let (found, bar) = value(&one, symbol);
         assert!((found - truth).abs() < 2.0 * bar.max(1.0e-3 * truth), "{symbol}: {found} +- {bar}, {truth}");
     }
-    // White noise behind the low-pass at 0.7 of a cut-off of at most 10 Hz has 0.12 of its deviation; as much again is
-    // left for friction that is not quite the truth's.
+    // White noise behind the low-pass at 0.7 of a cut-off of at most 10 Hz has 0.12 of its standard deviation; the same
+    // amount is allowed for inexact friction.
     let error = one.result.validation[0].model.rmse_nm;
     assert!(error < 2.0 * 0.12 * NOISE, "{error}");
 }
 
-/// More logs than the instants that mistakes are looked for on: one of every so many gives one.
+/// More logs than the samples used for the examination: only every n-th log contributes one.
 #[test]
 fn hundreds_of_short_logs_are_one_identification() {
-    /// Each two seconds at 100 Hz of another part of the motion.
+    /// Number of logs, each 2 s at 100 Hz of another part of the motion.
     const LOGS: usize = 305;
     const ROWS_OF_EACH: usize = 200;
     let folder = tempfile::tempdir().unwrap();

@@ -1,13 +1,12 @@
-//! Are the written masses nearer to the truth than the description's?
+//! Identified masses are nearer to the truth than nominal masses.
 
 use super::common::{Job, Motion, Random, Truth, header, repository, write_log};
 use dynident::estimation::HALF_WIDTH_95;
 use dynident::result::ValueSource;
 
-/// Arms whose masses are up to 30 % from their descriptions, with friction; twenty seconds at 200 Hz with noise of 0.2
-/// Nm and 1e-5 rad. The median mass is nearer to the truth than the description's, none is further than 1.2 times the
-/// description's error and three of its own bars, which hold, and the first one, of which only the inertia about its
-/// axis is in any torque, is the description's with the bar of the description.
+/// Arms with masses up to 30 % from their descriptions, with friction; 20 s at 200 Hz with noise of 0.2 Nm and 1e-5
+/// rad. The median mass error decreases, no error exceeds 1.2 times the nominal error plus three error bars, and the
+/// first mass, of which only the inertia about its axis affects a torque, keeps its nominal value and error bar.
 #[test]
 fn masses_come_nearer_to_the_truth() {
     let robots = ["robots/ur10.urdf", "robots/panda_arm7.urdf"];
@@ -48,11 +47,11 @@ fn masses_come_nearer_to_the_truth() {
             found_errors.push(found);
             described_errors.push(described);
         }
-        // Its inertia about the axis pulls at the mass only through the shape of the body: a thousandth.
+        // Its inertia about the axis affects the mass only through the shape of the body: 0.001.
         let first = &found.result.bodies[0];
         let (described, source) = (first.prior.unwrap()[0], first.sources.unwrap()[0]);
         assert!((first.mass_kg / described - 1.0).abs() < 1e-3 && source == ValueSource::Nominal, "{first:?}");
-        // A hundredth of a rough body is mixed into the description's.
+        // 0.01 of an approximate body is mixed into the nominal one.
         assert!((first.std.unwrap()[0] / (0.3 * 1.01 * described) - 1.0).abs() < 1e-3, "{first:?}");
     }
     let median = |errors: &mut Vec<f64>| {
@@ -61,9 +60,9 @@ fn masses_come_nearer_to_the_truth() {
     };
     let (found, described) = (median(&mut found_errors), median(&mut described_errors));
     assert!(found < described, "{found} for {described}");
-    // Truths within 30 % are nearer than a belief of 30 % expects, so bars that rest on it hold more than 95 %.
+    // Truths within 30 % are nearer than a prior of 30 % expects, so error bars from the prior cover more than 95 %.
     assert!(held as f64 > 0.93 * all as f64, "{held} of {all} hold");
-    // Of values that the logs tell by themselves, the scatter of the mean square of a few dozens.
+    // For identified values: the scatter of the mean square of a few dozen values.
     let mean = (told.iter().sum::<f64>() / told.len() as f64).sqrt();
     println!("{held} of {all} hold, {mean} of {}", told.len());
     assert!(told.len() > 20 && (0.5..1.5).contains(&mean), "{mean} of {}", told.len());

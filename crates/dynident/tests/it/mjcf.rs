@@ -1,10 +1,10 @@
-//! A robot that is described by an MJCF, from the log to the MJCF with identified values.
+//! A robot described by an MJCF, from the log to the MJCF with identified values.
 
 use super::common::{Job, Motion, Random, Truth, header, repository, write_log};
 use dynident_model::{DescriptionFormat, load_robot};
 
-/// A UR5e with other masses and drives: the written MJCF holds the bodies and drives of the result, and the URDF beside
-/// it the same bodies.
+/// A UR5e with other masses and drives: the written MJCF has the bodies and drives of the result, and the additional
+/// URDF has the same bodies.
 #[test]
 fn the_users_mjcf_gets_the_identified_values() {
     let description = repository("golden/mjcf/robosuite_ur5e.xml");
@@ -33,7 +33,7 @@ fn the_users_mjcf_gets_the_identified_values() {
         let robot = load_robot(&path).unwrap();
         for (read, found) in robot.model.inertials().iter().zip(&found.inertials) {
             let scale = found.0.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-            // About the centre of mass and back: some ten roundings.
+            // To the centre of mass and back: about ten roundings.
             assert!((0..10).all(|k| (read.0[k] - found.0[k]).abs() <= 1e-12 * scale), "{name}: {read:?} {found:?}");
         }
         let is_mjcf = robot.format == DescriptionFormat::Mjcf;
@@ -46,7 +46,7 @@ fn the_users_mjcf_gets_the_identified_values() {
     assert!((sums[0] - expected).abs() < 1e-12 && expected > 0.0, "{sums:?} {expected}");
 }
 
-/// A spring that the description has at the elbow, softer than it says: found, and written back.
+/// A spring at the elbow that is softer than described: identified and written back.
 #[test]
 fn a_spring_of_the_description_is_identified() {
     const STIFFNESS: f64 = 25.0;
@@ -74,7 +74,7 @@ fn a_spring_of_the_description_is_identified() {
     let name = format!("k_{elbow}");
     let spring = found.result.joints[2].terms.iter().find(|term| term.symbol == name).unwrap();
     let std = spring.std.unwrap();
-    // One of three hundred robots is three deviations off.
+    // One of 300 robots is off by three standard deviations.
     assert!((spring.value - STIFFNESS).abs() < 3.0 * std && std < 0.5, "{} ± {std}", spring.value);
     let written = folder.path().join("identified.xml");
     std::fs::write(&written, found.mjcf.unwrap()).unwrap();

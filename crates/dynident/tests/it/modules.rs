@@ -1,5 +1,4 @@
-//! Arrows between modules run one way: no top-level module of a crate, and no file, uses one that uses it, directly or
-//! by way of others.
+//! Module dependencies are acyclic: neither top-level modules nor files use each other, directly or indirectly.
 
 use super::common::repository;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,14 +17,12 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The code of a file without its tests and comments.
 fn code(file: &Path) -> String {
     let text = std::fs::read_to_string(file).unwrap();
     let code = text.split("#[cfg(test)]\nmod ").next().unwrap();
     code.lines().map(|line| line.split("//").next().unwrap()).collect::<Vec<_>>().join("\n")
 }
 
-/// The module of a file, as a path from the root of its crate; empty for the root.
 fn module(src: &Path, file: &Path) -> String {
     let parts = file.strip_prefix(src).unwrap().with_extension("");
     let parts: Vec<&str> = parts.iter().map(|part| part.to_str().unwrap()).collect();
@@ -34,7 +31,6 @@ fn module(src: &Path, file: &Path) -> String {
     names.join("::")
 }
 
-/// Every path of `code` that starts with `crate::` or `super::`, from the root of the crate.
 fn paths(own: &str, code: &str) -> Vec<String> {
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     let mut found = Vec::new();
@@ -57,7 +53,7 @@ fn paths(own: &str, code: &str) -> Vec<String> {
     found
 }
 
-/// Which files each file of the crate uses. Roots of modules are left out: they gather and re-export.
+/// Files used by each file of the crate. Module roots are excluded, because they re-export.
 fn uses_of_files(src: &Path) -> Uses {
     let mut files = Vec::new();
     sources(src, &mut files);
@@ -75,12 +71,11 @@ fn uses_of_files(src: &Path) -> Uses {
     files.iter().map(uses).collect()
 }
 
-/// The first part of every `crate::` path on a line of code.
 fn used(line: &str) -> impl Iterator<Item = &str> {
     line.split("crate::").skip(1).map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap())
 }
 
-/// Which top-level modules each top-level module of the crate uses, tests inside of files left out.
+/// Top-level modules used by each top-level module, without tests.
 fn uses(src: &Path) -> Uses {
     let mut files = Vec::new();
     sources(src, &mut files);
@@ -103,7 +98,6 @@ fn uses(src: &Path) -> Uses {
     uses
 }
 
-/// Modules that come back to themselves.
 fn cycle(uses: &Uses) -> Vec<&str> {
     let returns = |start: &String| {
         let (mut seen, mut open) = (BTreeSet::new(), vec![start]);

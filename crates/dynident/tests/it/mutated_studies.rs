@@ -1,11 +1,10 @@
-//! A good study with bytes changed at random: every one is read or refused with its place, and none brings anything
-//! down.
+//! A valid study with random byte changes: each is parsed or rejected with its place, without a panic.
 use crate::common::repository;
 use dynident::{Error, Expected, Folders, Study, StudyError, StudyRobot};
 use proptest::prelude::*;
 use std::path::Path;
 
-/// A study that uses most keys, on a robot of the repository.
+/// A study with most keys.
 const STUDY: &str = r#"
 name = "all keys"
 [robot]
@@ -52,7 +51,7 @@ fraction = [0.25, 1.0]
 role = "validate"
 "#;
 
-/// Reads the study and builds its robot; either may refuse, with a message that names the file.
+/// Parses the study and builds its robot; both may fail with a message that names the file.
 fn try_whole(text: &str) {
     let path = repository("study.toml");
     match Study::parse(text, &path) {
@@ -110,7 +109,7 @@ proptest! {
         any::<f64>().prop_map(|x| format!("{x:?}").to_lowercase()), any::<i64>().prop_map(|x| x.to_string()), Just("nan".to_owned()), Just("-inf".to_owned()),
         Just("1e308".to_owned()), Just("\"\"".to_owned()), Just("[]".to_owned())
     ]) {
-        // A number is what stands after `= `, `[` or a comma up to the next comma, bracket or line end.
+        // A number follows `= `, `[` or a comma, up to the next comma, bracket or line end.
         let places: Vec<(usize, usize)> = STUDY
             .match_indices(|c: char| c.is_ascii_digit())
             .filter(|(at, _)| STUDY[..*at].ends_with([' ', '[', '-']))

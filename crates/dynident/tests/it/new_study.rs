@@ -1,4 +1,4 @@
-//! Studies that are written from a robot and its recordings, beside those that people wrote by hand.
+//! Generated studies compared with manually written ones.
 
 use crate::common::{recordings, repository};
 use dynident::recording::log::{ChannelGroup, ColumnRef};
@@ -13,7 +13,6 @@ struct Written {
     text: String,
 }
 
-/// Unit, scale and sign of positions and of torques.
 fn reading_keys(study: &Study) -> ([String; 3], [String; 3]) {
     let format = study.format.as_ref().unwrap();
     (reading(&format.position).1, reading(&format.torque).1)
@@ -40,7 +39,7 @@ fn written(robot: &Path, logs: &[PathBuf], rate_hz: Option<f64>) -> Written {
     Written { study, unsure, text: found.text }
 }
 
-/// What decides which numbers a group's are: its columns and how they are read.
+/// Everything that determines the numbers of a group: columns, units, scales, signs.
 fn reading(group: &ChannelGroup) -> (Vec<ColumnRef>, [String; 3], Option<PathBuf>) {
     let keys = [format!("{:?}", group.unit), format!("{:?}", group.scale), format!("{:?}", group.sign)];
     (group.column_list("columns").unwrap(), keys, group.file.clone())
@@ -51,7 +50,7 @@ fn by_hand(example: &str) -> Study {
     Study::load(&path).unwrap()
 }
 
-/// Positions, torques, clock and joints are read as in the example that a person wrote.
+/// Checks that positions, torques, clock and joints equal those of the example.
 fn is_read_alike(example: &str, found: &Written) {
     let hand = by_hand(example);
     let (own, other) = (found.study.format.as_ref().unwrap(), hand.format.as_ref().unwrap());
@@ -86,8 +85,8 @@ fn public_recordings_need_no_edit() {
     }
 }
 
-/// The sensors of the LBR count torques the other way round: the logs say that some sign is wrong, not which. The
-/// line that is asked for is the one that was written by hand.
+/// The sensors of the LBR have the opposite sign: the logs show a wrong sign, but not which. The proposed line equals
+/// the manual one.
 #[test]
 fn a_sign_is_asked_for_and_stated() {
     let Some(data) = recordings() else { return };
@@ -110,7 +109,7 @@ fn a_sign_is_asked_for_and_stated() {
     is_read_alike("lbr_med7.toml", &Written { study, unsure: Vec::new(), text: found.text });
 }
 
-/// Currents of unknown constants, positions and efforts in files of their own.
+/// Currents with unknown constants, positions and efforts in separate files.
 #[test]
 fn what_no_name_and_no_number_tells_is_marked() {
     let Some(data) = recordings() else { return };
@@ -126,13 +125,13 @@ fn what_no_name_and_no_number_tells_is_marked() {
     let tiago = files(&["tiago_arm/tiago_position.csv", "tiago_arm/tiago_velocity.csv", "tiago_arm/tiago_effort.csv"]);
     let found = written(&data.join("tiago_arm/tiago.urdf"), &tiago, None);
     assert_eq!(found.study.robot.joints, by_hand("tiago.toml").robot.joints, "{}", found.text);
-    // Currents called efforts: no factor of the positions is made up that explains them.
+    // Currents named as efforts: no scale of the positions is proposed that would explain them.
     let (position, ..) = reading_keys(&found.study);
     assert!(position.iter().all(|key| key == "None"), "{position:?}\n{}", found.text);
     assert!(!found.unsure.is_empty());
 }
 
-/// The simulated arm of README, from its files alone; and what cannot be known is asked for.
+/// The simulated arm of README, from its files alone; unknowns are marked.
 #[test]
 fn a_recording_without_a_clock_needs_its_rate() {
     let folder = tempfile::tempdir().unwrap();
@@ -153,13 +152,13 @@ fn a_recording_without_a_clock_needs_its_rate() {
     let logs: Vec<PathBuf> = logs.iter().map(without_clock).collect();
     let found = written(&robot, &logs, None);
     assert!(found.unsure.iter().any(|line| line.contains("rate_hz")), "{:?}", found.unsure);
-    assert!(found.text.contains("# UNSURE: no column is a time"), "{}", found.text);
+    assert!(found.text.contains("# UNSURE: no time column recognised"), "{}", found.text);
 
-    // A recording with other columns is not passed over in silence.
+    // A recording with other columns is reported.
     let alien = folder.path().join("alien.csv");
     std::fs::write(&alien, "t_s,speed_of_wind\n0,1\n1,2\n").unwrap();
     let found = written(&robot, &[repository("examples/ur10_simulated/train.csv"), alien], None);
-    assert!(found.unsure.iter().any(|line| line.contains("alien.csv is left out")), "{:?}", found.unsure);
+    assert!(found.unsure.iter().any(|line| line.contains("alien.csv is not in the study")), "{:?}", found.unsure);
 
     let other = repository("robots/panda.urdf");
     let few = folder.path().join("few.csv");

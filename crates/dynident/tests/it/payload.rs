@@ -1,4 +1,4 @@
-//! Payloads: beside a free arm, with a held arm, and what is said of what cannot be determined.
+//! Payloads with a free arm and with a fixed arm, and messages about undetermined values.
 use crate::common::{Job, Motion, Random, Truth, assert_recovered, format, header, plain, repository, write_log};
 use dynident::identification::payload::Measured;
 use dynident::model::{InertialParameters, Mat3, Vec3};
@@ -19,7 +19,7 @@ fn box_at_link() -> InertialParameters {
     InertialParameters::from_centre_of_mass(MASS_KG, Vec3(COM_M), &inertia)
 }
 
-/// The same arm with the box at a link: added to the body that the link moves with, in that body's frame.
+/// The same arm with the payload added to the body of a link.
 fn loaded(truth: &Truth, link: &str) -> Truth {
     let mut inertials = truth.model.inertials().to_vec();
     for (body, inertial) in truth.model.bodies().iter().zip(&mut inertials) {
@@ -64,7 +64,6 @@ fn ur10() -> String {
 #[test]
 fn arm_and_payload_from_an_empty_and_a_loaded_log() {
     let folder = tempfile::tempdir().unwrap();
-    // The description's own bodies, which are physically consistent.
     let truth = three_logs(folder.path(), 0.0);
     let text = format!(
         "robot.file = {:?}\ndrive.friction = \"stated\"\n{BOX}\nparallel_filter.factor = 4\nlog = [{{ file = \"empty.csv\" }}, {{ file = \"box.csv\", payload = \"box\" }}, \
@@ -87,11 +86,11 @@ fn arm_and_payload_from_an_empty_and_a_loaded_log() {
     }
     let possible = payload.possible.as_ref().unwrap();
     assert!((possible.mass_kg - MASS_KG).abs() < 1e-2 && !possible.on_the_boundary, "{possible:?}");
-    // The held-out log carries the box too, and the consistent arm beside it.
+    // The held-out log carries the payload too, and the consistent arm is listed.
     let held_out = &found.result.validation[0];
     assert!(held_out.model.relative_error_percent.unwrap() < 1e-4, "{:?}", held_out.model.relative_error_percent);
     assert!(held_out.physical.as_ref().unwrap().relative_error_percent.unwrap() < 0.1);
-    // And the finished model alone says the same of it.
+    // `validate` gives the same figures.
     let stored = folder.path().join("result.json");
     std::fs::write(&stored, serde_json::to_string(&found.result).unwrap()).unwrap();
     let tested = validate(&stored, &job.study, &job.path, &Job::options(1)).unwrap();
@@ -105,7 +104,7 @@ fn a_known_payload_is_taken_off_and_a_second_one_found_with_the_arm_held() {
     let known = format!(
         "payload = [{{ name = \"box\", link = \"tool0\", mass_kg = {MASS_KG}, com_m = {COM_M:?}, inertia_at_com_kgm2 = {INERTIA:?} }}]"
     );
-    // The arm from a log with the known box.
+    // The arm from a log with the known payload.
     let text = format!(
         "robot.file = {:?}\ndrive.friction = \"stated\"\n{known}\nparallel_filter.factor = 4\nlog = [{{ file = \"box.csv\", payload = \"box\" }}]\n{}",
         ur10(),
@@ -189,7 +188,7 @@ fn intervals_hold_the_payload_with_the_arm_free_and_held() {
         let held = Job::new(folder.path(), &study(carrying, held)).identify();
         for (way, found) in [free, held].iter().enumerate() {
             let payload = &found.result.payloads[0];
-            // A planar arm determines mass, first moments in its plane and the inertia about its axis; axes of the
+            // A planar arm determines mass, first moments in its plane and the inertia about its axis; the axes of the
             // paper's arm are parallel.
             assert_eq!(payload.parameters.len(), 4, "{:?}", payload.parameters);
             assert_eq!(payload.not_identified.len(), 6);
@@ -200,8 +199,8 @@ fn intervals_hold_the_payload_with_the_arm_free_and_held() {
         }
         intervals += 4;
     }
-    // 160 intervals, of which four of a run are correlated: 95 % to 3 %, twice that below. With the arm held they are
-    // cautious.
+    // 160 intervals, of which four per run are correlated: 95 % within 3 %, twice that below. With a fixed arm they are
+    // conservative.
     for inside in inside {
         let share = inside as f64 / intervals as f64;
         assert!((0.89..=1.0).contains(&share), "{share}");
@@ -229,7 +228,7 @@ fn offsets_differ_from_log_to_log() {
     );
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    // The base parameters hold the mean.
+    // The base parameters contain the mean.
     assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
     assert_eq!(found.result.offsets.len(), 18);
     for offsets in found.result.offsets.chunks(3) {
@@ -270,7 +269,7 @@ fn what_does_not_go_together_is_refused_with_the_fix() {
         let said = refused(more, log);
         assert!(said.contains(words), "{said}");
     }
-    // A payload that is never off cannot be determined from the arm; that is a verdict, not an error.
+    // A payload that is in all logs cannot be distinguished from the arm; this is a finding, not an error.
     let text = format!(
         "robot.file = {:?}\ndrive.friction = \"stated\"\n{BOX}\nparallel_filter.factor = 4\nlog = [{carrying}]\n{}",
         ur10(),
@@ -298,7 +297,7 @@ fn a_mass_from_a_balance_leaves_the_centre_to_be_found() {
     for gains in ["", "drive.gains = \"unknown\""] {
         let job = Job::new(folder.path(), &with_box(&of_mass, gains));
         let found = job.identify();
-        // With gains there is a step of iteration more.
+        // With gains there is one more iteration.
         let tolerance = if gains.is_empty() { NOISE_FREE } else { 10.0 * NOISE_FREE };
         assert_recovered(&found, &truth.base_values(&job.robot()), tolerance);
         let payload = &found.result.payloads[0];
@@ -322,7 +321,7 @@ fn a_mass_from_a_balance_leaves_the_centre_to_be_found() {
 fn quoted_gains_that_are_off_stand_in_the_payloads_bar() {
     let folder = tempfile::tempdir().unwrap();
     let truth = Truth::near(&repository("robots/ur10.urdf"), 0.0, false);
-    // Gains as quoted over gains as they are, drawn with the standard deviation that is stated.
+    // Stated divided by true gains, drawn with the stated standard deviation.
     let share = 0.1;
     let mut random = Random(8);
     let (mut inside, mut alone, mut figures) = (0, 0, 0);
@@ -353,10 +352,10 @@ fn quoted_gains_that_are_off_stand_in_the_payloads_bar() {
             inside += usize::from((honest.value - truth).abs() <= honest.half_width_95);
             alone += usize::from((exact.value - truth).abs() <= exact.half_width_95);
         }
-        // Some percent of the mass: six joints tell it together.
+        // Some percent of the mass, which affects six joints.
         let mass = honest.mass_kg.unwrap();
         assert!((0.02..0.3).contains(&(mass.half_width_95 / MASS_KG)), "{mass:?}");
     }
-    // Of sixteen intervals of 95 % more than two miss in 4 % of all cases, and the seed is fixed.
+    // Of 16 intervals with 95 % more than two miss in 4 % of all cases, and the seed is fixed.
     assert!(inside >= figures - 2 && alone < inside, "{inside} and {alone} of {figures}");
 }

@@ -1,4 +1,4 @@
-//! A payload beside much that is unknown too: friction that the logs choose, gains, a lag of the torque.
+//! A payload with other unknowns: selected friction, gains, a torque lag.
 use crate::common::{Job, Motion, Random, format, header, repository};
 use dynident::IdentificationOutcome;
 use dynident::dynamics::{Workspace, inverse_dynamics};
@@ -9,18 +9,17 @@ use std::fmt::Write;
 use std::path::Path;
 
 const MASS_KG: f64 = 2.0;
-/// In the plane of the arm, from the wrist.
+/// Centre of mass in the plane of the arm, from the wrist, m.
 const COM_M: [f64; 2] = [0.21, 0.04];
 const WEIGHT: &str = "{ name = \"weight\", link = \"hand\", mass_kg = 3.0, com_m = [0.25, 0.0, 0.0], inertia_at_com_kgm2 = [0.01, 0.0, 0.0, 0.01, 0.0, 0.01] }";
-/// Velocity of the shoulder's Stribeck curve, rad/s: between 0.05 and 0.1 of the grid.
+/// Stribeck velocity of the shoulder, rad/s: between 0.05 and 0.1 of the grid.
 const STRIBECK_SPEED: f64 = 0.08;
 const WIDTH: f64 = 0.02;
-/// Standard deviation of the torque's noise, Nm, with a lag-1 correlation of 0.8.
+/// Standard deviation of the torque noise, Nm, with a lag-1 correlation of 0.8.
 const NOISE_NM: f64 = 0.1;
 const GAINS: [f64; 3] = [11.0, 6.5, -3.2];
 const RATE_HZ: f64 = 200.0;
 
-/// What logs are made with.
 #[derive(Clone, Copy)]
 struct Making {
     gains: [f64; 3],
@@ -32,7 +31,6 @@ fn planar() -> std::path::PathBuf {
     repository("examples/robots/planar_3r.toml")
 }
 
-/// The arm with a body in its hand.
 fn arm(carried: Option<(f64, [f64; 2])>) -> Model {
     let model = load_robot(planar()).unwrap().model;
     let Some((mass, [x, y])) = carried else { return model };
@@ -43,8 +41,7 @@ fn arm(carried: Option<(f64, [f64; 2])>) -> Model {
     model.with_inertials(&inertials).unwrap()
 }
 
-/// Friction: a Stribeck curve at the shoulder, another step forwards than backwards at the elbow, a plain one at the
-/// wrist.
+/// Friction: Stribeck at the shoulder, directional at the elbow, plain at the wrist.
 fn friction(joint: usize, dq: f64) -> f64 {
     let step = (dq / WIDTH).tanh();
     match joint {
@@ -75,7 +72,7 @@ fn write_log(path: &Path, model: &Model, motion: &Motion, making: Making, random
     std::fs::write(path, text).unwrap();
 }
 
-/// Logs of the arm alone, with the known weight, and with the box.
+/// Logs without payload, with the known payload, and with the unknown one.
 fn write_logs(folder: &Path, making: Making, seed: u64) {
     let random = &mut Random(1000 + seed);
     let carried = [("empty", None), ("weight", Some((3.0, [0.25, 0.0]))), ("box", Some((MASS_KG, COM_M)))];
@@ -99,12 +96,12 @@ fn study(logs: &[&str], more: &str) -> String {
     )
 }
 
-/// The study with its torque taken as logged.
+/// The study without a lag estimate.
 fn with_no_lag(study: &str) -> String {
     study.replace("[motion]", "[motion]\ntorque_lag_s = 0.0")
 }
 
-/// Of mass, m c_x and m c_y how many intervals hold the truth.
+/// Number of intervals of mass, m c_x and m c_y that contain the truth.
 fn held(found: &IdentificationOutcome) -> usize {
     let payload = &found.result.payloads[0];
     let truth = [MASS_KG, MASS_KG * COM_M[0], MASS_KG * COM_M[1]];
@@ -112,13 +109,12 @@ fn held(found: &IdentificationOutcome) -> usize {
     (0..3).filter(holds).count()
 }
 
-/// Half of the mass's interval.
 fn half_width(found: &IdentificationOutcome) -> f64 {
     found.result.payloads[0].mass_kg.unwrap().half_width_95
 }
 
-/// Whether the friction that was put in is among what was chosen: Stribeck at the shoulder, and at the elbow another
-/// step forwards than backwards (with the offset a shifted one says nearly the same).
+/// Whether the true friction was selected: Stribeck at the shoulder, directional at the elbow (a shifted step with an
+/// offset is nearly equivalent).
 fn is_friction_chosen(found: &IdentificationOutcome) -> bool {
     let [shoulder, elbow, wrist] = &found.result.friction_choice[..] else { panic!("three joints") };
     let near = |term: &FrictionTerm| matches!(term, FrictionTerm::Stribeck(own) if (own.speed / STRIBECK_SPEED - 1.0).abs() < 0.2);
@@ -128,7 +124,7 @@ fn is_friction_chosen(found: &IdentificationOutcome) -> bool {
         && wrist.drive.is_some()
 }
 
-/// The terms that the logs are made with.
+/// The true terms.
 const TRUE_TERMS: &str = "drive.joints.shoulder.laws = [{ law = \"stribeck\", speed = 0.08, exponent = 2.0 }]\n\
                           drive.joints.elbow.laws = [{ law = \"asymmetric-coulomb\" }]";
 
@@ -139,7 +135,7 @@ fn friction_is_chosen_with_a_payload_and_its_intervals_hold() {
     let (mut inside, mut chosen) = (0, 0);
     for run in 0..runs as u64 {
         write_logs(folder.path(), Making { gains: [1.0; 3], lag_s: 0.0, seconds: 20.0 }, 1 + run);
-        // By default, where no key states friction.
+        // By default, without a friction key.
         let found = Job::new(folder.path(), &study(&["empty", "box"], "")).identify();
         inside += held(&found);
         chosen += usize::from(is_friction_chosen(&found));
@@ -147,7 +143,7 @@ fn friction_is_chosen_with_a_payload_and_its_intervals_hold() {
         let stated = Job::new(folder.path(), &with_no_lag(&stated)).identify();
         assert!(half_width(&found) < half_width(&stated));
     }
-    // 3 of 9 intervals of 95 % miss in 0.8 % of all cases; a choice is as good as its data, so most are right.
+    // 3 of 9 intervals with 95 % miss in 0.8 % of all cases; most selections are correct.
     assert!(inside + 2 + runs / 4 >= 3 * runs, "{inside} of {}", 3 * runs);
     assert!(10 * chosen >= 8 * runs, "{chosen} of {runs}");
 }
@@ -165,12 +161,12 @@ fn a_lag_is_taken_off_with_a_payload_and_offsets_of_single_logs() {
         let lag = &found.result.method.torque_lag;
         common += usize::from(lag.kind == LagKind::Common);
         let measured = lag.common.unwrap();
-        // A twenty-fifth of a sample: what Coulomb's step between samples is worth.
+        // 0.04 samples: the effect of sampling Coulomb's step.
         assert!((measured.lag_s - 4.0e-3).abs() < 0.2e-3, "{measured:?}");
         unheeded += held(&Job::new(folder.path(), &with_no_lag(&text)).identify());
     }
     assert_eq!(common, runs);
-    // Of 18 intervals of 95 % four miss in 1 % of all cases.
+    // Of 18 intervals with 95 % four miss in 1 % of all cases.
     assert!(inside + 3 + runs / 6 >= 3 * runs && unheeded < inside, "{inside} and {unheeded} of {}", 3 * runs);
 }
 

@@ -1,4 +1,4 @@
-//! The studies in `examples/` on the public recordings, where these are at hand.
+//! Studies in `examples/` on the public recordings, if available.
 use crate::common::{recordings, repository};
 use dynident::study::FrictionChoice;
 use dynident::{IdentificationOutcome, RunOptions, Silent, Study, identify};
@@ -13,13 +13,13 @@ fn example(name: &str) -> Option<IdentificationOutcome> {
     let data = recordings()?;
     let path = repository("examples").join(name);
     let found = run(&Study::load(&path).unwrap(), &path, &data);
-    // A physically consistent set explains the torque with the sign that the study gives it.
+    // A physically consistent set explains the torque with the sign in the study.
     let sign = found.result.physical.sign.unwrap();
     assert!(!sign.is_reversed(), "{name}: {sign:?}");
     Some(found)
 }
 
-/// The same with the friction that the study states in place of the one that the logs choose.
+/// The same with stated friction in place of selected friction.
 fn with_stated_friction(name: &str) -> Option<IdentificationOutcome> {
     let data = recordings()?;
     let path = repository("examples").join(name);
@@ -28,8 +28,7 @@ fn with_stated_friction(name: &str) -> Option<IdentificationOutcome> {
     Some(run(&study, &path, &data))
 }
 
-/// The held-out error is no worse than the limit: the figure in README, and 5 % of it for what other processors round
-/// otherwise.
+/// Checks that the held-out error is within 5 % of the limit in README; the 5 % are for rounding on other processors.
 fn held_out(name: &str, limit_percent: f64) -> Option<IdentificationOutcome> {
     let found = example(name)?;
     let error = found.result.validation[0].model.relative_error_percent.unwrap();
@@ -57,7 +56,7 @@ fn ur10_has_54_base_parameters() {
 #[test]
 fn tx40_has_61_base_parameters() {
     if let Some(found) = held_out("tx40.toml", 12.8) {
-        // Also joints with friction that differs by direction have a velocity; half of the held-out rows stand still.
+        // Joints with directional friction have a velocity too; half of the held-out rows are at rest.
         for joint in &found.result.validation[0].residuals {
             let regimes = joint.regimes.unwrap();
             assert_eq!(
@@ -76,11 +75,11 @@ fn tx40_has_61_base_parameters() {
 #[test]
 fn panda_has_43_base_parameters_of_bodies() {
     let Some(found) = held_out("panda.toml", 2.13) else { return };
-    // Those of friction are as many as the log asks for.
+    // The number of friction parameters matches the selection.
     let of_bodies = found.result.base_parameters.iter().filter(|parameter| parameter.unit.starts_with("kg")).count();
     assert_eq!(of_bodies, 43);
     let urdf = found.urdf.unwrap();
-    assert!(urdf.contains("holds with the joints locked behind which stand: panda_leftfinger, panda_rightfinger"));
+    assert!(urdf.contains("valid only with the joints locked that carry: panda_leftfinger, panda_rightfinger"));
 }
 
 #[test]
@@ -105,7 +104,7 @@ fn tiago_reports_its_dead_channels_and_its_jitter() {
     let dead: Vec<&str> =
         import.findings.iter().filter(|f| f.message.contains("dead")).map(|f| &f.channel[..]).collect();
     assert_eq!(dead, ["torque arm_5_joint", "torque arm_6_joint", "torque arm_7_joint"]);
-    // 7.7 to 12.3 ms by the publishers' own account of the whole log.
+    // 7.7 to 12.3 ms according to the publishers.
     assert!(import.steps.min_s > 0.0076 && import.steps.min_s < 0.0095, "{:?}", import.steps);
     assert!(import.steps.max_s > 0.0105 && import.steps.max_s < 0.0124, "{:?}", import.steps);
     assert!((import.rate_hz - 100.0).abs() < 0.5);
@@ -121,19 +120,19 @@ fn the_double_pendulum_has_a_rotor_between_its_joints() {
     // Steps of up to 8 ms at 500 Hz.
     let longest = found.result.logs.iter().map(|log| log.import.steps.max_s).fold(0.0, f64::max);
     assert!((0.006..0.009).contains(&longest), "{longest}");
-    // Least squares is biased towards zero here, at the cut-off that the log asks for by two thirds; that is found and
-    // undone without a key of the study.
+    // Least squares is biased towards zero by two thirds at this cut-off; Dynident detects and corrects this by
+    // default.
     assert_eq!(found.result.method.estimator, "instrumental");
     assert!(found.result.problems.is_empty(), "{:?}", found.result.problems);
     assert_published(&found, "left to itself");
-    // The cut-off follows the instruments down, so that held-out errors are about the robot.
+    // The cut-off decreases with the instruments, so that held-out errors are meaningful.
     let noise = found.result.noise_in_regressor.as_ref().unwrap();
     let (before_hz, now_hz) = (noise.cutoff_before_hz.unwrap(), found.result.logs[0].motion_cutoff_hz.unwrap());
     assert!(now_hz < 0.8 * before_hz, "{before_hz} and {now_hz} Hz");
 }
 
 /// The publishers' model 3.0 of design C.0: m2 r2 = 0.56394 * 0.32127, m1 r1 + 0.2 m2 = 0.64169 * 0.2 + 0.2 * 0.56394,
-/// I2 = 0.053878 less six times Ir = 9.937e-5; the goal for this set is 5 %.
+/// I2 = 0.053878 - 6 Ir with Ir = 9.937e-5; the limit is 5 %.
 fn assert_published(found: &IdentificationOutcome, what: &str) {
     let published =
         [("mz2", -0.181_18), ("mz1 - 0.2 m2", -0.241_13), ("Iyy2 - 6 Ia_rotor", 0.053_878 - 6.0 * 9.937e-5)];
@@ -143,8 +142,8 @@ fn assert_published(found: &IdentificationOutcome, what: &str) {
     }
 }
 
-/// Noise biases least squares at every cut-off that may be chosen for the double pendulum; the estimate does not depend
-/// on which it is.
+/// Noise biases least squares for the double pendulum at every possible cut-off; the estimate must not depend on the
+/// cut-off.
 #[test]
 fn the_double_pendulum_is_found_at_any_cutoff() {
     let Some(data) = recordings() else { return };
@@ -158,7 +157,6 @@ fn the_double_pendulum_is_found_at_any_cutoff() {
     }
 }
 
-/// The study of the double pendulum at a high cut-off, as text, and where it stands.
 fn pendulum_with_instruments() -> (String, std::path::PathBuf) {
     let path = repository("examples/dfki_pendulum_iv.toml");
     (std::fs::read_to_string(&path).unwrap(), path)
@@ -174,7 +172,7 @@ fn instruments_undo_the_bias_of_the_double_pendulum() {
     let (text, path) = pendulum_with_instruments();
     let found = run(&Study::parse(&text, &path).unwrap(), &path, &data);
     // The publishers' model 3.0 of design C.0: m2 r2 = 0.56394 * 0.32127, m1 r1 + 0.2 m2 = 0.64169 * 0.2 + 0.2 *
-    // 0.56394, I2 = 0.053878 less six times Ir = 9.937e-5. Limits: 3 % and 8 % are the project's goals for this set.
+    // 0.56394, I2 = 0.053878 - 6 Ir with Ir = 9.937e-5. The limits are 3 % and 8 %.
     assert!((-base_value(&found, "mz2") / 0.181_18 - 1.0).abs() < 0.03, "{}", base_value(&found, "mz2"));
     assert!((-base_value(&found, "mz1 - 0.2 m2") / 0.241_13 - 1.0).abs() < 0.08, "{}", base_value(&found, "mz1"));
     let inertia = base_value(&found, "Iyy2 - 6 Ia_rotor");
@@ -182,8 +180,8 @@ fn instruments_undo_the_bias_of_the_double_pendulum() {
     let noise = found.result.noise_in_regressor.as_ref().unwrap();
     assert_eq!(noise.hausman.verdict, dynident::estimation::HausmanVerdict::RejectLeastSquares);
     assert!(!noise.instruments.weak && noise.instruments.weakest_f.unwrap() > 10.0);
-    // With another method the instruments only test it; least squares on the same rows loses most of the second link's
-    // gravity.
+    // With another method the instruments only test for bias; least squares on the same rows loses most of the second
+    // link's gravity.
     let plain = text.replace("method = \"instrumental\"", "method = \"ordinary\"");
     assert_ne!(plain, text);
     let plain = run(&Study::parse(&plain, &path).unwrap(), &path, &data);
@@ -192,7 +190,7 @@ fn instruments_undo_the_bias_of_the_double_pendulum() {
     assert_eq!(test.verdict, dynident::estimation::HausmanVerdict::RejectLeastSquares);
 }
 
-/// What the positions hold is motion, or too little noise to matter: weighted least squares, and nothing said.
+/// With little noise Dynident uses weighted least squares and reports no bias.
 #[test]
 fn other_real_logs_are_not_called_noisy() {
     for name in ["panda", "tiago", "lbr_med7"] {
@@ -209,7 +207,7 @@ fn every_estimator_is_at_hand_on_a_real_log() {
     let Some(data) = recordings() else { return };
     let path = repository("examples/dfki_pendulum.toml");
     let text = std::fs::read_to_string(&path).unwrap();
-    // At a cut-off that leaves little noise: rows are what these estimators weigh, not what is in them.
+    // A cut-off with little noise: these estimators weight rows.
     let motion = "motion.differentiator = { method = \"butterworth\", cutoff_hz = 6.0 }\n".to_owned();
     let text = motion + &text;
     let plain = run(&Study::parse(&text, &path).unwrap(), &path, &data);
@@ -218,8 +216,7 @@ fn every_estimator_is_at_hand_on_a_real_log() {
         let found = run(&Study::parse(&text, &path).unwrap(), &path, &data);
         assert_eq!(found.result.method.estimator, method);
         assert_eq!(found.result.method.status, "complete");
-        // They weight the same rows differently: nothing moves by more than a few of the error bars, and those are of
-        // the same size.
+        // They weight the same rows differently: changes stay within a few error bars, and these have similar size.
         for (a, b) in found.result.base_parameters.iter().zip(&plain.result.base_parameters) {
             let bar = a.std.max(b.std);
             assert!((a.value - b.value).abs() < 10.0 * bar, "{method} {}: {} and {}", a.expression, a.value, b.value);

@@ -1,11 +1,11 @@
-//! Mistakes in studies of real logs are named with the key that mends them.
+//! Mistakes in studies of real logs are reported with the key that corrects them.
 
 use super::common::{Job, recordings, repository};
 use dynident::result::CheckFinding;
 use dynident::{RunOptions, Silent, check};
 use dynident_recording::Level;
 
-/// An example, its joints, the names of its columns with the number of the first, and how its torque line ends.
+/// An example: joints, column names with the first number, and end of its torque line.
 struct Real {
     example: &'static str,
     joints: usize,
@@ -23,7 +23,7 @@ const MED7: Real =
     Real { example: "lbr_med7", joints: 7, position: "q_#", torque: "tau_#", first: 0, torque_sign: -1.0 };
 
 impl Real {
-    /// The study with other keys behind the columns of position and torque, these in another order, and other text.
+    /// The study with modified keys of position and torque, column orders and text.
     fn study(&self, [q, tau]: [&str; 2], orders: [&[usize]; 2], [from, to]: [&str; 2]) -> String {
         let text = std::fs::read_to_string(repository(&format!("examples/{}.toml", self.example))).unwrap();
         let names = |pattern: &str, order: &[usize]| {
@@ -31,7 +31,7 @@ impl Real {
             order.iter().map(name).collect::<Vec<_>>().join(", ")
         };
         let line = |line: &str| {
-            // Velocity and acceleration would be found out by themselves.
+            // Velocity and acceleration would reveal the mistake.
             if line.starts_with("velocity") || line.starts_with("acceleration") {
                 String::new()
             } else if line.starts_with("position") {
@@ -46,7 +46,6 @@ impl Real {
         text.lines().map(line).collect::<String>().replace("data = \"../../shared/data\"", &data).replace(from, to)
     }
 
-    /// A value for one joint, another for the others.
     fn only(&self, joint: usize, value: &str, others: &str) -> String {
         let values = (0..self.joints).map(|j| if j == joint { value } else { others });
         format!("[{}]", values.collect::<Vec<_>>().join(", "))
@@ -131,8 +130,8 @@ fn mistakes_in_studies_of_real_logs_are_named() {
     }
 }
 
-/// Torques 30 ms late, as a slow bus makes them, are no mistake of the study: the fit takes the lag off. Wrists were
-/// said to be coupled, for the torque that another is added to is larger and leaves a smaller share by itself.
+/// Torques that are 30 ms late are not a mistake of the study: the fit compensates the lag. Wrists must not be reported
+/// as coupled.
 #[test]
 fn a_lag_of_a_slow_bus_is_no_coupled_wrist() {
     const ROWS_LATE: usize = 6; // of 200 a second

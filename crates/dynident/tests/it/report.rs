@@ -1,4 +1,4 @@
-//! The report of an identification: every joint drawn, gaps kept, hostile names harmless.
+//! The report of an identification: plots of every joint, gaps, escaped names.
 use crate::common::{Job, Motion, Truth, header, plain, repository, write_log};
 
 const NAME: &str = "elbow</script><b>&quot;";
@@ -15,7 +15,7 @@ fn every_joint_is_drawn_and_no_name_becomes_markup() {
         let path = folder.path().join(format!("log{seed}.csv"));
         write_log(&path, &truth, &Motion::new(2, seed), (100.0, 20.0), &header(2), plain);
     }
-    // A gap of two seconds in the second log.
+    // A gap of 2 s in the second log.
     let log = std::fs::read_to_string(folder.path().join("log2.csv")).unwrap();
     let lines: Vec<&str> = log.lines().enumerate().filter(|(i, _)| !(1000..1200).contains(i)).map(|(_, l)| l).collect();
     std::fs::write(folder.path().join("log2.csv"), lines.join("\n") + "\n").unwrap();
@@ -41,18 +41,18 @@ fn every_joint_is_drawn_and_no_name_becomes_markup() {
         for joint in &trace.joints {
             assert_eq!(joint.measured_nm.len(), joint.predicted_nm.len());
             assert_eq!(joint.measured_nm.iter().filter(|value| value.is_nan()).count(), gaps, "{}", trace.log);
-            // A noise-free log of a known robot: what differs is rounding.
+            // A noise-free log of a known robot: only rounding differs.
             let both = joint.measured_nm.iter().zip(&joint.predicted_nm).filter(|(m, _)| !m.is_nan());
             assert!(both.clone().count() > 1000 && both.into_iter().all(|(m, p)| (m - p).abs() < 1e-3));
         }
     }
     let page = found.report().unwrap();
-    // Two joints for each log, with their residuals in a strip of the same plot.
+    // Two joints per log, with residuals in a strip of the same plot.
     assert_eq!(page.matches("data-plot=\"plot-").count(), 2 * 2);
-    assert!(page.matches("measured less predicted").count() >= 2 * 2, "residuals are drawn");
+    assert!(page.matches("measured minus predicted").count() >= 2 * 2, "residuals are drawn");
     assert!(!page.contains(NAME) && !page.contains("</script><b>") && !page.contains("joints </title>"));
     for heading in ["Torque", "Parameters", "Friction and drives", "Bodies", "Logs", "Origin and time"] {
         assert!(page.contains(&format!(">{heading}</h2>")), "{heading}");
     }
-    assert!(page.contains("steps longer than three median steps"), "what was found in the log");
+    assert!(page.contains("steps longer than three median steps"), "findings about the log");
 }

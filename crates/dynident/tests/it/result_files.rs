@@ -1,4 +1,4 @@
-//! Files that jobs write: read back as they were written, older ones too, and as their schemas say.
+//! Output files are read back identically, also older ones, and conform to their schemas.
 
 use crate::common::{assert_reads_back, repository};
 use dynident::result::{LimitReport, RobotFault, RobotStatus};
@@ -7,7 +7,6 @@ use serde_json::Value;
 use std::path::Path;
 use std::sync::LazyLock;
 
-/// The example that the repository holds, identified.
 static EXAMPLE: LazyLock<ResultFile> = LazyLock::new(|| {
     let path = repository("examples/ur10_simulated.toml");
     let study = Study::load(&path).unwrap();
@@ -23,13 +22,13 @@ fn a_result_and_an_inspection_read_back() {
     }
 }
 
-/// The simulated arm of README has drives, and its study is files and columns.
+/// The simulated arm of README has drives; its study states only files and columns.
 #[test]
 fn the_example_states_nothing_of_its_drives() {
     let study = Study::load(&repository("examples/ur10_simulated.toml")).unwrap();
     assert_eq!(study.drive, dynident::study::DriveSection::default());
     assert!(EXAMPLE.drive_inertia_choice.as_ref().unwrap().seen);
-    // Some 1 % of the torque is noise; without the drives' inertia 4 % is left.
+    // About 1 % of the torque is noise; without drive inertia 4 % is unexplained.
     let error = EXAMPLE.validation[0].physical.as_ref().unwrap().relative_error_percent.unwrap();
     assert!(error < 1.2, "{error} %");
 }
@@ -41,7 +40,7 @@ fn a_robot_that_failed_and_a_motion_that_is_not_finite_read_back() {
     let report = r#"{"kind":"speed","joint":"elbow","worst_ratio":null,"at_s":1.0,"violated":true}"#;
     let read: LimitReport = serde_json::from_str(report).unwrap();
     assert!(read.worst_ratio == f64::INFINITY);
-    // JSON knows no infinity: a number, so that `>` and sorting work for whoever reads it.
+    // JSON has no infinity, so a finite number allows comparison and sorting.
     let written = serde_json::to_value(&read).unwrap();
     assert_eq!(written["worst_ratio"].as_f64(), Some(f64::MAX));
     assert_reads_back(&read);

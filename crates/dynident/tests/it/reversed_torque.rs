@@ -1,21 +1,19 @@
-//! The torque of one joint of a real log has the other sign: no model comes out of that without a problem that names
-//! the joint.
+//! Reversed torque of one joint of a real log: the result has a problem that names the joint.
 
 use super::common::{Job, recordings, repository};
 
-/// Example, joints, and the signs of their torque in it.
+/// Example, joints, and the signs of their torque.
 const EXAMPLES: [(&str, &[i32]); 6] = [
     ("ur10", &[1; 6]),
     ("panda", &[1; 7]),
     ("lbr_med7", &[-1; 7]),
     ("dfki_pendulum", &[1; 2]),
-    // Of its other joints the torque is dead for most of the time, which is said.
+    // The torque of its other joints is dead for most of the time, which is reported.
     ("tiago", &[1, 1, 1, -1, -1]),
-    // The sign of its last joint cannot be told: reversed or not, no robot explains more than a fifth of its torque.
+    // The sign of its last joint is not identifiable: no robot explains more than a fifth of its torque.
     ("lwr4plus_23_to_1", &[1; 6]),
 ];
 
-/// The example's study with the torque of `joint` reversed.
 fn reversed(name: &str, signs: &[i32], joint: usize) -> String {
     let study = std::fs::read_to_string(repository(&format!("examples/{name}.toml"))).unwrap();
     let data = recordings().unwrap();

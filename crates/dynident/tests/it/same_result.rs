@@ -1,11 +1,11 @@
-//! One result, wherever it is read: any number of threads, the written URDF, the stored model.
+//! Equal results for any number of threads, from the written URDF and from the stored model.
 use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
 use dynident::dynamics::{Workspace, inverse_dynamics, torque_regressor};
 use dynident::model::load_robot;
 use dynident::{IdentificationOutcome, Silent, validate};
 use std::path::Path;
 
-/// A noisy study of a UR10 with two logs to fit to and two held out.
+/// A noisy study of a UR10 with two training and two held-out logs.
 fn study(folder: &Path) -> (Job, Truth) {
     let truth = Truth::near(&repository("robots/ur10.urdf"), 0.1, false);
     let mut random = Random(5);
@@ -54,7 +54,7 @@ fn the_written_urdf_gives_the_torques_of_the_base_parameters() {
     let path = folder.path().join("identified.urdf");
     std::fs::write(&path, found.urdf.as_ref().unwrap()).unwrap();
     let written = load_robot(&path).unwrap().model;
-    // All parameters with the dependent ones zero: another full set than the one in the URDF, of the same torques.
+    // All parameters with zero dependent ones: another full set than in the URDF, with the same torques.
     let mut parameters = vec![0.0; robot.base().all_columns().len()];
     for (&column, parameter) in robot.base().independent().iter().zip(&found.result.base_parameters) {
         parameters[column] = parameter.physical.unwrap();
@@ -69,7 +69,7 @@ fn the_written_urdf_gives_the_torques_of_the_base_parameters() {
         let largest = from_urdf.iter().fold(0.0_f64, |max, t| max.max(t.abs()));
         for row in 0..6 {
             let base: f64 = (0..60).map(|k| regressor[60 * row + k] * parameters[k]).sum();
-            // Regrouping and the numbers of the URDF are good to some 1e-12.
+            // Regrouping and the numbers of the URDF are accurate to about 1e-12.
             assert!((base - from_urdf[row]).abs() < 1e-9 * largest, "{base} {}", from_urdf[row]);
         }
     }
@@ -82,7 +82,8 @@ fn the_written_urdf_gives_the_torques_of_the_base_parameters() {
                 assert_eq!(joint.damping, Some(value("fv")));
                 assert_eq!(joint.friction, Some(value("fc")));
             }
-            // A description has one value for both: about their mean, the more nearly the less of the motion is slow.
+            // A robot description has one value for both directions: near their mean, depending on the share of slow
+            // motion.
             [forward, backward] => {
                 let (friction, mean) = (joint.friction.unwrap(), 0.5 * (forward + backward));
                 assert!((friction - mean).abs() < 0.05 * mean, "{friction} {forward} {backward}");

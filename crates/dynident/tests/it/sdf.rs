@@ -1,4 +1,4 @@
-//! A robot that is described by an SDF, from the log to the SDF with identified values.
+//! A robot described by an SDF, from the log to the SDF with identified values.
 
 use super::common::{Job, Motion, Random, Truth, header, repository, write_log};
 use dynident_model::{DescriptionFormat, load_robot};
@@ -21,7 +21,7 @@ fn identified(description: &std::path::Path) -> dynident::IdentificationOutcome 
     Job::new(folder.path(), &study).identify()
 }
 
-/// A UR5 with other masses: the written SDF has the bodies of the result, those of the URDF beside it.
+/// A UR5 with other masses: the written SDF and URDF have the bodies of the result.
 #[test]
 fn the_users_sdf_gets_the_identified_values() {
     let found = identified(&repository("golden/sdf/urdf_ur5.sdf"));
@@ -38,13 +38,13 @@ fn the_users_sdf_gets_the_identified_values() {
         assert_eq!(robot.format, format);
         for (read, found) in robot.model.inertials().iter().zip(&found.inertials) {
             let scale = found.0.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-            // About the centre of mass and back: some ten roundings.
+            // To the centre of mass and back: about ten roundings.
             assert!((0..10).all(|k| (read.0[k] - found.0[k]).abs() <= 1e-12 * scale), "{name}: {read:?} {found:?}");
         }
     }
 }
 
-/// A fixed link that says no mass counts as 1 kg: there is no SDF that has the result's bodies, and the reason is said.
+/// SDF assumes 1 kg for a fixed link without mass: no SDF has the result's bodies, and the reason is reported.
 #[test]
 fn a_fixed_link_of_unknown_mass_is_named() {
     let text = std::fs::read_to_string(repository("golden/sdf/urdf_ur5.sdf")).unwrap();
@@ -55,5 +55,5 @@ fn a_fixed_link_of_unknown_mass_is_named() {
     let found = identified(&path);
     assert!(found.sdf.is_none() && found.urdf.is_some());
     let reason = found.result.no_sdf.unwrap();
-    assert!(reason.contains("`tool` has no mass, which SDF takes for 1 kg"), "{reason}");
+    assert!(reason.contains("`tool` has no mass, for which SDF assumes 1 kg"), "{reason}");
 }

@@ -1,5 +1,4 @@
-//! DIDIM, CLIE and CLOE through a study: logs of a simulated closed loop with noise, and what is said when there is
-//! nothing to simulate.
+//! DIDIM, CLIE and CLOE in a study: logs of a simulated closed loop with noise, and messages for missing parts.
 use crate::common::{Job, Motion, assert_reads_back, repository};
 use core::ops::ControlFlow;
 use dynident::{Error, IdentificationOutcome, identify, simulate_study};
@@ -21,8 +20,7 @@ fn write_trajectory(path: &Path) {
     std::fs::write(path, text + "\n").unwrap();
 }
 
-/// A study that simulates and identifies the planar arm. Positions are read to 3e-4 rad, so that accelerations below 30
-/// Hz are mostly noise.
+/// A study of the planar arm. Positions have a noise of 3e-4 rad, so accelerations below 30 Hz are mostly noise.
 fn study(method: &str, controller: &str) -> String {
     format!(
         r#"
@@ -55,7 +53,7 @@ fn study(method: &str, controller: &str) -> String {
 
 const CONTROLLER: &str = "[controller]\nkind = \"joint-pd\"\nkp = [1500.0, 250.0]\nkd = [100.0, 8.0]";
 
-/// Writes trajectory and log; gives the true base parameters.
+/// Writes trajectory and log; returns the true base parameters.
 fn recorded(folder: &Path) -> Vec<f64> {
     write_trajectory(&folder.join("trajectory.csv"));
     let job = Job::new(folder, &study("weighted", CONTROLLER));
@@ -66,7 +64,7 @@ fn recorded(folder: &Path) -> Vec<f64> {
     run.file.base_parameters.iter().map(|parameter| parameter.value).collect()
 }
 
-/// Root mean square of the errors in units of `bars`.
+/// Root mean square error in units of `bars`.
 fn score(found: &IdentificationOutcome, truth: &[f64], bars: &[f64]) -> f64 {
     let squares = (0..truth.len()).map(|i| ((found.estimate.values[i] - truth[i]) / bars[i]).powi(2));
     (squares.sum::<f64>() / truth.len() as f64).sqrt()
@@ -85,8 +83,8 @@ fn all_three_find_the_truth_where_least_squares_is_biased() {
         let bars = &found.estimate.std;
         let (simulated, least_squares) = (score(&found, &truth, bars), score(&plain, &truth, bars));
         assert_eq!((&found.result.method.estimator[..], &found.result.method.status[..]), (method, "complete"));
-        // Twelve squares of mean one: their root mean square is below 1.8 by four deviations; the jackknife is
-        // cautious.
+        // Twelve squares with mean one: their root mean square is below 1.8 by four standard deviations; the jackknife
+        // is conservative.
         assert!(simulated < 1.8, "{method}: {simulated}");
         assert!(least_squares > 3.0 * simulated, "{method}: {least_squares} and {simulated}");
     }
@@ -105,7 +103,7 @@ fn what_cannot_be_simulated_is_said() {
     for method in ["didim", "clie", "cloe"] {
         let message = refused(folder.path(), &study(method, ""));
         assert!(message.contains("[controller]") && message.contains(method), "{message}");
-        // Sampled at 1 kHz, a damping of 80000 Nm s/rad blows up.
+        // Sampled at 1 kHz, damping of 80000 Nm s/rad is unstable.
         let wild = CONTROLLER.replace("kd = [100.0, 8.0]", "kd = 80000.0");
         let wild = study(method, &wild).replace("off_percent", "effort_limits = false\noff_percent");
         let message = refused(folder.path(), &wild);

@@ -1,4 +1,4 @@
-//! What recorders do to a log must not reach the model: outliers and held torque on a simulated UR10.
+//! Outliers and held torque must not affect the model of a simulated UR10.
 use crate::common::{Job, Motion, Random, Truth, header, plain, repository, write_log};
 use dynident::IdentificationOutcome;
 use dynident_testing::count;
@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 
 const RATE_HZ: f64 = 125.0;
 const SECONDS: f64 = 20.0;
-/// Noise of one sample of the torque: that of `examples/ur10_simulated`.
+/// Torque noise of one sample, as in `examples/ur10_simulated`.
 const SIGMA_NM: [f64; 6] = [1.2, 1.5, 0.8, 0.25, 0.25, 0.2];
 const SIGMA_RAD: f64 = 1e-5;
-/// How much worse the model of a spoilt log may be than that of the same log as it was: the goal of the issue.
-const MOST_WORSE: f64 = 1.15;
+/// Largest error ratio of the models of corrupt and clean logs.
+const MAX_ERROR_RATIO: f64 = 1.15;
 const JOINTS: usize = 6;
 const NAMES: [&str; JOINTS] =
     ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"];
@@ -21,7 +21,7 @@ fn arm() -> PathBuf {
     repository("robots/ur10.urdf")
 }
 
-/// The rows of a log with noise, and beside it `truth.csv`: another motion without noise.
+/// Rows of a log with noise; also writes `truth.csv`, another motion without noise.
 fn rows(folder: &Path, seed: u64) -> Vec<Vec<f64>> {
     let (truth, mut random) = (Truth::near(&arm(), 0.1, true), Random(seed));
     let (file, tested) = (folder.join("clean.csv"), folder.join("truth.csv"));
@@ -63,19 +63,18 @@ fn fitted(folder: &Path, rows: &[Vec<f64>]) -> IdentificationOutcome {
     Job::new(folder, &study).identify()
 }
 
-/// Error of the torque on the motion without noise: that of the model alone, in percent; the estimate's and the one of
-/// the model that is written.
+/// Torque error on the motion without noise, percent: of the estimate and of the written model.
 fn model_errors(found: &IdentificationOutcome) -> [f64; 2] {
     let validation = &found.result.validation[0];
     let written = validation.physical.as_ref().unwrap();
     [&validation.model, written].map(|report| report.relative_error_percent.unwrap())
 }
 
-/// What is spoilt: column, first row, and how many rows.
+/// Corrupt samples: column, first row, number of rows.
 type Spoilt = Vec<(usize, usize, usize)>;
 type Spoiler = fn(&mut [Vec<f64>], &mut Random) -> Spoilt;
 
-/// One sample in twenty off by twenty standard deviations of its noise, either way.
+/// One sample in twenty with an error of twenty standard deviations, either sign.
 fn outliers(rows: &mut [Vec<f64>], random: &mut Random) -> Spoilt {
     let mut spoilt = Vec::new();
     for (number, row) in rows.iter_mut().enumerate() {
@@ -102,7 +101,6 @@ fn held(rows: &mut [Vec<f64>], random: &mut Random) -> Spoilt {
     spoilt
 }
 
-/// The entry of `set_aside` for a joint.
 fn set_aside<'a>(found: &'a Value, joint: &str, reason: &str) -> Option<&'a Value> {
     let all = found["set_aside"].as_array().unwrap().iter();
     all.into_iter().find(|aside| aside["joint"] == joint && aside["reason"] == reason && aside["channel"] == "torque")
@@ -113,8 +111,8 @@ fn outliers_and_held_torque_do_not_reach_the_model() {
     let folder = tempfile::tempdir().unwrap();
     let spoilers: [(&str, Spoiler); 2] = [("outlier", outliers), ("held", held)];
     let experiments = count(2, 40);
-    // Sums of squares: of the clean log and of the spoilt ones; estimate and written model. With `keep_outliers` the
-    // roots are four to nine times as large.
+    // Sums of squares for clean and corrupt logs; estimate and written model. With `keep_outliers` the roots are four
+    // to nine times as large.
     let (mut clean_squares, mut squares) = ([0.0; 2], [[0.0; 2]; 2]);
     let add = |to: &mut [f64; 2], found: &IdentificationOutcome| {
         to.iter_mut().zip(model_errors(found)).for_each(|(sum, error)| *sum += error * error);
@@ -135,7 +133,7 @@ fn outliers_and_held_torque_do_not_reach_the_model() {
                 let own: Vec<_> = spoilt.iter().filter(|(of, ..)| *of == joint).collect();
                 let samples: usize = own.iter().map(|(.., samples)| samples).sum();
                 let told = set_aside(&import, name, reason).unwrap_or_else(|| panic!("{seed}, {reason}, {name}"));
-                // The channel, how many and when: at least three quarters of them, and none beside.
+                // Channel, number and time: at least three quarters of them, and no others.
                 let of = |key: &str| told[key].as_f64().unwrap();
                 let row = of("row") as usize;
                 assert!((0.75 * samples as f64..=samples as f64).contains(&of("samples")), "{seed} {samples} {told}");
@@ -152,13 +150,13 @@ fn outliers_and_held_torque_do_not_reach_the_model() {
     for ((reason, _), spoilt) in spoilers.iter().zip(squares) {
         for (spoilt, clean) in spoilt.map(root).into_iter().zip(clean_squares.map(root)) {
             println!("{reason}: {spoilt:.3} % instead of {clean:.3} %");
-            assert!(spoilt <= MOST_WORSE * clean, "{reason}: {spoilt} % instead of {clean} %");
+            assert!(spoilt <= MAX_ERROR_RATIO * clean, "{reason}: {spoilt} % instead of {clean} %");
         }
     }
 }
 
-/// A channel that ends at 80 % of what the shoulder's torque is: what is cut off is left out, and said, and the model
-/// is that of the rest. It was a warning alone.
+/// A channel that saturates at 80 % of the shoulder's torque: saturated samples are removed and reported, and the model
+/// uses the rest.
 #[test]
 fn saturated_torque_does_not_reach_the_model() {
     const LIFT: usize = 1;
@@ -176,14 +174,14 @@ fn saturated_torque_does_not_reach_the_model() {
     let import = serde_json::to_value(&found.result.logs[0].import).unwrap();
     let told = set_aside(&import, NAMES[LIFT], "saturated").unwrap();
     let samples = told["samples"].as_f64().unwrap();
-    // Where noise crosses the limit runs are shorter than ten samples and stay.
+    // Near the limit, noise makes runs shorter than ten samples, which remain.
     assert!((0.75 * cut as f64..=cut as f64).contains(&samples), "{cut} {told}");
     let findings = import["findings"].as_array().unwrap();
     let names = |finding: &&Value| finding["channel"] == format!("torque {}", NAMES[LIFT]);
     let own: Vec<&Value> = findings.iter().filter(names).collect();
     assert!(own.len() == 1 && own[0]["level"] == "warning", "{own:?}");
     for (found, reference) in model_errors(&found).into_iter().zip(model_errors(&reference)) {
-        // What is cut off is more than a few outliers: a tenth to a third of a joint's rows.
+        // A tenth to a third of a joint's rows is saturated.
         assert!(found < 1.5 * reference, "{found} for {reference}, {cut} samples cut off");
     }
 }

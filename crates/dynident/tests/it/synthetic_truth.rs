@@ -1,11 +1,11 @@
-//! Robots whose parameters are known are identified: noise-free logs give the truth back, however they are written.
+//! Robots with known parameters: noise-free logs give the truth, in every notation.
 use crate::common::{Job, Motion, Random, Truth, assert_recovered, format, header, plain, repository, write_log};
 use dynident::model::{Model, load_robot, read_dh, read_urdf};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Differences of order eight at 400 Hz and 0.65 Hz leave 1e-15 of truncation and 1e-10 of rounding; the condition
-/// number of these motions is below a thousand.
+/// Differences of order eight at 400 Hz and 0.65 Hz have a truncation error of 1e-15 and rounding of 1e-10; the
+/// condition number is below 1000.
 const NOISE_FREE: f64 = 1e-6;
 const CLOCK: (f64, f64) = (400.0, 12.0);
 
@@ -45,7 +45,7 @@ fn every_estimator_drive_inertia_and_the_butterworth_filter() {
     let truth = Truth::near(&repository("robots/ur10.urdf"), 0.2, true);
     one_log(folder.path(), &truth);
     for method in ["ordinary", "weighted", "generalized", "huber", "tukey", "noise-weighted", "instrumental"] {
-        // At a fortieth of the cut-off a two-way filter of order 4 passes all but 1e-13.
+        // At a fortieth of the cut-off a zero-phase filter of order 4 has a gain of 1 within 1e-13.
         let text = format!(
             "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log.csv\" }}]\ndrive.drive_inertia = true\nestimator.method = \"{method}\"\n\
              parallel_filter.factor = 4\n{}",
@@ -53,7 +53,7 @@ fn every_estimator_drive_inertia_and_the_butterworth_filter() {
             format(6)
                 .replace("method = \"central-differences\", order = 8", "method = \"butterworth\", cutoff_hz = 26.0")
         );
-        // The ends of the log, where the filter has to invent samples, are left out.
+        // Filter transients at the ends of the log are removed.
         let text = text.replace("[motion]", "[motion]\ntrim_s = 1.0");
         let job = Job::new(folder.path(), &text);
         assert_recovered(&job.identify(), &truth.base_values(&job.robot()), NOISE_FREE);
@@ -77,7 +77,7 @@ fn several_logs_and_a_held_out_one() {
     let found = job.identify();
     assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
     let held_out = &found.result.validation[0];
-    // Perfect parameters leave what the differences leave.
+    // Only errors of the differences remain.
     assert!(held_out.model.relative_error_percent.unwrap() < 1e-4, "{:?}", held_out.model.relative_error_percent);
     assert!(held_out.raw.relative_error_percent.unwrap() < 1e-4);
     assert!(held_out.prior.as_ref().unwrap().relative_error_percent.unwrap() > 1.0);
@@ -109,7 +109,7 @@ fn locked_joints_and_a_tilted_base() {
     let locked = ("wrist_3_joint".to_owned(), 0.7);
     let five =
         Truth { model: truth.model.locked(std::slice::from_ref(&locked)).unwrap(), drive: truth.drive[..5].to_vec() };
-    // The log is simulated with all six joints, the last of which stands still: nothing of the lumping enters.
+    // The log is simulated with six joints, the last of which rests, so lumping is not involved.
     let mut workspace = dynident::dynamics::Workspace::new(&truth.model);
     let (motion, mut text) = (Motion::new(5, 1), format!("{}\n", header(5)));
     for k in 0..(CLOCK.0 * CLOCK.1) as usize {
@@ -123,7 +123,7 @@ fn locked_joints_and_a_tilted_base() {
         writeln!(text, "{t},{}", row.join(",")).unwrap();
     }
     std::fs::write(folder.path().join("log.csv"), text).unwrap();
-    // The default of an arm with fewer joints is another one.
+    // The default step width depends on the number of joints.
     let width = truth.coulomb_width(0);
     let text = format!(
         "robot = {{ file = {:?}, lock = {{ wrist_3_joint = 0.7 }}, base_rpy_rad = [0.3, -0.4, 0.2] }}\n\
@@ -136,7 +136,7 @@ fn locked_joints_and_a_tilted_base() {
     let found = job.identify();
     assert_recovered(&found, &five.base_values(&job.robot()), NOISE_FREE);
     let urdf = found.urdf.unwrap();
-    assert!(urdf.contains("holds with the joints locked behind which stand: wrist_3_link"), "{urdf}");
+    assert!(urdf.contains("valid only with the joints locked that carry: wrist_3_link"), "{urdf}");
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn a_denavit_hartenberg_table() {
     let found = job.identify();
     assert_eq!(found.result.base_parameters.len(), 6 + 6);
     assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
-    // The table with the new values, and a URDF of it: the bodies of the result, to the rounding of frames.
+    // The table with the new values, and a URDF of it: equal to the bodies of the result within rounding.
     let table = read_dh(found.table.as_ref().unwrap()).unwrap();
     let urdf = read_urdf(found.urdf.as_ref().unwrap()).unwrap().model;
     for model in [&table, &urdf] {
@@ -171,8 +171,8 @@ fn a_denavit_hartenberg_table() {
 fn motor_side_in_degrees_with_gears_currents_and_a_coupled_wrist() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
     let (gear, gain) = ([101.0, 101.0, 101.0, -54.0, 54.0, 54.0], [0.13, 0.12, 0.1, 0.09, 0.08, 0.07]);
-    // Motor velocities M q': the last motor also turns with joint 5. Power is the same on both sides: joint torques are
-    // Mᵀ times motor torques.
+    // Motor velocities M q': the last motor also turns with joint 5. Power is invariant, so joint torques are Mᵀ times
+    // motor torques.
     let motor_side = |q: &[f64], tau: &[f64]| -> Vec<f64> {
         let mut angle: Vec<f64> = (0..6).map(|j| gear[j] * q[j]).collect();
         angle[5] += 20.0 * q[4];
@@ -211,7 +211,7 @@ fn motor_side_in_degrees_with_gears_currents_and_a_coupled_wrist() {
 fn a_reversed_sign_is_found_and_fixed() {
     let folder = tempfile::tempdir().unwrap();
     let mut truth = Truth::near(&repository("robots/ur10.urdf"), 0.05, false);
-    // Little friction, so that the description's own torque resembles the log's.
+    // Little friction, so that the nominal torque resembles the log's.
     truth.drive.iter_mut().flatten().for_each(|value| *value *= 0.1);
     let reversed = |q: &[f64], tau: &[f64]| -> Vec<f64> { q.iter().copied().chain(tau.iter().map(|t| -t)).collect() };
     write_log(&folder.path().join("log.csv"), &truth, &Motion::new(6, 1), CLOCK, &header(6), reversed);
@@ -256,13 +256,13 @@ fn noise_widens_the_error_bars_by_as_much_as_it_moves_the_values() {
     let truth = truth.base_values(&job.robot());
     let scores: Vec<f64> =
         found.result.base_parameters.iter().zip(&truth).map(|(p, truth)| (p.value - truth) / p.std).collect();
-    // 54 scores from segments (a t distribution with tens of degrees of freedom): none beyond 6. Their mean
-    // square is one on average; its own deviation would be sqrt(2/54) = 0.2 for independent scores and is larger for
-    // these, which are correlated: 0.4 to 2.
+    // 54 scores from segments (a t distribution with tens of degrees of freedom): none beyond 6. The mean square is one
+    // on average; its standard deviation is sqrt(2/54) = 0.2 for independent scores and larger for these correlated
+    // ones: 0.4 to 2.
     let mean_square = scores.iter().map(|z| z * z).sum::<f64>() / scores.len() as f64;
     assert!(scores.iter().all(|z| z.abs() < 6.0), "{scores:?}");
     assert!((0.4..2.0).contains(&mean_square), "{mean_square} {scores:?}");
-    // The held-out residual is the noise: 4000 samples give a deviation to 1.1 %; five of these.
+    // The held-out residual is the noise: 4000 samples give 1.1 %; five of these.
     for (joint, sigma) in found.result.validation[0].model.joints.iter().zip(sigma) {
         assert!((joint.rmse_nm / sigma - 1.0).abs() < 0.055, "{} {} for {sigma}", joint.name, joint.rmse_nm);
     }

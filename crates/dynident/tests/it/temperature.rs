@@ -1,4 +1,4 @@
-//! Friction that changes with the temperature, through the whole job.
+//! Temperature-dependent friction in a study.
 use crate::common::{Job, Motion, Truth, format, header, repository};
 use dynident::dynamics::Workspace;
 use std::fmt::Write;
@@ -7,7 +7,7 @@ use std::path::Path;
 /// Nm s/(rad K) and Nm/K of each joint.
 const CHANGES: [[f64; 2]; 2] = [[-0.02, 0.01], [0.015, -0.012]];
 
-/// Joints that warm up from `from` °C by 20 K within a minute or so, the second one faster.
+/// Joints that warm up from `from` °C by 20 K within about a minute, the second one faster.
 fn temperature(t: f64, from: f64) -> [f64; 2] {
     [from + 20.0 * (1.0 - (-t / 40.0).exp()), from + 20.0 * (1.0 - (-t / 15.0).exp())]
 }
@@ -46,7 +46,7 @@ fn changes_with_the_temperature_come_back() {
     let truth = Truth::near(&robot, 0.3, false);
     warm_log(&folder.path().join("warm.csv"), &truth, 1, 22.0, 24.0);
     warm_log(&folder.path().join("test.csv"), &truth, 2, 35.0, 6.0);
-    // In the unit of the law, and in another one.
+    // In the unit of the law, and in another unit.
     for channel in [
         "temperature = { columns = \"T{1..2}\", unit = \"degC\" }",
         "temperature = { columns = [\"T1\", \"T2\"], scale = 0.5, offset = 10.0 }",
@@ -57,7 +57,7 @@ fn changes_with_the_temperature_come_back() {
         for (joint, [viscous, coulomb]) in found.result.joints.iter().zip(CHANGES) {
             for (symbol, expected) in [("fvT", viscous), ("fcT", coulomb)] {
                 let term = joint.terms.iter().find(|term| term.symbol.starts_with(symbol)).unwrap();
-                // Noise-free: as all other parameters, of order one hundredth here.
+                // Noise-free: the tolerance of all other parameters, which are of order 0.01 here.
                 assert!((term.value - half * expected).abs() < 1e-6, "{term:?} {expected}");
             }
         }
@@ -86,7 +86,7 @@ fn a_log_without_temperature_is_refused_and_a_constant_one_tells_nothing() {
         let said = dynident::Study::parse(&text, Path::new("study.toml")).unwrap_err().to_string();
         assert!(said.contains(words), "{said}");
     }
-    // At one temperature the change is friction itself: held at nothing, and said so.
+    // At constant temperature the change coincides with friction: it is fixed at zero and reported.
     let text = std::fs::read_to_string(folder.path().join("warm.csv")).unwrap();
     let lines = text.lines().enumerate().map(|(k, line)| {
         let fields: Vec<&str> = line.split(',').collect();

@@ -1,4 +1,4 @@
-//! The band of a held-out torque where the model does not tell the torque: at rest, and after the robot has changed.
+//! Band of a held-out torque that the model does not determine: at rest, and after a change of the robot.
 
 use crate::common::{Job, Motion, Random, Truth, format, header, plain, repository, write_log};
 use dynident::dynamics::Workspace;
@@ -23,7 +23,7 @@ fn noisy(random: &mut Random, q: &[f64], tau: &[f64]) -> Vec<f64> {
     plain(q, &noisy)
 }
 
-/// Two seconds of motion and two of rest in turns; at rest the drives hold any part of the Coulomb friction.
+/// Alternating 2 s of motion and 2 s of rest; at rest the drives hold any part of the Coulomb friction.
 fn write_stop_and_go(path: &Path, truth: &Truth, motion: &Motion, seed: u64) {
     let (rate_hz, seconds, turn_s) = (200.0, 40.0, 4.0);
     let (mut random, mut workspace) = (Random(seed), Workspace::new(&truth.model));
@@ -32,7 +32,7 @@ fn write_stop_and_go(path: &Path, truth: &Truth, motion: &Motion, seed: u64) {
     for k in 0..(rate_hz * seconds) as usize {
         let t = k as f64 / rate_hz;
         let (turns, within) = ((t / turn_s).floor(), t % turn_s);
-        // The way along the motion: at a speed that rises and falls once a turn, for one second each turn on average.
+        // Path coordinate with a varying speed, one second per turn on average.
         let w = core::f64::consts::TAU / (0.5 * turn_s);
         let rests = within >= 0.5 * turn_s;
         let (way, speed, change) = if rests {
@@ -59,8 +59,8 @@ fn write_stop_and_go(path: &Path, truth: &Truth, motion: &Motion, seed: u64) {
     std::fs::write(path, text + "\n").unwrap();
 }
 
-/// Positions do not tell what holds a joint at rest, up to its Coulomb friction: ten times the noise here, over half of
-/// the test.
+/// Positions do not determine the torque at rest within Coulomb friction: ten times the noise here, for more than half
+/// of the test.
 #[test]
 fn the_band_holds_at_rest() {
     let folder = tempfile::tempdir().unwrap();
@@ -74,14 +74,14 @@ fn the_band_holds_at_rest() {
     let found = identified(folder.path());
     assert_eq!(found.result.torque_band.len(), 2);
     for (band, residuals) in found.result.torque_band.iter().zip(&found.result.validation[0].residuals) {
-        // The test is what it says: the torque at rest is not what the model says.
+        // At rest the torque differs from the prediction.
         let regimes = residuals.regimes.unwrap();
         assert!(regimes.at_rest.rmse_nm.unwrap() > 3.0 * NOISE_NM, "{regimes:?}");
         assert!(regimes.at_rest.samples > 3000, "{regimes:?}");
-        // 95 % of half the rows and nearly all of the other half, which friction's limit holds.
+        // 95 % of half of the rows and nearly all of the others, which the friction limit covers.
         assert!(band.coverage_percent > 95.0, "{band:?}");
-        // No wider than needed: in the rows at rest by the friction up to 0.1 rad/s of a usual arm, which is 0.15 rad/s
-        // of this one at most, and by a tenth of chance elsewhere.
+        // Not wider than needed: at rest by the friction up to 0.1 rad/s of a 1.2 m arm, which is at most 0.15 rad/s
+        // here, and by 10 % elsewhere.
         let [_, viscous, coulomb, _] = truth.drive[usize::from(band.joint == "joint2")];
         let share = regimes.at_rest.samples as f64 / found.result.validation[0].model.samples as f64;
         let widest = share * (coulomb + 0.15 * viscous) + 1.1 * 1.96 * NOISE_NM;
@@ -89,7 +89,7 @@ fn the_band_holds_at_rest() {
     }
 }
 
-/// Training that drifts says so in its own blocks of time: what lies ahead is told less well than what was fitted.
+/// Drift within the training logs widens the band of future torque.
 #[test]
 fn the_band_is_wider_after_training_that_drifts() {
     let folder = tempfile::tempdir().unwrap();
@@ -105,13 +105,13 @@ fn the_band_is_wider_after_training_that_drifts() {
             });
         }
         let found = identified(folder.path());
-        // Against the band of the training's own residuals.
+        // Compared with the band from training residuals.
         let bands = found.result.torque_band.iter().zip(&found.result.training.joints);
         bands.map(|(band, fit)| band.half_width_nm / (1.96 * fit.rmse_nm)).collect::<Vec<f64>>()
     });
     for joint in 0..2 {
         let [steady, drifting] = [widths[0][joint], widths[1][joint]];
-        // Reversals add the friction of the few rows in which a joint counts as at rest.
+        // Reversals add friction in the few rows near rest.
         assert!((0.95..1.2).contains(&steady) && drifting > 1.1 * steady, "{widths:?}");
     }
 }

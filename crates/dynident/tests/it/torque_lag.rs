@@ -1,11 +1,11 @@
-//! The lag of torque behind motion: found, with error bars that hold the truth.
+//! The lag of torque behind motion: estimated with valid error bars.
 use crate::common::{Job, Motion, Random, Truth, format, header, repository};
 use dynident::dynamics::Workspace;
 use dynident::identification::examination::LagKind;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Writes a log whose torque of joint j comes `lags_s[j]` late, with AR(1) noise of deviation `sigma` and lag-1
+/// Writes a log with torque delayed by `lags_s[j]` at joint j, with AR(1) noise of standard deviation `sigma` and lag-1
 /// correlation 0.9.
 fn late_log(path: &Path, truth: &Truth, motion: &Motion, clock: (f64, f64), lags_s: &[f64], noise: (f64, &mut Random)) {
     let dof = lags_s.len();
@@ -33,7 +33,6 @@ fn study(robot: &str, dof: usize, more: &str) -> String {
     format!("robot.file = {robot:?}\ndrive.friction = \"stated\"\n{more}\n{}", format(dof))
 }
 
-/// The study with a lag that it states.
 fn stating(study: &str, lag_s: Option<f64>) -> String {
     let key = |lag_s| format!("[motion]\ntorque_lag_s = {lag_s:?}");
     lag_s.map_or_else(|| study.to_owned(), |lag_s| study.replace("[motion]", &key(lag_s)))
@@ -44,7 +43,7 @@ fn without_noise_the_lag_is_exact_though_the_model_absorbed_it() {
     let folder = tempfile::tempdir().unwrap();
     let description = repository("robots/ur10.urdf");
     let truth = Truth::near(&description, 0.2, true);
-    // Far below a sample (2.5 ms), between samples, early, none, and many samples.
+    // Far below a sample (2.5 ms), between samples, negative, zero, and many samples.
     let lags = [0.4e-3, 6.1e-3, -3.3e-3, 0.0, 31.7e-3, 8.0e-3];
     let noise = (0.0, &mut Random(1));
     late_log(&folder.path().join("log.csv"), &truth, &Motion::new(6, 1), (400.0, 12.0), &lags, noise);
@@ -56,8 +55,8 @@ fn without_noise_the_lag_is_exact_though_the_model_absorbed_it() {
         let result = job.identify().result;
         for (joint, lag) in result.joints.iter().zip(lags) {
             let found = joint.torque_lag.unwrap();
-            // Torque between samples by quintics: where Coulomb's step (0.02 rad/s wide, passed in some 10 ms) is
-            // sampled every 2.5 ms they err; a hundredth of a sample.
+            // Torque between samples from quintics: the Coulomb step (0.02 rad/s wide, passed in about 10 ms) is
+            // sampled every 2.5 ms, which gives errors of 0.01 samples.
             assert!((found.lag_s - lag).abs() < 2.5e-5, "{}: {found:?} for {lag}, {filter}", joint.name);
         }
         assert_eq!(result.logs[0].torque_lag_s.len(), 6);
@@ -84,7 +83,7 @@ fn intervals_hold_the_lag() {
             intervals += 1;
         }
     }
-    // 120 intervals give 95 % to 2 %: three of these below; the jackknife is slightly cautious.
+    // 120 intervals give 95 % within 2 %: three of these below; the jackknife is slightly conservative.
     let share = inside as f64 / intervals as f64;
     assert!((0.89..=1.0).contains(&share), "{share}");
 }
@@ -106,8 +105,8 @@ fn a_log_that_stands_still_tells_no_lag() {
     assert_eq!(result.logs[0].torque_lag_s, [None, None]);
 }
 
-/// A lag of the recorder, 0 to 8 ms at every joint: how many of the parameters' 95 % intervals hold the truth, and by
-/// how many of their standard deviations the parameters are off.
+/// A recorder lag of 0 to 8 ms at every joint: coverage of the parameters' 95 % intervals, and their errors in standard
+/// deviations.
 fn coverage_with_a_lag(runs: u64, stated: Option<f64>) -> (f64, f64) {
     let folder = tempfile::tempdir().unwrap();
     let description = repository("examples/robots/paper_2r.toml");
@@ -136,10 +135,10 @@ fn coverage_with_a_lag(runs: u64, stated: Option<f64>) -> (f64, f64) {
 #[test]
 fn parameters_are_right_whatever_the_lag() {
     let (inside, off) = coverage_with_a_lag(24, None);
-    // 240 intervals of some ten parameters, whose errors go together in a run: 95 % to 3 %, two of these below. The
-    // jackknife is slightly cautious.
+    // 240 intervals of about ten parameters with correlated errors per run: 95 % within 3 %, two of these below. The
+    // jackknife is slightly conservative.
     assert!(inside >= 0.89 && (0.6..=1.3).contains(&off), "{inside}, {off}");
-    // The same as logged: what the lag does where it stays in.
+    // The same as logged: the effect of an uncompensated lag.
     let (inside, off) = coverage_with_a_lag(8, Some(0.0));
     assert!(inside < 0.85 && off > 1.5, "{inside}, {off}");
 }
@@ -164,14 +163,14 @@ fn a_lag_is_taken_off_found_or_stated_and_the_test_does_the_same() {
         std::fs::write(&path, serde_json::to_string(&outcome.result).unwrap()).unwrap();
         let again = dynident::validate(&path, &job.study, &job.path, &Job::options(1)).unwrap();
         let percent = outcome.result.validation[0].model.relative_error_percent.unwrap();
-        // What the result says was taken off is taken off again: the same figure to rounding of the file.
+        // `validate` compensates the stored lag: the same figure within rounding of the file.
         assert!((again.validation[0].model.relative_error_percent.unwrap() - percent).abs() < 1e-6 * percent);
         (outcome.result, percent)
     };
     let (found, with_lag_found) = held_out(None);
     assert_eq!(found.method.torque_lag.kind, LagKind::Common);
     for lag_s in &found.method.torque_lag.lag_s {
-        // Its own bar is some hundredth of a millisecond; a tenth is far below a sample (4 ms).
+        // Its error bar is about 0.01 ms; the tolerance of 0.1 ms is far below a sample (4 ms).
         assert!((lag_s - 5.0e-3).abs() < 1.0e-4, "{lag_s}");
     }
     let common = found.method.torque_lag.common.unwrap();
@@ -180,7 +179,7 @@ fn a_lag_is_taken_off_found_or_stated_and_the_test_does_the_same() {
     assert_eq!((stated.method.torque_lag.kind, stated.method.torque_lag.lag_s.len()), (LagKind::Stated, 6));
     let (as_logged, with_lag_left) = held_out(Some(0.0));
     assert!(as_logged.joints.iter().any(|joint| joint.torque_lag.is_some_and(|lag| lag.matters)));
-    // Found or stated makes no difference; left in it makes much.
+    // Estimated and stated lag are equivalent; an uncompensated lag is not.
     assert!((with_lag_found / with_lag_stated - 1.0).abs() < 0.02, "{with_lag_found} {with_lag_stated}");
     assert!(with_lag_left > 1.5 * with_lag_found, "{with_lag_left} {with_lag_found}");
 }

@@ -1,4 +1,4 @@
-//! The example log that the repository holds is what its generator makes, and a motion that a UR10 may do.
+//! The stored example log equals the output of its generator, and respects the limits of a UR10.
 
 #[path = "../../examples/simulate_ur10.rs"]
 #[allow(
@@ -37,8 +37,8 @@ fn the_generator_makes_the_committed_logs() {
         for (row, (a, b)) in made.iter().zip(&committed).enumerate() {
             assert_eq!(a.len(), b.len(), "{name}, row {row}");
             for (column, (a, b)) in a.iter().zip(b).enumerate() {
-                // Sine, logarithm and the fused multiply-add differ in the last bit between robots, which may turn the
-                // last of seven digits; an encoder value may then fall on the neighbouring step of 4.8e-5 rad.
+                // Sine, logarithm and fused multiply-add differ in the last bit between computers, which may change the
+                // last of seven digits or the encoder step of 4.8e-5 rad.
                 let tolerance = 1e-6 * b.abs() + if (1..=6).contains(&column) { 4.9e-5 } else { 1e-9 };
                 assert!((a - b).abs() <= tolerance, "{name}, row {row}, column {column}: {a} and {b}");
             }
@@ -73,7 +73,7 @@ fn the_motions_keep_the_robots_limits_and_start_and_end_at_rest() {
         assert_eq!(rows.len(), 2501);
         for (joint, limits) in model.joints().iter().map(|joint| joint.limits).enumerate() {
             let (q, tau) = (1 + joint, 7 + joint);
-            // Over ten samples the encoder's steps and noise (1e-4 rad) make an error of velocity of 1e-3 rad/s.
+            // Over ten samples, encoder steps and noise (1e-4 rad) give a velocity error of 1e-3 rad/s.
             let speed = |from: usize| (rows[from + 10][q] - rows[from][q]).abs() * RATE_HZ / 10.0;
             for from in 0..rows.len() - 10 {
                 assert!(speed(from) < limits.velocity.unwrap());
@@ -133,8 +133,8 @@ fn identification_finds_the_truth_within_its_error_bars() {
     let expressions: Vec<&String> = result.base_parameters.iter().map(|parameter| &parameter.expression).collect();
     assert_eq!(expressions, base.expressions().iter().collect::<Vec<_>>());
     for (parameter, truth) in result.base_parameters.iter().zip(&truth) {
-        // 64 segments for 58 parameters give a standard deviation to a factor of 1.5 or so; beyond that, 3.3 of the
-        // true ones.
+        // 64 segments for 58 parameters give a standard deviation within a factor of about 1.5; in addition 3.3 true
+        // standard deviations.
         let error = (parameter.value - truth).abs() / parameter.std;
         assert!(
             error < 5.0,
@@ -145,9 +145,9 @@ fn identification_finds_the_truth_within_its_error_bars() {
     }
     let held_out = &result.validation[0];
     let error_percent = held_out.model.relative_error_percent.unwrap();
-    // The torque noise that passes the filter is some 2 % of the torque; errors of the parameters are well below it.
+    // Filtered torque noise is about 2 % of the torque; parameter errors are well below it.
     assert!(error_percent < 3.0, "{error_percent} %");
-    // Inertials off by a tenth, and no friction at all.
+    // Inertials are off by 10 %, without friction.
     let prior_percent = held_out.prior.as_ref().unwrap().relative_error_percent.unwrap();
     assert!(prior_percent > 10.0, "{prior_percent} %");
 }

@@ -1,11 +1,11 @@
-//! The keys of a study that corrections of its mistakes change.
+//! Study keys that correct a mistake.
 
 use crate::result::StudyChange;
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{KeyChange, Mistake, StudyKeys};
 
-/// The keys for the first training log; none in a study without.
+/// Keys for the first training log; `None` for a study without training logs.
 pub(super) fn keys_of_study(study: &Study, robot: &StudyRobot) -> Option<StudyKeys> {
     let index = *study.logs_of_role(Role::Identify).first()?;
     let keys = keys_of_log(study, robot, index);
@@ -13,7 +13,7 @@ pub(super) fn keys_of_study(study: &Study, robot: &StudyRobot) -> Option<StudyKe
     Some(if is_common { StudyKeys { table: "format".to_owned(), ..keys } } else { keys })
 }
 
-/// The keys for log number `index` alone: those of the other logs stay as they are.
+/// Keys for log number `index` only; the other logs keep theirs.
 pub(super) fn keys_of_log(study: &Study, robot: &StudyRobot, index: usize) -> StudyKeys {
     let place = |joint: usize| {
         let name = &robot.model().joints()[joint].name;
@@ -29,7 +29,7 @@ pub(super) fn keys_of_log(study: &Study, robot: &StudyRobot, index: usize) -> St
     }
 }
 
-/// What to write in place of a mistake; nothing without keys.
+/// Key changes that correct a mistake; empty without keys.
 pub(super) fn changes(mistake: &Mistake, keys: Option<&StudyKeys>) -> Vec<StudyChange> {
     let changes = keys.map_or_else(Vec::new, |keys| mistake.changes(keys));
     changes.into_iter().map(StudyChange::from).collect()

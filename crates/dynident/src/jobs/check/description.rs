@@ -1,27 +1,23 @@
 //! Findings on the robot description: its units, its masses, or another robot.
 
-use super::wording::finding;
+use super::wording::{FindingContext, finding};
 use crate::result::{CheckFinding, StudyChange};
-use dynident_identification::diagnosis::{DescriptionFit, StudyKeys, WrongMass};
+use dynident_identification::diagnosis::{DescriptionFit, WrongMass};
 use dynident_model::{AuditFinding, Model, audit};
 use dynident_recording::Level;
 
-/// Times the least factor of a joint's torque that the largest may be where they are one unit, or the currents of
-/// drives: motor constants times gear ratios of an arm lie within five of each other.
-const MOST_SPREAD: f64 = 10.0;
-
-/// Torques of another size than the description's bodies make: another unit of theirs, or of the masses.
+/// Torque magnitude that differs from the robot description's: another torque unit, or another unit of the masses.
 pub(super) fn torque_unit(
     fit: &DescriptionFit,
     far: &[usize],
     model: &Model,
-    joints: &[String],
-    keys: Option<&StudyKeys>,
+    words: &FindingContext<'_>,
 ) -> CheckFinding {
+    let FindingContext { joints, keys, thresholds } = *words;
     let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], fit.scale[joint].unwrap_or(1.0)));
     let factors = factors.collect::<Vec<_>>().join(", ");
     let common = fit.common_unit();
-    // Where the description is absurd by itself it is not the torques' unit.
+    // An implausible robot description is reported instead of the torque unit.
     let audited = audit(model);
     let of_inertia = |found: &&AuditFinding| found.check == "inertia-too-large";
     let most_have_it = 2 * audited.iter().filter(of_inertia).count() > model.bodies().len();
@@ -30,30 +26,29 @@ pub(super) fn torque_unit(
     if let Some(absurd) = absurd {
         return finding(
             "description",
-            format!("the description is in other units: {} {}", absurd.place, absurd.message),
+            format!("the robot description uses other units: {} {}", absurd.place, absurd.message),
             format!(
-                "its bodies would need other torques than the log has, times {factors}: `dynident inspect` says more; where the \
-                 description is right the torque is not in Nm (N)"
+                "the log's torques differ from those of its bodies by the factors {factors}: run `dynident inspect`; if the \
+                 description is correct, the torque is not in Nm (N)"
             ),
         );
     }
     let scales = || far.iter().filter_map(|&joint| fit.scale[joint]);
     let (least, most) = (scales().fold(f64::INFINITY, f64::min), scales().fold(0.0, f64::max));
-    // One joint of several may have a body that is described badly.
+    // A single joint may have one wrong body.
     let is_alone = far.len() == 1 && joints.len() > 1;
-    if is_alone || (common.is_none() && most > MOST_SPREAD * least) {
+    if is_alone || (common.is_none() && most > thresholds.max_factor_ratio * least) {
         return finding(
             "description",
-            "the description's masses are not this robot's, or the torques of some joints are in another unit"
-                .to_owned(),
+            "wrong masses in the robot description, or torques of some joints in another unit".to_owned(),
             format!(
-                "its bodies, friction aside, would need other torques than the log has, times {factors}: {}; compare the \
-                 masses of the bodies beyond these joints with the maker's data (`dynident inspect`), and the units of \
+                "without friction, the log's torques differ from those of its bodies by the factors {factors}: {}; compare the \
+                 masses of the bodies beyond these joints with the manufacturer's data (`dynident inspect`), and the units of \
                  their columns",
                 if is_alone {
-                    "one joint, which says nothing of the others' unit"
+                    "only one joint, so the unit is not common to all"
                 } else {
-                    "too far apart for one unit or for the currents of drives"
+                    "the spread is too large for one unit or for motor currents"
                 }
             ),
         );
@@ -62,8 +57,8 @@ pub(super) fn torque_unit(
         "unit",
         common.map_or_else(|| "the torque is not in Nm (N)".to_owned(), |(name, _)| format!("the torque is in {name}")),
         format!(
-            "by the description's bodies, friction aside, a unit of it is worth this many Nm (N): {factors}; for currents that is \
-             motor constant times gear ratio, which the maker's data say better, or write `gains = \"unknown\"` under [estimator] and \
+            "Nm (N) per logged unit, from the bodies of the robot description without friction: {factors}; for currents this is \
+             motor constant times gear ratio (prefer the manufacturer's data), or set `gains = \"unknown\"` under [drive] and \
              add a log with a known payload"
         ),
     );
@@ -79,16 +74,16 @@ pub(super) fn torque_unit(
     found
 }
 
-/// One body of the description is far too heavy or too light: no fit of base parameters suffers, but the nominal ones.
+/// One body of the robot description is far too heavy or too light. Base parameters are not affected, nominal ones are.
 pub(super) fn wrong_mass(wrong: &WrongMass, model: &Model) -> CheckFinding {
     let name = model.bodies()[wrong.body].name();
     let mass_kg = model.inertials()[wrong.body].mass_kg();
     let found = finding(
         "description",
-        format!("the description's mass of `{name}` is not this robot's"),
+        format!("wrong mass of `{name}` in the robot description"),
         format!(
-            "with {:.4} kg in place of {mass_kg:.4} (times {:.3}, its inertia as well) its bodies leave {:.0} % of the torques, friction \
-             aside, where no units of the torques explain more; correct the description: `dynident inspect` looks at it, too",
+            "with {:.4} kg instead of {mass_kg:.4} kg (factor {:.3}, also for its inertia) the unexplained torque is {:.0} %, without friction, \
+             and no other torque unit explains more; correct the robot description (see `dynident inspect`)",
             wrong.factor * mass_kg,
             wrong.factor,
             100.0 * wrong.left
@@ -97,17 +92,17 @@ pub(super) fn wrong_mass(wrong: &WrongMass, model: &Model) -> CheckFinding {
     CheckFinding { level: Level::Warning, ..found }
 }
 
-/// The description's bodies explain no joint, and other bodies do.
+/// The bodies of the robot description explain no joint's torque, while other consistent bodies do.
 pub(super) fn another_robot(fit: &DescriptionFit, joints: &[String]) -> CheckFinding {
     let best = fit.best_explained().map_or_else(String::new, |(joint, share)| {
-        format!("{:.0} % of that of `{}`, which is the most of all joints", 100.0 * share, joints[joint])
+        format!("{:.0} % of the torque of `{}`, the largest share of all joints", 100.0 * share, joints[joint])
     });
     finding(
         "description",
-        "the description is of another robot, or its masses are placeholders".to_owned(),
+        "the robot description is of another robot, or its masses are placeholders".to_owned(),
         format!(
-            "friction and drive inertia aside, its bodies, scaled as suits each joint, explain {best}, where bodies that could be explain nearly all of it: \
-             compare `file` under [robot] with the robot; where nobody knows a body, leave its <inertial> element out"
+            "without friction and drive inertia, its bodies, scaled per joint, explain {best}; other physically consistent bodies explain nearly all of it: \
+             compare `file` under [robot] with the robot; if the inertia of a body is unknown, remove its <inertial> element"
         ),
     )
 }

@@ -1,42 +1,36 @@
-//! The findings of a diagnosis in words.
+//! Converts a diagnosis to findings.
 
+use super::CheckSettings;
 use super::changes::{changes, keys_of_log, keys_of_study};
 use super::description::{another_robot, torque_unit, wrong_mass};
-use super::wording::{alternative, evidence, finding};
+use super::wording::{FindingContext, alternative, evidence, finding};
 use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{
     BeyondLimit, Channels, DescriptionFit, Diagnosis, DuplicateChannel, HeldOutHypothesis, Hypothesis,
-    InconsistentTorque, Mistake, Search, StudyKeys, UnmodelledPayload,
+    InconsistentTorque, Mistake, Search, UnmodelledPayload,
 };
 use dynident_identification::{GainChoice, IdentificationSettings};
 use dynident_model::Model;
 use dynident_recording::Level;
 use dynident_recording::log::OneOrMany;
 
-/// Largest unexplained share of all torque for an explanation; most real sets have 0.1.
-const MAX_LEFT: f64 = 0.3;
-/// The same as a share of that of the study as written, for noisy logs.
-const MAX_LEFT_RATIO: f64 = 0.75;
-/// Unexplained share of all torque from which even the best hypothesis explains nothing. A correct study of a slow
-/// pendulum's noisy log has 0.81.
-const NOTHING_EXPLAINED: f64 = 0.92;
-
-/// The findings of a diagnosis, with the evidence of the study as written and of the best hypothesis.
+/// Findings of a diagnosis, with the scores of the study as written and of the best hypothesis.
 pub(super) fn study_check(
     study: &Study,
     robot: &StudyRobot,
     settings: &IdentificationSettings,
     diagnosis: &Diagnosis,
+    thresholds: &CheckSettings,
 ) -> StudyCheck {
     let joints = robot.parametric.joint_names();
     let keys = keys_of_study(study, robot);
-    let words = Words { joints: &joints, keys: keys.as_ref() };
+    let words = FindingContext { joints: &joints, keys: keys.as_ref(), thresholds };
     let search = &diagnosis.search;
     let spoilt = spoilt_columns(diagnosis, &joints);
     let is_spoilt = !spoilt.is_empty();
-    let best = explanation(search).filter(|_| !is_spoilt);
+    let best = explanation(search, thresholds).filter(|_| !is_spoilt);
     let foreign = diagnosis.description_fit.as_ref().filter(|fit| fit.is_of_another_robot());
     let mut findings = if is_spoilt {
         spoilt
@@ -52,7 +46,7 @@ pub(super) fn study_check(
     if let Some(fit) = bodies.filter(|_| has_stated_gains && foreign.is_none() && !is_spoilt) {
         findings.extend(words.wrong_scale(fit, robot.model()));
     }
-    // The runs of an iteration are not logs of its study: the iteration itself judges its held-out runs.
+    // The iteration judges its held-out runs; they are not logs of the study.
     let payloads = diagnosis.unmodelled_payloads.iter().filter(|payload| payload.log < study.log.len());
     findings.extend(payloads.map(|payload| unmodelled_payload(study, robot, payload)));
     let held_out = diagnosis.held_out.iter().filter(|found| found.log < study.log.len());
@@ -63,7 +57,7 @@ pub(super) fn study_check(
     if findings.is_empty() && diagnosis.is_unexplained() {
         findings.push(unexplained(search, &joints));
     }
-    if findings.is_empty() && search.believed().left_of_all > NOTHING_EXPLAINED {
+    if findings.is_empty() && search.believed().left_of_all > thresholds.min_unrelated_share {
         findings.push(unrelated_torques(search));
     }
     StudyCheck {
@@ -75,24 +69,17 @@ pub(super) fn study_check(
     }
 }
 
-/// The best hypothesis, if it explains the logs. A hypothesis that explains nothing is no advice.
-fn explanation(search: &Search) -> Option<&Hypothesis> {
-    let most_left = MAX_LEFT.max(MAX_LEFT_RATIO * search.as_written.left_of_all);
+/// The best hypothesis, if it explains the logs well enough.
+fn explanation<'a>(search: &'a Search, thresholds: &CheckSettings) -> Option<&'a Hypothesis> {
+    let most_left =
+        thresholds.max_unexplained_share.max(thresholds.max_unexplained_ratio * search.as_written.left_of_all);
     search.best.as_ref().filter(|best| !best.is_unexplained() && best.left_of_all < most_left)
 }
 
-/// Names of the joints and keys of the study, to which findings refer.
-#[derive(Clone, Copy)]
-struct Words<'a> {
-    joints: &'a [String],
-    keys: Option<&'a StudyKeys>,
-}
-
-impl Words<'_> {
-    /// One finding for each mistake of the best hypothesis; the last one names the hypotheses that the logs do not
-    /// distinguish from it.
+impl FindingContext<'_> {
+    /// One finding per mistake of the best hypothesis; the last finding lists indistinguishable hypotheses.
     fn mistakes(self, search: &Search, best: &Hypothesis) -> Vec<CheckFinding> {
-        let Self { joints, keys } = self;
+        let Self { joints, keys, .. } = self;
         let one = |(number, mistake): (usize, &Mistake)| {
             let evidence = evidence(mistake, &search.as_written, best, joints);
             let mut found = finding(mistake.key(), mistake.sentence(joints), evidence);
@@ -106,10 +93,10 @@ impl Words<'_> {
         best.mistakes.iter().enumerate().map(one).collect()
     }
 
-    /// A description of another robot. The mistakes of the best hypothesis are alternatives: some mistake always
-    /// explains a little more.
+    /// Finding for the robot description of another robot. The best hypothesis is listed only as an alternative,
+    /// because some mistake always explains slightly more.
     fn another_robot(self, fit: &DescriptionFit, best: Option<&Hypothesis>) -> CheckFinding {
-        let Self { joints, keys } = self;
+        let Self { joints, keys, .. } = self;
         let mut found = another_robot(fit, joints);
         let others = best.iter().flat_map(|best| best.mistakes.iter().map(|mistake| (mistake, best.factors_alike)));
         let text = |(mistake, range): (&Mistake, Option<[f64; 2]>)| {
@@ -120,25 +107,23 @@ impl Words<'_> {
         found
     }
 
-    /// A wrong mass of one body, or torques in another unit.
     fn wrong_scale(self, fit: &DescriptionFit, model: &Model) -> Option<CheckFinding> {
         let far = fit.joints_in_another_unit();
         match &fit.wrong_mass {
             Some(wrong) => Some(wrong_mass(wrong, model)),
-            None => (!far.is_empty()).then(|| torque_unit(fit, &far, model, self.joints, self.keys)),
+            None => (!far.is_empty()).then(|| torque_unit(fit, &far, model, &self)),
         }
     }
 }
 
-/// No hypothesis explains the logs: the description is wrong, or several mistakes were made.
 fn unexplained(search: &Search, joints: &[String]) -> CheckFinding {
     let left = &search.as_written.left;
     let worst = (0..left.len()).max_by(|&a, &b| left[a].total_cmp(&left[b])).unwrap_or(0);
     finding(
         "description",
-        "the description is not this robot's, or several mistakes were made at once".to_owned(),
+        "the robot description is of another robot, or the study has several mistakes".to_owned(),
         format!(
-            "none of {} readings of the logs (signs, orders, zeros, mounting) makes a robot of this description that explains them: {:.0} % of the torque of `{}` is left; \
+            "none of {} hypotheses (signs, orders, zeros, mounting) explains the logs with this robot: {:.0} % of the torque of `{}` is unexplained; \
              check link lengths, axes and the kind of the robot",
             search.tried,
             100.0 * left[worst],
@@ -147,21 +132,19 @@ fn unexplained(search: &Search, joints: &[String]) -> CheckFinding {
     )
 }
 
-/// The best hypothesis explains almost no torque.
 fn unrelated_torques(search: &Search) -> CheckFinding {
     finding(
         "torque",
-        "the torques have nothing to do with the motion".to_owned(),
+        "the torques are unrelated to the motion".to_owned(),
         format!(
-            "the best of {} readings of the logs leaves {:.0} % of all torque: compare `columns` under torque and position with the log's \
-             header, and whether both are of one run; commanded positions, or positions that are held for many rows, are no measured ones",
+            "with the best of {} hypotheses, {:.0} % of all torque is unexplained: compare `columns` under torque and position with the log's \
+             header, check that both come from one run, and do not use commanded positions or positions that repeat for many rows",
             search.tried,
             100.0 * search.believed().left_of_all
         ),
     )
 }
 
-/// What the study alone says of units.
 pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSettings) -> Option<CheckFinding> {
     let index = *study.logs_of_role(Role::Identify).first()?;
     let torque = study.format_of(index).torque;
@@ -170,21 +153,21 @@ pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSet
         OneOrMany::Many(units) => units.clone(),
     };
     let odd = units.into_iter().find(|unit| matches!(unit.as_str(), "A" | "mA" | "%" | "raw"))?;
-    let is_told = torque.scale.is_some() || torque.matrix.is_some() || torque.inverse_matrix.is_some();
-    if is_told || settings.gains == GainChoice::Unknown {
+    let is_scaled = torque.scale.is_some() || torque.matrix.is_some() || torque.inverse_matrix.is_some();
+    if is_scaled || settings.gains == GainChoice::Unknown {
         return None;
     }
     let mut found = finding(
         "unit",
-        format!("the torque columns are in {odd} and no `scale` says what that is in Nm (N)"),
-        "every mass would come out in units of the motor constant".to_owned(),
+        format!("the torque columns are in {odd}, and their `scale` to Nm (N) is missing"),
+        "every mass estimate would be multiplied by the unknown motor constant".to_owned(),
     );
     let line = "scale = [...]   # motor constant times gear ratio, Nm per unit, one for each joint".to_owned();
     found.write.push(StudyChange { table: "format.torque".to_owned(), line });
     Some(found)
 }
 
-/// Columns that are not what the study states: with these, no hypothesis about the others means much.
+/// Torque columns that do not contain what the study states; other hypotheses are not reliable then.
 fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding> {
     let same = |same: &DuplicateChannel| {
         let [a, b] = same.joints.map(|joint| &joints[joint]);
@@ -196,8 +179,8 @@ fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding>
         };
         finding(
             "order",
-            format!("{what} one and the same column"),
-            "sample by sample one is a multiple of the other, and no robot explains both: compare `columns` with the log's header".to_owned(),
+            format!("{what} the same column"),
+            "one is a multiple of the other in all samples, and no robot explains both: compare `columns` with the log's header".to_owned(),
         )
     };
     let mut found: Vec<CheckFinding> = diagnosis.duplicate_channels.iter().map(same).collect();
@@ -205,13 +188,12 @@ fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding>
         found.push(finding(
             "sign",
             "the torques are magnitudes: their signs are lost".to_owned(),
-            "no joint's torque is ever negative though all joints turn to and fro, and no robot explains them: log currents or torques with their signs".to_owned(),
+            "all joints move back and forth but no torque is ever negative, and no robot explains this: log currents or torques with their signs".to_owned(),
         ));
     }
     found
 }
 
-/// A mistake of one held-out log that the training logs do not have.
 fn of_held_out_log(
     study: &Study,
     robot: &StudyRobot,
@@ -224,7 +206,7 @@ fn of_held_out_log(
         mistake.key(),
         format!("in log `{}` {}", study.log_name(*log), mistake.sentence(joints)),
         format!(
-            "the training logs' parameters leave {left_as_written:.3} Nm of its torque as the study is written and {left_without:.3} Nm so corrected; the training logs have no such mistake"
+            "rms residual with the parameters of the training logs: {left_as_written:.3} Nm as written, {left_without:.3} Nm with the correction; the training logs do not have this mistake"
         ),
     );
     found.write = changes(mistake, Some(&keys));
@@ -232,16 +214,16 @@ fn of_held_out_log(
     found
 }
 
-/// A torque that the robot which explains the others does not explain.
+/// A joint torque that does not fit the robot identified from all joints.
 fn inconsistent_torque(torque: &InconsistentTorque, joints: &[String]) -> CheckFinding {
     let name = &joints[torque.joint];
     if torque.is_motionless() {
         return finding(
             "torque",
-            format!("the torque of joint `{name}` has nothing to do with its motion"),
+            format!("the torque of joint `{name}` is unrelated to its motion"),
             format!(
-                "parameters of its own leave {:.0} % of it, and where the other joints' bodies should be felt it says nothing: \
-                 compare `columns` under torque with the log's header, and whether the channel lives",
+                "{:.0} % of it is unexplained even with separate parameters for this joint, and it does not show the other joints' bodies: \
+                 compare `columns` under torque with the log's header, and check whether the channel is dead",
                 100.0 * torque.alone
             ),
         );
@@ -253,11 +235,11 @@ fn inconsistent_torque(torque: &InconsistentTorque, joints: &[String]) -> CheckF
     };
     let found = finding(
         "torque",
-        format!("the torque of joint `{name}` does not belong to one robot with that of the others"),
+        format!("the torque of joint `{name}` is inconsistent with the other joints"),
         format!(
-            "one robot for all joints leaves {:.1} % of it, parameters of its own {:.1} %{}: {:.1} times as much, where logs that \
-             fit together have at most 2.3; compare whether all its columns are of one clock and one run, its gain, and the \
-             lengths and axes of the description",
+            "unexplained with one robot for all joints {:.1} %, with separate parameters for this joint {:.1} %{}: a ratio of {:.1}, \
+             at most 2.3 in consistent logs; check that all its columns come from one clock and one run, its gain, and the \
+             lengths and axes of the robot description",
             100.0 * torque.left,
             100.0 * torque.alone,
             noise,
@@ -268,10 +250,10 @@ fn inconsistent_torque(torque: &InconsistentTorque, joints: &[String]) -> CheckF
 }
 
 fn behind_limit(beyond: &BeyondLimit, joints: &[String]) -> CheckFinding {
-    let what = format!("the {} of joint `{}` goes beyond its limit", beyond.quantity, joints[beyond.joint]);
+    let what = format!("the {} of joint `{}` exceeds its limit", beyond.quantity, joints[beyond.joint]);
     let evidence = format!(
-        "it reaches {:.4} where the description allows {:.4}: compare `unit`, `scale` (gear ratio: positions of the motor side?), `sign` and `offset` under position, \
-         or the limits of the description",
+        "it reaches {:.4}, but the limit is {:.4}: compare `unit`, `scale` (gear ratio: positions of the motor side?), `sign` and `offset` under position, \
+         or the limits in the robot description",
         beyond.value, beyond.limit
     );
     finding("limits", what, evidence)
@@ -289,7 +271,7 @@ fn unmodelled_payload(study: &Study, robot: &StudyRobot, payload: &UnmodelledPay
             format!("the training logs carry a payload that log `{log}` does not")
         },
         format!(
-            "with {:.2} ± {:.2} kg at [{x:.3}, {y:.3}, {z:.3}] m of `{link}` what is left of its torque falls from {:.3} to {:.3} Nm",
+            "with {:.2} ± {:.2} kg at [{x:.3}, {y:.3}, {z:.3}] m in `{link}` its rms residual falls from {:.3} to {:.3} Nm",
             payload.mass_kg.abs(),
             1.96 * payload.mass_std_kg,
             payload.left_without,

@@ -1,9 +1,12 @@
-//! Before any fit is believed: do study, robot and logs fit together?
+//! `check`: tests whether study, robot and logs are consistent, before any fit.
 
 mod changes;
 mod description;
 mod findings;
+mod settings;
 mod wording;
+
+pub use settings::CheckSettings;
 
 use crate::error::Error;
 use crate::inputs::InputFiles;
@@ -17,21 +20,32 @@ use dynident_recording::{ImportReport, Level};
 use findings::{currents_without_scale, study_check};
 use std::path::Path;
 
-/// Equations for each parameter below which a fit proves nothing, and below which it may: ten seconds of slow motion
-/// have 2.7, and a fit to them, at a cut-off of its own, is a model as often as not.
-const EQUATIONS_PER_PARAMETER: [usize; 2] = [2, 3];
+/// Audit checks for physically inconsistent bodies, independent of the robot's size.
+const INCONSISTENT_BODY_CHECKS: [&str; 4] =
+    ["mass-not-positive", "inertia-not-positive", "triangle-inequality", "inertia-too-large"];
+/// Largest inertia about the centre of mass of a point mass, relative to mass times squared arm length.
+const MAX_POINT_INERTIA_RATIO: f64 = 1e-12;
 
-/// Checks of the audit that tell of bodies which cannot be, whatever the robot's size.
-const NO_BODY: [&str; 4] = ["mass-not-positive", "inertia-not-positive", "triangle-inequality", "inertia-too-large"];
-/// Inertia about the centre of mass, as a share of mass times the arm's length squared, that is none.
-const NO_INERTIA: f64 = 1e-12;
-
-/// Examines a study against its robot and its logs: channels, clock and samples of every log, and which hypothesis
-/// about the training logs a consistent robot explains best. Nothing is written.
+/// Examines a study against its robot and its logs: channels, clock and samples of every log, and the hypothesis about
+/// the training logs that a consistent robot explains best. Writes no files.
 ///
 /// # Errors
-/// Everything that [`Error`] names: files, study, logs. Mistakes that are found are no error.
+/// Every variant of [`Error`] for files, study and logs. Mistakes that are found are not errors.
 pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<CheckFile, Error> {
+    check_with(study, study_path, options, &CheckSettings::default())
+}
+
+/// As [`check()`], with other thresholds.
+///
+/// # Errors
+/// As [`check()`], and invalid thresholds.
+pub fn check_with(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    thresholds: &CheckSettings,
+) -> Result<CheckFile, Error> {
+    thresholds.validate().map_err(Error::section(study_path, "check"))?;
     study.require_training_log(study_path)?;
     let files = InputFiles::of(study, study_path, options.data.as_deref());
     let folders = Folders::new(study, study_path, options.data.as_deref());
@@ -45,31 +59,31 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
 
     let mut check = examined.diagnosis.as_ref().map_or_else(
         || StudyCheck { joints: robot.parametric.joint_names(), ..StudyCheck::default() },
-        |diagnosis| diagnosis_check(study, &robot, &task.settings, diagnosis),
+        |diagnosis| diagnosis_check(study, &robot, &task.settings, diagnosis, thresholds),
     );
     for (index, import) in &examined.imports {
         check.findings.extend(import.iter().flat_map(|import| import_findings(&study.log_name(*index), import)));
     }
-    // A dead channel makes every description look like that of another robot, and strays every torque that needs it.
+    // A dead channel distorts the test of the robot description and of every torque that needs it.
     if check.findings.iter().any(|finding| finding.kind == "log" && finding.level == Level::Problem) {
         check.findings.retain(|finding| !["description", "torque"].contains(&&finding.kind[..]));
     }
     check.findings.extend(impossible_bodies(&robot));
-    check.findings.extend(too_few_rows(&examined));
+    check.findings.extend(too_few_rows(&examined, thresholds));
     check.findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
     Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study_name(study, study_path), check })
 }
 
-/// Rows that are few for so many parameters.
-fn too_few_rows(examined: &StudyExamination) -> Option<CheckFinding> {
-    let [too_few, few] = EQUATIONS_PER_PARAMETER.map(|each| examined.rows < each * examined.parameters);
+fn too_few_rows(examined: &StudyExamination, thresholds: &CheckSettings) -> Option<CheckFinding> {
+    let [too_few, few] =
+        [thresholds.too_few_equations, thresholds.few_equations].map(|each| examined.rows < each * examined.parameters);
     let what = if too_few { "are too short" } else { "are short" };
     few.then(|| CheckFinding {
         level: if too_few { Level::Problem } else { Level::Warning },
         kind: "rows".to_owned(),
         what: format!("the training logs {what} for this robot"),
         evidence: format!(
-            "{} equations for {} parameters after filter and decimation: a fit {} follow the noise; record for longer, or give more logs the role \"identify\"",
+            "{} equations for {} parameters after filter and decimation: a fit {} follow the noise; record longer logs, or give more logs the role \"identify\"",
             examined.rows,
             examined.parameters,
             if too_few { "would" } else { "may" }
@@ -79,28 +93,29 @@ fn too_few_rows(examined: &StudyExamination) -> Option<CheckFinding> {
     })
 }
 
-/// Bodies of the description that cannot be, as one warning: no fit of base parameters suffers, but a body that no
-/// base parameter tells of stays as the description has it.
+/// One warning for all physically inconsistent bodies of the robot description. Base parameters are not affected, but
+/// unidentifiable bodies keep the values of the robot description.
 fn impossible_bodies(robot: &StudyRobot) -> Option<CheckFinding> {
     let model = &robot.robot.model;
-    let of_audit =
-        audit(model).into_iter().filter(|found| found.level != AuditLevel::Info && NO_BODY.contains(&found.check));
+    let of_audit = audit(model)
+        .into_iter()
+        .filter(|found| found.level != AuditLevel::Info && INCONSISTENT_BODY_CHECKS.contains(&found.check));
     let mut doubtful: Vec<String> =
         of_audit.map(|AuditFinding { place, message, .. }| format!("{place} of the description: {message}")).collect();
     let points = model.bodies().iter().filter(|body| body.prior().is_some_and(|body| is_a_point(&body, model.arm_m())));
-    doubtful.extend(points.map(|body| format!("body {} of the description: has a mass and no inertia", body.name())));
+    doubtful.extend(points.map(|body| format!("body {} of the description: has a mass but no inertia", body.name())));
     let first = doubtful.first()?;
     let more = match doubtful.len() {
         1 => String::new(),
-        all => format!(" and {} more like it", all - 1),
+        all => format!(" and {} more", all - 1),
     };
     Some(CheckFinding {
         level: Level::Warning,
         kind: "description".to_owned(),
         what: format!("{first}{more}"),
         evidence: format!(
-            "`dynident inspect {}` lists all, and with --fix it corrects those that one slip explains; what no log tells stays \
-             as the description has it",
+            "`dynident inspect {}` lists all, and corrects simple errors with --fix; parameters that the logs do not determine stay \
+             as in the robot description",
             robot.robot.path.display()
         ),
         write: Vec::new(),
@@ -108,21 +123,22 @@ fn impossible_bodies(robot: &StudyRobot) -> Option<CheckFinding> {
     })
 }
 
-/// Whether a body has a mass and no inertia about its centre of mass, on an arm of this length.
+/// Whether a body is a point mass, for an arm of this length.
 fn is_a_point(body: &InertialParameters, arm_m: f64) -> bool {
     let trace = |inertia: Mat3| (0..3).map(|k| inertia.0[k][k].abs()).sum::<f64>();
-    let none = NO_INERTIA * body.mass_kg() * arm_m.powi(2);
-    body.mass_kg() > 0.0 && body.inertia_at_com().is_some_and(|inertia| trace(inertia) <= none)
+    let most = MAX_POINT_INERTIA_RATIO * body.mass_kg() * arm_m.powi(2);
+    body.mass_kg() > 0.0 && body.inertia_at_com().is_some_and(|inertia| trace(inertia) <= most)
 }
 
-/// A diagnosis as findings, with what the study alone says of units.
+/// Findings of a diagnosis and of the stated torque units.
 pub(super) fn diagnosis_check(
     study: &Study,
     robot: &StudyRobot,
     settings: &IdentificationSettings,
     diagnosis: &Diagnosis,
+    thresholds: &CheckSettings,
 ) -> StudyCheck {
-    let mut check = study_check(study, robot, settings, diagnosis);
+    let mut check = study_check(study, robot, settings, diagnosis, thresholds);
     if let Some(currents) = currents_without_scale(study, settings) {
         check.findings.retain(|finding| finding.kind != "unit" || finding.what.contains("position"));
         check.findings.insert(0, currents);
@@ -130,7 +146,6 @@ pub(super) fn diagnosis_check(
     check
 }
 
-/// What the import found in one log, where it matters.
 fn import_findings(log: &str, import: &ImportReport) -> Vec<CheckFinding> {
     let matters = import.findings.iter().filter(|finding| finding.level != Level::Info);
     let one = |finding: &dynident_recording::Finding| CheckFinding {

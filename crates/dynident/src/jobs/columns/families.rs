@@ -1,27 +1,25 @@
-//! Columns of one quantity, one for each joint.
+//! Columns of one quantity, one per joint.
 
 use super::meaning::{JointKey, Meaning, Source, meaning, of_file};
 use super::quantity::Quantity;
 use crate::result::LogContents;
 use std::path::Path;
 
-/// Columns of one quantity, one for each joint of `joints`.
+/// Columns of one quantity, one per joint of `joints`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::jobs) struct Family {
-    /// Number of the recording among those that were given.
     pub(in crate::jobs) file: usize,
-    /// Number of the group (topic) within it.
+    /// Index of the group (topic) within it.
     pub(in crate::jobs) group: usize,
     pub(in crate::jobs) quantity: Quantity,
     pub(in crate::jobs) source: Source,
     pub(in crate::jobs) unit: Option<&'static str>,
-    /// What says the quantity: the columns' names or the file's.
+    /// Whether the file name, not the column names, gives the quantity.
     pub(in crate::jobs) by_file_name: bool,
     /// Joint and name of each column: in the order of the robot's joints, of the numbers, or of the file.
     pub(in crate::jobs) columns: Vec<(JointKey, String)>,
 }
 
-/// Every family of columns in the recordings.
 pub(in crate::jobs) fn families<'a>(
     logs: impl IntoIterator<Item = (&'a Path, &'a LogContents)>,
     joints: &[String],
@@ -32,7 +30,7 @@ pub(in crate::jobs) fn families<'a>(
         let (of_file, source_of_file) = of_file(&stem);
         for channel in contents.channels.iter().filter(|channel| channel.samples > 0) {
             let Meaning { quantity, joint, source, unit, stem } = meaning(&channel.name, joints);
-            // Columns that are named by joints alone: the file says what they are.
+            // The file name gives the quantity of columns that are named by joints alone.
             let bare = quantity.is_none() && matches!(joint, JointKey::Joint(_)) && stem.is_empty();
             let (quantity, source) = if bare { (of_file, source_of_file) } else { (quantity, source) };
             let Some(quantity) = quantity else { continue };
@@ -43,7 +41,7 @@ pub(in crate::jobs) fn families<'a>(
             };
             let column = (joint.clone(), channel.name.clone());
             match found.iter_mut().find(same) {
-                // One column for each joint: of several the first.
+                // Of several columns for one joint, the first is used.
                 Some((_, family)) if family.columns.iter().any(|(key, _)| *key == joint) => {}
                 Some((_, family)) => family.columns.push(column),
                 None => found.push((
@@ -63,7 +61,7 @@ pub(in crate::jobs) fn families<'a>(
     }
     let mut found: Vec<Family> = found.into_iter().map(|(_, family)| family).collect();
     for family in &mut found {
-        // As the robot has its joints, or by number; other names keep the order of the file.
+        // In the order of the robot's joints, or by number; other names keep the order of the file.
         family.columns.sort_by_key(|(key, _)| match key {
             JointKey::Joint(place) => *place as u64,
             JointKey::Number(number) => *number,
@@ -73,7 +71,8 @@ pub(in crate::jobs) fn families<'a>(
     found
 }
 
-/// The family with this quantity that says most: of the most joints, nearest to the joint; of equals the first.
+/// The best family with this quantity: measured before commanded, then the largest number of joints; the first of
+/// equals.
 pub(in crate::jobs) fn best(
     families: &[Family],
     quantity: Quantity,

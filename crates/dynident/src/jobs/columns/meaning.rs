@@ -1,42 +1,40 @@
-//! What the name of a column says: which quantity of which joint, in which unit, and whether it was measured.
+//! Quantity, joint, unit and source of a column from its name.
 
 use super::quantity::Quantity;
 use super::units::ended;
 
-/// Which joint a name means.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::jobs) enum JointKey {
-    /// A joint of the robot, by its place.
+    /// Index of a joint of the robot.
     Joint(usize),
-    /// A name in brackets that is none of the robot's joints: `effort[elbow]`, in small letters.
+    /// A name in brackets that is not a joint of the robot: `effort[elbow]`, in lower case.
     Name(String),
-    /// A number of the name: `q3`, `tau[0]`.
+    /// A number in the name: `q3`, `tau[0]`.
     Number(u64),
-    /// None: the only one of its kind.
+    /// No joint: the only column of its kind.
     Alone,
 }
 
-/// How near to the joint a quantity was taken; the higher the better.
+/// Source of a quantity; a higher value is preferred.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(in crate::jobs) enum Source {
-    /// What was asked for.
+    /// A commanded value.
     Commanded,
-    /// The name does not say.
-    Unsaid,
-    /// The name says that it was measured.
+    /// Not stated in the name.
+    Unstated,
+    /// A measured value, according to the name.
     Measured,
 }
 
-/// What a name says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::jobs) struct Meaning {
-    /// None where only the name of the file can tell.
+    /// `None` if only the name of the file could give it.
     pub(in crate::jobs) quantity: Option<Quantity>,
     pub(in crate::jobs) joint: JointKey,
     pub(in crate::jobs) source: Source,
-    /// As a study writes it.
+    /// In the notation of a study.
     pub(in crate::jobs) unit: Option<&'static str>,
-    /// The name without its joint: what the columns of all joints share.
+    /// The name without its joint, equal for the columns of all joints.
     pub(in crate::jobs) stem: String,
 }
 
@@ -51,17 +49,17 @@ const CURRENTS: [&str; 5] = ["current", "currents", "curr", "amps", "ampere"];
 const COMMANDED: [&str; 11] =
     ["cmd", "command", "commanded", "desired", "des", "target", "ref", "reference", "setpoint", "goal", "d"];
 const MEASURED: [&str; 6] = ["actual", "measured", "meas", "msr", "sensor", "sensed"];
-/// What is neither measured nor commanded: estimates of something else.
+/// Quantities that are neither measured nor commanded: estimates and others.
 const OTHERS: [&str; 16] = [
     "ext", "external", "error", "err", "residual", "model", "gravity", "grav", "friction", "window", "tcp", "ee",
     "wrench", "limit", "std", "temp",
 ];
 
-/// What `name` says of a robot with these joints.
+/// Interprets `name` for a robot with these joints.
 pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
-    let lower = broken_up(name).to_lowercase();
+    let lower = split_camel_case(name).to_lowercase();
     let (rest, joint) = without_joint(&lower, joints);
-    // Units of joints alone: a motor's torque `tau_m` is in no metres.
+    // Only units of joint quantities: the suffix of a motor torque `tau_m` is not metres.
     let with_unit = |text: &str| ended(text).filter(|(_, _, quantity)| quantity.is_some());
     let (rest, unit) = match with_unit(&rest) {
         Some((rest, unit, quantity)) => (rest, Some((unit, quantity))),
@@ -75,21 +73,21 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
     };
     let has = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
     let by_words = [
-        // The longer derivative first: `ddq` is no `q`.
+        // The longest derivative first, because `ddq` contains `q`.
         (&ACCELERATIONS[..], Quantity::Acceleration),
         (&VELOCITIES[..], Quantity::Velocity),
         (&CURRENTS[..], Quantity::Current),
         (&TORQUES[..], Quantity::Torque),
         (&POSITIONS[..], Quantity::Position),
     ];
-    let said = by_words.into_iter().find(|(list, _)| has(list)).map(|(_, quantity)| quantity);
-    // A torque in amperes is a current; every other unit says what the words leave open.
+    let by_word = by_words.into_iter().find(|(list, _)| has(list)).map(|(_, quantity)| quantity);
+    // A torque in amperes is a current; any other unit is used only if the words give no quantity.
     let of_unit = unit.and_then(|(_, quantity)| quantity);
-    let quantity = match (said, of_unit) {
+    let quantity = match (by_word, of_unit) {
         (Some(Quantity::Torque), Some(Quantity::Current)) => Some(Quantity::Current),
-        // One letter is not enough to make a current of a column.
+        // A suffix of one letter is not sufficient for a current.
         (None, Some(Quantity::Current)) if unit.is_some_and(|(unit, _)| unit == "A") => None,
-        (said, of_unit) => said.or(of_unit),
+        (by_word, of_unit) => by_word.or(of_unit),
     };
     let is_of_unit = |(_, of_unit): &(&str, Option<Quantity>)| *of_unit == quantity;
     let source = if has(&COMMANDED) {
@@ -97,7 +95,7 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
     } else if has(&MEASURED) {
         Source::Measured
     } else {
-        Source::Unsaid
+        Source::Unstated
     };
     Meaning {
         quantity: quantity.filter(|_| !has(&OTHERS)),
@@ -110,14 +108,14 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
     }
 }
 
-/// The quantity and the source that the name of a file says, where columns are named by joints alone.
+/// Quantity and source from a file name, for columns that are named by joints alone.
 pub(in crate::jobs) fn of_file(stem: &str) -> (Option<Quantity>, Source) {
     let found = meaning(stem, &[]);
     (found.quantity, found.source)
 }
 
-/// `actualQ` as `actual_Q`.
-fn broken_up(name: &str) -> String {
+/// Splits camel case: `actualQ` becomes `actual_Q`.
+fn split_camel_case(name: &str) -> String {
     let mut text = String::with_capacity(name.len() + 4);
     let mut before = ' ';
     for c in name.chars() {
@@ -130,7 +128,7 @@ fn broken_up(name: &str) -> String {
     text
 }
 
-/// The name without that of a robot's joint, the longest that stands in it by itself, and the joint's place.
+/// Removes the longest joint name that is a separate word; returns the rest and the joint's index.
 fn without_joint(lower: &str, joints: &[String]) -> (String, Option<usize>) {
     let mut found: Option<(usize, usize, usize)> = None;
     for (place, joint) in joints.iter().enumerate() {
@@ -138,11 +136,11 @@ fn without_joint(lower: &str, joints: &[String]) -> (String, Option<usize>) {
         if joint.is_empty() {
             continue;
         }
-        let by_itself = |at: &usize| {
+        let is_separate_word = |at: &usize| {
             let is_part = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
             !is_part(lower[..*at].chars().next_back()) && !is_part(lower[*at + joint.len()..].chars().next())
         };
-        let at = lower.match_indices(&joint).map(|(at, _)| at).find(by_itself);
+        let at = lower.match_indices(&joint).map(|(at, _)| at).find(is_separate_word);
         if let Some(at) = at
             && found.is_none_or(|(_, length, _)| length < joint.len())
         {
@@ -155,7 +153,6 @@ fn without_joint(lower: &str, joints: &[String]) -> (String, Option<usize>) {
     }
 }
 
-/// The name without a word in brackets at its end, and that word.
 fn without_brackets(lower: &str) -> (String, Option<String>) {
     let found = lower.strip_suffix(']').and_then(|name| name.rsplit_once('['));
     match found.filter(|(_, inside)| inside.chars().any(char::is_alphabetic)) {
@@ -164,7 +161,6 @@ fn without_brackets(lower: &str) -> (String, Option<String>) {
     }
 }
 
-/// Words and numbers, in order.
 fn words(text: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut before: Option<bool> = None;
@@ -194,18 +190,18 @@ mod tests {
     fn names_of_real_recordings_are_understood() {
         let joints = ["arm_1_joint", "arm_11_joint", "shoulder_pan_joint", "Joint_1"].map(str::to_owned);
         let cases = [
-            ("q1_rad", Some(Position), Number(1), Source::Unsaid, Some("rad")),
-            ("qd1_rad_s", Some(Velocity), Number(1), Source::Unsaid, Some("rad/s")),
-            ("qdd7_rad_s2", Some(Acceleration), Number(7), Source::Unsaid, Some("rad/s^2")),
-            ("tau3_Nm", Some(Torque), Number(3), Source::Unsaid, Some("N m")),
+            ("q1_rad", Some(Position), Number(1), Source::Unstated, Some("rad")),
+            ("qd1_rad_s", Some(Velocity), Number(1), Source::Unstated, Some("rad/s")),
+            ("qdd7_rad_s2", Some(Acceleration), Number(7), Source::Unstated, Some("rad/s^2")),
+            ("tau3_Nm", Some(Torque), Number(3), Source::Unstated, Some("N m")),
             ("tau_cmd1_Nm", Some(Torque), Number(1), Source::Commanded, Some("N m")),
-            ("tau_ext_0", None, Number(0), Source::Unsaid, None),
-            ("q_6", Some(Position), Number(6), Source::Unsaid, None),
-            ("- arm_1_joint_effort", Some(Torque), Joint(0), Source::Unsaid, None),
-            ("- arm_11_joint_position", Some(Position), Joint(1), Source::Unsaid, None),
-            ("/joint_states.position[shoulder_pan_joint]", Some(Position), Joint(2), Source::Unsaid, None),
-            ("/joint_states.effort[shoulder_pan_joint]", Some(Torque), Joint(2), Source::Unsaid, None),
-            ("/joint_states.effort[Other]", Some(Torque), Name("other".to_owned()), Source::Unsaid, None),
+            ("tau_ext_0", None, Number(0), Source::Unstated, None),
+            ("q_6", Some(Position), Number(6), Source::Unstated, None),
+            ("- arm_1_joint_effort", Some(Torque), Joint(0), Source::Unstated, None),
+            ("- arm_11_joint_position", Some(Position), Joint(1), Source::Unstated, None),
+            ("/joint_states.position[shoulder_pan_joint]", Some(Position), Joint(2), Source::Unstated, None),
+            ("/joint_states.effort[shoulder_pan_joint]", Some(Torque), Joint(2), Source::Unstated, None),
+            ("/joint_states.effort[Other]", Some(Torque), Name("other".to_owned()), Source::Unstated, None),
             ("actual_q_0", Some(Position), Number(0), Source::Measured, None),
             ("actual_qd_0", Some(Velocity), Number(0), Source::Measured, None),
             ("target_q_0", Some(Position), Number(0), Source::Commanded, None),
@@ -213,12 +209,12 @@ mod tests {
             ("actual_current_window_5", None, Number(5), Source::Measured, None),
             ("actual_momentum", None, Alone, Source::Measured, None),
             ("target_moment_2", Some(Torque), Number(2), Source::Commanded, None),
-            ("tau_J[3]", Some(Torque), Number(3), Source::Unsaid, None),
+            ("tau_J[3]", Some(Torque), Number(3), Source::Unstated, None),
             ("tau_J_d[3]", Some(Torque), Number(3), Source::Commanded, None),
             ("q_d[3]", Some(Position), Number(3), Source::Commanded, None),
             ("msrJointTorque2", Some(Torque), Number(2), Source::Measured, None),
-            ("position_deg[4]", Some(Position), Number(4), Source::Unsaid, Some("deg")),
-            ("joint_1", None, Joint(3), Source::Unsaid, None),
+            ("position_deg[4]", Some(Position), Number(4), Source::Unstated, Some("deg")),
+            ("joint_1", None, Joint(3), Source::Unstated, None),
         ];
         for (name, quantity, joint, source, unit) in cases {
             let found = meaning(name, &joints);
@@ -231,7 +227,6 @@ mod tests {
         assert_eq!(of_file("curr_data").0, Some(Current));
         assert_eq!(of_file("pos_read_data").0, Some(Position));
         assert_eq!(of_file("measurements").0, None);
-        // Columns of one kind have one stem.
         assert_eq!(meaning("tau_1", &joints).stem, meaning("tau_2", &joints).stem);
         assert_ne!(meaning("tau_ext_1", &joints).stem, meaning("tau_1", &joints).stem);
     }

@@ -1,4 +1,4 @@
-//! What the names of a recording's columns say: quantities, joints, units, times.
+//! Interprets the names of a recording's columns: quantities, joints, units, times.
 
 mod families;
 mod meaning;

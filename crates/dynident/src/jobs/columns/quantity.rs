@@ -1,12 +1,11 @@
-//! The quantity that a column holds.
+//! Quantity of a column.
 
-/// The quantity of a joint that a column contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::jobs) enum Quantity {
     Position,
     Velocity,
     Acceleration,
     Torque,
-    /// A motor's current: a torque once its constant and gear ratio are known.
+    /// Motor current: proportional to torque by motor constant and gear ratio.
     Current,
 }

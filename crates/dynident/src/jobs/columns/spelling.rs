@@ -1,10 +1,10 @@
-//! Names of columns as a study writes them.
+//! Column names in the notation of a study.
 
 use dynident_text::quoted;
 
-/// A name as what its siblings share and what is its own: `q12_rad` is `q{}_rad` and `12`, `tau[elbow]` is `tau[]` and
-/// `elbow`.
-fn parted(name: &str) -> (String, String) {
+/// Splits a name into a common pattern and its own part: `q12_rad` into `q{}_rad` and `12`, `tau[elbow]` into `tau[]`
+/// and `elbow`.
+fn split_pattern(name: &str) -> (String, String) {
     if let Some((open, close)) = name.rfind('[').zip(name.rfind(']')).filter(|(open, close)| open < close) {
         return (format!("{}[{}", &name[..open], &name[close..]), name[open + 1..close].to_owned());
     }
@@ -15,7 +15,6 @@ fn parted(name: &str) -> (String, String) {
     (format!("{}{{}}{}", &name[..begin], &name[end + 1..]), name[begin..=end].to_owned())
 }
 
-/// Columns as a study writes them: a pattern with a range, or their names.
 fn columns(members: &[(String, String)]) -> String {
     let numbers: Option<Vec<u64>> = members.iter().map(|(own, _)| own.parse().ok()).collect();
     if let Some(numbers) = numbers
@@ -30,14 +29,14 @@ fn columns(members: &[(String, String)]) -> String {
             return quoted(&format!("{before}{{{}..{}}}{after}", first.0, last.0));
         }
     }
-    // A number is an index only where columns have no names; in quotes it is a name.
+    // A bare number would be a column index, so names are quoted.
     let names: Vec<String> = members.iter().map(|(_, name)| quoted(name)).collect();
     format!("[{}]", names.join(", "))
 }
 
-/// Names of columns as a study writes them: a pattern where they differ by a running number, else a list.
+/// Column names in study notation: a pattern if they differ by consecutive numbers, otherwise a list.
 pub(in crate::jobs) fn column_list(names: &[String]) -> String {
-    let parts: Vec<(String, String)> = names.iter().map(|name| parted(name)).collect();
+    let parts: Vec<(String, String)> = names.iter().map(|name| split_pattern(name)).collect();
     if parts.windows(2).all(|pair| pair[0].0 == pair[1].0) {
         let members: Vec<_> = parts.into_iter().zip(names).map(|((_, own), name)| (own, name.clone())).collect();
         return columns(&members);
@@ -51,9 +50,9 @@ mod tests {
 
     #[test]
     fn running_numbers_become_a_pattern() {
-        assert_eq!(parted("q12_rad"), ("q{}_rad".to_owned(), "12".to_owned()));
-        assert_eq!(parted("/a.position[elbow]"), ("/a.position[]".to_owned(), "elbow".to_owned()));
-        assert_eq!(parted("7"), ("{}".to_owned(), "7".to_owned()));
+        assert_eq!(split_pattern("q12_rad"), ("q{}_rad".to_owned(), "12".to_owned()));
+        assert_eq!(split_pattern("/a.position[elbow]"), ("/a.position[]".to_owned(), "elbow".to_owned()));
+        assert_eq!(split_pattern("7"), ("{}".to_owned(), "7".to_owned()));
         let list = |names: &[&str]| column_list(&names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
         assert_eq!(list(&["q1_rad", "q2_rad"]), "\"q{1..2}_rad\"");
         assert_eq!(list(&["q[0]", "q[1]"]), "\"q[{0..1}]\"");

@@ -1,9 +1,8 @@
-//! Units that names of columns end with.
+//! Units from the endings of column names.
 
 use super::quantity::Quantity;
 
-/// Endings of names, the unit that they say as studies write it, and the quantity of a joint that has it; the longest
-/// first.
+/// Ending, unit in study notation, and joint quantity with this unit; longest ending first.
 const ENDINGS: [(&str, &str, Option<Quantity>); 30] = [
     ("rad_per_s2", "rad/s^2", Some(Quantity::Acceleration)),
     ("rad_s2", "rad/s^2", Some(Quantity::Acceleration)),
@@ -27,7 +26,7 @@ const ENDINGS: [(&str, &str, Option<Quantity>); 30] = [
     ("ma", "mA", Some(Quantity::Current)),
     ("amps", "A", Some(Quantity::Current)),
     ("a", "A", Some(Quantity::Current)),
-    // Of no joint, or of times.
+    // Units that are not of a joint quantity.
     ("degc", "degC", None),
     ("mm", "mm", None),
     ("ms", "ms", None),
@@ -38,7 +37,6 @@ const ENDINGS: [(&str, &str, Option<Quantity>); 30] = [
     ("s", "s", None),
 ];
 
-/// Fields of ROS messages that hold joints, and their units (REP 103).
 const FIELDS: [(&str, &str); 8] = [
     (".position", "rad"),
     (".positions", "rad"),
@@ -50,24 +48,22 @@ const FIELDS: [(&str, &str); 8] = [
     (".stamp", "s"),
 ];
 
-/// The unit that a name says: `q1_rad`, `tau_Nm[3]`, `/joint_states.effort[elbow]`.
+/// Unit from a name: `q1_rad`, `tau_Nm[3]`, `/joint_states.effort[elbow]`.
 pub(in crate::jobs) fn unit(name: &str) -> Option<&'static str> {
     let lower = name.to_lowercase();
-    // Only ROS topics begin with a stroke.
+    // Only ROS topics begin with a slash.
     if name.starts_with('/') {
         let field = indexed(&lower).0;
         if let Some((_, unit)) = FIELDS.iter().find(|(end, _)| field.ends_with(end)) {
             return Some(unit);
         }
     }
-    // A number counts joints: `tau3`, `tau_3`.
     ended(&lower).map(|(_, unit, _)| unit)
 }
 
-/// What stands before the unit that a name in small letters ends with, the unit, and the quantity that has it; an index
-/// in brackets stays.
+/// Splits a lower-case name into the part before its unit (with any index in brackets), the unit, and its quantity.
 pub(super) fn ended(lower: &str) -> Option<(String, &'static str, Option<Quantity>)> {
-    // `tau_Nm[3]` has its unit before the index.
+    // In `tau_Nm[3]` the unit precedes the index.
     let (name, index) = indexed(lower);
     let name = name.trim_end_matches([')', ']', ' ']);
     let before = |ending: &str| {
@@ -77,7 +73,6 @@ pub(super) fn ended(lower: &str) -> Option<(String, &'static str, Option<Quantit
     found.map(|(before, unit, quantity)| (format!("{before}{index}"), unit, quantity))
 }
 
-/// A name and its index in brackets at the end.
 fn indexed(name: &str) -> (&str, &str) {
     match name.rfind('[') {
         Some(at) if name.ends_with(']') && at > 0 => name.split_at(at),
@@ -85,7 +80,7 @@ fn indexed(name: &str) -> (&str, &str) {
     }
 }
 
-/// The unit in seconds of a column that is a time by its name.
+/// Unit, in seconds, of a column whose name is a time.
 pub(in crate::jobs) fn time_unit_s(name: &str) -> Option<f64> {
     let lower = name.to_lowercase();
     let own = lower.rsplit(['.', '/']).next().unwrap_or(&lower);
@@ -100,7 +95,7 @@ pub(in crate::jobs) fn time_unit_s(name: &str) -> Option<f64> {
     }
 }
 
-/// The column of times as a study's `time` has it.
+/// The time column as the value of a study's `time`.
 pub(in crate::jobs) fn time_as_toml(name: &str) -> String {
     let unit = match time_unit_s(name) {
         Some(1e-3) => ", unit = \"ms\"",
@@ -116,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_tell_units_and_times() {
+    fn units_and_times_from_names() {
         assert_eq!(unit("q1_rad"), Some("rad"));
         assert_eq!(unit("tau_Nm[3]"), Some("N m"));
         assert_eq!(unit("/joint_states.effort[elbow]"), Some("N m"));

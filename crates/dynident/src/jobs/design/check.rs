@@ -1,5 +1,4 @@
-//! The look at a motion that is there already: a trajectory that the user brings, or a log after the run. Nothing is
-//! searched.
+//! Check of an existing motion: a trajectory of the user, or a log after the run. No search.
 
 use super::limit_check::{LimitCheck, SingleChanges};
 use super::outcome::{MotionOrigin, MotionReview};
@@ -7,7 +6,7 @@ use super::setup::{DesignSetup, MotionInformation};
 use super::{DesignOutcome, table};
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::{motion_provenance, seen_from};
+use crate::jobs::provenance::{motion_provenance, relative_path};
 use crate::study::{DesignSection, Folders, Study, StudyInput, StudyLogSource, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
@@ -17,25 +16,23 @@ use dynident_recording::MotionBlock;
 use nalgebra::DMatrix;
 use std::path::Path;
 
-/// What is checked of a table, and of a log.
 const SPLINE: &str = "the quintic spline through the samples of the table";
 const SAMPLES: &str = "the log's own samples, its positions through the study's differentiator";
 
-/// Nothing is searched for, and nobody asks for a stop.
+/// No search for limit changes, no stop request.
 const NO_SEARCH: SingleChanges<'static> = (&|| Ok(Vec::new()), &|| false);
 
-/// Most samples of a log.
 const MAX_SAMPLES: usize = 2_000_000;
 
-/// A velocity at an end below this share of its peak is rest.
-const REST: f64 = 1e-3;
+/// Largest speed of a joint at rest, relative to its peak speed.
+const MAX_REST_SPEED_RATIO: f64 = 1e-3;
 
-/// Judges the trajectory in the table `trajectory` (`t_s`, `q1..` or the joints' names, and `dq1..`, `ddq1..` or
-/// neither) as a design would be: every limit at 10 kHz on the quintic spline through the table's samples, the
-/// criteria's figures and the forecast at `search.rate_hz`.
+/// Checks the trajectory in the table `trajectory` (`t_s`, `q1..` or the joint names, and both or neither of `dq1..`
+/// and `ddq1..`) like a design: every limit at 10 kHz on the quintic spline through the samples, criteria and forecast
+/// at `search.rate_hz`.
 ///
 /// # Errors
-/// If the study makes no sense, or the table is missing, holds other joints or something that is no motion.
+/// If the study is invalid, or the table is missing, has other joints, or is not a valid motion.
 pub fn check_trajectory(
     study: &Study,
     study_path: &Path,
@@ -52,7 +49,7 @@ pub fn check_trajectory(
     let duration_s = given.duration_s();
     let longest_s = DesignSection::longest_s(setup.robot.model());
     if duration_s > longest_s {
-        let message = format!("{duration_s} s: at most {longest_s:.0} s can be checked; give a part of it");
+        let message = format!("{duration_s} s: at most {longest_s:.0} s can be checked; use a part of it");
         return Err(Error::States { path: trajectory.to_owned(), line: 1, message });
     }
     setup.notes.extend(table.note);
@@ -63,9 +60,9 @@ pub fn check_trajectory(
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
     let information = setup.information(&times, &motion_at);
-    // A path of this computer says nothing elsewhere.
+    // An absolute path is stored relative to the study.
     let name = match study_path.parent().filter(|_| trajectory.is_absolute()) {
-        Some(folder) => seen_from(folder, trajectory),
+        Some(folder) => relative_path(folder, trajectory),
         None => trajectory.display().to_string(),
     };
     let origin = MotionOrigin::given(&setup, name, given, &information);
@@ -76,12 +73,12 @@ pub fn check_trajectory(
     Ok(DesignOutcome::new(setup, origin, review).with_provenance(provenance))
 }
 
-/// Judges a log of the study, by its name or its file: what the finished run says about each parameter.
-/// Positions go the same way to velocities and accelerations as they would to a fit; limits are looked at on the log's
-/// own samples, every one of which counts for the forecast.
+/// Checks a log of the study, given by name or file: information of the run about each parameter. Velocities and
+/// accelerations are computed as for a fit; limits are checked on the log's samples, all of which are used in the
+/// forecast.
 ///
 /// # Errors
-/// If the study makes no sense, no log or more than one is called `name`, or the log cannot be read.
+/// If the study is invalid, no log or several logs have the name, or the log cannot be read.
 pub fn check_log(
     study: &Study,
     study_path: &Path,
@@ -97,7 +94,7 @@ pub fn check_log(
     let gaps = pieces.len().saturating_sub(1);
     if gaps > 0 {
         setup.notes.push(format!(
-            "the log has {gaps} gap(s): its pieces are judged one by one and count together; pictures show the longest"
+            "the log has {gaps} gap(s): its pieces are checked separately and combined; plots show the longest"
         ));
     }
     let count = setup.robot.layout().columns().len();
@@ -126,7 +123,6 @@ pub fn check_log(
     Ok(DesignOutcome::new(setup, origin, review).with_provenance(provenance))
 }
 
-/// Which log is meant: by its name in reports, or by its file.
 fn log_called(study: &Study, name: &str) -> Result<usize, StudyError> {
     let all: Vec<usize> = (0..study.log.len()).collect();
     let mut called: Vec<usize> = all.iter().copied().filter(|&index| study.log_name(index) == name).collect();
@@ -140,7 +136,7 @@ fn log_called(study: &Study, name: &str) -> Result<usize, StudyError> {
     Err(StudyError::LogName { name: name.to_owned(), found: called.len(), known })
 }
 
-/// The uninterrupted pieces of a log as motions in the model's order of joints, and the log's rate.
+/// Continuous pieces of a log as motions, joints in the order of the model, and the sample rate, Hz.
 fn pieces(
     study: &Study,
     study_path: &Path,
@@ -164,7 +160,7 @@ fn pieces(
         return Err(Error::study(study_path)(StudyError::missing(format!("log `{log}`"), "it has no samples")));
     };
     let rate_hz = stream.rate_hz();
-    // By piece: for q, dq, ddq and each joint of the model its samples.
+    // Per piece: samples of q, dq, ddq for each joint of the model.
     let mut found: Vec<Vec<Vec<f64>>> = Vec::new();
     let (mut segment, mut samples, mut block) = (None, 0, MotionBlock::default());
     let dof = robot.model().dof();
@@ -175,7 +171,7 @@ fn pieces(
         }
         samples += block.rows;
         if samples > MAX_SAMPLES {
-            let message = format!("log `{log}`: more than {MAX_SAMPLES} samples: give a part of it with time_range_s");
+            let message = format!("log `{log}`: more than {MAX_SAMPLES} samples: select a part with time_range_s");
             return Err(Error::States { path: source.path(), line: 1, message });
         }
         if let Some(piece) = found.last_mut() {
@@ -193,15 +189,15 @@ fn pieces(
         Given::new(times, Motion { samples, joints: dof, q, dq, ddq, dddq: Vec::new() })
     };
     let whole = found.into_iter().filter(|piece| piece[0].len() >= 2).map(given).collect::<Result<Vec<_>, _>>();
-    let none = |message: String| Error::States { path: source.path(), line: 1, message };
-    let pieces = whole.map_err(|error| none(format!("log `{log}`: {error}")))?;
+    let wrong = |message: String| Error::States { path: source.path(), line: 1, message };
+    let pieces = whole.map_err(|error| wrong(format!("log `{log}`: {error}")))?;
     if pieces.is_empty() {
-        return Err(none(format!("log `{log}`: no uninterrupted piece of two samples or more")));
+        return Err(wrong(format!("log `{log}`: no uninterrupted piece of two samples or more")));
     }
     Ok((pieces, rate_hz))
 }
 
-/// A word on ends in motion: a robot cannot begin there.
+/// Note about joints that do not start and end at rest, which a robot cannot execute.
 fn not_at_rest(given: &Given, joints: &[String]) -> Option<String> {
     let motion = given.samples();
     let moving: Vec<&str> = joints
@@ -210,7 +206,7 @@ fn not_at_rest(given: &Given, joints: &[String]) -> Option<String> {
         .filter(|(joint, _)| {
             let speeds = &motion.dq[motion.of(*joint)];
             let peak = speeds.iter().fold(0.0_f64, |peak, speed| peak.max(speed.abs()));
-            [speeds[0], speeds[speeds.len() - 1]].iter().any(|speed| speed.abs() > REST * peak)
+            [speeds[0], speeds[speeds.len() - 1]].iter().any(|speed| speed.abs() > MAX_REST_SPEED_RATIO * peak)
         })
         .map(|(_, name)| name.as_str())
         .collect();

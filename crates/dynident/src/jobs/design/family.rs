@@ -1,4 +1,4 @@
-//! What further motions are designed from, as a study's `[design]` says it.
+//! Family, limits and search settings of further motions, from a study's `[design]`.
 
 use super::setup::DesignSetup;
 use crate::error::Error;
@@ -8,17 +8,14 @@ use dynident_excitation::limits::Limits;
 use dynident_excitation::{DesignSettings, Family};
 use std::path::Path;
 
-/// Motions of a study's `[design]`.
 pub(in crate::jobs) struct MotionFamily {
-    /// The family, with the study's duration.
     pub(in crate::jobs) family: Box<dyn Family>,
-    /// The limits in force: the description's, those assumed, and the study's.
+    /// The limits in force: those of the robot description, the assumed ones, and the study's.
     pub(in crate::jobs) limits: Limits,
-    /// How much is searched.
     pub(in crate::jobs) search: DesignSettings,
 }
 
-/// The motions of a study, something bounding how fast each joint moves.
+/// The motion family of a study; the speed of every joint must be limited.
 ///
 /// # Errors
 /// As [`design_study`](super::design_study).

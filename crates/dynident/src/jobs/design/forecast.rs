@@ -1,35 +1,33 @@
-//! The forecast under the parameters' names.
+//! Forecast by parameter name.
 
 use crate::result::{DirectionForecast, ParameterForecast};
 use crate::study::StudyRobot;
 use dynident_excitation::predicted_covariance;
 use nalgebra::DMatrix;
 
-/// Worst directions shown, and the terms of each.
-const DIRECTIONS: usize = 3;
-const TERMS: usize = 6;
+const MAX_DIRECTIONS: usize = 3;
+const MAX_TERMS: usize = 6;
 
-/// A prior value below this share of the largest is zero.
-const NEGLIGIBLE: f64 = 1e-9;
+/// Nominal values below this fraction of the largest are rounding errors of zero.
+const MIN_RELATIVE_NOMINAL: f64 = 1e-9;
 
-/// The forecast from the motion's information, with the parameters' names and with their sizes by the description;
-/// `with_prior` is the information that includes what was known before. Worst directions are those of all that is
-/// known.
+/// Predicted standard deviations from the motion's information, relative to the nominal values; `with_prior` includes
+/// prior information. The worst directions use all information.
 pub(super) fn named_forecast(
     robot: &StudyRobot,
     information: &DMatrix<f64>,
     with_prior: Option<&DMatrix<f64>>,
 ) -> (Vec<ParameterForecast>, Vec<DirectionForecast>) {
     let columns = robot.layout().columns();
-    let alone = predicted_covariance(information, DIRECTIONS);
-    let all = with_prior.map(|information| predicted_covariance(information, DIRECTIONS));
-    // A prior that is zero but for the rounding of the description's angles has no relative error.
+    let alone = predicted_covariance(information, MAX_DIRECTIONS);
+    let all = with_prior.map(|information| predicted_covariance(information, MAX_DIRECTIONS));
+    // Rounding of angles in the robot description makes some zero values nonzero; these have no relative error.
     let largest =
         robot.nominal_base().iter().copied().flatten().fold(0.0_f64, |largest, prior| largest.max(prior.abs()));
     let expressions = robot.base().expressions();
     let parameters = expressions.into_iter().enumerate().map(|(index, expression)| {
         let (std, prior) = (alone.std[index], robot.nominal_base().map(|prior| prior[index]));
-        let size = prior.map(f64::abs).filter(|size| *size > NEGLIGIBLE * largest);
+        let size = prior.map(f64::abs).filter(|size| *size > MIN_RELATIVE_NOMINAL * largest);
         let relative = std.zip(size).map(|(std, size)| 100.0 * std / size);
         let (symbol, unit) = (columns[index].symbol(), columns[index].unit().to_owned());
         let std_with_prior = all.as_ref().and_then(|all| all.std[index]);
@@ -39,7 +37,7 @@ pub(super) fn named_forecast(
         let mut terms: Vec<(String, f64)> =
             columns.iter().zip(&direction.shares).map(|(column, share)| (column.symbol(), *share)).collect();
         terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-        terms.truncate(TERMS);
+        terms.truncate(MAX_TERMS);
         DirectionForecast { inflation: direction.inflation, terms }
     });
     (parameters.collect(), directions.collect())

@@ -1,4 +1,4 @@
-//! Whether a motion keeps its limits, and why not.
+//! Check of a motion against its limits, with a diagnosis of violations.
 
 use super::setup::DesignSetup;
 use crate::error::Error;
@@ -7,33 +7,30 @@ use dynident_excitation::limits::{LimitSet, Relaxation, diagnose_until};
 use dynident_excitation::{Motion, grid};
 use std::path::Path;
 
-/// Rate of the diagnosis, Hz of a usual arm.
+/// Sample rate of the diagnosis for a 1.2 m arm, Hz.
 const DIAGNOSIS_RATE_HZ: f64 = 1000.0;
 
-/// Divisor of both rates after a stop was requested.
-const COARSER: f64 = 10.0;
+/// Divisor of both sample rates after a stop request.
+const STOPPED_RATE_DIVISOR: f64 = 10.0;
 
-/// Every limit as a motion uses it.
 pub(super) struct LimitCheck {
-    /// Every limit at the motion's worst moment.
+    /// Utilisation of every limit at the worst moment of the motion.
     pub(super) reports: Vec<LimitReport>,
-    /// Samples a second that were looked at.
     pub(super) rate_hz: f64,
-    /// What was looked at.
     pub(super) of: &'static str,
-    /// Why limits are broken, in sentences; empty if none is.
+    /// Reasons for violated limits, as sentences; empty without violations.
     pub(super) diagnosis: Vec<String>,
 }
 
-/// A search for changes of one limit that would make another motion possible, and whether it has to stop.
+/// Search for single limit changes that would make another motion feasible, and a stop request.
 pub(super) type SingleChanges<'a> = (&'a dyn Fn() -> Result<Vec<Relaxation>, Error>, &'a dyn Fn() -> bool);
 
 impl LimitCheck {
-    /// Looks at the motion `rate_hz` times a second, ten times more rarely once `stop` says so. If it breaks a limit,
-    /// `single` looks for changes of one limit that would make another motion possible.
+    /// Checks the motion at `rate_hz`, or at a tenth of it after a stop request. If a limit is violated, `single`
+    /// searches for single limit changes that would make another motion feasible.
     ///
     /// # Errors
-    /// Limits that make no sense for the robot.
+    /// Invalid limits for the robot.
     pub(super) fn of(
         setup: &DesignSetup,
         study_path: &Path,
@@ -49,7 +46,7 @@ impl LimitCheck {
         let (reports, rate_hz) = if let Some(reports) = whole {
             (reports, rate_hz)
         } else {
-            let rate_hz = rate_hz / COARSER;
+            let rate_hz = rate_hz / STOPPED_RATE_DIVISOR;
             let reports = check_limits(&setup.limits, model, duration_s, rate_hz, motion_at);
             (reports.map_err(in_limits)?, rate_hz)
         };
@@ -59,13 +56,11 @@ impl LimitCheck {
         Ok(Self { reports, rate_hz, of, diagnosis })
     }
 
-    /// Whether every limit is kept.
-    pub(super) fn kept(&self) -> bool {
+    pub(super) fn is_kept(&self) -> bool {
         self.diagnosis.is_empty() && self.reports.iter().all(|report| !report.violated)
     }
 
-    /// Takes in the check of a later piece, which begins `after_s` into the whole: of each limit the worse report
-    /// stays.
+    /// Merges the check of a later piece, which starts at `after_s`: the worse report of each limit is kept.
     pub(super) fn append(&mut self, later: Self, after_s: f64) {
         let first = self.reports.is_empty();
         for (place, mut report) in later.reports.into_iter().enumerate() {
@@ -80,7 +75,6 @@ impl LimitCheck {
     }
 }
 
-/// Why the motion is not feasible.
 fn sentences(
     set: &LimitSet,
     duration_s: f64,
@@ -89,7 +83,8 @@ fn sentences(
     single: Vec<Relaxation>,
     stop: &dyn Fn() -> bool,
 ) -> Vec<String> {
-    let rate_hz = set.model().own_scale().round_hertz(DIAGNOSIS_RATE_HZ) / if stop() { COARSER } else { 1.0 };
+    let rate_hz =
+        set.model().own_scale().round_hertz(DIAGNOSIS_RATE_HZ) / if stop() { STOPPED_RATE_DIVISOR } else { 1.0 };
     let times = grid(duration_s, (duration_s * rate_hz).ceil() as usize + 1);
     let mut motion = Motion::default();
     motion_at(&times, &mut motion);
@@ -99,7 +94,7 @@ fn sentences(
     if !sentences.is_empty() {
         return sentences;
     }
-    // Broken between the diagnosis' samples only.
+    // The violation lies between the diagnosis samples.
     let broken = reports.iter().filter(|report| report.violated).map(|report| {
         let excess = 100.0 * (report.worst_ratio - 1.0).max(VIOLATION);
         format!("The {} limit of `{}` is exceeded by {excess:.4} % at {:.4} s.", report.kind, report.joint, report.at_s)

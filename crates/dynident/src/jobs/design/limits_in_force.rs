@@ -1,5 +1,5 @@
-//! The limits that a study's motions keep: the description's, those assumed, the study's, and the envelope of its
-//! iteration; and the torque beyond the rigid bodies' that they include.
+//! Limits in force for a study's motions (robot description, assumptions, study, iteration envelope), and the torque of
+//! friction and drives that they include.
 
 use super::prior;
 use crate::error::{Error, StudyError};
@@ -14,23 +14,20 @@ use dynident_model::terms::{JointProperty, TorqueTerm};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Purpose of the limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum LimitsFor<'a> {
-    /// A search for a motion, which keeps room inside the iteration's envelope.
+    /// A search, which keeps a margin inside the iteration's envelope.
     Search,
-    /// A motion that is there already and starts at these positions.
+    /// An existing motion with these start positions.
     Motion(&'a [f64]),
-    /// Ways to a motion and back.
+    /// Approach and return paths.
     Ways,
-    /// A log of a finished run: nothing is assumed.
+    /// A log of a finished run: no assumed limits.
     Log,
 }
 
-/// The limits in force.
-///
 /// # Errors
-/// Limits, start posture, home or envelope that make no sense for the robot.
+/// Limits, start posture, home or envelope that are invalid for the robot.
 pub(super) fn in_force(
     study: &Study,
     study_path: &Path,
@@ -59,7 +56,7 @@ pub(super) fn in_force(
             .map_err(Error::section(study_path, "iteration.envelope"))?;
         if margin > 0.0 {
             in_force.assumed.push(format!(
-                "the motion keeps {:.0} % of the allowed tracking error free inside the iteration's envelope (iteration.envelope.search_margin_percent)",
+                "the motion keeps a margin of {:.0} % of the allowed tracking error inside the iteration's envelope (iteration.envelope.search_margin_percent)",
                 100.0 * margin
             ));
         }
@@ -71,8 +68,8 @@ pub(super) fn in_force(
             let (all, joints) = with_typical(robot, known);
             if !joints.is_empty() {
                 in_force.assumed.push(format!(
-                    "torque limits include friction and drive inertia typical of geared drives, as rehearsals do, of {}: nothing states theirs",
-                    listed(&joints)
+                    "torque limits include typical friction and drive inertia of geared drives for {}, because theirs are unknown",
+                    join_names(&joints)
                 ));
             }
             all
@@ -82,10 +79,10 @@ pub(super) fn in_force(
     Ok(in_force)
 }
 
-/// The robot with the payload that the motion carries.
+/// The robot model with the payload of the motion.
 ///
 /// # Errors
-/// A payload that the study does not have, or of which mass or centre of mass is not known.
+/// A payload that the study does not define, or whose mass or centre of mass is unknown.
 pub(super) fn loaded(study: &Study, study_path: &Path, robot: &StudyRobot) -> Result<Model, Error> {
     let model = robot.model();
     let Some(name) = study.design.as_ref().and_then(|design| design.payload.as_ref()) else { return Ok(model.clone()) };
@@ -95,7 +92,7 @@ pub(super) fn loaded(study: &Study, study_path: &Path, robot: &StudyRobot) -> Re
         return Err(wrong(StudyError::Unknown { key: "payload", what: "payload", name: name.clone(), known }));
     };
     let Some(known) = section.known() else {
-        let fix = "torque limits need what it weighs: give its mass_kg and com_m";
+        let fix = "torque limits need a known payload: give its mass_kg and com_m";
         return Err(wrong(StudyError::conflict(format!("payload = \"{name}\""), fix)));
     };
     let links = model.bodies().iter().enumerate();
@@ -113,7 +110,7 @@ pub(super) fn loaded(study: &Study, study_path: &Path, robot: &StudyRobot) -> Re
     model.with_inertials(&inertials).map_err(Error::study(study_path))
 }
 
-/// Limits of a study's robot for ways to a motion and back.
+/// Limits of a study's robot for approach and return paths.
 ///
 /// # Errors
 /// As [`in_force`].
@@ -126,7 +123,6 @@ pub(in crate::jobs) fn limits_of(
     Ok(in_force(study, study_path, folders, robot, LimitsFor::Ways)?.limits)
 }
 
-/// Where the motion starts and the robot waits, as far as that is known.
 fn starts(
     section: &DesignSection,
     iteration: Option<&IterationSection>,
@@ -142,14 +138,14 @@ fn starts(
     Ok(StartPositions { start, home: home.unwrap_or_default() })
 }
 
-/// What the description states, `described`, and the declared torques whose coefficients the study states.
+/// The known torque of the robot description and of declared torques with a nominal value.
 fn known_torque(robot: &StudyRobot, described: KnownTorque) -> KnownTorque {
     let declared = robot.terms().iter().filter(|term| term.is_declared());
     let valued = declared.filter_map(|term| Some((term, term.described(robot.model())?)));
     valued.fold(described, |known, (term, value)| known.with(term.clone(), value))
 }
 
-/// The same with typical friction and drive inertia where nothing is known of a term, and the joints of these.
+/// Adds typical friction and drive inertia for unknown terms, and returns the joints that use them.
 fn with_typical(robot: &StudyRobot, known: KnownTorque) -> (KnownTorque, Vec<String>) {
     let Some(typical) = with_typical_drives(&robot.parametric) else { return (known, Vec::new()) };
     let values = &typical[robot.model().inertial_count()..];
@@ -168,7 +164,6 @@ fn with_typical(robot: &StudyRobot, known: KnownTorque) -> (KnownTorque, Vec<Str
     (all, joints)
 }
 
-/// Whether something is known of friction or inertia of a joint.
 fn is_known(known: &KnownTorque, joint: usize, property: Option<JointProperty>) -> bool {
     known.terms().iter().any(|(term, _)| {
         let is_same = match property {
@@ -181,7 +176,7 @@ fn is_known(known: &KnownTorque, joint: usize, property: Option<JointProperty>) 
     })
 }
 
-/// A sentence about the torque that limits include in addition to the rigid bodies; `None` without known torque.
+/// Note about torque in the limits in addition to the rigid bodies; `None` without known torque.
 pub(super) fn included(limits: &Limits, model: &Model) -> Option<String> {
     let mut by_kind: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for (term, _) in limits.known_torque.terms() {
@@ -193,13 +188,13 @@ pub(super) fn included(limits: &Limits, model: &Model) -> Option<String> {
         by_kind.entry(kind).or_default().extend(joints);
     }
     let parts: Vec<String> =
-        by_kind.into_iter().map(|(kind, joints)| format!("{kind} of {}", listed(&joints))).collect();
+        by_kind.into_iter().map(|(kind, joints)| format!("{kind} of {}", join_names(&joints))).collect();
     let is_limited = limits.joints.iter().any(|limit| limit.torque.or(limit.power_w).is_some());
     (is_limited && !parts.is_empty())
         .then(|| format!("torque limits include, in addition to the rigid bodies: {}", parts.join("; ")))
 }
 
-/// What torque limits do not include because nothing states it, and how much of each limit the motion leaves for it.
+/// Torque that the limits do not include because it is unknown, with the margin of each limit.
 pub(super) fn not_included(limits: &Limits, robot: &StudyRobot, reports: &[LimitReport]) -> Vec<String> {
     let model = robot.model();
     let limited: Vec<(usize, &LimitReport)> = reports
@@ -224,8 +219,8 @@ pub(super) fn not_included(limits: &Limits, robot: &StudyRobot, reports: &[Limit
     for (what, joints) in [("friction", without(&has_friction)), ("drive inertia", without(&has_inertia))] {
         if !joints.is_empty() {
             lines.push(format!(
-                "torque of {what} (not stated anywhere); part of each torque limit that is free at the peak: {}",
-                listed(&joints)
+                "torque of {what} (unknown); margin of each torque limit at the peak: {}",
+                join_names(&joints)
             ));
         }
     }
@@ -239,16 +234,15 @@ pub(super) fn not_included(limits: &Limits, robot: &StudyRobot, reports: &[Limit
     });
     let unvalued: Vec<String> = unvalued.map(TorqueTerm::symbol).collect();
     if !unvalued.is_empty() {
-        lines.push(format!("torque of terms without a known value: {}", listed(&unvalued)));
+        lines.push(format!("torque of terms without a known value: {}", join_names(&unvalued)));
     }
     lines
 }
 
-/// Names, of many only the first.
-fn listed(names: &[String]) -> String {
-    const SHOWN: usize = 8;
-    match names.len().checked_sub(SHOWN) {
-        Some(more) if more > 0 => format!("{} and {more} more", names[..SHOWN].join(", ")),
+fn join_names(names: &[String]) -> String {
+    const MAX_SHOWN: usize = 8;
+    match names.len().checked_sub(MAX_SHOWN) {
+        Some(more) if more > 0 => format!("{} and {more} more", names[..MAX_SHOWN].join(", ")),
         _ => names.join(", "),
     }
 }

@@ -1,5 +1,4 @@
-//! A study to the motion that should be recorded: the best of a family inside every limit, checked again, with a
-//! forecast.
+//! `design`: optimal excitation trajectory within all limits, with an independent check and a forecast.
 
 mod check;
 mod family;
@@ -36,15 +35,15 @@ use setup::DesignSetup;
 use std::path::Path;
 use step_wise::step_wise;
 
-/// Designs the motion that a study's `[design]` asks for (its defaults where the section is absent). `watch` hears how
-/// far the search is and may end it: the best so far is the result, its limits checked at a tenth of the rate.
+/// Designs the motion of a study's `[design]` (defaults without this section). `watch` receives the progress and may
+/// stop the search; then the best motion so far is the result, with limits checked at a tenth of the sample rate.
 ///
 /// The terms are those of `[drive]`, with a smooth step for Coulomb friction. Limits are checked again at 10 kHz; a
-/// motion that breaks one is a result, with `feasible` false and a diagnosis.
+/// motion that violates one is returned with `feasible` false and a diagnosis.
 ///
 /// # Errors
-/// If the study, the description, the family's settings, the start, the prior, the task or the limits make no sense, or
-/// torque is limited without a prior.
+/// If the study, the robot description, the settings of the family, the start, the prior, the task or the limits are
+/// invalid, or torque is limited without a prior.
 pub fn design_study(
     study: &Study,
     study_path: &Path,
@@ -54,7 +53,7 @@ pub fn design_study(
     let mut setup = DesignSetup::for_search(study, study_path, options)?;
     let longest = Expected::Range(0.0, DesignSection::longest_s(setup.robot.model()));
     longest.check("duration_s", setup.section.duration_s).map_err(Error::section(study_path, "design"))?;
-    // A search takes long: the files may change once they have been read and hashed.
+    // The search takes long, so files may change after they have been read and hashed.
     let provenance =
         setup.inputs.while_unchanged(|| motion_provenance(study, study_path, options.data.as_deref(), &[]))?;
     let is_stopped = AtomicBool::new(false);
@@ -64,18 +63,17 @@ pub fn design_study(
         answer
     };
 
-    // The best motion of the family.
     let found = match &setup.section.criterion {
         CriterionChoice::WindowedCondition(windowed) => {
             let found = step_wise(&setup.section, windowed, &setup.robot, &setup.limits, watch)
                 .map_err(Error::section(study_path, "design"))?;
-            setup.notes.push(WINDOWED.to_owned());
+            setup.notes.push(WINDOWED_NOTE.to_owned());
             found
         }
         _ => search(&setup, study_path, watch)?,
     };
 
-    // Its limits, by a check that shares nothing with the search, and what it says about the parameters.
+    // The limit check is independent of the search.
     let duration_s = found.family.duration_s();
     let check_rate_hz = setup.robot.model().own_scale().round_hertz(CHECK_RATE_HZ);
     let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
@@ -97,5 +95,4 @@ pub fn design_study(
     Ok(outcome)
 }
 
-/// What a windowed design leaves to the check.
-const WINDOWED: &str = "the strokes are chosen by position, velocity and acceleration of their joints; limits of jerk, torque, power and place are checked on the whole motion afterwards";
+const WINDOWED_NOTE: &str = "the search for strokes uses only the position, velocity and acceleration limits; limits of jerk, torque, power and workspace are checked afterwards on the whole motion";

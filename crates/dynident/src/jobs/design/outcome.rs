@@ -1,4 +1,4 @@
-//! All that is known of a motion in the end.
+//! Result of a design or check.
 
 use super::forecast::named_forecast;
 use super::limit_check::LimitCheck;
@@ -18,10 +18,9 @@ use dynident_excitation::{Family, Motion};
 use dynident_model::Model;
 use nalgebra::DMatrix;
 
-/// Rate of the pictures, Hz of a usual arm.
-const PICTURES_HZ: f64 = 100.0;
+/// Sample rate of plots for a 1.2 m arm, Hz.
+const PLOT_RATE_HZ: f64 = 100.0;
 
-/// A motion and where it comes from: a search, or somebody who brings it.
 pub(super) struct MotionOrigin {
     motion: Box<dyn Family>,
     parameters: Vec<f64>,
@@ -39,7 +38,6 @@ pub(super) struct MotionOrigin {
 }
 
 impl MotionOrigin {
-    /// The best motion of a search.
     pub(super) fn search(setup: &DesignSetup, found: SearchResult) -> Self {
         let section = &setup.section;
         let windowed = found.windowed.as_ref();
@@ -60,7 +58,7 @@ impl MotionOrigin {
         }
     }
 
-    /// The trajectory or log called `name`.
+    /// The given trajectory or log with this name.
     pub(super) fn given(setup: &DesignSetup, name: String, motion: Given, known: &MotionInformation) -> Self {
         Self {
             family: "given".to_owned(),
@@ -80,36 +78,32 @@ impl MotionOrigin {
     }
 }
 
-/// What a look at a motion shows.
 pub(super) struct MotionReview {
-    /// Seconds from its start to its end; of a log with gaps, of all its pieces.
+    /// Duration, s; for a log with gaps, the sum of its pieces.
     pub(super) duration_s: f64,
-    /// Rate of the samples that count for the information, Hz.
+    /// Rate of the samples used for the information, Hz.
     pub(super) rate_hz: f64,
-    /// What the motion says about the parameters.
     pub(super) information: MotionInformation,
-    /// The limits.
     pub(super) check: LimitCheck,
 }
 
 /// A finished design.
 #[derive(Debug)]
 pub struct DesignOutcome {
-    /// What `design.json` holds.
+    /// Content of `design.json`.
     pub file: DesignFile,
     /// The robot.
     pub robot: StudyRobot,
-    /// The limits in force: the description's with the study's laid over them.
+    /// Limits in force: those of the robot description, overridden by the study.
     pub limits: Limits,
-    /// The search by generations, for optimisers that have them; empty for gradients.
+    /// Generations of the search; empty for gradients.
     pub history: Vec<Generation>,
-    /// The robot with the payload that the motion carries.
+    /// The robot with the payload of the motion.
     loaded: Model,
     family: Box<dyn Family>,
 }
 
 impl DesignOutcome {
-    /// All of it together.
     pub(super) fn new(mut setup: DesignSetup, origin: MotionOrigin, review: MotionReview) -> Self {
         setup.not_checked.extend(not_included(&setup.limits, &setup.robot, &review.check.reports));
         let MotionInformation { plain, weighted } = &review.information;
@@ -138,7 +132,7 @@ impl DesignOutcome {
             duration_s: review.duration_s,
             rate_hz: review.rate_hz,
             torque_std_nm: setup.torque_std_nm,
-            feasible: review.check.kept(),
+            feasible: review.check.is_kept(),
             check_rate_hz: review.check.rate_hz,
             check_of: review.check.of.to_owned(),
             limits: review.check.reports,
@@ -159,23 +153,21 @@ impl DesignOutcome {
         Self { file, robot, loaded, limits, history: origin.history, family: origin.motion }
     }
 
-    /// The outcome with what it comes from.
     pub(super) fn with_provenance(mut self, provenance: Provenance) -> Self {
         self.file.provenance = Some(provenance);
         self
     }
 
-    /// The family of the motion; its parameters are the file's.
+    /// The family of the motion; its parameters are in `file`.
     pub fn family(&self) -> &dyn Family {
         &*self.family
     }
 
-    fn pictures_hz(&self) -> f64 {
-        self.robot.model().own_scale().round_hertz(PICTURES_HZ)
+    fn plot_rate_hz(&self) -> f64 {
+        self.robot.model().own_scale().round_hertz(PLOT_RATE_HZ)
     }
 
-    /// The times `0, 1/rate, ..` up to the end, which stands last even if the rate does not divide the duration, and
-    /// the motion there; of a log with gaps that of its longest piece.
+    /// Samples the motion at `0, 1/rate, ..` and at its end; for a log with gaps its longest piece.
     pub fn sampled(&self, rate_hz: f64) -> (Vec<f64>, Motion) {
         let duration_s = self.family.duration_s();
         let steps = (duration_s * rate_hz - 1e-9).ceil().max(1.0) as usize;
@@ -185,9 +177,8 @@ impl DesignOutcome {
         (times, motion)
     }
 
-    /// Torque along a motion by the prior inertial parameters and the known torque of friction and drives (at rest the
-    /// middle of what friction may hold), joint-major as the motion, Nm (N); `None` while a body's
-    /// inertial is unknown.
+    /// Torque along a motion from nominal inertials and known friction and drives (at rest the middle of the friction
+    /// range), joint-major as the motion, Nm (N); `None` if the inertials of a body are unknown.
     pub fn torque_nm(&self, motion: &Motion) -> Option<Vec<f64>> {
         let model = &self.loaded;
         if !model.bodies_without_prior().is_empty() {
@@ -210,29 +201,30 @@ impl DesignOutcome {
         Some(torque)
     }
 
-    /// `preview.svg`: position, velocity, acceleration and, where the inertials are known, torque of every joint over
-    /// time, limits dashed.
+    /// `preview.svg`: position, velocity, acceleration and, with known inertials, torque of every joint over time, with
+    /// limits as dashed lines.
     ///
     /// # Errors
-    /// A motion that cannot be drawn.
+    /// A motion that cannot be plotted.
     pub fn preview_svg(&self) -> Result<String, Error> {
-        let (times_s, motion) = self.sampled(self.pictures_hz());
+        let (times_s, motion) = self.sampled(self.plot_rate_hz());
         pictures::preview(&self.file, &self.limits, &times_s, &motion, self.torque_nm(&motion).as_deref())
     }
 
-    /// `path.svg`: the tool's path and some poses of the arm in the base frame, from above and from the side, with
-    /// floor, column and boxes. The tool is the frame farthest out on every last body.
+    /// `path.svg`: tool path and some poses of the arm in the base frame, from above and from the side, with floor,
+    /// column and boxes. The tool is the outermost frame on every last body.
     ///
     /// # Errors
-    /// A motion that cannot be drawn.
+    /// A motion that cannot be plotted.
     pub fn path_svg(&self) -> Result<String, Error> {
-        pictures::path(&self.file, &self.limits, self.robot.model(), &self.sampled(self.pictures_hz()).1)
+        pictures::path(&self.file, &self.limits, self.robot.model(), &self.sampled(self.plot_rate_hz()).1)
     }
 
-    /// `fitness.svg`: best and mean fitness by generation (the paper's Fig. 7); none for a search without generations.
+    /// `fitness.svg`: best and mean fitness per generation (the paper's Fig. 7); `None` for a search without
+    /// generations.
     ///
     /// # Errors
-    /// A curve that cannot be drawn.
+    /// A curve that cannot be plotted.
     pub fn fitness_svg(&self) -> Result<Option<String>, Error> {
         pictures::fitness(&self.file, &self.history)
     }

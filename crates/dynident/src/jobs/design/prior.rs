@@ -1,4 +1,4 @@
-//! The information that `[design.prior]` stands for.
+//! Information of `[design.prior]`.
 
 use crate::error::{Error, StudyError};
 use crate::result::BaseParameterResult;
@@ -11,7 +11,6 @@ use nalgebra::DMatrix;
 use serde::Deserialize;
 use std::path::Path;
 
-/// What a prior needs of an earlier result.
 #[derive(Deserialize)]
 struct EarlierEstimate {
     base_parameters: Vec<BaseParameterResult>,
@@ -19,15 +18,14 @@ struct EarlierEstimate {
     base_parameter_covariance: Vec<Vec<f64>>,
 }
 
-/// A value below this share of the largest of its kind in its body is known no better than one of this size.
-const FLOOR: f64 = 0.1;
+/// Smallest size for the relative uncertainty, relative to the largest value of the same kind in the body.
+const MIN_RELATIVE_SIZE: f64 = 0.1;
 
-/// Standard deviation (SI) of a term's parameter that the description says nothing about: as good as unknown beside any
-/// measurement.
-const UNKNOWN: f64 = 1e3;
+/// Standard deviation of an unknown term parameter, SI units: no information compared with any measurement.
+const UNKNOWN_STD: f64 = 1e3;
 
-/// The information about the robot's base parameters, inverse covariance, and a sentence on each source. None if
-/// nothing is said.
+/// Prior information (inverse covariance) about the robot's base parameters, with a note about each source. `None`
+/// without a prior.
 pub(super) fn information(
     section: &PriorSection,
     robot: &StudyRobot,
@@ -42,28 +40,29 @@ pub(super) fn information(
     };
     if let Some(result) = &section.result {
         let path = folders.find(result, None)?;
-        add(of_result(&path, robot)?);
+        add(information_of_result(&path, robot)?);
         notes.push(format!("prior: the covariance of {}", result.display()));
     }
     if let Some(percent) = section.cad_std_percent {
         let unknown = robot.model().bodies_without_prior();
         if !unknown.is_empty() {
-            let fix = "give them in the description, or leave cad_std_percent out";
+            let fix = "add them to the robot description, or remove cad_std_percent";
             return Err(wrong(StudyError::NoInertials {
                 bodies: unknown.into_iter().map(str::to_owned).collect(),
                 fix,
             }));
         }
         let covariance = cad_covariance(robot, percent / 100.0);
-        let too_small = || wrong(StudyError::conflict("cad_std_percent", "it is too small: give a larger one"));
+        let too_small =
+            || wrong(StudyError::conflict("cad_std_percent", "give a larger value: the covariance is singular"));
         add(inverse(&covariance).ok_or_else(too_small)?);
-        notes.push(format!("prior: the description's inertial parameters, good to {percent} % each"));
+        notes.push(format!("prior: inertial parameters of the robot description, standard deviation {percent} % each"));
     }
     Ok(total)
 }
 
-/// The known torque with the friction and drive inertia of an earlier result: every term whose base parameter sums
-/// nothing else. It replaces the friction of the joint by the description.
+/// Adds friction and drive inertia of an earlier result: every term that is alone in its base parameter. It replaces
+/// the joint's friction in the robot description.
 pub(super) fn with_earlier_torque(
     section: &PriorSection,
     robot: &StudyRobot,
@@ -87,8 +86,7 @@ pub(super) fn with_earlier_torque(
     Ok(found.into_iter().fold(known, |known, (term, value)| known.with(term.clone(), value)))
 }
 
-/// `K diag(σ²) Kᵀ` of the base parameters: the independent ones with their own variance, and what is regrouped into
-/// them.
+/// `K diag(σ²) Kᵀ` of the base parameters: variances of the independent parameters plus those of the regrouped ones.
 fn cad_covariance(robot: &StudyRobot, share: f64) -> DMatrix<f64> {
     let std = standard_deviations(robot, share);
     let base = robot.base();
@@ -114,49 +112,47 @@ fn standard_deviations(robot: &StudyRobot, share: f64) -> Vec<f64> {
         for kind in KINDS {
             let of_robot = bodies.chunks_exact(10).map(|body| largest(&body[kind.clone()])).fold(0.0, f64::max);
             let own = largest(&body[kind.clone()]);
-            // A robot without any parameter of the kind: one of its unit.
+            // 1 SI unit if all parameters of this kind are zero.
             let scale = [own, of_robot, 1.0].into_iter().find(|scale| *scale > 0.0).unwrap_or(1.0);
-            std.extend(body[kind].iter().map(|value| share * value.abs().max(FLOOR * scale)));
+            std.extend(body[kind].iter().map(|value| share * value.abs().max(MIN_RELATIVE_SIZE * scale)));
         }
     }
     std.extend(robot.terms().iter().zip(terms).map(|(term, value)| {
         let is_stated = term.property().is_some() || term.is_declared();
-        if is_stated && *value != 0.0 { share * value.abs() } else { UNKNOWN }
+        if is_stated && *value != 0.0 { share * value.abs() } else { UNKNOWN_STD }
     }));
     std
 }
 
-/// Inverse of a covariance by way of its correlations, whose entries are of one size; `None` if it is not positive
-/// definite.
+/// Inverse of a covariance, scaled by its correlation matrix for accuracy; `None` if it is not positive definite.
 fn inverse(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale: Vec<f64> = covariance.diagonal().iter().map(|variance| variance.sqrt().recip()).collect();
     let between = |matrix: &DMatrix<f64>| {
         DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| scale[i] * matrix[(i, j)] * scale[j])
     };
     let inverse = between(&between(covariance).cholesky()?.inverse());
-    // Symmetric to the last bit, as everything that is made of it expects.
+    // Later steps need exact symmetry.
     let symmetric = (&inverse + inverse.transpose()) * 0.5;
     symmetric.iter().all(|x| x.is_finite()).then_some(symmetric)
 }
 
-/// Inverse covariance of an earlier result in the robot's columns; zero for those that it did not excite.
-fn of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>, Error> {
+/// Inverse covariance of an earlier result in the order of the robot's columns; zero for unexcited columns.
+fn information_of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let stored: EarlierEstimate = read_part(path)?;
     let place = places(&stored.base_parameters, robot).map_err(wrong)?;
     let rows = &stored.base_parameter_covariance;
     if rows.is_empty() {
-        let message = "no base_parameter_covariance: made by an earlier version, identify again with this one";
+        let message = "base_parameter_covariance is missing because an earlier version wrote the file: identify again";
         return Err(wrong(message.to_owned()));
     }
     let count = place.len();
     if rows.len() != count || rows.iter().any(|row| row.len() != count) {
         return Err(wrong(format!("base_parameter_covariance is not {count} rows of {count} numbers: identify again")));
     }
-    // Places of the excited parameters in the file.
     let excited: Vec<usize> = (0..count).filter(|&index| stored.base_parameters[index].excited).collect();
     let covariance = DMatrix::from_fn(excited.len(), excited.len(), |i, j| rows[excited[i]][excited[j]]);
-    // NaN compares as false: it is refused too.
+    // The comparison is false for NaN, so NaN is rejected.
     let symmetric = covariance
         .iter()
         .zip(covariance.transpose().iter())
@@ -176,30 +172,29 @@ fn of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>, Error> {
     Ok(information)
 }
 
-/// Names shown of a list at most.
-const LISTED: usize = 6;
+const MAX_LISTED: usize = 6;
 
-/// For every stored parameter its column in the robot.
 fn places(stored: &[BaseParameterResult], robot: &StudyRobot) -> Result<Vec<usize>, String> {
     let symbols: Vec<String> = robot.layout().columns().iter().map(Column::symbol).collect();
     let expressions = robot.base().expressions();
     let listed = |names: &[&str]| {
-        let more = if names.len() > LISTED { format!(" and {} more", names.len() - LISTED) } else { String::new() };
-        format!("{}{more}", names[..names.len().min(LISTED)].join(", "))
+        let more =
+            if names.len() > MAX_LISTED { format!(" and {} more", names.len() - MAX_LISTED) } else { String::new() };
+        format!("{}{more}", names[..names.len().min(MAX_LISTED)].join(", "))
     };
-    let strange: Vec<&str> =
+    let unknown: Vec<&str> =
         stored.iter().filter(|p| !symbols.contains(&p.symbol)).map(|p| p.symbol.as_str()).collect();
-    let absent: Vec<&str> = symbols
+    let missing: Vec<&str> = symbols
         .iter()
         .filter(|symbol| stored.iter().filter(|p| p.symbol == **symbol).count() != 1)
         .map(String::as_str)
         .collect();
     let fix = "use a result of the same robot with the same [drive] and [robot]";
-    if !strange.is_empty() {
-        return Err(format!("its base parameters {} are none of the study's robot: {fix}", listed(&strange)));
+    if !unknown.is_empty() {
+        return Err(format!("its base parameters {} do not belong to the study's robot: {fix}", listed(&unknown)));
     }
-    if !absent.is_empty() {
-        return Err(format!("it does not hold the robot's base parameters {} once each: {fix}", listed(&absent)));
+    if !missing.is_empty() {
+        return Err(format!("base parameters {} of the robot are missing or duplicate: {fix}", listed(&missing)));
     }
     stored
         .iter()
@@ -209,7 +204,7 @@ fn places(stored: &[BaseParameterResult], robot: &StudyRobot) -> Result<Vec<usiz
                 Ok(place)
             } else {
                 Err(format!(
-                    "its base parameter `{}` sums `{}`, that of the study's robot `{}`: {fix}",
+                    "its base parameter `{}` is `{}`, but `{}` for the study's robot: {fix}",
                     parameter.symbol, parameter.expression, expressions[place]
                 ))
             }
@@ -222,7 +217,7 @@ mod tests {
     use super::inverse;
     use nalgebra::DMatrix;
 
-    /// Sizes twelve decades apart: each entry of C⁻¹C to 1e-9 in the units of both.
+    /// Variances of different magnitude: C⁻¹C is accurate to 1e-9 in scaled units.
     #[test]
     fn inverse_of_very_unequal_variances() {
         let root = DMatrix::from_row_slice(3, 3, &[1.0, 0.4, 0.1, 0.0, 1.0, -0.3, 0.2, 0.0, 1.0]);

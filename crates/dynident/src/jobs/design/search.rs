@@ -1,4 +1,4 @@
-//! The search for the motion that a study asks for.
+//! Search for the motion of a study.
 
 use super::setup::DesignSetup;
 use crate::error::{Error, StudyError};
@@ -11,33 +11,26 @@ use dynident_excitation::optimisers::{Generation, OptimiserError};
 use dynident_excitation::{DesignProgress, DesignTask, Family, design, design_without_gradients, single_changes};
 use std::path::Path;
 
-/// The displacement, rad or m, that every joint must at least have the time for.
-const LEAST_DISPLACEMENT: f64 = 0.05;
+/// Displacement, rad or m, that every joint must be able to move within the duration.
+const MIN_DISPLACEMENT: f64 = 0.05;
 
-/// The best motion of a search.
 pub(super) struct SearchResult {
-    /// The family of the motion.
     pub(super) family: Box<dyn Family>,
-    /// Its parameters.
     pub(super) parameters: Vec<f64>,
-    /// Where the study lets each joint start, rad (m).
+    /// Fixed start position of each joint, rad (m).
     pub(super) start_posture: Vec<Option<f64>>,
-    /// The criterion's figure; none where a parameter is not excited.
+    /// Value of the criterion; `None` if a parameter is not excited.
     pub(super) figure: Option<f64>,
-    /// Largest violation of a limit by the search; zero of a windowed design.
+    /// Largest limit violation in the search; zero for a windowed design.
     pub(super) violation: f64,
-    /// The strokes of a windowed design.
     pub(super) windowed: Option<WindowedFile>,
-    /// The search by generations, for optimisers that have them.
+    /// Generations of the search; empty for gradients.
     pub(super) history: Vec<Generation>,
-    /// Evaluations of criterion, limits and gradient.
     pub(super) evaluations: usize,
-    /// Seconds by the clock.
     pub(super) seconds: f64,
 }
 
 impl SearchResult {
-    /// What is reported after the search.
     pub(super) fn progress(&self, round: &'static str) -> DesignProgress {
         DesignProgress {
             round,
@@ -48,7 +41,7 @@ impl SearchResult {
     }
 }
 
-/// The search for the ordinary problem: all joints at once, by gradients or without.
+/// Search over all joints at once, with or without gradients.
 pub(super) fn search(
     setup: &DesignSetup,
     study_path: &Path,
@@ -57,7 +50,7 @@ pub(super) fn search(
     let DesignSetup { section, robot, limits, .. } = setup;
     let model = robot.model();
     limits
-        .check_duration(model, section.duration_s, LEAST_DISPLACEMENT)
+        .check_duration(model, section.duration_s, MIN_DISPLACEMENT)
         .map_err(Error::section(study_path, "design.limits"))?;
     let family = section.family.family(model.dof(), section.duration_s);
     let mut family = family.map_err(Error::section(study_path, "design.family"))?;
@@ -76,7 +69,7 @@ pub(super) fn search(
     .map_err(|why| match why {
         OptimiserError::Start => Error::section(study_path, "design.family")(StudyError::missing(
             "no motion of this family excites every parameter, or none can be computed",
-            "take a richer family, join it with another, or give [design.prior]",
+            "use a richer family, combine it with another (kind = \"joined\"), or give [design.prior]",
         )),
         why => Error::section(study_path, "design")(why),
     })?;
@@ -99,13 +92,13 @@ fn task<'a>(setup: &'a DesignSetup, family: &'a dyn Family, criteria: &'a [&'a d
         criteria,
         limits: &setup.set,
         layout: setup.robot.layout(),
-        torque_std_nm: setup.counted_std_nm(),
+        torque_std_nm: setup.criterion_std_nm(),
         prior: setup.prior.as_ref(),
     }
 }
 
-/// Changes of a single limit with which another motion than the one found would be possible; within the time limit's
-/// own length where there is one. `watch` may end the search for them.
+/// Searches for single limit changes that would make another motion feasible, within the time limit of the search.
+/// `watch` may stop it.
 pub(super) fn changes(
     setup: &DesignSetup,
     study_path: &Path,

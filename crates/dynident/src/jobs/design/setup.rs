@@ -1,4 +1,4 @@
-//! What a search and the check of a given motion start with: robot, limits, noise, prior and criterion of a study.
+//! Inputs of a search or check: robot, limits, noise, prior and criterion of a study.
 
 use super::limits_in_force::{LimitsFor, in_force, included, loaded};
 use super::stopwatch::Stopwatch;
@@ -14,23 +14,20 @@ use dynident_model::Model;
 use nalgebra::DMatrix;
 use std::path::Path;
 
-/// Samples whose regressor is held at once.
-const SAMPLES_AT_ONCE: usize = 4096;
+const BLOCK_SAMPLES: usize = 4096;
 
-/// What a motion says about the base parameters.
 pub(super) struct MotionInformation {
-    /// `Σ WᵀW`: every torque noise 1 Nm (N).
+    /// `Σ WᵀW`: unit torque noise, 1 Nm (N).
     pub(super) plain: DMatrix<f64>,
-    /// `Σ Wᵀ Σ⁻¹ W` with the torque noise of the study.
+    /// `Σ Wᵀ Σ⁻¹ W` with the study's torque noise.
     pub(super) weighted: DMatrix<f64>,
 }
 
-/// A study's `[design]`, read and checked.
 pub(super) struct DesignSetup {
     pub(super) name: String,
     pub(super) section: DesignSection,
     pub(super) robot: StudyRobot,
-    /// The robot with the payload that the motion carries.
+    /// The robot with the payload of the motion.
     pub(super) loaded: Model,
     pub(super) limits: Limits,
     pub(super) set: LimitSet,
@@ -39,16 +36,16 @@ pub(super) struct DesignSetup {
     pub(super) torque_std_nm: Vec<f64>,
     ones: Vec<f64>,
     pub(super) notes: Vec<String>,
-    /// What limits were assumed, and what none looks at.
+    /// Assumed limits, and limits without a check.
     pub(super) assumed: Vec<String>,
     pub(super) not_checked: Vec<String>,
     pub(super) stopwatch: Stopwatch,
-    /// The study's files as they were before anything was read.
+    /// The study's files before the first read.
     pub(super) inputs: InputFiles,
 }
 
 impl DesignSetup {
-    /// For a search: terms are smooth, and something bounds how fast each joint moves.
+    /// For a search: smooth terms; the speed of every joint must be limited.
     pub(super) fn for_search(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
         let mut notes = Vec::new();
         let setup = Self::new(&smooth(study, &mut notes), study_path, options, notes, LimitsFor::Search)?;
@@ -56,7 +53,7 @@ impl DesignSetup {
         Ok(setup)
     }
 
-    /// For a motion that is there already and starts at these positions: terms as the study has them.
+    /// For an existing motion with these start positions: terms as in the study.
     pub(super) fn for_check(
         study: &Study,
         study_path: &Path,
@@ -66,7 +63,7 @@ impl DesignSetup {
         Self::new(study, study_path, options, Vec::new(), LimitsFor::Motion(start))
     }
 
-    /// For a log: what the robot did needs no assumption of what it may do.
+    /// For a log: no assumed limits.
     pub(super) fn for_log(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
         Self::new(study, study_path, options, Vec::new(), LimitsFor::Log)
     }
@@ -99,8 +96,7 @@ impl DesignSetup {
                 let motion_at = |times: &[f64], out: &mut Motion| task.given.motion(&[], times, out);
                 let sum = information(&robot, &torque_std_nm, task.given.times_s(), &motion_at);
                 let criterion: Box<dyn Criterion> = Box::new(Prediction::new(sum / samples.samples as f64));
-                // From a motion that determines all parameters well to one that determines the task's: a better start
-                // than any random one.
+                // The D-optimal motion is a better start for the task criterion than random parameters.
                 vec![Box::new(DOptimal), criterion]
             }
             named => named.criteria().unwrap_or_default(),
@@ -124,35 +120,32 @@ impl DesignSetup {
         })
     }
 
-    /// The torque noise that the criterion counts with.
-    pub(super) fn counted_std_nm(&self) -> &[f64] {
-        if self.section.criterion.of_regressor() { &self.ones } else { &self.torque_std_nm }
+    /// Torque noise of the criterion, Nm (N).
+    pub(super) fn criterion_std_nm(&self) -> &[f64] {
+        if self.section.criterion.ignores_torque_noise() { &self.ones } else { &self.torque_std_nm }
     }
 
-    /// What a motion says about the parameters at `times`.
     pub(super) fn information(&self, times: &[f64], motion_at: &dyn Fn(&[f64], &mut Motion)) -> MotionInformation {
         let [plain, weighted] =
             [&self.ones, &self.torque_std_nm].map(|std| information(&self.robot, std, times, motion_at));
         MotionInformation { plain, weighted }
     }
 
-    /// The criterion's name.
     pub(super) fn criterion(&self) -> &'static str {
         self.criteria.last().map_or("", |criterion| criterion.name())
     }
 
-    /// The criterion's figure of a motion that was not searched for.
     pub(super) fn figure(&self, MotionInformation { plain, weighted }: &MotionInformation) -> Option<f64> {
         let criterion = self.criteria.last()?;
         match &self.prior {
-            _ if self.section.criterion.of_regressor() => criterion.figure(plain),
+            _ if self.section.criterion.ignores_torque_noise() => criterion.figure(plain),
             Some(prior) => criterion.figure(&(prior + weighted)),
             None => criterion.figure(weighted),
         }
     }
 }
 
-/// Information of a motion at `times`, a block at a time.
+/// Information of a motion at `times`, computed in blocks.
 fn information(
     robot: &StudyRobot,
     torque_std_nm: &[f64],
@@ -162,14 +155,14 @@ fn information(
     let count = robot.layout().columns().len();
     let mut gatherer = Information::new(robot.model(), robot.layout(), torque_std_nm, None);
     let (mut sum, mut motion) = (DMatrix::zeros(count, count), Motion::default());
-    for times in times.chunks(SAMPLES_AT_ONCE) {
+    for times in times.chunks(BLOCK_SAMPLES) {
         motion_at(times, &mut motion);
         sum += gatherer.of(&motion, 1.0);
     }
     sum
 }
 
-/// The study with smooth steps in place of signs: a sign has no slope to follow.
+/// Replaces sign steps by smooth steps, because a sign has no gradient.
 fn smooth(study: &Study, notes: &mut Vec<String>) -> Study {
     let mut study = study.clone();
     let mut changed = false;
@@ -181,14 +174,13 @@ fn smooth(study: &Study, notes: &mut Vec<String>) -> Study {
         changed = true;
     }
     if changed {
-        notes.push(
-            "Coulomb friction is designed for with a smooth step (coulomb_width) in place of the sign".to_owned(),
-        );
+        notes
+            .push("the design uses a smooth step (coulomb_width) for Coulomb friction in place of the sign".to_owned());
     }
     study
 }
 
-/// That something bounds how fast each joint moves: without it the best motion is infinitely fast.
+/// Checks that the speed of every joint is limited; otherwise the optimum is infinitely fast.
 fn bounded(robot: &StudyRobot, limits: &Limits) -> Result<(), StudyError> {
     for joint in robot.model().joints() {
         let free = limits.of(&joint.name).is_none_or(|limit| {
@@ -202,7 +194,6 @@ fn bounded(robot: &StudyRobot, limits: &Limits) -> Result<(), StudyError> {
     Ok(())
 }
 
-/// Torque noise of every joint.
 fn torque_std(section: &DesignSection, robot: &StudyRobot, notes: &mut Vec<String>) -> Result<Vec<f64>, StudyError> {
     let joints = robot.model().joints();
     match &section.torque_std_nm {
@@ -214,7 +205,7 @@ fn torque_std(section: &DesignSection, robot: &StudyRobot, notes: &mut Vec<Strin
         }
         None => {
             notes.push(
-                "torque noise is taken as 1 % of each effort limit (torque_std_nm), 1 Nm where there is none"
+                "torque noise (torque_std_nm) is not stated: assumed as 1 % of each effort limit, 1 Nm without an effort limit"
                     .to_owned(),
             );
             let of = |effort: Option<f64>| effort.filter(|effort| *effort > 0.0).map_or(1.0, |effort| 0.01 * effort);

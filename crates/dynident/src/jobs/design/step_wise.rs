@@ -1,5 +1,4 @@
-//! The paper's criterion over windows with the settings of a study, solved by any optimiser and compared with the
-//! optimum.
+//! The paper's criterion over windows, solved with the study's optimiser and compared with the optimum.
 
 use super::search::SearchResult;
 use crate::error::{Expected, StudyError};
@@ -15,13 +14,11 @@ use dynident_excitation::step_wise::{StepWiseJoint, StepWiseProblem, Stroke, Str
 use dynident_excitation::{DesignProgress, Family};
 use std::time::Instant;
 
-/// Random starts of the gradient optimiser for each joint.
-const STARTS: usize = 4;
+const STARTS_PER_JOINT: usize = 4;
 
-/// A joint without position limits: more than any range of amplitudes.
-const FREE_RAD: f64 = 1e6;
+/// Position limit of a joint without position limits, rad: larger than any amplitude range.
+const UNLIMITED_RAD: f64 = 1e6;
 
-/// Solves the step-wise problem of a study.
 pub(crate) fn step_wise(
     section: &DesignSection,
     windowed: &WindowedCondition,
@@ -51,8 +48,9 @@ pub(crate) fn step_wise(
         };
         if watch(&progress).is_break() || late() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    // The file lists the optimum next to every design: it takes a tenth of a second.
-    let (x, evaluations) = problem.gradient_solution(section.search.seed, STARTS, |_| ControlFlow::Continue(()))?;
+    // The optimum is computed with every design; it takes about 0.1 s.
+    let (x, evaluations) =
+        problem.gradient_solution(section.search.seed, STARTS_PER_JOINT, |_| ControlFlow::Continue(()))?;
     let optimum = FoundStrokes { x, evaluations, optimiser: section.optimiser.name(), history: Vec::new() };
     let found = if section.parameters.is_empty() {
         searched(section, &problem, &optimum, stop)?
@@ -79,20 +77,20 @@ pub(crate) fn step_wise(
     })
 }
 
-/// The settings of the family, the only one whose strokes have mid-points.
+/// Settings of the family; only `spliced-logistic` has strokes with mid-points.
 fn spliced_settings(section: &DesignSection) -> Result<&SplicedLogisticSettings, StudyError> {
     let FamilyChoice::SplicedLogistic(settings) = &section.family else {
-        let fix = "the criterion windowed-condition is for kind = \"spliced-logistic\", whose strokes have mid-points";
+        let fix = "the criterion windowed-condition needs kind = \"spliced-logistic\", whose strokes have mid-points";
         return Err(StudyError::conflict(format!("family.kind = \"{}\"", section.family.name()), fix));
     };
     if settings.periods_s.is_some() {
-        let fix = "with windowed-condition each period follows from period_times_omega; leave it out";
+        let fix = "with windowed-condition each period follows from period_times_omega; remove periods_s";
         return Err(StudyError::conflict("family.periods_s", fix));
     }
     Ok(settings)
 }
 
-/// The strokes of a design, as the vector of the problem, and the search for them.
+/// Strokes of a design as the vector of unknowns, with the statistics of the search.
 #[derive(Clone)]
 struct FoundStrokes {
     x: Vec<f64>,
@@ -101,7 +99,7 @@ struct FoundStrokes {
     history: Vec<Generation>,
 }
 
-/// The strokes that the study's optimiser finds; `optimum` are those of the gradient.
+/// Strokes found by the study's optimiser; `optimum` are those of the gradient method.
 fn searched(
     section: &DesignSection,
     problem: &StepWiseProblem,
@@ -137,17 +135,15 @@ fn searched(
     Ok(FoundStrokes { x, evaluations, optimiser: section.optimiser.name(), history })
 }
 
-/// A problem with what makes a motion of its strokes.
 struct StrokeMotion<'a> {
     problem: &'a StepWiseProblem,
     settings: &'a SplicedLogisticSettings,
-    /// Where each joint starts, rad (m).
+    /// Start position of each joint, rad (m).
     offsets: &'a [f64],
     robot: &'a StudyRobot,
 }
 
 impl StrokeMotion<'_> {
-    /// The motion: one stroke after another.
     fn family(&self, strokes: &[Stroke]) -> Result<StepWiseLogistic, StudyError> {
         let steps = self.problem.joints.iter().zip(strokes).map(|(joint, stroke)| Step {
             joint: joint.joint,
@@ -156,7 +152,7 @@ impl StrokeMotion<'_> {
         Ok(StepWiseLogistic::new(self.offsets, &steps.collect::<Vec<_>>(), self.settings)?)
     }
 
-    /// The design as the file lists it, with the optimum if that is inside all limits.
+    /// Content of the result file; the optimum is included if it is inside all limits.
     fn file(&self, windowed: &WindowedCondition, found: &FoundStrokes, optimum: &[f64]) -> WindowedFile {
         let problem = self.problem;
         let strokes = problem.strokes(&found.x);
@@ -176,14 +172,13 @@ impl StrokeMotion<'_> {
         }
     }
 
-    /// Strokes as the file lists them.
     fn stroke_files(&self, strokes: &[Stroke]) -> Vec<StrokeFile> {
         let Self { problem, settings, offsets, robot } = *self;
         let conditions = problem.condition_numbers(strokes);
         let one = |place: usize| {
             let (stroke, joint) = (&strokes[place], problem.joints[place].joint);
             let limits = problem.limits(place, stroke).into_iter();
-            let limits = limits.filter(|limit| limit.limit < FREE_RAD).map(|limit| StrokeLimitFile {
+            let limits = limits.filter(|limit| limit.limit < UNLIMITED_RAD).map(|limit| StrokeLimitFile {
                 quantity: limit.quantity,
                 value: limit.value,
                 limit: limit.limit,
@@ -205,7 +200,6 @@ impl StrokeMotion<'_> {
     }
 }
 
-/// The constants of every joint.
 fn problem(
     section: &DesignSection,
     windowed: &WindowedCondition,
@@ -237,7 +231,7 @@ fn problem(
             Some(limits_rad) => {
                 return Err(StudyError::StrokeStart { joint: name.clone(), offset_rad: h, limits_rad });
             }
-            None => FREE_RAD,
+            None => UNLIMITED_RAD,
         };
         let constants = StrokeConstants {
             gravity,
@@ -255,12 +249,14 @@ fn problem(
         joints.push(StepWiseJoint { joint, constants });
     }
     if joints.is_empty() {
-        return Err(StudyError::conflict("criterion.joints", "name the joints that move, or leave it out for all"));
+        return Err(StudyError::conflict(
+            "criterion.joints",
+            "list the joints that move, or remove the key for all joints",
+        ));
     }
     Ok(StepWiseProblem { joints })
 }
 
-/// The vector of given strokes.
 fn given(strokes: &[GivenStroke], names: &[String]) -> Result<Vec<f64>, StudyError> {
     if let Some(stroke) = strokes.iter().find(|stroke| !names.contains(&stroke.joint)) {
         let (what, name, known) = ("joint that moves", stroke.joint.clone(), names.to_vec());

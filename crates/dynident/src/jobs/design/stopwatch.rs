@@ -3,7 +3,6 @@
 use crate::cpu_time::cpu_seconds;
 use std::time::Instant;
 
-/// Measures the wall time and processor time of a job.
 pub(super) struct Stopwatch {
     pub(super) started: Instant,
     cpu_s: Option<f64>,

@@ -1,4 +1,4 @@
-//! A trajectory as a table: what the user brings to be checked, or the task that a model is for.
+//! Reads a trajectory table: for a check, or as the task of a design.
 
 use crate::error::Error;
 use dynident_excitation::Motion;
@@ -7,25 +7,23 @@ use dynident_files::quoted;
 use dynident_recording::{Derivatives, MotionSettings, cutoff};
 use std::path::Path;
 
-/// Most rows.
 const MAX_ROWS: usize = 1_000_000;
 
-/// Steps of a table whose velocities are to be found may differ by this share.
-const UNEVEN: f64 = 1e-3;
+/// Largest relative deviation of the time steps of a table without derivatives.
+const MAX_RELATIVE_STEP_DEVIATION: f64 = 1e-3;
 
-/// Velocities may disagree with positions by this share of the largest step, and by this much, rad (m).
-const DISAGREE: f64 = 0.05;
-const DISAGREE_LEAST: f64 = 1e-3;
+/// Allowed difference between positions and integrated velocities: relative to the largest step, and absolute, rad (m).
+const MAX_RELATIVE_DISAGREEMENT: f64 = 0.05;
+const MIN_ALLOWED_DISAGREEMENT: f64 = 1e-3;
 
-/// A table and how it was understood.
 pub(crate) struct Trajectory {
     pub(crate) given: Given,
-    /// Where velocity and acceleration come from, if not from the table.
+    /// Method of velocity and acceleration if they are not in the table.
     pub(crate) note: Option<String>,
 }
 
-/// Reads `t_s`, `q1..` (or the joints' names) and `dq1..`, `ddq1..` where both are there; else velocities and
-/// accelerations are the study's differentiator's.
+/// Reads `t_s`, `q1..` (or the joint names), and `dq1..`, `ddq1..` if the table has both; otherwise the study's
+/// differentiator computes them.
 pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettings) -> Result<Trajectory, Error> {
     let wrong = |line: u64, message: String| Error::States { path: path.to_owned(), line, message };
     let broken = |error: &csv::Error| wrong(error.position().map_or(1, csv::Position::line), error.to_string());
@@ -34,7 +32,7 @@ pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettin
     let header = reader.headers().map_err(|error| broken(&error))?.clone();
     let columns = Columns::of(&header, joints).map_err(|message| wrong(1, message))?;
 
-    // The rows, one list for each joint and order of derivative.
+    // One list per joint and order of derivative.
     let (mut lines, mut times_s) = (Vec::new(), Vec::new());
     let mut groups = vec![vec![Vec::new(); joints.len()]; columns.groups.len()];
     let mut record = csv::StringRecord::new();
@@ -52,7 +50,7 @@ pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettin
             return Err(wrong(line, format!("t_s = {time_s} after {before}: times must increase")));
         }
         if times_s.len() == MAX_ROWS {
-            return Err(wrong(line, format!("more than {MAX_ROWS} rows: give a part of it, or a lower rate")));
+            return Err(wrong(line, format!("more than {MAX_ROWS} rows: use a part of it, or a lower sample rate")));
         }
         times_s.push(time_s);
         lines.push(line);
@@ -66,7 +64,7 @@ pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettin
         return Err(wrong(1, format!("{} rows: a motion needs two or more", times_s.len())));
     }
 
-    // The motion: with the table's own derivatives, if they are those of its positions, or with the differentiator's.
+    // Derivatives of the table are checked against its positions.
     let mut motion = Motion { samples: times_s.len(), joints: joints.len(), ..Motion::default() };
     let note = if groups.len() == 3 {
         disagreement(&times_s, &groups, joints).map_or(Ok(()), |(row, message)| Err(wrong(lines[row], message)))?;
@@ -81,7 +79,7 @@ pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettin
     Ok(Trajectory { given, note })
 }
 
-/// Where the columns stand: q, and dq and ddq if the table has both.
+/// Column indices of q, and of dq and ddq if the table has both.
 struct Columns {
     time: usize,
     groups: Vec<Vec<usize>>,
@@ -136,20 +134,20 @@ fn number_of(column: &str, group: &str) -> Option<usize> {
     digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| digits.parse().ok())?
 }
 
-/// Where positions do not move as velocities and accelerations say: the row, and what to do. `q₁ - q₀` is `h (q̇₀ +
-/// q̇₁) / 2 - h² (q̈₁ - q̈₀) / 12` but for `h⁵ q⁽⁵⁾ / 720`.
+/// Finds a row where positions do not match velocities and accelerations, with a message. `q₁ - q₀` equals `h (q̇₀ +
+/// q̇₁) / 2 - h² (q̈₁ - q̈₀) / 12` up to `h⁵ q⁽⁵⁾ / 720`.
 fn disagreement(times_s: &[f64], groups: &[Vec<Vec<f64>>], joints: &[String]) -> Option<(usize, String)> {
     joints.iter().enumerate().find_map(|(joint, name)| {
         let [q, dq, ddq] = [&groups[0][joint], &groups[1][joint], &groups[2][joint]];
         let largest = q.windows(2).fold(0.0_f64, |largest, pair| largest.max((pair[1] - pair[0]).abs()));
-        let allowed = (DISAGREE * largest).max(DISAGREE_LEAST);
+        let allowed = (MAX_RELATIVE_DISAGREEMENT * largest).max(MIN_ALLOWED_DISAGREEMENT);
         let row = (1..q.len()).find(|&k| {
             let h = times_s[k] - times_s[k - 1];
             let step = h * (dq[k - 1] + dq[k]) / 2.0 - h * h * (ddq[k] - ddq[k - 1]) / 12.0;
             ((q[k] - q[k - 1]) - step).abs() > allowed
         })?;
         let message = format!(
-            "dq{0} and ddq{0} (joint `{name}`) are not the derivatives of q{0}: from t_s = {1} to {2} the position moves by {3:.4}; check units (rad, rad/s, rad/s^2), or leave dq and ddq out",
+            "dq{0} and ddq{0} (joint `{name}`) are not the derivatives of q{0}: from t_s = {1} to {2} the position moves by {3:.4}; check units (rad, rad/s, rad/s^2), or remove dq and ddq",
             joint + 1,
             times_s[row - 1],
             times_s[row],
@@ -159,13 +157,15 @@ fn disagreement(times_s: &[f64], groups: &[Vec<Vec<f64>>], joints: &[String]) ->
     })
 }
 
-/// Positions to velocities and accelerations, by the study's own differentiator.
+/// Computes velocities and accelerations with the study's differentiator.
 fn derive(times_s: &[f64], groups: &mut Vec<Vec<Vec<f64>>>, settings: &MotionSettings) -> Result<String, String> {
     let step = (times_s[times_s.len() - 1] - times_s[0]) / (times_s.len() - 1) as f64;
-    if let Some(pair) = times_s.windows(2).find(|pair| (pair[1] - pair[0] - step).abs() > UNEVEN * step) {
+    if let Some(pair) =
+        times_s.windows(2).find(|pair| (pair[1] - pair[0] - step).abs() > MAX_RELATIVE_STEP_DEVIATION * step)
+    {
         return Err(format!(
             "without dq and ddq the times must be even to {} %: the step at t_s = {} is {} s, the mean {step} s; give dq1.. and ddq1.., or even times",
-            100.0 * UNEVEN,
+            100.0 * MAX_RELATIVE_STEP_DEVIATION,
             pair[0],
             pair[1] - pair[0]
         ));

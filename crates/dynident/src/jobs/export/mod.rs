@@ -1,4 +1,4 @@
-//! A finished model in the form that a controller or a simulator reads.
+//! `export`: an identified model for a controller or a simulator.
 
 mod simulator;
 
@@ -14,12 +14,12 @@ use dynident_identification::Role;
 use dynident_model::{InertialParameters, Mat3, Vec3};
 use std::path::Path;
 
-/// Writes the model of a `result.json` in the form `target`: bodies, friction and drives as `identified.urdf` has
-/// them, the physically consistent set unless the study asked for none. `study` is the study that the result was made
-/// with; `data` a folder in which its robot is looked for as well.
+/// Exports the model of a `result.json` to `target`: bodies, friction and drives as in `identified.urdf` (physically
+/// consistent unless the study disables this). `study` is the study of the result; its robot is also searched in the
+/// folder `data`.
 ///
 /// # Errors
-/// If the result does not belong to the study's robot; [`Error::Export`] for what the form cannot hold at all.
+/// If the result does not belong to the study's robot; [`Error::Export`] if the target cannot represent the model.
 pub fn export_model(
     result_path: &Path,
     study: &Study,
@@ -30,7 +30,7 @@ pub fn export_model(
     export_result(&ResultFile::read(result_path)?, result_path, study, study_path, data, target)
 }
 
-/// As [`export_model()`] with a result that is in memory; messages call it `result_path`.
+/// Like [`export_model()`] with a result in memory; `result_path` is its name in messages.
 ///
 /// # Errors
 /// As [`export_model()`].
@@ -97,7 +97,6 @@ fn of_form(robot: &RobotModel, form: &FormResult) -> Result<RobotModel, ExportEr
     RobotModel::new(robot.model().clone(), terms, values)
 }
 
-/// What a user of the model has to know of the result.
 fn reservations(stored: &ResultFile) -> Vec<String> {
     let mut notes: Vec<String> =
         stored.problems.iter().map(|problem| format!("The result has a PROBLEM: {problem}")).collect();
@@ -114,7 +113,6 @@ fn reservations(stored: &ResultFile) -> Vec<String> {
     notes
 }
 
-/// The robot with the values that the result holds.
 fn robot_model(
     stored: &ResultFile,
     path: &Path,
@@ -125,7 +123,7 @@ fn robot_model(
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let study = &stored.as_fitted(study);
     let robot = StudyRobot::new(study, study_path, &Folders::new(study, study_path, data))?;
-    // That study and result belong together.
+    // Checks that study and result belong together.
     stored.base_values(path, &robot.parametric)?;
     let of = |name: &str| {
         let body = stored.bodies.iter().find(|body| body.name == name);
@@ -144,11 +142,11 @@ fn robot_model(
     let violations = violations(&robot.parametric, &inertials, &values);
     if stored.physical.consistent && !violations.is_empty() {
         return Err(wrong(format!(
-            "not physically consistent, which physical.consistent promises ({}): the file was edited or damaged; identify again",
+            "physical.consistent is true, but the model is not physically consistent ({}): the file was edited or damaged; identify again",
             violations.join("; ")
         )));
     }
-    // Results of before velocities were kept have none.
+    // Results of earlier versions contain no velocities.
     let training = stored.logs.iter().filter(|log| log.role == Role::Identify);
     let velocities = recorded_velocities(training.map(|log| &log.velocities[..]), model.dof());
     let made = RobotModel::new(model, robot.terms().to_vec(), values);
@@ -156,16 +154,16 @@ fn robot_model(
         .map_err(|source| Error::Export { path: path.to_owned(), source: Box::new(source) })
 }
 
-/// The payload called `name` of a `result.json` (where it has one only, `name` may be none) as the command by which the
-/// controller of `reader` takes it: the body that it may be, in the frame of the link that carries it.
+/// Exports a payload of a `result.json` as a command for the controller of `reader`: the physically consistent body, in
+/// the frame of its link. `name` may be `None` if there is only one payload.
 ///
 /// # Errors
-/// A result without payloads or without this one, a payload without a body that can be real.
+/// A result without payloads or without this one, a payload without a physically consistent body.
 pub fn export_payload(result_path: &Path, name: Option<&str>, reader: PayloadReader) -> Result<Exported, Error> {
     export_payload_of(&ResultFile::read(result_path)?, result_path, name, reader)
 }
 
-/// As [`export_payload()`] with a result that is in memory; messages call it `result_path`.
+/// Like [`export_payload()`] with a result in memory; `result_path` is its name in messages.
 ///
 /// # Errors
 /// As [`export_payload()`].
@@ -180,21 +178,20 @@ pub fn export_payload_of(
     let found = match (name, &stored.payloads[..]) {
         (_, []) => return Err(wrong("no payload was estimated: add [[payload]] to the study".to_owned())),
         (None, [only]) => only,
-        (None, _) => return Err(wrong(format!("has the payloads {names}: name one (--payload)"))),
+        (None, _) => return Err(wrong(format!("several payloads ({names}): select one (--payload)"))),
         (Some(name), all) => (all.iter().find(|payload| payload.name == name))
             .ok_or_else(|| wrong(format!("no payload `{name}`; it has {names}")))?,
     };
-    let none = || {
+    let inconsistent = || {
         let why = found.failure.as_deref().unwrap_or("its mass is zero");
         wrong(format!("payload `{}` has no body that can be real: {why}", found.name))
     };
-    let body = found.possible.as_ref().ok_or_else(none)?;
+    let body = found.possible.as_ref().ok_or_else(inconsistent)?;
     let [xx, xy, xz, yy, yz, zz] = body.inertia_at_com_kgm2;
     let inertia = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
     let inertial = InertialParameters::from_centre_of_mass(body.mass_kg, Vec3(body.com_m), &inertia);
-    let text = payload_command(&PayloadBody { name: found.name.clone(), inertial }, reader).ok_or_else(none)?;
-    let mut notes =
-        vec![format!("In the frame of the link {}: it has to be the frame that the controller means.", found.link)];
+    let text = payload_command(&PayloadBody { name: found.name.clone(), inertial }, reader).ok_or_else(inconsistent)?;
+    let mut notes = vec![format!("In the frame of the link {}; the controller must use the same frame.", found.link)];
     if let Some(mass) = &found.mass_kg {
         notes.push(format!("Mass {:.4} ± {:.4} kg (95 %).", mass.value, mass.half_width_95));
     }

@@ -1,4 +1,4 @@
-//! What a result knows of drives, for simulators.
+//! Drive parameters of a result for simulators.
 
 use super::{reservations, robot_model};
 use crate::error::Error;
@@ -8,9 +8,10 @@ use dynident_export::{DriveKnowledge, ExportError, RobotModel, SimulatorFile, Si
 use dynident_identification::examination::{LagKind, TorqueLag};
 use std::path::Path;
 
-/// Armature, damping, frictionloss, delay and actuator gain of every joint as simulators mean them, with error bars:
-/// friction nearest to the identified law over the recorded velocities, bars by the covariance of `result.json`.
-/// `study` is the study that the result was made with; `data` a folder in which its robot is looked for as well.
+/// Exports armature, damping, frictionloss, delay and actuator gain of every joint in the conventions of simulators,
+/// with error bars: friction is the best approximation of the identified law over the recorded velocities, error bars
+/// use the covariance of `result.json`. `study` is the study of the result; its robot is also searched in the folder
+/// `data`.
 ///
 /// # Errors
 /// If the result does not belong to the study's robot.
@@ -23,7 +24,7 @@ pub fn export_simulator(
     export_simulator_of(&ResultFile::read(result_path)?, result_path, study, study_path, data)
 }
 
-/// As [`export_simulator()`] with a result that is in memory; messages call it `result_path`.
+/// Like [`export_simulator()`] with a result in memory; `result_path` is its name in messages.
 ///
 /// # Errors
 /// As [`export_simulator()`].
@@ -39,7 +40,7 @@ pub fn export_simulator_of(
     SimulatorFile::of(&robot, &drive_knowledge(stored, &robot), &reservations(stored)).map_err(cannot)
 }
 
-/// Covariance, delays and gains that a result holds, in the order of the robot's terms and joints.
+/// Covariance, delays and gains of a result, in the order of the robot's terms and joints.
 fn drive_knowledge(stored: &ResultFile, robot: &RobotModel) -> DriveKnowledge {
     let known: Vec<Option<&TermResult>> = robot
         .terms()
@@ -53,7 +54,8 @@ fn drive_knowledge(stored: &ResultFile, robot: &RobotModel) -> DriveKnowledge {
     let product = |a: Option<usize>, b: Option<usize>| {
         let (a, b) = (a?, b?);
         let covariance = *stored.base_parameter_covariance.get(a)?.get(b)?;
-        let product = covariance * half_widths(&stored.base_parameters[a]) * half_widths(&stored.base_parameters[b]);
+        let product =
+            covariance * half_width_ratio(&stored.base_parameters[a]) * half_width_ratio(&stored.base_parameters[b]);
         product.is_finite().then_some(product)
     };
     let joints: Vec<&str> = robot.model().joints().iter().map(|joint| joint.name.as_str()).collect();
@@ -71,29 +73,29 @@ fn drive_knowledge(stored: &ResultFile, robot: &RobotModel) -> DriveKnowledge {
     }
 }
 
-/// The base parameter that a term is by itself, if the logs excite it.
+/// Index of the base parameter that equals a term, if it is excited.
 fn base_place(stored: &ResultFile, term: &TermResult) -> Option<usize> {
     let place =
         stored.base_parameters.iter().position(|base| Some(&base.expression) == term.base_parameter.as_ref())?;
     (term.std.is_some() && stored.base_parameters[place].excited).then_some(place)
 }
 
-/// Half of the 95 % interval in standard deviations.
-fn half_widths(base: &BaseParameterResult) -> f64 {
+/// Ratio of the 95 % half-width to the standard deviation.
+fn half_width_ratio(base: &BaseParameterResult) -> f64 {
     if base.std > 0.0 { base.bar_95() / base.std } else { 0.0 }
 }
 
-/// What keeps a term from having an interval of its own.
+/// Reason why a term has no separate interval.
 fn note(stored: &ResultFile, term: &TermResult) -> Option<String> {
     let expression = term.base_parameter.as_ref()?;
     let base = stored.base_parameters.iter().find(|base| base.expression == *expression)?;
     if !base.excited {
-        return Some(format!("the logs do not excite {}: it was held", base.symbol));
+        return Some(format!("the logs do not excite {}: it was fixed", base.symbol));
     }
     if term.std.is_none() {
         let (value, bar) = (base.value, base.bar_95());
         return Some(format!(
-            "{} is told only in the sum {expression} = {value:.4} ± {bar:.4}, which is shared out near the description",
+            "{} is told only in the sum {expression} = {value:.4} ± {bar:.4}; the values are those nearest to the robot description",
             term.symbol
         ));
     }
@@ -106,12 +108,12 @@ fn milliseconds(seconds: f64, half_width_95_s: Option<f64>, note: Option<String>
 }
 
 fn delay(lag: &TorqueLag) -> SimulatorValue {
-    let taken_off = (lag.taken_off_s != 0.0)
-        .then(|| format!("{:.3} ms of it were taken off the torque before the fit", 1e3 * lag.taken_off_s));
-    milliseconds(lag.lag_s, Some(lag.half_width_95_s), taken_off)
+    let compensated =
+        (lag.taken_off_s != 0.0).then(|| format!("compensated before the fit: {:.3} ms", 1e3 * lag.taken_off_s));
+    milliseconds(lag.lag_s, Some(lag.half_width_95_s), compensated)
 }
 
-/// The delay of all joints together; where joints have their own or the study states them, it means nothing beside.
+/// Common delay of all joints; `None` if joints have separate delays.
 fn common_delay(stored: &ResultFile) -> Option<SimulatorValue> {
     let choice = &stored.method.torque_lag;
     match choice.kind {
@@ -119,7 +121,7 @@ fn common_delay(stored: &ResultFile) -> Option<SimulatorValue> {
         LagKind::Stated => {
             let first = *choice.lag_s.first()?;
             let is_one = choice.lag_s.iter().all(|lag_s| *lag_s == first);
-            is_one.then(|| milliseconds(first, None, Some("as the study states".to_owned())))
+            is_one.then(|| milliseconds(first, None, Some("stated in the study".to_owned())))
         }
         LagKind::Joints => None,
     }
@@ -140,7 +142,7 @@ fn gain(stored: &ResultFile, joint: &str, turns: bool) -> SimulatorValue {
             half_width_95: None,
             unit,
             note: Some(
-                "torque was taken as logged, in Nm (N) by the study's format: a gain of the torque scales all parameters, so that only logs with a known payload can tell it (drive.gains = \"unknown\")".to_owned(),
+                "torque as logged, in Nm (N) by the study's format: a torque gain scales all parameters, so its identification needs logs with a known payload (drive.gains = \"unknown\")".to_owned(),
             ),
         },
     }

@@ -1,4 +1,4 @@
-//! Logs to a model: the main job.
+//! `identify`: a model from logs.
 
 mod forms;
 mod joint_values;
@@ -8,10 +8,10 @@ mod sections;
 use crate::clock::now;
 use crate::error::Error;
 use crate::inputs::InputFiles;
-use crate::jobs::check::diagnosis_check;
+use crate::jobs::check::{CheckSettings, diagnosis_check};
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
-use crate::jobs::provenance::{beside, provenance, seen_from};
+use crate::jobs::provenance::{concurrently, provenance, relative_path};
 use crate::result::{LogSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyInput, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
@@ -33,59 +33,56 @@ use sections::{
 use std::path::Path;
 use std::time::Instant;
 
-/// Correlations that a result lists.
-const CORRELATIONS: usize = 10;
+const MAX_CORRELATIONS: usize = 10;
 
 /// A finished identification of a study.
 #[derive(Debug)]
 pub struct IdentificationOutcome {
-    /// What `result.json` holds.
+    /// Content of `result.json`.
     pub result: ResultFile,
     /// The estimate with its covariance.
     pub estimate: Estimate,
     /// Inertial parameters of the bodies, as in `result.bodies`.
     pub inertials: Vec<InertialParameters>,
-    /// The user's own URDF with the new values, or one of the robot that a D-H table, an MJCF or an SDF describes;
-    /// without it, [`ResultFile::no_urdf`] says why.
+    /// The user's URDF with the new values, or a URDF converted from a D-H table, MJCF or SDF; if missing,
+    /// [`ResultFile::no_urdf`] has the reason.
     pub urdf: Option<String>,
-    /// The user's own D-H table with the new values, where the description is one.
+    /// The user's D-H table with the new values.
     pub table: Option<String>,
-    /// The user's own MJCF with the new values, where the description is one; without it, [`ResultFile::no_mjcf`] says
-    /// why.
+    /// The user's MJCF with the new values; if missing, [`ResultFile::no_mjcf`] has the reason.
     pub mjcf: Option<String>,
-    /// The user's own SDF with the new values, where the description is one; without it, [`ResultFile::no_sdf`] says
-    /// why.
+    /// The user's SDF with the new values; if missing, [`ResultFile::no_sdf`] has the reason.
     pub sdf: Option<String>,
-    /// Measured and predicted torque over time, training logs first: at most the first 20 000 samples of a log that was
-    /// fitted to, the first 100 000 filtered rows of a held-out one.
+    /// Measured and predicted torque over time, training logs first: at most the first 20 000 samples of a training log
+    /// and the first 100 000 filtered rows of a held-out log.
     pub traces: Vec<LogTrace>,
 }
 
 impl IdentificationOutcome {
-    /// The report as one self-contained HTML page: torque measured against predicted, residuals, parameters with error
-    /// bars, friction, bodies, what was found in the logs, where the time went.
+    /// The report as one self-contained HTML page: measured and predicted torque, residuals, parameters with error
+    /// bars, friction, bodies, findings about the logs, computing times.
     ///
     /// # Errors
-    /// [`Error::Report`], which would be a defect of this program.
+    /// [`Error::Report`], which indicates a bug.
     pub fn report(&self) -> Result<String, Error> {
         crate::pages::identification::identification_report(&self.result, &self.traces)
     }
 }
 
-/// Fits a study's model to its logs and tests it on the held-out ones.
+/// Fits a study's model to its training logs and validates it on the held-out logs.
 ///
 /// # Errors
-/// Everything that [`Error`] names: files, study, logs. A poor fit is not an error.
+/// Every variant of [`Error`] for files, study and logs. A poor fit is not an error.
 pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<IdentificationOutcome, Error> {
-    identified(study, study_path, options, None)
+    identify_unchanged(study, study_path, options, None)
 }
 
-/// As [`identify()`] with the method `"instrumental"`, whatever the study asks for, and instruments from `source`: the
-/// closed loop simulated with the model so far (IDIM-IV: call again with a new simulation until the parameters settle),
-/// or a repeated run.
+/// Like [`identify()`] with the method `"instrumental"`, regardless of the study, and instruments from `source`: a
+/// simulation of the closed loop with the current model (IDIM-IV: repeat with a new simulation until the parameters
+/// converge), or a repeated run.
 ///
 /// # Errors
-/// As [`identify()`], and what `source` returns.
+/// As [`identify()`], and errors of `source`.
 pub fn identify_with_instruments(
     study: &Study,
     study_path: &Path,
@@ -94,41 +91,40 @@ pub fn identify_with_instruments(
 ) -> Result<IdentificationOutcome, Error> {
     let mut study = study.clone();
     study.estimator.method = EstimatorMethod::Instrumental;
-    identified(&study, study_path, options, Some(source))
+    identify_unchanged(&study, study_path, options, Some(source))
 }
 
-fn identified(
+fn identify_unchanged(
     study: &Study,
     study_path: &Path,
     options: &RunOptions<'_>,
     source: Option<&mut dyn InstrumentSource>,
 ) -> Result<IdentificationOutcome, Error> {
     let files = InputFiles::of(study, study_path, options.data.as_deref());
-    files.while_unchanged(|| identified_from_files(study, study_path, options, source))
+    files.while_unchanged(|| identify_from_files(study, study_path, options, source))
 }
 
-fn identified_from_files(
+fn identify_from_files(
     study: &Study,
     study_path: &Path,
     options: &RunOptions<'_>,
     source: Option<&mut dyn InstrumentSource>,
 ) -> Result<IdentificationOutcome, Error> {
-    // The study's files: robot, known arm, logs.
     let start = Instant::now();
     study.require_training_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let arm = study.arm.as_ref().map(|section| known_arm(section, &folders)).transpose()?;
-    // With the friction that was chosen when the arm was identified.
+    // Uses the friction that was selected when the arm was identified.
     let with_arm = arm.as_ref().map(|(_, stored)| stored.as_fitted(study));
     let study = with_arm.as_ref().unwrap_or(study);
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let in_study = Error::identification::<IdentificationError>(study_path);
-    // Names first: no log is read for a study that is wrong.
-    // Whoever reads the result may load its model: the study is examined whether the fit looks doubtful or not.
+    // Names are checked before any log is read.
+    // The study is always examined, because any result may be used.
     let mut settings = study.settings(study_path, &robot)?;
     settings.diagnosis = DiagnosisChoice::Always;
     if source.is_some() {
-        // What makes the instruments has the study's own terms.
+        // Instruments need the terms that the study states.
         settings.friction.retain(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
         settings.drive_inertia.clear();
     }
@@ -142,7 +138,6 @@ fn identified_from_files(
     read.extend(arm.iter().map(|(path, _)| ("result", StudyInput::File(path.clone()))));
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
 
-    // The identification itself.
     let execution = options.execution();
     let identification = || -> Result<_, Error> {
         let found = match (&arm, &study.arm, source) {
@@ -156,7 +151,7 @@ fn identified_from_files(
         found.map_err(&in_study)
     };
     let hashes = || provenance(study, study_path, &read);
-    let (provenance, found) = beside(options.threads, hashes, identification);
+    let (provenance, found) = concurrently(options.threads, hashes, identification);
     let (found, provenance) = (found?, provenance?);
     timings.logs = found.times.logs_s;
     timings.estimation = found.times.estimation_s;
@@ -164,29 +159,28 @@ fn identified_from_files(
     timings.total = start.elapsed().as_secs_f64();
     timings.made_at = now();
 
-    let made = Made { timings, provenance, is_payload: arm.is_some() };
-    written(study, study_path, &robot, &task, found, made)
+    let metadata = FitMetadata { timings, provenance, is_payload: arm.is_some() };
+    build_outcome(study, study_path, &robot, &task, found, metadata)
 }
 
-/// How an identification was made.
-pub(in crate::jobs) struct Made {
+pub(in crate::jobs) struct FitMetadata {
     pub(in crate::jobs) timings: Timings,
     pub(in crate::jobs) provenance: Provenance,
-    /// Whether payloads on a known arm were looked for.
+    /// Whether payloads on a known arm were estimated.
     pub(in crate::jobs) is_payload: bool,
 }
 
-/// What is written of an identification.
+/// Writes the result and the model files of an identification.
 ///
 /// # Errors
-/// Rows that the estimate does not belong to.
-pub(in crate::jobs) fn written(
+/// Rows that do not match the estimate.
+pub(in crate::jobs) fn build_outcome(
     study: &Study,
     study_path: &Path,
     robot: &StudyRobot,
     task: &IdentificationTask,
     found: Identification,
-    Made { timings, provenance, is_payload }: Made,
+    FitMetadata { timings, provenance, is_payload }: FitMetadata,
 ) -> Result<IdentificationOutcome, Error> {
     let in_study = Error::identification::<IdentificationError>(study_path);
     let inertials = found.inertials();
@@ -225,9 +219,9 @@ pub(in crate::jobs) fn written(
     let mut result = result_file(study, robot, task, &found, parts);
     result.problems = result.found_problems();
     let folder = study_path.parent().unwrap_or(Path::new(""));
-    result.robot.file = seen_from(folder, &robot.robot.path);
+    result.robot.file = relative_path(folder, &robot.robot.path);
     for log in &mut result.logs {
-        log.import.file = seen_from(folder, Path::new(&log.import.file));
+        log.import.file = relative_path(folder, Path::new(&log.import.file));
     }
     result.seal();
     let mut traces = found.examination.traces;
@@ -235,7 +229,6 @@ pub(in crate::jobs) fn written(
     Ok(IdentificationOutcome { result, estimate: found.estimate, inertials, urdf, table, mjcf, sdf, traces })
 }
 
-/// The earlier result of an arm, and where it lies.
 fn known_arm(section: &ArmSection, folders: &Folders) -> Result<(std::path::PathBuf, ResultFile), Error> {
     let path = folders.find(&section.result, None)?;
     let stored = ResultFile::read(&path)?;
@@ -250,9 +243,9 @@ fn physical_verdict(study: &Study, found: &Identification, inertials: &[Inertial
         verdict.fit = Some(physical_fit_result(fit, &arm_estimate));
         let is_fitted_to_logs = found.estimator.is_plain() && study.arm.is_none();
         verdict.note = String::from(if is_fitted_to_logs {
-            "of the consistent set that fits the logs best; the base parameters above it are the unconstrained estimate"
+            "of the physically consistent set with the best fit to the logs; the base parameters are the unconstrained estimate"
         } else {
-            "of the consistent set nearest to the estimate; the base parameters above it are that unconstrained estimate"
+            "of the physically consistent set nearest to the estimate; the base parameters are the unconstrained estimate"
         });
     }
     verdict.failure.clone_from(&consistent.failure);
@@ -260,12 +253,12 @@ fn physical_verdict(study: &Study, found: &Identification, inertials: &[Inertial
     verdict.impossible_priors = consistent
         .inconsistent_nominal
         .iter()
-        .map(|(body, least)| format!("{body}: least eigenvalue of the pseudo-inertia {least:.2e}"))
+        .map(|(body, least)| format!("{body}: smallest eigenvalue of the pseudo-inertia {least:.2e}"))
         .collect();
     verdict
 }
 
-/// Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
+/// A result without URDF is still valid if a URDF cannot express its parameters.
 fn exported_model(
     robot: &StudyRobot,
     task: &IdentificationTask,
@@ -279,14 +272,13 @@ fn exported_model(
     if task.settings.consistency.is_some() && (verdict.failure.is_some() || !verdict.consistent) {
         let reason = verdict.failure.clone().unwrap_or_else(|| verdict.violations.join("; "));
         return Err(format!(
-            "the bodies are not physically possible: {reason} (estimator.physical = false writes them as they are)"
+            "the bodies are not physically consistent: {reason} (set estimator.physical = false to write them anyway)"
         ));
     }
     let sources = sources(found.model(), found.estimate());
     model_files(robot, found, &sources)
 }
 
-/// What the result has beside the identification itself.
 struct Parts<'a> {
     name: String,
     timings: Timings,
@@ -346,7 +338,7 @@ fn result_file(
         bodies: bodies(model, parts.inertials, &sources(model, estimate), &found.consistent.parameter_std),
         possible_intervals: found.consistent.intervals.clone(),
         essential: found.essential.clone(),
-        correlations: strongest_correlations(estimate, CORRELATIONS),
+        correlations: strongest_correlations(estimate, MAX_CORRELATIONS),
         joints: joint_results(model, estimate, parameters, &found.examination.pooled_delays),
         drive_inertia_choice: found.drive_inertia.clone().or_else(|| study.drive_inertia_untested(robot)),
         friction_choice: [&found.training.friction_choice[..], &study.friction_as_stated(robot)]
@@ -364,7 +356,10 @@ fn result_file(
         validation: held_out.map(|log| log.validation.clone()).collect(),
         physical: parts.verdict,
         logs: log_summaries(task, found),
-        check: found.diagnosis.as_ref().map(|diagnosis| diagnosis_check(study, robot, &task.settings, diagnosis)),
+        check: found
+            .diagnosis
+            .as_ref()
+            .map(|diagnosis| diagnosis_check(study, robot, &task.settings, diagnosis, &CheckSettings::default())),
         no_urdf: parts.no_urdf,
         no_mjcf: parts.no_mjcf,
         no_sdf: parts.no_sdf,
@@ -372,20 +367,19 @@ fn result_file(
     }
 }
 
-/// Training logs first.
 fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSummary> {
     let joints = found.model().joint_names();
     let pairs = found.training.logs.iter().zip(&found.examination.delays);
-    let is_the_best = |diagnosis: &Diagnosis| diagnosis.search.best.is_none() && !diagnosis.is_unexplained();
-    let no_other_reading = found.diagnosis.as_ref().is_some_and(is_the_best);
+    let has_no_better = |diagnosis: &Diagnosis| diagnosis.search.best.is_none() && !diagnosis.is_unexplained();
+    let is_best_as_written = found.diagnosis.as_ref().is_some_and(has_no_better);
     let training = pairs.map(|(factors, delays)| {
         let mut summary = training_summary(&task.recordings[factors.index], factors, delays, &joints);
         summary.model_findings.extend(found.examination.sign.as_ref().and_then(sign_findings));
-        summary.model_findings.extend(friction_sign_findings(&found.examination.friction_signs, no_other_reading));
+        summary.model_findings.extend(friction_sign_findings(&found.examination.friction_signs, is_best_as_written));
         summary
     });
     let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));
-    // Another reading names the mistake; signs seen joint by joint are its consequences, and would name others.
+    // The best hypothesis gives the mistake; sign findings of single joints are consequences of it.
     let is_explained = found.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.search.best.is_some());
     let mut all: Vec<LogSummary> = training.chain(held_out).collect();
     if is_explained {

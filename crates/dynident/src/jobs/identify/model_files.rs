@@ -1,5 +1,4 @@
-//! The user's own description with the identified values; of a D-H table or an MJCF a URDF beside it, of an SDF a URDF
-//! alone.
+//! The user's robot description with the identified values; additionally a URDF for D-H tables, MJCF and SDF.
 
 use super::joint_values::JointValues;
 use crate::result::{InputFile, Provenance, ValueSource};
@@ -16,21 +15,19 @@ use dynident_model::{
 };
 use std::path::Path;
 
-/// Descriptions with the identified values.
 #[derive(Debug)]
 pub(super) struct ModelFiles {
-    /// The user's own URDF, or one of the robot that a D-H table, an MJCF or an SDF describes.
+    /// The user's URDF, or one converted from a D-H table, MJCF or SDF.
     pub(super) urdf: String,
-    /// The user's own D-H table.
     pub(super) table: Option<String>,
-    /// The user's own MJCF, or why there is none.
+    /// The user's MJCF, or the reason why it is missing.
     pub(super) mjcf: Option<Result<String, String>>,
-    /// The user's own SDF, or why there is none.
+    /// The user's SDF, or the reason why it is missing.
     pub(super) sdf: Option<Result<String, String>>,
 }
 
-/// The user's description with the new values; joints that were locked keep theirs. Otherwise the reason why there is
-/// none.
+/// Writes the new values into the user's robot description; locked joints keep their values. The error is the reason
+/// for a missing description.
 pub(super) fn model_files(
     robot: &StudyRobot,
     found: &Identification,
@@ -41,7 +38,7 @@ pub(super) fn model_files(
     let JointValues { changes: joints, is_refitted } = JointValues::of(found, TermClass::DampingAndFriction);
     let mut links = link_changes(model.model(), inertials).map_err(|error| error.to_string())?;
     note_locked(robot, &mut links);
-    let known = Known { model, parameters, std, sources, is_refitted };
+    let known = BodyNotes { model, parameters, std, sources, is_refitted };
     known.note(lost_in_urdf, &mut links);
     let Robot { model: whole, format, text, .. } = &robot.robot;
     let urdf = |text: &str| rewrite_urdf(text, &links, &joints).map_err(|error| error.to_string());
@@ -51,7 +48,7 @@ pub(super) fn model_files(
             let mjcf = keeping(robot, model.model(), inertials).and_then(|mut links| {
                 let JointValues { changes: joints, is_refitted } =
                     JointValues::of(found, TermClass::DampingFrictionAndInertia);
-                Known { is_refitted, ..known }.note(|property| property.is_none(), &mut links);
+                BodyNotes { is_refitted, ..known }.note(|property| property.is_none(), &mut links);
                 let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
                 rewrite_mjcf(text, &mut included_from(folder), &links, &joints).map_err(|error| error.to_string())
             });
@@ -78,14 +75,14 @@ fn with_springs(found: &Identification, joints: &[JointChange]) -> Vec<JointChan
     joints.iter().map(|joint| JointChange { stiffness: spring(joint), ..joint.clone() }).collect()
 }
 
-/// URDF, SDF and the D-H table have no drive inertia.
+/// URDF, SDF and D-H tables cannot express drive inertia.
 fn lost_in_urdf(property: Option<JointProperty>) -> bool {
     !matches!(property, Some(JointProperty::Damping | JointProperty::Friction))
 }
 
-/// The changes of an MJCF, in which bodies behind locked joints must keep their mass, for MuJoCo takes no body with a
-/// joint and without mass, or of an SDF, in which every fixed link must, for it counts as 1 kg without: the body that
-/// carries them gets the rest.
+/// Changes for MJCF and SDF, where links behind locked joints (MJCF) or fixed links (SDF) keep their mass: MuJoCo
+/// rejects a moving body without mass, and SDF assumes 1 kg for a link without mass. The body that carries them gets
+/// the difference.
 fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) -> Result<Vec<LinkChange>, String> {
     let is_sdf = robot.robot.format == DescriptionFormat::Sdf;
     let mut rest = inertials.to_vec();
@@ -104,15 +101,12 @@ fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) 
         for link in &behind {
             let is_unknown = |loss: &Loss| matches!(loss, Loss::UnknownMass { body, .. } if *body == link.name);
             if robot.robot.notices.iter().any(|notice| is_unknown(&notice.loss)) {
-                return Err(format!(
-                    "the mass of `{}` behind a locked joint is not known: give it an <inertial>",
-                    link.name
-                ));
+                return Err(format!("unknown mass of `{}` behind a locked joint: add an <inertial>", link.name));
             }
             if is_sdf && link.inertial.is_none() {
                 let name = &link.name;
                 return Err(format!(
-                    "the fixed link `{name}` has no mass, which SDF takes for 1 kg: give it an <inertial>"
+                    "the fixed link `{name}` has no mass, for which SDF assumes 1 kg: add an <inertial>"
                 ));
             }
             if let Some(inertial) = link.inertial {
@@ -132,17 +126,16 @@ fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) 
             _ => None,
         });
         if let Some(note) = set {
-            let what = if is_sdf { "is fixed to it" } else { "stands behind locked joints" };
-            let text = format!("without what {what} and keeps its values: {}", kept.join(", "));
+            let what = if is_sdf { "are fixed to it" } else { "are behind locked joints" };
+            let text = format!("without links that {what}, which keep their values: {}", kept.join(", "));
             *note = Some(note.take().map_or(text.clone(), |note| format!("{note}; {text}")));
         }
     }
     Ok(links)
 }
 
-/// What the comment of a body states about its values.
 #[derive(Clone, Copy)]
-struct Known<'a> {
+struct BodyNotes<'a> {
     model: &'a ParametricModel,
     parameters: &'a [f64],
     std: &'a [Option<f64>],
@@ -151,9 +144,9 @@ struct Known<'a> {
     is_refitted: bool,
 }
 
-impl Known<'_> {
-    /// Says in a body's comment how well its mass is known, which of its values torque told, and what of its joint's
-    /// drive the file does not hold or holds as something near to it.
+impl BodyNotes<'_> {
+    /// Writes the comment of a body: error bar of its mass, identifiable values, and drive values that the file cannot
+    /// express or only approximates.
     fn note(&self, lost: fn(Option<JointProperty>) -> bool, changes: &mut [LinkChange]) {
         let Self { model, parameters, std, sources, is_refitted } = self;
         for (index, (body, sources)) in model.model().bodies().iter().zip(*sources).enumerate() {
@@ -163,7 +156,7 @@ impl Known<'_> {
                 if names.is_empty() { "none".to_owned() } else { names.join(" ") }
             };
             let mut text = format!(
-                "about the link's frame, measured: {}; partly, in sums with others: {}; not measured, near the description: {}",
+                "in the link's frame, identified: {}; identified in sums: {}; not identified, near the original values: {}",
                 of(ValueSource::Measured),
                 of(ValueSource::Partly),
                 of(ValueSource::Nominal)
@@ -176,7 +169,7 @@ impl Known<'_> {
             let lost: Vec<String> =
                 lost.map(|(term, value)| format!("{} = {value:.4} {}", term.symbol(), term.unit())).collect();
             if !lost.is_empty() {
-                let _ = write!(text, "; of this joint's drive this file does not hold {}", lost.join(", "));
+                let _ = write!(text, "; drive values of this joint that this file cannot express: {}", lost.join(", "));
             }
             if *is_refitted && index < model.dof() {
                 let _ = write!(text, "; its damping and friction are fitted to the training logs without these terms");
@@ -192,19 +185,19 @@ impl Known<'_> {
     }
 }
 
-/// What the comment of a description that this program has written begins with.
-const SIGNATURE: &str = "<!-- dynident ";
-const TABLE_SIGNATURE: &str = "# dynident ";
+/// Start of the provenance comment in XML and in TOML.
+const XML_COMMENT_START: &str = "<!-- dynident ";
+const TOML_COMMENT_START: &str = "# dynident ";
 
 impl ModelFiles {
-    /// The same with a comment in each that says where its values come from; that of an earlier identification gives
-    /// way.
+    /// Adds a comment about the origin of the values to each file; it replaces the comment of an earlier
+    /// identification.
     pub(super) fn with_provenance(self, provenance: &Provenance) -> Self {
         let line = provenance_line(provenance);
         let table = |text: String| {
-            let earlier = text.strip_prefix(TABLE_SIGNATURE).and_then(|rest| rest.split_once('\n'));
+            let earlier = text.strip_prefix(TOML_COMMENT_START).and_then(|rest| rest.split_once('\n'));
             let rest = earlier.map_or(&*text, |(_, rest)| rest);
-            format!("{TABLE_SIGNATURE}{line}\n{}", rest.trim_start_matches('\u{feff}'))
+            format!("{TOML_COMMENT_START}{line}\n{}", rest.trim_start_matches('\u{feff}'))
         };
         let commented = |text: Result<String, String>| text.map(|text| commented_xml(&text, &line));
         let (mjcf, sdf) = (self.mjcf.map(commented), self.sdf.map(commented));
@@ -212,15 +205,15 @@ impl ModelFiles {
     }
 }
 
-/// The description with a comment that says where its values come from, before everything but the XML declaration; that
-/// of an earlier identification gives way.
+/// Adds a comment about the origin of the values after the XML declaration; it replaces the comment of an earlier
+/// identification.
 fn commented_xml(urdf: &str, line: &str) -> String {
-    let comment = format!("{SIGNATURE}{line} -->");
+    let comment = format!("{XML_COMMENT_START}{line} -->");
     let declared = urdf.find("<?xml").and_then(|from| urdf[from..].find("?>").map(|length| from + length + 2));
     let mark = if urdf.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
     let (head, rest) = urdf.split_at(declared.filter(|_| urdf[mark..].starts_with("<?xml")).unwrap_or(mark));
     let start = rest.trim_start();
-    let earlier = start.strip_prefix(SIGNATURE).and_then(|rest| rest.split_once("-->")).map(|(_, rest)| rest);
+    let earlier = start.strip_prefix(XML_COMMENT_START).and_then(|rest| rest.split_once("-->")).map(|(_, rest)| rest);
     let line = if head.len() > mark { "\n" } else { "" };
     match earlier {
         Some(rest) => format!("{head}{line}{comment}{rest}"),
@@ -228,23 +221,23 @@ fn commented_xml(urdf: &str, line: &str) -> String {
     }
 }
 
-/// Where the values come from, in a line that no comment of XML or TOML ends in.
+/// Origin of the values, in one line that cannot end a comment of XML or TOML.
 fn provenance_line(provenance: &Provenance) -> String {
     let robot = provenance.inputs.iter().find(|input| input.what == "robot");
     let named = |input: Option<&InputFile>| input.map_or_else(|| "in memory".to_owned(), |input| input.file.clone());
     let line = format!(
-        "{}, identity {}: identified from the study {} and the description {}; result.json has the rest",
+        "{}, identity {}: identified from the study {} and the robot description {}; details in result.json",
         provenance.version,
         provenance.identity,
         named(provenance.study.as_ref()),
         named(robot)
     );
-    // One form for both: comments of XML allow less than those of TOML.
+    // XML is stricter than TOML about comments.
     dynident_text::xml::comment(&line)
 }
 
-/// Says in a body's comment which of its links are not fixed but stood behind locked joints: its values hold while
-/// those stay where they were.
+/// Notes links behind locked joints in a body's comment: the values are valid only with these joints locked at the same
+/// positions.
 fn note_locked(robot: &StudyRobot, changes: &mut [LinkChange]) {
     for body in robot.model().bodies() {
         let own = robot.robot.model.bodies().iter().find(|original| original.name() == body.name());
@@ -259,7 +252,7 @@ fn note_locked(robot: &StudyRobot, changes: &mut [LinkChange]) {
             _ => None,
         });
         if let (Some(note), false) = (set, behind.is_empty()) {
-            let locked = format!("holds with the joints locked behind which stand: {}", behind.join(", "));
+            let locked = format!("valid only with the joints locked that carry: {}", behind.join(", "));
             *note = Some(note.take().map_or(locked.clone(), |note| format!("{note}; {locked}")));
         }
     }
@@ -300,7 +293,7 @@ mod tests {
         assert_eq!(roxmltree_names(&urdf), ["a"]);
     }
 
-    /// Names of the elements, by the reader of robots' descriptions: a comment that ended early would add one.
+    /// Names of the elements: a comment that ended early would add one.
     fn roxmltree_names(urdf: &str) -> Vec<String> {
         let inside = urdf.split_once("<!--").unwrap().1;
         let (comment, rest) = inside.split_once("-->").unwrap();

@@ -1,4 +1,4 @@
-//! From an estimate to the sections of `result.json`.
+//! Sections of `result.json`.
 
 use crate::jobs::violations::violations;
 use crate::result::{
@@ -58,7 +58,7 @@ pub(super) fn method_summary(study: &Study, identification: &Identification) -> 
         motion_hz: identification.motion_hz,
         condition_number: estimate.condition_number_raw,
         condition_number_scaled: estimate.condition_number_scaled,
-        base_columns: "from the robot's structure: columns from base to tip, bodies then laws; a column that depends on earlier ones is regrouped into them"
+        base_columns: "from the robot's structure: columns from base to tip, bodies before friction and drives; a column that depends on earlier ones is regrouped into them"
             .to_owned(),
         base_gap: [weakest, strongest],
         not_excited: estimate.rank.fixed.iter().map(|fixed| fixed.name.clone()).collect(),
@@ -69,15 +69,14 @@ pub(super) fn method_summary(study: &Study, identification: &Identification) -> 
     }
 }
 
-/// Sentences on declared torques that cannot be told from other parameters.
+/// Messages about declared torques that coincide with other parameters.
 fn coincident(model: &RegressorModel) -> Vec<String> {
     let of_term = |(term, others): (&TorqueTerm, Vec<String>)| {
         let joint = term.own_joint().map_or("", |joint| &model.model().joints()[joint].name);
         let nominal = term.described(model.model());
-        let held =
-            nominal.map_or("0, for the study gives no nominal".to_owned(), |value| format!("its nominal {value}"));
+        let held = nominal.map_or("0 (no nominal value stated)".to_owned(), |value| format!("its nominal {value}"));
         format!(
-            "torque {} of joint {joint} is the torque of {} already: no motion tells its coefficient, which stays near {held}; the sums are known",
+            "torque {} of joint {joint} coincides with that of {}: its coefficient is unidentifiable and stays near {held}; the sums are identifiable",
             term.symbol(),
             others.join(", ")
         )
@@ -85,7 +84,7 @@ fn coincident(model: &RegressorModel) -> Vec<String> {
     model.base().coincident().into_iter().map(of_term).collect()
 }
 
-/// The base parameters; error terms only where the estimate is the estimator's own, without parameters held at zero.
+/// The base parameters. Error terms are listed only for the estimator's estimate without fixed parameters.
 pub(super) fn base_parameters(found: &Identification, conditionals: &[Conditional]) -> Vec<BaseParameterResult> {
     let (model, estimate, physical) = (found.model(), found.estimate(), found.consistent_base_values());
     let expressions = model.base().expressions();
@@ -118,7 +117,7 @@ pub(super) fn base_parameters(found: &Identification, conditionals: &[Conditiona
         .collect()
 }
 
-/// For each body its ten values' sources; base parameters that the logs do not excite count as not measured.
+/// Sources of the ten values of each body; unexcited base parameters are not measured.
 pub(super) fn sources(model: &RegressorModel, estimate: &Estimate) -> Vec<[ValueSource; 10]> {
     let fixed: Vec<usize> = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
     let all = model.base().determination(&fixed, typical_length_m(model.model()));
@@ -169,7 +168,7 @@ pub(super) fn term_results(
     let of_term = |(x, term): (usize, &TorqueTerm)| {
         let column = first_term + x;
         let place = model.base().independent().iter().position(|&index| index == column);
-        // A term that other parameters were regrouped into has no value of its own either.
+        // A term with other parameters regrouped into it is not alone.
         let alone = place.filter(|&place| expressions[place] == term.symbol());
         let home = place.or_else(|| {
             let d = model.base().dependent().iter().position(|&index| index == column)?;
@@ -188,7 +187,7 @@ pub(super) fn term_results(
     model.terms().iter().enumerate().filter(|(_, term)| wanted(term)).map(of_term).collect()
 }
 
-/// Deviations of single logs' offsets from their mean; the last log's is what the others leave.
+/// Deviations of each log's offsets from their mean; the last log's deviation is minus the sum of the others.
 pub(super) fn offset_results(identification: &Identification, recordings: &[Recording]) -> Vec<LogOffset> {
     let (model, columns, estimate) =
         (identification.model(), &identification.training.columns, identification.estimate());
@@ -245,7 +244,7 @@ pub(super) fn training_result(
     let values = &identification.estimate().values;
     let base = identification.training.columns.base();
     let (samples, estimate) = training_errors(identification, values)?;
-    // Offsets of single logs and payloads are those of the estimate.
+    // Offsets of single logs and payloads use the estimate.
     let written = identification.consistent_base_values().map(|written| [written, &values[base..]].concat());
     let physical = written.map(|written| training_errors(identification, &written)).transpose()?;
     Ok(TrainingResult {
@@ -257,7 +256,6 @@ pub(super) fn training_result(
     })
 }
 
-/// Rows of each joint, and the errors of parameters on them.
 fn training_errors(
     identification: &Identification,
     values: &[f64],
@@ -300,12 +298,11 @@ pub(super) fn verdict(model: &RegressorModel, inertials: &[InertialParameters], 
         failure: None,
         impossible_priors: Vec::new(),
         sign: None,
-        note: "of the full set nearest to the prior; plain least squares does not enforce it, and another set with the same torques may pass"
+        note: "of the full set nearest to the prior; least squares does not enforce consistency, and another set with the same torques may be consistent"
             .to_owned(),
     }
 }
 
-/// The section of `result.json` about the fit.
 pub(super) fn physical_fit_result(fit: &PhysicalFit, estimate: &Estimate) -> PhysicalFitResult {
     PhysicalFitResult {
         status: match fit.status {

@@ -1,4 +1,4 @@
-//! The least that the errors of one run can be.
+//! Lower bound of the estimation error of one run.
 
 use crate::study::StudyRobot;
 use dynident_excitation::Information;
@@ -7,12 +7,11 @@ use dynident_iteration::Leg;
 use dynident_simulation::SensorSettings;
 use nalgebra::DMatrix;
 
-/// Samples whose regressor is held at once.
-const SAMPLES_AT_ONCE: usize = 4096;
+const BLOCK_SAMPLES: usize = 4096;
 
-/// The Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the recorded samples along the
-/// trajectories that count, for white torque noise and exact positions; none without torque noise, with correlated
-/// noise, or where a parameter is not excited.
+/// Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the used samples of the trajectories, for
+/// white torque noise and exact positions; `None` without torque noise, with correlated noise, or with an unexcited
+/// parameter.
 pub(super) fn cramer_rao(robot: &StudyRobot, legs: &[Leg], sensors: &SensorSettings) -> Option<Vec<f64>> {
     let dof = robot.model().dof();
     let std: Vec<f64> = (0..dof).map(|joint| sensors.torque_std.of(joint)).collect();
@@ -30,13 +29,13 @@ pub(super) fn cramer_rao(robot: &StudyRobot, legs: &[Leg], sensors: &SensorSetti
             for joint in 0..dof {
                 let inside = |sample: &usize| leg.counts(joint, *sample as f64 / rate_hz);
                 let samples: Vec<usize> = (0..whole.samples).filter(inside).collect();
-                // The others' torque determines nothing there.
+                // Infinite noise excludes the torque of the other joints.
                 let mut alone = vec![f64::INFINITY; dof];
                 alone[joint] = std[joint];
                 own += information(robot, whole, &alone, &samples);
             }
         }
-        // Samples a second that are recorded, of those that are controlled.
+        // Ratio of recorded to controlled samples.
         sum += own * (sensors.record_rate_hz.unwrap_or(rate_hz) / rate_hz);
     }
     let count = sum.nrows();
@@ -49,13 +48,13 @@ pub(super) fn cramer_rao(robot: &StudyRobot, legs: &[Leg], sensors: &SensorSetti
     Some((0..count).map(|k| inverse[(k, k)].sqrt() / scale[k]).collect())
 }
 
-/// `Σ Wᵀ Σ_τ⁻¹ W` over some samples of a motion.
+/// `Σ Wᵀ Σ_τ⁻¹ W` over selected samples of a motion.
 fn information(robot: &StudyRobot, whole: &Motion, std: &[f64], samples: &[usize]) -> DMatrix<f64> {
     let dof = robot.model().dof();
     let mut gatherer = Information::new(robot.model(), robot.layout(), std, None);
     let count = robot.layout().columns().len();
     let mut sum = DMatrix::zeros(count, count);
-    for some in samples.chunks(SAMPLES_AT_ONCE) {
+    for some in samples.chunks(BLOCK_SAMPLES) {
         let mut part = Motion::default();
         part.reset(dof, some.len());
         for joint in 0..dof {

@@ -1,17 +1,17 @@
-//! What the runs of an iteration depend on, as text that two calls compare.
+//! Fingerprint of all inputs of an iteration's runs.
 
 use crate::jobs::options::RunOptions;
 use crate::study::{Study, StudyRobot};
 use fnv::FnvHasher;
 use std::hash::Hasher;
 
-/// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits); then
-/// a number of each table, so that words can name the one that differs.
+/// Hash of study, robot and program version (FNV-1a, 64 bits), followed by a hash of each table so that messages can
+/// name the table that differs.
 pub(super) fn fingerprint(study: &Study, robot: &StudyRobot, options: &RunOptions<'_>) -> String {
     let mut study = study.clone();
-    // It is called otherwise, and is the same.
+    // The name does not affect the runs.
     study.name = None;
-    study.iteration = study.iteration.map(|section| section.of_runs());
+    study.iteration = study.iteration.map(|section| section.without_unrelated_settings());
     let (model, version) = (format!("{:?}", robot.model()), env!("CARGO_PKG_VERSION"));
     let all = number(&format!("{study:?} {model} {:?} {version}", options.data));
     let mut parts = vec![format!("{all:016x}"), format!("description:{:08x}", number(&model) as u32)];

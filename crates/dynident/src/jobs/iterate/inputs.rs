@@ -1,4 +1,4 @@
-//! The files and settings of the study, checked before any search starts.
+//! Files and settings of the study, checked before any search starts.
 
 use super::job::Job;
 use crate::error::{Error, StudyError};
@@ -9,21 +9,19 @@ use dynident_iteration::IterationSettings;
 use dynident_system::{PermittedProgram, ProgramPermission};
 use std::path::Path;
 
-/// The robot and the settings of a study.
 pub(super) struct Inputs {
     pub(super) section: IterationSection,
     pub(super) simulation: SimulationSection,
-    /// The files that are read, as they were before.
+    /// The input files before the first read.
     pub(super) files: InputFiles,
     pub(super) folders: Folders,
     pub(super) robot: StudyRobot,
     pub(super) settings: IterationSettings,
-    /// The simulated robot, if the study's robot is the simulator.
+    /// The simulated robot, if the study uses the simulator.
     pub(super) truth: Option<SimulatedTruth>,
 }
 
 impl Inputs {
-    /// Reads the robot and the settings.
     pub(super) fn read(job: &Job<'_>, section: IterationSection) -> Result<Self, Error> {
         let (study, study_path, data) = (job.study, job.study_path, job.options.data.as_deref());
         let simulation = study.simulation.clone().unwrap_or_default();
@@ -41,7 +39,6 @@ impl Inputs {
         Ok(Self { section, simulation, files, folders, robot, settings, truth })
     }
 
-    /// Checks the table `[iteration]`.
     pub(super) fn check_section(&self, study: &Study) -> Result<(), StudyError> {
         let Self { section, robot, .. } = self;
         section.check_legs(robot)?;
@@ -54,7 +51,7 @@ impl Inputs {
     }
 }
 
-/// The program that the study names as its robot, once its start is permitted.
+/// The program of the study's robot, if it may be started.
 pub(super) fn permitted_program(
     section: &IterationSection,
     study_path: &Path,

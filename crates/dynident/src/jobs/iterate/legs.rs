@@ -15,10 +15,10 @@ use dynident_simulation::controllers::ControllerModel;
 use dynident_system::PermittedProgram;
 use std::path::Path;
 
-/// Spreads the seeds of legs that have an iteration each.
-const SEED_OF_LEG: u64 = 0xd1b5_4a32_d192_ed03;
+/// Decorrelates the noise of legs with separate iterations.
+const SEED_STEP_PER_LEG: u64 = 0xd1b5_4a32_d192_ed03;
 
-/// The trajectory of each leg; the study's own is looked for once, and again with each known load.
+/// The trajectory of each leg; the study's trajectory is designed once, and again for each known payload.
 pub(super) fn trajectories(
     study: &Study,
     study_path: &Path,
@@ -35,7 +35,7 @@ pub(super) fn trajectories(
     let mut whole: Option<Trajectory> = None;
     let mut all = Vec::new();
     for leg in &section.leg {
-        // A load that is known is part of the torque limits, and its motion is looked for with it.
+        // Torque limits depend on a known payload, so its motion is designed separately.
         let is_known = |name: &String| study.payload.iter().any(|one| one.name == *name && one.known().is_some());
         let load = leg.payload.as_ref().filter(|name| is_known(name));
         if leg.trajectory.is_some() || leg.design.is_some() || load.is_some() {
@@ -61,7 +61,6 @@ pub(super) fn trajectories(
 }
 
 impl IterationSection {
-    /// The legs, as places among all, of each iteration.
     pub(super) fn stages(&self) -> Vec<Vec<usize>> {
         match self.order {
             LegOrder::OneAfterAnother if self.leg.len() > 1 => (0..self.leg.len()).map(|leg| vec![leg]).collect(),
@@ -69,7 +68,6 @@ impl IterationSection {
         }
     }
 
-    /// Checks names and numbers of the legs.
     pub(super) fn check_legs(&self, robot: &StudyRobot) -> Result<(), StudyError> {
         let names = robot.parametric.joint_names();
         for (number, leg) in (1..).zip(&self.leg) {
@@ -78,13 +76,15 @@ impl IterationSection {
         Ok(())
     }
 
-    /// What is run, with held joints at rest and the times that count.
     pub(super) fn legs(&self, trajectories: &[Trajectory], robot: &StudyRobot) -> Result<Vec<Leg>, StudyError> {
         let names = robot.parametric.joint_names();
         let free = [LegSection::default()];
         let sections = if self.leg.is_empty() { &free[..] } else { &self.leg[..] };
         if sections.len() != trajectories.len() {
-            return Err(StudyError::conflict("trajectory.json", "it has other legs: remove it"));
+            return Err(StudyError::conflict(
+                "trajectory.json",
+                "its legs differ from those of the study: remove the file",
+            ));
         }
         let mut legs = Vec::new();
         for (section, trajectory) in sections.iter().zip(trajectories) {
@@ -116,14 +116,13 @@ impl IterationSection {
         Ok(legs)
     }
 
-    /// The motion that is never fitted.
     pub(super) fn held_out_motion(&self, trajectory: &Trajectory) -> Result<HeldOutMotion, StudyError> {
         let every = self.held_out.as_ref().and_then(|own| own.every);
         Ok(HeldOutMotion { leg: Leg::whole(trajectory.reference()?)?, every })
     }
 
-    /// The robots of one iteration: the simulator for each of its legs, or the one outside (`program` is the permitted
-    /// program of the study); none where the caller brings it.
+    /// Robots of one iteration: one simulator per leg, or the external robot (`program` is the permitted program of the
+    /// study); empty for a robot of the caller.
     pub(super) fn robots(
         &self,
         simulation: &SimulationSection,
@@ -144,15 +143,15 @@ impl IterationSection {
                 if stage > 0 {
                     settings.folder = settings.folder.join(format!("leg_{}", stage + 1));
                 }
-                // Torques are compared with it to find a wrong unit; without it they are not.
+                // Used to detect a wrong torque unit; without a model the torques are not compared.
                 let prior = ControllerModel::from_parameters(robot.model(), robot.terms(), robot.nominal()).ok();
                 vec![Box::new(FolderRobot::new(settings, joints)?.with_prior(prior))]
             }
             RobotChoice::Function => Vec::new(),
             RobotChoice::Simulation => {
                 let mut simulation = simulation.clone();
-                // Runs of every leg count from 1: their noise is not to be the same.
-                simulation.sensors.seed ^= (stage as u64).wrapping_mul(SEED_OF_LEG);
+                // The runs of every leg start at 1, but their noise must differ.
+                simulation.sensors.seed ^= (stage as u64).wrapping_mul(SEED_STEP_PER_LEG);
                 let mut robots: Vec<Box<dyn Robot>> = Vec::new();
                 for &member in members {
                     let robot = simulation.truth(coupling, robot)?.robot;
@@ -172,7 +171,6 @@ impl IterationSection {
 }
 
 impl LegSection {
-    /// Checks names and numbers.
     fn check(&self, names: &[String]) -> Result<(), StudyError> {
         if self.trajectory.is_some() && self.design.is_some() {
             return Err(StudyError::Exclusive { keys: vec!["trajectory", "design"] });
@@ -194,7 +192,7 @@ impl LegSection {
             Expected::Finite.check(format!("hold.{name}"), *position)?;
         }
         if self.hold.len() == names.len() {
-            return Err(StudyError::conflict("hold", "all joints are held: leave one that moves"));
+            return Err(StudyError::conflict("hold", "all joints are held: at least one must move"));
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Run, identify, load the better model, run again: a study's whole iteration.
+//! `iterate`: repeated runs and identification with improving models.
 
 mod bound;
 mod files;
@@ -30,20 +30,20 @@ use inputs::{Inputs, permitted_program};
 use job::Job;
 use model::{RobotFiles, robot_found};
 use plan::Plan;
-use report::joined;
+use report::merged;
 use stages::Stages;
 use std::path::Path;
 use std::time::Instant;
-use trajectories::{Trajectories, kept};
+use trajectories::{Trajectories, load_or_make};
 
-/// Iterates a study's robot and writes the results into `out`: `trajectory.json` (the trajectories at the controller's
-/// rate), `runs/run_k/` (each run is written completely or not at all; for legs one after another
-/// `leg_n/runs/run_k/`), `iterations.json` after every run, and `report.html` at the end. With `resume`, runs that are
-/// already in the folder are not repeated: a call that continues after an interruption reaches the same result.
+/// Iterates a study's robot and writes the results to `out`: `trajectory.json` (trajectories at the controller's rate),
+/// `runs/run_k/` (each run is written completely or not at all; with sequential legs `leg_n/runs/run_k/`),
+/// `iterations.json` after every run, and `report.html` at the end. With `resume`, runs in the folder are not repeated:
+/// a call that continues after an interruption reaches the same result.
 ///
 /// # Errors
-/// Files, study, settings, and files of another study's iteration in `out`. The file itself reports how the robot and
-/// the iteration did.
+/// Invalid files, study or settings, or files of another study's iteration in `out`. Failures of runs are reported in
+/// the returned file.
 pub fn iterate_study(
     study: &Study,
     study_path: &Path,
@@ -55,11 +55,10 @@ pub fn iterate_study(
     iterated(Job { study, study_path, out, resume, options }, watch, None)
 }
 
-/// As [`iterate_study`] with the caller's robot in place of the study's: `robot` gets the names of the joints and makes
-/// the robot.
+/// Like [`iterate_study`] with the caller's robot: `robot` receives the joint names and returns the robot.
 ///
 /// # Errors
-/// As [`iterate_study`], and legs that hold joints locked, which only the simulator does.
+/// As [`iterate_study`], and legs with locked joints, which only the simulator supports.
 pub fn iterate_with_robot(
     study: &Study,
     study_path: &Path,
@@ -74,20 +73,19 @@ pub fn iterate_with_robot(
     iterated(Job { study: &study, study_path, out, resume, options }, watch, Some(robot))
 }
 
-/// Checks the study, prepares the folder and the motions, runs all stages and writes what they found.
 fn iterated(
     job: Job<'_>,
     watch: &mut IterationWatch<'_>,
     own_robot: Option<RobotMaker<'_>>,
 ) -> Result<IterationsFile, Error> {
     let Job { study, study_path, out, resume, options } = job;
-    // Before any file is read and any search starts.
+    // Permission is checked before any file is read or search starts.
     let section = study.iteration.clone().unwrap_or_default();
     let program = permitted_program(&section, study_path, watch.programs)?;
     let begin = Instant::now();
     let inputs = Inputs::read(&job, section)?;
     if inputs.section.robot == RobotChoice::Function && own_robot.is_none() {
-        let fix = "a function has to be given: call iterate_with_robot";
+        let fix = "robot = \"function\" needs code of the caller: call iterate_with_robot";
         return Err(job.section_error(StudyError::missing("robot", fix)));
     }
     inputs.check_section(study).map_err(|why| job.section_error(why))?;
@@ -97,7 +95,7 @@ fn iterated(
     let files = ResultFiles::of(out);
     let stores = opened_stores(&job, &files, members.len(), &fingerprint)?;
     let make = || Trajectories::of_study(&job, &inputs, watch);
-    let trajectories = kept(&files.trajectory(), &fingerprint, resume, make)?;
+    let trajectories = load_or_make(&files.trajectory(), &fingerprint, resume, make)?;
     let plan = Plan::of(&job, &inputs, &trajectories)?;
     let before_runs_s = begin.elapsed().as_secs_f64();
 
@@ -105,12 +103,11 @@ fn iterated(
     let stages = Stages { job, inputs, plan, files, members: &members, stores: &stores, program };
     let results = stages.run(watch, own_robot)?;
 
-    // All stages as one.
-    let missing = || job.section_error(StudyError::missing("leg", "there is none"));
-    let mut file = joined(results.files).ok_or_else(missing)?;
+    let missing = || job.section_error(StudyError::missing("leg", "no leg was run"));
+    let mut file = merged(results.files).ok_or_else(missing)?;
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == members.len()));
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: results.runs_made };
-    // Runs are not lost because their robot cannot be written.
+    // The runs remain valid if the robot files cannot be written.
     let (provenance, failed) = (&plan.report.provenance, |error| job.iteration_error(error));
     let found = robot_found(study, study_path, &inputs.robot, provenance, &results.ended, options, failed)
         .unwrap_or_else(|why| {
@@ -122,7 +119,7 @@ fn iterated(
     Ok(file)
 }
 
-/// The stores of all stages, each in its folder; without `resume` the results of an earlier call are removed.
+/// Opens the stores of all stages, each in its folder; without `resume` the results of an earlier call are removed.
 fn opened_stores(
     job: &Job<'_>,
     files: &ResultFiles<'_>,
@@ -132,12 +129,12 @@ fn opened_stores(
     let in_iteration = |error: IterationError| job.iteration_error(error);
     let folder =
         |stage: usize| if stages == 1 { job.out.to_owned() } else { job.out.join(format!("leg_{}", stage + 1)) };
-    // The results of an earlier call are removed before its runs, and nothing is removed unless all may be.
+    // Results are removed before runs, and only if all folders may be reset.
     if !job.resume {
         (0..stages).try_for_each(|stage| IterationStore::may_begin_afresh(&folder(stage))).map_err(in_iteration)?;
         files.remove()?;
     }
-    // All stores are opened first: with --fresh no run of an earlier call may be left in any of them.
+    // All stores are opened first, so that with --fresh no earlier run remains in any of them.
     (0..stages)
         .map(|stage| IterationStore::open(&folder(stage), fingerprint, job.resume))
         .collect::<Result<Vec<_>, _>>()

@@ -1,11 +1,10 @@
-//! The robot that an iteration found, as `identify` writes one: result.json, the description with the new values,
-//! pages.
+//! Writes the identified robot of an iteration like `identify`: result.json, robot description, pages.
 
 use crate::clock::now;
 use crate::error::Error;
-use crate::jobs::identify::{IdentificationOutcome, Made, written};
+use crate::jobs::identify::{FitMetadata, IdentificationOutcome, build_outcome};
 use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::{later_provenance, seen_from};
+use crate::jobs::provenance::{later_provenance, relative_path};
 use crate::output_set::OutputSet;
 use crate::result::{BaseParameterResult, Provenance, Timings};
 use crate::study::{Study, StudyInput, StudyRobot};
@@ -16,7 +15,6 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The files of the robot that was found.
 const RESULT: &str = "result.json";
 const URDF: &str = "identified.urdf";
 const TABLE: &str = "identified.toml";
@@ -25,30 +23,28 @@ const SDF: &str = "identified.sdf";
 const CONTROLLER: &str = "controller.json";
 const PAGE: &str = "identification.html";
 
-/// All of them: what the iteration writes when it ends, and what is absent until then.
+/// Files written at the end of an iteration and removed at its start.
 const MODEL_FILES: [&str; 7] = [RESULT, URDF, TABLE, MJCF, SDF, CONTROLLER, PAGE];
 
-/// An iteration of legs that are identified together, as it ended.
+/// A finished iteration of legs that are identified together.
 pub(super) struct EndedStage<'a> {
     pub(super) iteration: Iteration,
     pub(super) records: Vec<RunRecord>,
     pub(super) store: &'a IterationStore,
 }
 
-/// The files, by their names.
 pub(super) struct RobotFiles {
     files: Vec<(&'static str, Vec<u8>)>,
-    /// The base parameters, with names, units and bars.
     pub(super) base_parameters: Vec<BaseParameterResult>,
 }
 
 impl RobotFiles {
-    /// Of no robot: no run was good.
+    /// No files, because no run was accepted.
     pub(super) fn none() -> Self {
         Self { files: Vec::new(), base_parameters: Vec::new() }
     }
 
-    /// The set with these files, and without the others. Where there are none, those of another command stay.
+    /// Adds these files to the set and removes the others. Without own files, those of another command remain.
     pub(super) fn added_to(self, mut set: OutputSet, are_own: bool) -> OutputSet {
         if self.files.is_empty() && !are_own {
             return set;
@@ -62,10 +58,10 @@ impl RobotFiles {
     }
 }
 
-/// The robot that all good runs tell, all joints at once; none without a good run.
+/// Identifies the robot from all accepted runs, all joints at once; no files without an accepted run.
 ///
 /// # Errors
-/// Logs that are not there any more, rows that carry no estimate.
+/// Missing logs, or rows without an estimate.
 pub(super) fn robot_found(
     study: &Study,
     study_path: &Path,
@@ -84,9 +80,9 @@ pub(super) fn robot_found(
         };
         let legs = stage.iteration.task().legs.len();
         logs.extend(task.recordings.iter().enumerate().map(|(place, recording)| {
-            // Named `run 3, leg 2`.
+            // The name is `run 3, leg 2`.
             let run = recording.name.split([' ', ',']).nth(1).and_then(|run| run.parse().ok()).unwrap_or(1);
-            // Those that test the robot come last.
+            // Validation logs are last.
             match recording.role {
                 Role::Identify => stage.store.log_path(run, place % legs),
                 Role::Validate => stage.store.held_out_log_path(run),
@@ -111,11 +107,12 @@ pub(super) fn robot_found(
         ..Timings::default()
     };
     let parameters = found.consistent.parameters.clone();
-    let made = Made { timings, provenance: later_provenance(study, study_path, begun, &read)?, is_payload: false };
-    let mut outcome = written(study, study_path, robot, &task, found, made)?;
+    let metadata =
+        FitMetadata { timings, provenance: later_provenance(study, study_path, begun, &read)?, is_payload: false };
+    let mut outcome = build_outcome(study, study_path, robot, &task, found, metadata)?;
     let folder = study_path.parent().unwrap_or(Path::new(""));
     for (summary, path) in outcome.result.logs.iter_mut().zip(&logs) {
-        summary.import.file = seen_from(folder, path);
+        summary.import.file = relative_path(folder, path);
     }
     outcome.result.seal();
     let mut files = vec![
@@ -138,7 +135,6 @@ fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
     Ok((text + "\n").into_bytes())
 }
 
-/// The controller of a next run, with these parameters as its model.
 fn controller(stage: &EndedStage<'_>, parameters: &[f64]) -> Result<serde_json::Value, IterationError> {
     let EndedStage { iteration, records, .. } = stage;
     let model = iteration.controller_model(records, &ModelParameters::All(parameters.to_vec()))?;

@@ -14,9 +14,8 @@ use dynident_excitation::limits::Limits;
 use dynident_iteration::{HeldOutMotion, Iteration, IterationSettings, IterationTask, Leg, MotionPlanner, Redesign};
 use std::sync::Arc;
 
-/// The common part of all stages.
 pub(super) struct Plan<'a> {
-    /// The robot with the parameters that are assumed before the first run.
+    /// The robot with its prior parameters.
     prior: ParametricModel,
     legs: Vec<Leg>,
     settings: IterationSettings,
@@ -27,7 +26,6 @@ pub(super) struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// The plan of a study along these trajectories.
     pub(super) fn of(job: &Job<'a>, inputs: &'a Inputs, trajectories: &Trajectories) -> Result<Self, Error> {
         let Inputs { section, simulation, robot, truth, .. } = inputs;
         let Job { study, study_path, options, .. } = *job;
@@ -46,7 +44,7 @@ impl<'a> Plan<'a> {
         let report = IterationReport {
             study,
             study_path,
-            // Runs take hours: the files may change once they have been read and hashed.
+            // Runs take hours, so files may change after they have been read and hashed.
             provenance: inputs.files.while_unchanged(|| motion_provenance(study, study_path, data, &[]))?,
             robot,
             duration_s: legs.iter().map(|leg| leg.reference().duration_s()).sum(),
@@ -62,7 +60,6 @@ impl<'a> Plan<'a> {
         Ok(Self { prior, legs, settings, torque_limits, planner, held_out, report })
     }
 
-    /// The iteration of some legs, with the base parameters that earlier legs determined.
     pub(super) fn iteration(&self, members: &[usize], known: &[(usize, f64)]) -> Result<Iteration, StudyError> {
         let task = IterationTask {
             robot: self.prior.clone(),
@@ -82,7 +79,6 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// The robot with the parameters that are assumed before the first run.
 fn prior(inputs: &Inputs) -> Result<ParametricModel, StudyError> {
     let robot = &inputs.robot;
     Ok(match inputs.section.prior {
@@ -91,7 +87,7 @@ fn prior(inputs: &Inputs) -> Result<ParametricModel, StudyError> {
     })
 }
 
-/// Plans the next motion, where `[iteration]` asks for that.
+/// Planner of the next motion; `None` unless `[iteration]` requests a redesign.
 fn planner(job: &Job<'_>, inputs: &Inputs, legs: &[Leg]) -> Result<Option<Arc<dyn MotionPlanner>>, Error> {
     let settings = inputs.section.redesign(job.study).map_err(|why| job.section_error(why))?;
     let Some(settings) = settings else { return Ok(None) };
@@ -100,7 +96,7 @@ fn planner(job: &Job<'_>, inputs: &Inputs, legs: &[Leg]) -> Result<Option<Arc<dy
     Ok(Some(Arc::new(planner.map_err(|why| job.section_error(why.into()))?)))
 }
 
-/// The largest torque of each drive: the stated limits of a simulated robot, or else those of the description.
+/// Torque limit of each joint, Nm (N): stated for the simulated robot, otherwise from the robot description.
 fn torque_limits(simulation: &SimulationSection, robot: &StudyRobot, simulated: bool) -> Option<Vec<f64>> {
     let dof = robot.model().dof();
     if let Some(stated) = simulation.limits.torque.as_ref().filter(|_| simulated) {

@@ -1,4 +1,4 @@
-//! From records to what `iterations.json` holds.
+//! Content of `iterations.json`.
 
 use super::bound::cramer_rao;
 use crate::jobs::options::study_name;
@@ -12,7 +12,7 @@ use dynident_iteration::{IterationStatus, Leg, LoweredBandwidth, MotionForecast,
 use dynident_simulation::SensorSettings;
 use std::path::Path;
 
-/// The newest run before `record` whose robot its controller had.
+/// The newest earlier run whose estimate is the controller's model.
 fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
     let model = record.controller.model.as_ref()?;
     let with_model = |before: &&RunRecord| {
@@ -21,7 +21,6 @@ fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
     records.iter().rfind(with_model).map(|before| before.run)
 }
 
-/// What the file is made from.
 pub(super) struct IterationReport<'a> {
     pub(super) study: &'a Study,
     pub(super) study_path: &'a Path,
@@ -29,34 +28,28 @@ pub(super) struct IterationReport<'a> {
     pub(super) robot: &'a StudyRobot,
     /// Length of a run with all its legs, s.
     pub(super) duration_s: f64,
-    /// True base parameters, where they are known.
     pub(super) truth: Option<Vec<f64>>,
-    /// The Cramér-Rao bound of a run along the first motion.
+    /// Cramér-Rao bound of a run with the first motion.
     pub(super) bound: Option<Vec<f64>>,
-    /// What it follows from.
     pub(super) sensors: &'a SensorSettings,
-    /// Joints whose loops are slower than asked for.
     pub(super) lowered: Vec<LoweredBandwidth>,
 }
 
-/// One iteration of legs that are identified together, so far.
+/// State of one iteration of legs that are identified together.
 pub(super) struct Stage<'a> {
-    /// The leg's number from 1, where each leg has a separate iteration.
+    /// Leg number from 1, if each leg has a separate iteration.
     pub(super) leg: Option<usize>,
-    /// With the friction in force.
     pub(super) robot: &'a ParametricModel,
     pub(super) records: &'a [RunRecord],
     pub(super) status: &'a IterationStatus,
-    /// What is not met after the last record.
     pub(super) shortfalls: &'a [Shortfall],
-    /// What a further run was expected to bring where that was too little.
+    /// Forecast of a further run that was not worthwhile.
     pub(super) declined: Option<&'a MotionForecast>,
-    /// For each base parameter the error bar by an earlier leg, if that determined it.
+    /// Error bar of each base parameter from an earlier leg, if determined there.
     pub(super) known_std: &'a [Option<f64>],
 }
 
 impl IterationReport<'_> {
-    /// The file of one stage.
     pub(super) fn file(&self, stage: &Stage<'_>) -> IterationsFile {
         let Stage { records, status, shortfalls, declined, .. } = *stage;
         let known = self.known(stage);
@@ -74,7 +67,7 @@ impl IterationReport<'_> {
             status: status_key(status).to_owned(),
             reason: in_words(status, shortfalls, declined),
             declined: declined.map(|forecast| run_forecast(forecast, None)),
-            unmet: shortfalls.iter().filter(|own| !is_noise(own, status)).map(unmet).collect(),
+            unmet: shortfalls.iter().filter(|own| !is_irrelevant(own, status)).map(unmet).collect(),
             joints: self.robot.parametric.joint_names(),
             lowered_bandwidths: self.lowered.clone(),
             duration_s: self.duration_s,
@@ -88,13 +81,12 @@ impl IterationReport<'_> {
         }
     }
 
-    /// Truth and bound of a stage: both are for the stated torque terms only.
+    /// Truth and bound of a stage; both are valid for the stated torque terms only.
     fn known(&self, stage: &Stage<'_>) -> Known<'_> {
         let is_stated = stage.robot.terms() == self.robot.terms();
         Known { truth: self.truth.as_deref().filter(|_| is_stated), bound: self.bound.as_deref().filter(|_| is_stated) }
     }
 
-    /// One run of a stage.
     fn run(&self, record: &RunRecord, stage: &Stage<'_>, known: Known<'_>) -> IterationRun {
         let parameters = |estimate: Option<&RunEstimate>| {
             estimate.map_or_else(Vec::new, |estimate| parameters(estimate, stage, known.truth))
@@ -128,7 +120,7 @@ impl IterationReport<'_> {
         }
     }
 
-    /// Root mean square of a run's parameter errors over their Cramér-Rao bound, which is for a single run.
+    /// Root mean square of a run's parameter errors relative to their Cramér-Rao bound for a single run.
     fn error_over_bound(&self, record: &RunRecord, known: Known<'_>) -> Option<f64> {
         let first_motion = known.bound?;
         let own = self.own_bound(record);
@@ -141,7 +133,6 @@ impl IterationReport<'_> {
         (!ratios.is_empty()).then(|| (ratios.iter().sum::<f64>() / ratios.len() as f64).sqrt())
     }
 
-    /// The bound of a run along another motion than the first.
     fn own_bound(&self, record: &RunRecord) -> Option<Vec<f64>> {
         let references = &record.motion.as_ref()?.references;
         let legs: Result<Vec<Leg>, _> = references.iter().map(|reference| Leg::whole(reference.clone())).collect();
@@ -149,14 +140,13 @@ impl IterationReport<'_> {
     }
 }
 
-/// Truth and Cramér-Rao bound of the base parameters, where they are known.
 #[derive(Clone, Copy)]
 struct Known<'a> {
     truth: Option<&'a [f64]>,
     bound: Option<&'a [f64]>,
 }
 
-/// The base parameters of an estimate, with the error bars of earlier legs where those determined them.
+/// The base parameters of an estimate, with error bars of earlier legs where available.
 fn parameters(estimate: &RunEstimate, stage: &Stage<'_>, truth: Option<&[f64]>) -> Vec<IterationParameter> {
     let columns = stage.robot.layout().columns();
     let expressions = stage.robot.base().expressions();
@@ -176,7 +166,6 @@ fn parameters(estimate: &RunEstimate, stage: &Stage<'_>, truth: Option<&[f64]>) 
     (0..columns.len()).map(one).collect()
 }
 
-/// The key of a status in the file.
 fn status_key(status: &IterationStatus) -> &'static str {
     match status {
         IterationStatus::Converged => "converged",
@@ -200,10 +189,13 @@ fn run_forecast(forecast: &MotionForecast, reached_gain_percent: Option<f64>) ->
     }
 }
 
-/// The status, with what is not met where that ended it, and what was not worth a run.
+/// The status, with the first unmet condition or the gain of a declined run.
 fn in_words(status: &IterationStatus, shortfalls: &[Shortfall], declined: Option<&MotionForecast>) -> String {
     if let Some(forecast) = declined {
-        return format!("{status}: a further run would narrow the worst bars by {:.0} % only", forecast.gain_percent);
+        return format!(
+            "{status}: a further run would reduce the largest error bars by only {:.0} %",
+            forecast.gain_percent
+        );
     }
     match (status, shortfalls) {
         (IterationStatus::Settled | IterationStatus::RunsUsedUp, [first, rest @ ..]) => {
@@ -214,8 +206,8 @@ fn in_words(status: &IterationStatus, shortfalls: &[Shortfall], declined: Option
     }
 }
 
-/// Where something else ended the iteration, that runs are missing is no news, and allowing more of them no help.
-fn is_noise(shortfall: &Shortfall, status: &IterationStatus) -> bool {
+/// Missing runs are not reported if something else ended the iteration, because more runs would not help.
+fn is_irrelevant(shortfall: &Shortfall, status: &IterationStatus) -> bool {
     let ended = matches!(
         status,
         IterationStatus::Interrupted { .. } | IterationStatus::Waiting { .. } | IterationStatus::Refused { .. }
@@ -228,8 +220,8 @@ fn unmet(shortfall: &Shortfall) -> UnmetCondition {
     UnmetCondition { shortfall: shortfall.clone(), message, remedy }
 }
 
-/// Iterations of one leg after another as one: converged if all are, with the verdict of the last.
-pub(super) fn joined(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
+/// Merges sequential iterations of legs: converged if all are, with the status of the last.
+pub(super) fn merged(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
     let converged = stages.iter().all(|stage| stage.converged);
     let improvement = stages.iter().filter_map(|stage| stage.tracking_improvement).reduce(f64::min);
     let unmet =

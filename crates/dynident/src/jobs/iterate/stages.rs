@@ -1,12 +1,12 @@
-//! The stages of an iteration one after another: runs, identification, and what the next stage holds.
+//! Runs the stages of an iteration in sequence, with fixed parameters from earlier stages.
 
 use super::files::ResultFiles;
 use super::inputs::Inputs;
 use super::job::Job;
 use super::model::{EndedStage, RobotFiles};
 use super::plan::Plan;
-use super::report::{Stage, joined};
-use super::watch::{IterationWatch, Watched};
+use super::report::{Stage, merged};
+use super::watch::{IterationWatch, StageSupervisor};
 use crate::error::{Error, StudyError};
 use crate::pages::iteration::{RunName, RunTrace};
 use crate::result::IterationsFile;
@@ -16,49 +16,42 @@ use dynident_iteration::{
 };
 use dynident_system::PermittedProgram;
 
-/// Makes a robot of the joints with these names.
+/// Creates a robot with these joints.
 pub type RobotMaker<'a> = &'a mut dyn FnMut(&[String]) -> Box<dyn Robot>;
 
-/// Everything that the stages need.
 pub(super) struct Stages<'a> {
     pub(super) job: Job<'a>,
     pub(super) inputs: &'a Inputs,
     pub(super) plan: &'a Plan<'a>,
     pub(super) files: &'a ResultFiles<'a>,
-    /// For each stage its legs, as places among all legs.
     pub(super) members: &'a [Vec<usize>],
-    /// For each stage its runs.
     pub(super) stores: &'a [IterationStore],
-    /// The permitted program of the study.
     pub(super) program: Option<&'a PermittedProgram>,
 }
 
-/// The results of the stages that have ended.
 pub(super) struct StageResults<'a> {
     pub(super) files: Vec<IterationsFile>,
     pub(super) traces: Vec<RunTrace>,
-    /// New runs; others were in the folder already.
+    /// Number of new runs, without those from earlier calls.
     pub(super) runs_made: usize,
     pub(super) ended: Vec<EndedStage<'a>>,
-    /// For each base parameter its error bar, if a stage has determined it.
+    /// Error bar of each base parameter, if a stage has determined it.
     known_std: Vec<Option<f64>>,
-    /// Base parameters that later stages hold: column and value.
+    /// Base parameters that are fixed in later stages: column and value.
     known: Vec<(usize, f64)>,
 }
 
-/// A stage that is being run.
 #[derive(Clone, Copy)]
 struct CurrentStage<'a> {
     iteration: &'a Iteration,
-    /// The leg's number from 1, where each leg has a separate iteration.
+    /// Leg number from 1, if each leg has a separate iteration.
     leg: Option<usize>,
-    /// How many legs it has.
     legs: usize,
     store: &'a IterationStore,
 }
 
 impl<'a> Stages<'a> {
-    /// Runs the stages until one of them ends the iteration; each holds what those before it have found.
+    /// Runs the stages until one ends the iteration; each uses the parameters of earlier stages.
     pub(super) fn run(
         &self,
         watch: &mut IterationWatch<'_>,
@@ -80,14 +73,13 @@ impl<'a> Stages<'a> {
             results.ended.push(EndedStage { records: outcome.runs.clone(), iteration, store });
             let last = outcome.runs.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
             match last {
-                Some(last) if !ends_iteration(&outcome.status) => results.hold(last),
+                Some(last) if !ends_iteration(&outcome.status) => results.fix_parameters(last),
                 _ => break,
             }
         }
         Ok(results)
     }
 
-    /// The robots of a stage: those of the study and the caller's own.
     fn robots(
         &self,
         stage: usize,
@@ -101,7 +93,7 @@ impl<'a> Stages<'a> {
         Ok(robots)
     }
 
-    /// Makes the runs of a stage; `iterations.json` is written after each.
+    /// Makes the runs of a stage and writes `iterations.json` after each.
     fn run_stage(
         &self,
         stage: &CurrentStage<'_>,
@@ -118,13 +110,12 @@ impl<'a> Stages<'a> {
             unwritten = self.write_progress(stage, &records, results).err();
             run(record, runs);
         };
-        let mut watched = Watched { stop: &watch.stop, allow: &mut watch.allow, made: &mut made };
+        let mut watched = StageSupervisor { stop: &watch.stop, allow: &mut watch.allow, made: &mut made };
         let outcome = iterate_supervised(stage.iteration, &mut robots, Some(stage.store), &mut watched);
         let outcome = outcome.map_err(|error| self.job.iteration_error(error))?;
         unwritten.map_or(Ok(outcome), Err)
     }
 
-    /// Writes `iterations.json` with the runs that were made, before the next run.
     fn write_progress(
         &self,
         stage: &CurrentStage<'_>,
@@ -143,10 +134,9 @@ impl<'a> Stages<'a> {
             known_std: &results.known_std,
         });
         let all: Vec<IterationsFile> = results.files.iter().cloned().chain([now]).collect();
-        joined(all).map_or(Ok(()), |file| self.files.write(&file, None, RobotFiles::none()))
+        merged(all).map_or(Ok(()), |file| self.files.write(&file, None, RobotFiles::none()))
     }
 
-    /// Adds the file and the tracking errors of a stage to the results.
     fn report(
         &self,
         stage: &CurrentStage<'_>,
@@ -176,7 +166,6 @@ impl<'a> Stages<'a> {
 }
 
 impl StageResults<'_> {
-    /// Before the first stage, with this number of base parameters.
     fn empty(columns: usize) -> Self {
         Self {
             files: Vec::new(),
@@ -188,8 +177,8 @@ impl StageResults<'_> {
         }
     }
 
-    /// Holds what an estimate determined for the first time in the stages that follow.
-    fn hold(&mut self, estimate: &RunEstimate) {
+    /// Fixes parameters that this estimate determined first.
+    fn fix_parameters(&mut self, estimate: &RunEstimate) {
         let determined = self.known_std.len().min(estimate.values.len());
         for column in (0..determined).filter(|column| !estimate.fixed.contains(column)) {
             if self.known_std[column].is_none() {
@@ -200,7 +189,6 @@ impl StageResults<'_> {
     }
 }
 
-/// Whether no further stage follows a stage that ended so.
 fn ends_iteration(status: &IterationStatus) -> bool {
     match status {
         IterationStatus::Refused { .. } | IterationStatus::Waiting { .. } | IterationStatus::Interrupted { .. } => true,

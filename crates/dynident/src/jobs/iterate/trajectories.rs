@@ -1,4 +1,4 @@
-//! The trajectories of all legs, and the file that keeps them between calls.
+//! Trajectories of all legs, stored between calls.
 
 use super::inputs::Inputs;
 use super::job::Job;
@@ -12,24 +12,20 @@ use dynident_iteration::other_settings;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// The trajectories that are run.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Trajectories {
-    /// One for each leg.
     pub(super) trajectories: Vec<Trajectory>,
-    /// The held-out motion, which is never fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) held_out: Option<Trajectory>,
 }
 
 impl Trajectories {
-    /// Reads or designs the trajectories of the study.
     pub(super) fn of_study(job: &Job<'_>, inputs: &Inputs, watch: &IterationWatch<'_>) -> Result<Self, Error> {
         let Inputs { section, simulation, robot, .. } = inputs;
         let Job { study, study_path, options, .. } = *job;
         let rate_hz = section.rate_hz.unwrap_or(simulation.rate_hz);
         let trajectories = legs::trajectories(study, study_path, robot, rate_hz, options, watch.design)?;
-        // An interrupted search would stay this folder's trajectory for all later calls.
+        // An interrupted search must not be stored, because later calls would use its trajectory.
         if watch.stop.is_requested() {
             return Err(Error::Interrupted { what: "the search for the trajectory" });
         }
@@ -44,8 +40,8 @@ impl Trajectories {
     }
 }
 
-/// The trajectories of an earlier call, or new ones, which are kept before anything is run.
-pub(super) fn kept(
+/// Trajectories of an earlier call, or new ones, which are stored before the first run.
+pub(super) fn load_or_make(
     path: &Path,
     fingerprint: &str,
     resume: bool,
@@ -61,7 +57,7 @@ pub(super) fn kept(
     if resume && path.is_file() {
         let text = read_result(path)?;
         let kept: TrajectoryFile = serde_json::from_slice(&text)
-            .map_err(|error| wrong(format!("is no trajectory of an iteration ({error}): remove it")))?;
+            .map_err(|error| wrong(format!("invalid trajectory file ({error}): remove it")))?;
         if kept.fingerprint == fingerprint {
             return Ok(kept.all);
         }

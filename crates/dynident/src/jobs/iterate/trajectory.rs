@@ -1,4 +1,4 @@
-//! The trajectory of every run: from a file, or designed first.
+//! Trajectory of the runs: from a file, or designed.
 
 use crate::error::{Error, StudyError};
 use crate::jobs::design::{design_study, trajectory_table};
@@ -10,41 +10,35 @@ use dynident_simulation::{Reference, SimulationError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A trajectory at the controller's rate, and the times that count for each joint.
+/// A trajectory at the controller's rate, with time windows per joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Trajectory {
-    /// Samples a second.
+    /// Sample rate, Hz.
     pub(crate) rate_hz: f64,
-    /// Joints.
     pub(crate) joints: usize,
-    /// Samples of each joint.
     pub(crate) samples: usize,
-    /// Positions, joint by joint.
+    /// Positions, joint-major, rad (m).
     pub(crate) q: Vec<f64>,
-    /// Velocities.
+    /// Velocities, joint-major, rad/s (m/s).
     pub(crate) dq: Vec<f64>,
-    /// Accelerations.
+    /// Accelerations, joint-major, rad/s² (m/s²).
     pub(crate) ddq: Vec<f64>,
-    /// For each joint the times (from, to; s) whose rows count; everything without it.
+    /// Time ranges (from, to; s) of each joint that are used in the fit; `None` for the whole motion.
     pub(crate) windows: Option<Vec<Vec<[f64; 2]>>>,
-    /// Of a step-wise design, which joint moves when.
     #[serde(default)]
     pub(crate) strokes: Vec<StrokeSpan>,
 }
 
-/// When one joint makes its stroke.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StrokeSpan {
-    /// The joint.
     pub(crate) joint: usize,
-    /// Begin, s.
+    /// Start, s.
     pub(crate) from_s: f64,
     /// End, s.
     pub(crate) to_s: f64,
 }
 
 impl Trajectory {
-    /// The study's trajectory at the controller's rate.
     pub(crate) fn of_study(
         study: &Study,
         study_path: &Path,
@@ -102,7 +96,6 @@ impl Trajectory {
         }
     }
 
-    /// As a reference for controllers.
     pub(crate) fn reference(&self) -> Result<Reference, SimulationError> {
         let motion = Motion {
             samples: self.samples,
@@ -115,8 +108,7 @@ impl Trajectory {
         Reference::new(self.rate_hz, motion)
     }
 
-    /// The part in which the joints that are not held make their strokes, if it is made of strokes; everything
-    /// otherwise.
+    /// The part with the strokes of joints that are not held; the whole trajectory without strokes.
     pub(crate) fn without(&self, held: &[Option<f64>]) -> Result<Self, StudyError> {
         if self.strokes.is_empty() || held.iter().all(Option::is_none) {
             return Ok(self.clone());
@@ -125,7 +117,7 @@ impl Trajectory {
         let span = own.fold([f64::INFINITY, 0.0_f64], |[from, to], s| [from.min(s.from_s), to.max(s.to_s)]);
         let at = |time_s: f64| (time_s * self.rate_hz).round() as usize;
         if span[0] > span[1] || at(span[1]) <= at(span[0]) {
-            return Err(StudyError::conflict("hold", "no joint that moves has a stroke in the design"));
+            return Err(StudyError::conflict("hold", "the design has no stroke of a moving joint"));
         }
         let (first, last) = (at(span[0]), at(span[1]).min(self.samples - 1));
         let samples = last + 1 - first;

@@ -1,4 +1,4 @@
-//! Who hears of an iteration's progress, permits its motions and stops it.
+//! Progress callbacks, permissions and stop signal of an iteration.
 
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
@@ -7,20 +7,20 @@ use dynident_system::ProgramPermission;
 
 /// Callbacks and permissions of an iteration.
 pub struct IterationWatch<'a> {
-    /// Hears of the search for the trajectory, if there is one.
+    /// Receives the progress of a trajectory search.
     pub design: &'a (dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
-    /// Hears of every new run.
+    /// Receives every new run.
     pub run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
-    /// Requests a stop: the robot is stopped, the recorded samples are kept, and no further run is commanded.
+    /// Requests a stop: the robot is stopped, recorded samples are kept, and no further run is commanded.
     pub stop: StopSignal,
-    /// Asked before each motion of an external robot whether it may be commanded. `None` permits all motions.
+    /// Called before each motion of an external robot; returns whether it may be commanded. `None` permits all motions.
     pub allow: Option<&'a mut dyn FnMut(&NextMotion) -> bool>,
-    /// Whether the program that a study names as its robot may be started. By default it may not.
+    /// Whether the program of the study's robot may be started; by default not.
     pub programs: ProgramPermission<'a>,
 }
 
 impl<'a> IterationWatch<'a> {
-    /// Only hears: nobody stops the iteration, every motion may be commanded, and no program is started.
+    /// Callbacks only: no stop, all motions permitted, no program is started.
     pub fn new(
         design: &'a (dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
         run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
@@ -29,14 +29,13 @@ impl<'a> IterationWatch<'a> {
     }
 }
 
-/// Hears of the runs of a stage, and asks for permission.
-pub(super) struct Watched<'a, 'b> {
+pub(super) struct StageSupervisor<'a, 'b> {
     pub(super) stop: &'a StopSignal,
     pub(super) allow: &'a mut Option<&'b mut dyn FnMut(&NextMotion) -> bool>,
     pub(super) made: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
 }
 
-impl Supervisor for Watched<'_, '_> {
+impl Supervisor for StageSupervisor<'_, '_> {
     fn stop(&self) -> Option<&StopSignal> {
         Some(self.stop)
     }

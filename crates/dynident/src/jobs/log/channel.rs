@@ -1,28 +1,26 @@
-//! One channel in figures: range, count, course.
+//! Statistics of one channel: range, count, course.
 
-/// Parts that the course has at most; an even number.
-const PARTS: usize = 48;
+/// Maximum number of averaged parts of the course; must be even.
+const MAX_PARTS: usize = 48;
 
-/// A channel under way.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tally {
+pub(super) struct ChannelStatistics {
     pub(super) samples: u64,
     pub(super) range: Option<[f64; 2]>,
     first: Option<f64>,
     last: Option<f64>,
     rows: u64,
-    /// Rows in a part; a power of two that doubles when the parts are full.
+    /// Rows per part: a power of two that doubles when all parts are full.
     rows_of_part: u64,
-    /// Sum and count of the values in each part.
     parts: Vec<(f64, u64)>,
 }
 
-impl Tally {
+impl ChannelStatistics {
     pub(super) fn add(&mut self, value: f64) {
         if self.rows_of_part == 0 {
             self.rows_of_part = 1;
         }
-        if self.rows == self.rows_of_part * PARTS as u64 {
+        if self.rows == self.rows_of_part * MAX_PARTS as u64 {
             self.parts =
                 self.parts.chunks(2).map(|pair| pair.iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1))).collect();
             self.rows_of_part *= 2;
@@ -42,12 +40,11 @@ impl Tally {
         self.range = Some([low.min(value), high.max(value)]);
     }
 
-    /// From the first value to the last; `None` if the channel does not grow.
-    pub(super) fn steps(&self) -> Option<f64> {
+    /// Difference from the first to the last value; `None` if it is not positive.
+    pub(super) fn increase(&self) -> Option<f64> {
         Some(self.last? - self.first?).filter(|span| *span > 0.0 && span.is_finite())
     }
 
-    /// Means of the parts, in order.
     pub(super) fn course(&self) -> Vec<Option<f64>> {
         let mean =
             |(sum, count): &(f64, u64)| (*count > 0).then(|| sum / *count as f64).filter(|mean| mean.is_finite());
@@ -62,17 +59,17 @@ mod tests {
     #[test]
     fn the_course_is_that_of_the_channel_at_any_length() {
         for rows in [1, 47, 48, 49, 1000, 10_000] {
-            let mut tally = Tally::default();
+            let mut tally = ChannelStatistics::default();
             (0..rows).for_each(|row| tally.add(f64::from(row)));
             let course: Vec<f64> = tally.course().into_iter().map(Option::unwrap).collect();
-            assert!(course.len() <= PARTS && course.windows(2).all(|pair| pair[0] < pair[1]), "{rows}: {course:?}");
+            assert!(course.len() <= MAX_PARTS && course.windows(2).all(|pair| pair[0] < pair[1]), "{rows}: {course:?}");
             assert_eq!((tally.samples, tally.range), (rows as u64, Some([0.0, f64::from(rows - 1)])));
         }
-        let mut gap = Tally::default();
+        let mut gap = ChannelStatistics::default();
         for value in [1.0, f64::NAN, f64::INFINITY, -2.0] {
             gap.add(value);
         }
         assert_eq!(gap.course(), [Some(1.0), None, None, Some(-2.0)]);
-        assert_eq!((gap.samples, gap.steps()), (2, None));
+        assert_eq!((gap.samples, gap.increase()), (2, None));
     }
 }

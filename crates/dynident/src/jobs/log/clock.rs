@@ -1,17 +1,16 @@
-//! The rate of a group, from its points in time.
+//! Sample rate of a group from its time stamps.
 
-/// A step of more than so many mean steps is a hole: a pause, or what lies between two episodes.
-const HOLE: f64 = 5.0;
-/// Steps before a mean counts.
-const FEW_STEPS: u64 = 8;
+/// Number of mean steps above which a step is a gap: a pause, or the end of an episode.
+const MIN_GAP_STEPS: f64 = 5.0;
+/// Steps before the mean is reliable.
+const MIN_STEPS_FOR_MEAN: u64 = 8;
 
-/// Steps of a clock, holes left out.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
     last: Option<f64>,
     steps: u64,
     sum: f64,
-    holes: u64,
+    gaps: u64,
 }
 
 impl Clock {
@@ -21,8 +20,8 @@ impl Clock {
         }
         if let Some(last) = self.last.replace(time) {
             let step = time - last;
-            if self.steps >= FEW_STEPS && step > HOLE * self.sum / self.steps as f64 {
-                self.holes += 1;
+            if self.steps >= MIN_STEPS_FOR_MEAN && step > MIN_GAP_STEPS * self.sum / self.steps as f64 {
+                self.gaps += 1;
             } else {
                 self.steps += 1;
                 self.sum += step;
@@ -30,10 +29,9 @@ impl Clock {
         }
     }
 
-    /// Rows in one unit of the clock: steps by the `span` of all `rows`, or without their holes by the sum of the
-    /// steps.
+    /// Rows per unit of time: from `span` and `rows`, or from the steps without gaps.
     pub(super) fn rate(&self, rows: u64, span: f64) -> Option<f64> {
-        let rate = if self.holes == 0 { rows.saturating_sub(1) as f64 / span } else { self.steps as f64 / self.sum };
+        let rate = if self.gaps == 0 { rows.saturating_sub(1) as f64 / span } else { self.steps as f64 / self.sum };
         Some(rate).filter(|rate| *rate > 0.0 && rate.is_finite())
     }
 }

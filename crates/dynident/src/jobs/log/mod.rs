@@ -1,4 +1,4 @@
-//! What a recording holds.
+//! `log`: contents of a recording.
 
 mod channel;
 mod clock;
@@ -7,14 +7,13 @@ mod study_format;
 use crate::error::Error;
 use crate::jobs::columns::{time_unit_s, unit};
 use crate::result::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
-use channel::Tally;
+use channel::ChannelStatistics;
 use clock::Clock;
 use dynident_recording::RecordingError;
 use dynident_recording::log::{FileLog, LogGroup, LogTable};
 use std::path::Path;
 
-/// Reads a recording of any format, once, and says what it holds. Memory does not grow with its
-/// length.
+/// Reads a recording of any format once and summarises its contents, with constant memory.
 ///
 /// # Errors
 /// If it cannot be read.
@@ -31,7 +30,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     let names = column_names(table.as_ref());
     let (groups, notes) = (table.groups(), table.notes());
     let times: Vec<_> = groups.iter().map(|group| time_column(group, &names[group.columns.clone()])).collect();
-    let mut read: Vec<Tallies> = groups.iter().map(|group| Tallies::new(group.columns.len())).collect();
+    let mut read: Vec<GroupStatistics> = groups.iter().map(|group| GroupStatistics::new(group.columns.len())).collect();
     table.all_rows(&mut |group, row| read[group].add(row, times[group].map(|(column, _)| column)))?;
     let mut found = LogContents {
         schema: LOG_SCHEMA.to_owned(),
@@ -44,10 +43,10 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
         notes,
         study_format: String::new(),
     };
-    for (index, (group, Tallies { rows, channels, clock })) in groups.iter().zip(read).enumerate() {
+    for (index, (group, GroupStatistics { rows, channels, clock })) in groups.iter().zip(read).enumerate() {
         let names = &names[group.columns.clone()];
         let time = times[index];
-        let seconds = time.and_then(|(column, unit_s)| Some((channels[column].steps()?, unit_s)));
+        let seconds = time.and_then(|(column, unit_s)| Some((channels[column].increase()?, unit_s)));
         let span_s = seconds.map(|(span, unit_s)| span * unit_s);
         let rate_hz = seconds.and_then(|(span, unit_s)| Some(clock.rate(rows, span)? / unit_s));
         found.channels.extend(channels.iter().zip(names).map(|(tally, name)| LogChannel {
@@ -72,7 +71,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     Ok(found)
 }
 
-/// What columns are called in a study: their names, or their 0-based indices.
+/// Names of the columns in a study: their names, or their 0-based indices.
 fn column_names(table: &dyn LogTable) -> Vec<String> {
     match table.names() {
         Some(names) => names.to_vec(),
@@ -97,19 +96,18 @@ fn time_column(group: &LogGroup, names: &[String]) -> Option<(usize, f64)> {
     }
 }
 
-/// A group under way.
-struct Tallies {
+struct GroupStatistics {
     rows: u64,
-    channels: Vec<Tally>,
+    channels: Vec<ChannelStatistics>,
     clock: Clock,
 }
 
-impl Tallies {
+impl GroupStatistics {
     fn new(columns: usize) -> Self {
-        Self { rows: 0, channels: vec![Tally::default(); columns], clock: Clock::default() }
+        Self { rows: 0, channels: vec![ChannelStatistics::default(); columns], clock: Clock::default() }
     }
 
-    /// A row, whose point in time is that of column `time`.
+    /// Adds a row; column `time` contains the time.
     fn add(&mut self, row: &[f64], time: Option<usize>) {
         self.rows += 1;
         self.channels.iter_mut().zip(row).for_each(|(tally, value)| tally.add(*value));

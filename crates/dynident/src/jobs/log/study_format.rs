@@ -1,11 +1,11 @@
-//! How the study of a recording could begin.
+//! Proposed `[format]` of a study for a recording.
 
 use crate::jobs::columns::{Quantity, best, column_list, families, time_as_toml};
 use crate::result::LogContents;
 use core::fmt::Write;
 use std::path::Path;
 
-/// A beginning of a study's `[format]`, by the names of columns alone: no robot is known here.
+/// A draft of a study's `[format]` from column names only, without knowledge of the robot.
 pub(super) fn study_format(found: &LogContents) -> String {
     let all = families([(Path::new(&found.file), found)], &[]);
     let position = best(&all, Quantity::Position, |_| true);
@@ -16,11 +16,11 @@ pub(super) fn study_format(found: &LogContents) -> String {
         Some(time) => {
             let _ = writeln!(text, "time = {}", time_as_toml(time));
         }
-        None => text += "rate_hz = 0.0  # no column of time was recognised: give its rate, or time = { column = .. }\n",
+        None => text += "rate_hz = 0.0  # no time column recognised: give the sample rate, or time = { column = .. }\n",
     }
     for (key, usual, family) in [("position", "rad", position), ("torque", "N m", torque)] {
         let Some(family) = family else {
-            let _ = writeln!(text, "{key} = {{ columns = [] }}  # not recognised by name: which columns?");
+            let _ = writeln!(text, "{key} = {{ columns = [] }}  # not recognised by name: list the columns");
             continue;
         };
         let names: Vec<String> = family.columns.iter().map(|(_, name)| name.clone()).collect();

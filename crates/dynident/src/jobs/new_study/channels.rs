@@ -1,19 +1,18 @@
-//! Which joints of the robot the columns of a family are.
+//! Assigns the columns of a family to the robot's joints.
 
 use crate::jobs::columns::{Family, JointKey};
 
-/// Which joints of the robot a family's columns are, in the order of the columns, and whether that is sure.
+/// Joint of each column, and whether the assignment is certain.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct LoggedJoints {
-    /// Places of the robot's joints.
+    /// Joint indices in the order of the columns.
     pub(super) joints: Vec<usize>,
-    /// Why these.
     pub(super) reason: String,
     pub(super) is_sure: bool,
 }
 
-/// The joints behind the columns of `family`, for a robot whose joints that move by themselves stand at the places
-/// `free` and turn where `turns` says so; none where the columns are more than the joints.
+/// Assigns the columns of `family` to the joints; `free` are the indices of joints that do not follow others, `turns`
+/// whether a joint is revolute. `None` if there are more columns than joints.
 pub(super) fn logged_joints(family: &Family, free: &[usize], turns: impl Fn(usize) -> bool) -> Option<LoggedJoints> {
     let of_name = |(key, _): &(JointKey, String)| match key {
         JointKey::Joint(place) => Some(*place),
@@ -21,20 +20,21 @@ pub(super) fn logged_joints(family: &Family, free: &[usize], turns: impl Fn(usiz
     };
     let named: Option<Vec<usize>> = family.columns.iter().map(of_name).collect();
     if let Some(joints) = named {
-        return Some(LoggedJoints { joints, reason: "the columns' names say the joints".to_owned(), is_sure: true });
+        return Some(LoggedJoints { joints, reason: "joints from the column names".to_owned(), is_sure: true });
     }
     let count = family.columns.len();
     let turning: Vec<usize> = free.iter().copied().filter(|&joint| turns(joint)).collect();
-    let of_all = format!("{count} columns, as many as the robot has joints, in the order of the description");
-    let of_turning = format!("{count} columns, as many as the robot has joints that turn, in that order");
-    let of_first = format!("{count} columns for {} joints: taken for the first ones of the description", free.len());
-    // Names that the description does not have: nothing says their order.
+    let of_all = format!("{count} columns for the {count} joints, in the order of the robot description");
+    let of_turning = format!("{count} columns for the {count} revolute joints, in the order of the robot description");
+    let of_first =
+        format!("{count} columns for {} joints: assigned to the first joints of the robot description", free.len());
+    // Names that are not in the robot description do not determine the order.
     let foreign = family.columns.iter().find_map(|(key, _)| match key {
         JointKey::Name(name) => Some(name),
         JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
     });
     if let Some(name) = foreign {
-        let reason = format!("the description has no joint `{name}`: {count} columns, taken in their order");
+        let reason = format!("the robot description has no joint `{name}`: {count} columns, assigned in order");
         return (count <= free.len()).then(|| LoggedJoints { joints: free[..count].to_vec(), reason, is_sure: false });
     }
     match count {
@@ -47,7 +47,7 @@ pub(super) fn logged_joints(family: &Family, free: &[usize], turns: impl Fn(usiz
     }
 }
 
-/// The columns of `family` in the order of `joints`; none where one is missing.
+/// The columns of `family` in the order of `joints`; `None` if one is missing.
 pub(super) fn in_order(family: &Family, logged: &Family, joints: &[usize]) -> Option<Vec<String>> {
     let name_at = |place: usize, joint: usize| {
         let by_name = family.columns.iter().find(|(key, _)| *key == JointKey::Joint(joint));
@@ -100,13 +100,13 @@ mod tests {
         let logged = logged_joints(position, &[0, 1], |_| true).unwrap();
         assert!(logged.is_sure && logged.joints == [0, 1]);
         let torque = best(&found, Quantity::Torque, |_| true).unwrap();
-        // In the order of the positions, not in that of the file.
+        // In the order of the positions, not of the file.
         assert_eq!(in_order(torque, position, &logged.joints).unwrap(), ["tau_0", "tau_1"]);
         assert_eq!(found.iter().filter(|family| family.quantity == Quantity::Torque).count(), 1);
     }
 
     #[test]
-    fn files_say_what_columns_of_joints_are() {
+    fn file_names_give_the_quantity_of_joint_columns() {
         let joints = ["Joint_1", "Joint_2"].map(str::to_owned);
         let logs = [
             (Path::new("pos_read_data.csv"), contents(&["Joint_1", "Joint_2"])),

@@ -1,41 +1,37 @@
-//! A study as it is written down: tables, lines, and beside each line why it is there.
+//! Draft of a study: tables and keys with reasons.
 
-use crate::result::{StudyChange, Unsure};
+use crate::result::{CheckFinding, StudyChange, StudyCheck, Unsure};
 use core::fmt::Write;
+use dynident_recording::Level;
 use dynident_text::{comment, toml_document};
 
-/// A key with its value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Line {
     key: String,
-    /// As TOML.
     value: String,
     reason: String,
     is_sure: bool,
 }
 
-/// A table, or one entry of a list of tables.
+/// A table, or one entry of an array of tables.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Table {
-    /// In brackets: `[robot]`, `[[log]]`; empty for the top.
+    /// In brackets: `[robot]`, `[[log]]`; empty for the top level.
     heading: String,
     reason: String,
     lines: Vec<Line>,
 }
 
 impl Table {
-    /// A table without lines.
     pub(super) fn new(heading: &str, reason: impl Into<String>) -> Self {
         Self { heading: heading.to_owned(), reason: reason.into(), lines: Vec::new() }
     }
 
-    /// With a further line.
     #[must_use]
     pub(super) fn with(self, key: &str, value: impl Into<String>, reason: impl Into<String>) -> Self {
         self.with_line(key, value, reason, true)
     }
 
-    /// With a line that a person should look at.
     #[must_use]
     pub(super) fn with_unsure(self, key: &str, value: impl Into<String>, reason: impl Into<String>) -> Self {
         self.with_line(key, value, reason, false)
@@ -54,14 +50,12 @@ impl Table {
     }
 }
 
-/// A study under way.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Draft {
     pub(super) tables: Vec<Table>,
 }
 
 impl Draft {
-    /// With a further table at its end.
     #[must_use]
     pub(super) fn with(&self, table: Table) -> Self {
         let mut tables = self.tables.clone();
@@ -69,7 +63,7 @@ impl Draft {
         Self { tables }
     }
 
-    /// Writes what an examination of the study asks for; false where it names no line, or a table that is not there.
+    /// Applies a proposed change; returns false if it is not a key or its table is missing.
     pub(super) fn apply(&mut self, change: &StudyChange, reason: &str) -> bool {
         let Some((key, value)) = change.line.split_once('=') else { return false };
         let (key, value) = (key.trim(), value.trim());
@@ -87,7 +81,27 @@ impl Draft {
         true
     }
 
-    /// The lines that a person should look at.
+    /// Applies unambiguous corrections of an examination; returns whether anything changed. Signs, orders, mountings
+    /// and units have few possible values. A zero or a factor has any value and may compensate for another mistake, so
+    /// a person decides.
+    pub(super) fn apply_corrections(&mut self, found: &StudyCheck) -> bool {
+        let is_discrete = |finding: &&CheckFinding| match finding.kind.as_str() {
+            "sign" | "order" | "mounting" => true,
+            "unit" => finding.write.iter().all(|change| change.line.starts_with("unit")),
+            _ => false,
+        };
+        let problems = found.findings.iter().filter(|finding| finding.level == Level::Problem && finding.or.is_empty());
+        let corrections = problems.filter(is_discrete);
+        let mut changed = false;
+        for finding in corrections {
+            for change in &finding.write {
+                let reason = format!("From `dynident check`: {}: {}", finding.what, finding.evidence);
+                changed |= self.apply(change, &reason);
+            }
+        }
+        changed
+    }
+
     pub(super) fn unsure(&self) -> Vec<Unsure> {
         let of_table = |table: &Table| {
             let unsure = |line: &Line| Unsure {
@@ -103,11 +117,9 @@ impl Draft {
         self.tables.iter().flat_map(of_table).collect()
     }
 
-    /// The study as TOML.
     pub(super) fn text(&self) -> String {
         let mut text =
-            "# Written by `dynident new`: every line with what speaks for it. Lines under UNSURE want a look.\n"
-                .to_owned();
+            "# Written by `dynident new`: each line with its reason. Check the lines marked UNSURE.\n".to_owned();
         let is_empty = |table: &&Table| table.heading.is_empty() && table.reason.is_empty();
         for table in self.tables.iter().filter(|table| !is_empty(table)) {
             text.push('\n');
@@ -129,7 +141,7 @@ impl Draft {
                 let _ = writeln!(text, "{key} = {value}");
             }
         }
-        // Values come from several places, which all write TOML.
+        // Values have several sources, all of which write TOML.
         toml_document(&text).into_owned()
     }
 }

@@ -1,4 +1,4 @@
-//! Whether the torque is that of motors, which turn with their rotors, or that of sensors behind them.
+//! Tests whether torque is measured at the motors (with rotor inertia) or at joint sensors.
 
 use super::NewStudy;
 use super::draft::{Draft, Table};
@@ -7,17 +7,16 @@ use crate::jobs::identify::identify;
 use crate::jobs::options::RunOptions;
 use core::fmt::Write;
 
-/// What the logs say of drive inertia: the table `[drive]` of the study where they show it, for commands that have no
-/// logs to ask; else the figures that do not.
-pub(super) enum DriveInertia {
-    /// Written into the study.
-    Seen(Table),
-    /// Said in a comment; empty where no drive stands apart from the bodies.
-    NotSeen(String),
+/// Result of the test for drive inertia: the table `[drive]` if the logs show it, for commands without logs; otherwise
+/// a comment with the estimates.
+pub(super) enum DriveInertiaFinding {
+    /// Table for the study.
+    Present(Table),
+    /// Comment for the study; empty if no drive inertia is identifiable.
+    Absent(String),
 }
 
-/// What [`identify()`] finds of the drives, with the simple friction: the choice of friction would take longer, and
-/// comes after.
+/// Runs [`identify()`] with simple friction, because the selection of friction takes longer and is independent.
 ///
 /// # Errors
 /// Those of [`identify()`].
@@ -25,12 +24,12 @@ pub(super) fn drive_inertia(
     request: &NewStudy,
     draft: &Draft,
     options: &RunOptions<'_>,
-) -> Result<DriveInertia, Error> {
+) -> Result<DriveInertiaFinding, Error> {
     let trial = Table::new("[drive]", "").with("friction", "\"stated\"", "");
     let study = request.study(&draft.with(trial))?;
     let found = identify(&study, &request.out, options)?.result.drive_inertia_choice;
     let Some(choice) = found.filter(|choice| !choice.drives.is_empty()) else {
-        return Ok(DriveInertia::NotSeen(String::new()));
+        return Ok(DriveInertiaFinding::Absent(String::new()));
     };
     let mut figures = String::new();
     for drive in &choice.drives {
@@ -38,8 +37,11 @@ pub(super) fn drive_inertia(
     }
     let figures = figures.trim_end_matches([',', ' ']);
     if !choice.seen {
-        return Ok(DriveInertia::NotSeen(format!("Drive inertia was tried and is not seen (kg m², 95 %): {figures}")));
+        return Ok(DriveInertiaFinding::Absent(format!(
+            "Drive inertia was tested and is not significant (kg m², 95 %): {figures}"
+        )));
     }
-    let reason = format!("The torque is the motors', whose rotors and gears turn too (kg m², 95 %): {figures}");
-    Ok(DriveInertia::Seen(Table::new("[drive]", "").with("drive_inertia", "true", reason)))
+    let reason =
+        format!("The torque is measured at the motors and includes rotor and gear inertia (kg m², 95 %): {figures}");
+    Ok(DriveInertiaFinding::Present(Table::new("[drive]", "").with("drive_inertia", "true", reason)))
 }

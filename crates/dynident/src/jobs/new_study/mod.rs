@@ -1,57 +1,52 @@
-//! A study from a robot and its recordings.
+//! `new`: a study from a robot and its recordings.
 
 mod channels;
 mod draft;
 mod drives;
 mod paths;
+mod settings;
+
+pub use settings::NewStudySettings;
 
 use crate::error::{Error, NewStudyError};
 use crate::jobs::check::check;
 use crate::jobs::columns::{Family, Quantity, Source, best, column_list, families, time_as_toml};
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
-use crate::result::{CheckFinding, LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
+use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
 use crate::robot_file::{LoadSettings, XacroSettings, load_robot};
 use crate::study::Study;
 use channels::{LoggedJoints, in_order, logged_joints};
 use draft::{Draft, Table};
-use drives::{DriveInertia, drive_inertia};
+use drives::{DriveInertiaFinding, drive_inertia};
 use dynident_model::{JointKind, Model, Robot};
 use dynident_recording::Level;
 use dynident_text::quoted;
-use paths::seen_from;
+use paths::path_in_study;
 use std::path::{Path, PathBuf};
 
-/// Rounds of examining the study and writing what the examination asks for, at most.
-const MOST_ROUNDS: usize = 3;
-/// Parts of a single recording that are fitted to and tested on; between them a gap, for neighbours are alike.
-const TRAINING: [f64; 2] = [0.0, 0.65];
-const TEST: [f64; 2] = [0.7, 1.0];
-/// Angles beyond this many turns are none in radians.
-const MOST_TURNS: f64 = 4.0;
+const MAX_ROUNDS: usize = 3;
 
-/// What a study is written from.
+/// Inputs of a new study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NewStudy {
-    /// The description: URDF, MJCF, SDF, or D-H table in TOML.
+    /// The robot description: URDF, MJCF, SDF, or D-H table in TOML.
     pub robot: PathBuf,
-    /// The description as [`load_robot`] reads it; `None` reads the file, which may then have no xacro macros.
+    /// The robot description as read by [`load_robot`]; `None` reads the file, which must not have xacro macros.
     pub description: Option<Box<Robot>>,
-    /// How the program `xacro` expands the file: written into the study if arguments are given.
+    /// Settings of the program `xacro`; written into the study if arguments are given.
     pub xacro: XacroSettings,
     /// The recordings, at least one.
     pub logs: Vec<PathBuf>,
-    /// Where the study will stand: paths in it are as seen from there.
+    /// Path of the study; paths in it are relative to its folder.
     pub out: PathBuf,
-    /// Samples a second, for recordings without time stamps.
+    /// Sample rate for recordings without time stamps, Hz.
     pub rate_hz: Option<f64>,
-    /// Lines that a person states, in place of what would be written there: the answers to
-    /// [`NewStudyFile::unsure`].
+    /// Lines that a person states; these override proposals and answer [`NewStudyFile::unsure`].
     pub stated: Vec<StudyChange>,
 }
 
 impl NewStudy {
-    /// The study of a draft, with the description that is in memory.
     fn study(&self, draft: &Draft) -> Result<Study, Error> {
         let mut study = Study::parse(&draft.text(), &self.out)?;
         study.robot.description.clone_from(&self.description);
@@ -59,53 +54,64 @@ impl NewStudy {
     }
 }
 
-/// Writes a study: which joints the columns are by their names and their number, units by names, limits and spread,
-/// which part tests the model; then examines it as [`check`] does and writes what that names without an alternative,
-/// and fits once to see whether drives have inertia, which `design` and `iterate` cannot see.
-/// Every line has its reason beside it; what is not sure is marked. Nothing is written to a file.
+/// Writes a study: joints from names and number of columns, units from names, limits and ranges, and a validation part.
+/// It is then examined like by [`check`], unambiguous corrections are applied, and one fit tests for drive inertia,
+/// which `design` and `iterate` need but cannot test. Every line has a reason; uncertain lines are marked. No file is
+/// written.
 ///
 /// # Errors
-/// A description or a recording that cannot be read, or without columns of positions and torques that could be
-/// recognised.
+/// A robot description or recording that cannot be read, or without recognisable columns of positions and torques.
 pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStudyFile, Error> {
+    new_study_with(request, options, &NewStudySettings::default())
+}
+
+/// As [`new_study()`], with other thresholds.
+///
+/// # Errors
+/// As [`new_study()`], and invalid thresholds.
+pub fn new_study_with(
+    request: &NewStudy,
+    options: &RunOptions<'_>,
+    thresholds: &NewStudySettings,
+) -> Result<NewStudyFile, Error> {
+    thresholds.validate().map_err(Error::section(&request.out, "new"))?;
     let robot = match &request.description {
         Some(robot) => (**robot).clone(),
         None => load_robot(&request.robot, &LoadSettings { xacro: request.xacro.clone(), ..LoadSettings::default() })?,
     };
     let logs: Vec<(&Path, LogContents)> =
         request.logs.iter().map(|path| Ok((path.as_path(), log_contents(path)?))).collect::<Result<_, Error>>()?;
-    let recorded = Recorded::find(&robot.model, &logs).map_err(Error::NewStudy)?;
+    let recorded = RecognisedColumns::find(&robot.model, &logs, thresholds).map_err(Error::NewStudy)?;
     let mut draft = recorded.draft(request, &robot.model, &logs);
     for change in &request.stated {
         draft.apply(change, "As stated");
     }
 
-    // What the data say of the reading so far.
     let mut examined = None;
     let mut unsure = draft.unsure();
-    unsure.extend(recorded.left_out(&logs));
+    unsure.extend(recorded.unused_recordings(&logs));
     let without_rate = |unsure: &Unsure| unsure.line.as_ref().is_some_and(|change| change.line.starts_with("rate_hz"));
     if !unsure.iter().any(without_rate) {
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let study = request.study(&draft)?;
             let found = check(&study, &request.out, options)?.check;
-            let changed = mend(&mut draft, &found);
+            let changed = draft.apply_corrections(&found);
             examined = Some(found);
             if !changed {
                 break;
             }
         }
     }
-    let left = examined.iter().flat_map(|check| &check.findings).filter(|finding| finding.level == Level::Problem);
-    unsure.extend(left.map(|finding| Unsure {
+    let remaining = examined.iter().flat_map(|check| &check.findings).filter(|finding| finding.level == Level::Problem);
+    unsure.extend(remaining.map(|finding| Unsure {
         line: None,
         proposed: finding.write.iter().filter(|change| change.is_well_formed()).cloned().collect(),
         reason: finding.sentence(),
     }));
     if unsure.is_empty() && examined.is_some() {
         match drive_inertia(request, &draft, options)? {
-            DriveInertia::Seen(table) => draft = draft.with(table),
-            DriveInertia::NotSeen(figures) => draft = draft.with(Table::new("", figures)),
+            DriveInertiaFinding::Present(table) => draft = draft.with(table),
+            DriveInertiaFinding::Absent(figures) => draft = draft.with(Table::new("", figures)),
         }
     }
     Ok(NewStudyFile {
@@ -117,45 +123,26 @@ pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStud
     })
 }
 
-/// Writes what an examination asks for where it knows no alternative; whether anything changed. A sign, an order, a
-/// mounting or a unit is one of a few; a zero or a factor of any size may make up for another mistake, and is left to
-/// a person.
-fn mend(draft: &mut Draft, found: &StudyCheck) -> bool {
-    let is_one_of_few = |finding: &&CheckFinding| match finding.kind.as_str() {
-        "sign" | "order" | "mounting" => true,
-        "unit" => finding.write.iter().all(|change| change.line.starts_with("unit")),
-        _ => false,
-    };
-    let problems = found.findings.iter().filter(|finding| finding.level == Level::Problem && finding.or.is_empty());
-    let asked = problems.filter(is_one_of_few);
-    let mut changed = false;
-    for finding in asked {
-        for change in &finding.write {
-            let reason = format!("By `dynident check`: {}: {}", finding.what, finding.evidence);
-            changed |= draft.apply(change, &reason);
-        }
-    }
-    changed
-}
-
-/// What was recognised in the recordings.
-struct Recorded {
-    /// Places of the joints, in the order of the columns.
+struct RecognisedColumns {
+    thresholds: NewStudySettings,
+    /// Joint assignment, in the order of the columns.
     logged: LoggedJoints,
     position: Family,
     torque: Family,
     velocity: Option<Family>,
-    /// Columns of the joints, in their order.
     columns: [Vec<String>; 2],
     velocity_columns: Option<Vec<String>>,
-    /// Recordings with these columns; those of torques alone are parts of them.
+    /// Recordings with these columns; recordings with torques only belong to one of them.
     files: Vec<usize>,
-    /// The time column with its rate.
     time: Option<(String, Option<f64>)>,
 }
 
-impl Recorded {
-    fn find(model: &Model, logs: &[(&Path, LogContents)]) -> Result<Self, NewStudyError> {
+impl RecognisedColumns {
+    fn find(
+        model: &Model,
+        logs: &[(&Path, LogContents)],
+        thresholds: &NewStudySettings,
+    ) -> Result<Self, NewStudyError> {
         let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
         let all = families(logs.iter().map(|(path, log)| (*path, log)), &names);
         let missing = |quantity| NewStudyError::NotRecognised {
@@ -169,20 +156,20 @@ impl Recorded {
             .ok_or(NewStudyError::MoreColumnsThanJoints { columns: position.columns.len(), joints: free.len() })?;
         let ordered = |family: &Family| in_order(family, position, &logged.joints);
 
-        // Beside the positions if they are there, else in a file of their own with as many rows.
-        let beside = |family: &Family| family.file == position.file && ordered(family).is_some();
+        // In the file of the positions if present, otherwise in another file with the same number of rows.
+        let in_same_file = |family: &Family| family.file == position.file && ordered(family).is_some();
         let rows = |family: &Family| logs[family.file].1.groups.get(family.group).map(|group| group.rows);
-        let elsewhere = |family: &Family| {
+        let in_other_file = |family: &Family| {
             family.file != position.file && rows(family) == rows(position) && ordered(family).is_some()
         };
         let measured = |quantity, fits: &dyn Fn(&Family) -> bool| best(&all, quantity, fits);
-        let torque = measured(Quantity::Torque, &beside)
-            .or_else(|| measured(Quantity::Current, &beside))
-            .or_else(|| measured(Quantity::Torque, &elsewhere))
-            .or_else(|| measured(Quantity::Current, &elsewhere))
+        let torque = measured(Quantity::Torque, &in_same_file)
+            .or_else(|| measured(Quantity::Current, &in_same_file))
+            .or_else(|| measured(Quantity::Torque, &in_other_file))
+            .or_else(|| measured(Quantity::Current, &in_other_file))
             .ok_or_else(|| missing("torques or currents"))?;
-        let velocity = measured(Quantity::Velocity, &beside)
-            .or_else(|| measured(Quantity::Velocity, &elsewhere))
+        let velocity = measured(Quantity::Velocity, &in_same_file)
+            .or_else(|| measured(Quantity::Velocity, &in_other_file))
             .filter(|family| family.source != Source::Commanded);
 
         let (Some(of_position), Some(of_torque)) = (ordered(position), ordered(torque)) else {
@@ -200,6 +187,7 @@ impl Recorded {
         let time = group.and_then(|group| Some((group.time.clone()?, group.rate_hz)));
         let files = (0..logs.len()).filter(holds).collect();
         Ok(Self {
+            thresholds: thresholds.clone(),
             columns: [of_position, of_torque],
             velocity_columns: velocity.and_then(ordered),
             files,
@@ -211,13 +199,13 @@ impl Recorded {
         })
     }
 
-    /// Recordings that the study does not name.
-    fn left_out(&self, logs: &[(&Path, LogContents)]) -> Vec<Unsure> {
-        let beside = [Some(&self.torque), self.velocity.as_ref()].into_iter().flatten().map(|family| family.file);
-        let used: Vec<usize> = self.files.iter().copied().chain(beside).collect();
+    fn unused_recordings(&self, logs: &[(&Path, LogContents)]) -> Vec<Unsure> {
+        let channel_files =
+            [Some(&self.torque), self.velocity.as_ref()].into_iter().flatten().map(|family| family.file);
+        let used: Vec<usize> = self.files.iter().copied().chain(channel_files).collect();
         let unused = logs.iter().enumerate().filter(|(number, _)| !used.contains(number));
         let reason = |path: &Path| {
-            format!("{} is left out of the study: its columns are not those of the other recordings", path.display())
+            format!("{} is not in the study: its columns differ from those of the other recordings", path.display())
         };
         unused.map(|(_, (path, _))| Unsure { line: None, proposed: Vec::new(), reason: reason(path) }).collect()
     }
@@ -226,18 +214,18 @@ impl Recorded {
         let from = request.out.parent().unwrap_or_else(|| Path::new(""));
         let joints = model.joints();
         let tables = [
-            vec![self.of_robot(request, model, from), self.of_time(request)],
-            vec![self.of_position(model, &logs[self.position.file].1)],
-            self.of_velocity(logs, from).into_iter().collect(),
-            vec![self.of_torque(logs, from)],
-            self.of_logs(logs, from),
+            vec![self.robot_table(request, model, from), self.time_table(request)],
+            vec![self.position_table(model, &logs[self.position.file].1)],
+            self.velocity_table(logs, from).into_iter().collect(),
+            vec![self.torque_table(logs, from)],
+            self.log_tables(logs, from),
         ];
         let mut tables = tables.concat();
         let known = |limit: fn(&dynident_model::JointLimits) -> Option<f64>| {
             self.logged.joints.iter().filter(|&&joint| limit(&joints[joint].limits).is_some()).count()
         };
         let note = format!(
-            "Friction, cut-off, lag and estimator are chosen by the logs; keys that state them: docs/src/study.md. A motor that turns two joints: [[coupling]]. Limits that `dynident design` keeps, of {} joints: {} positions, {} velocities, {} torques of the description",
+            "Dynident selects friction, cut-off, lag and estimator with the logs; docs/src/study.md lists the keys that state them. For a motor that drives two joints add [[coupling]]. Limits for `dynident design` in the robot description, of {} joints: {} positions, {} velocities, {} torques",
             self.logged.joints.len(),
             known(|limits| limits.upper),
             known(|limits| limits.velocity),
@@ -247,9 +235,9 @@ impl Recorded {
         Draft { tables }
     }
 
-    fn of_robot(&self, request: &NewStudy, model: &Model, from: &Path) -> Table {
+    fn robot_table(&self, request: &NewStudy, model: &Model, from: &Path) -> Table {
         let LoggedJoints { joints, reason, is_sure } = &self.logged;
-        let mut table = Table::new("[robot]", "").with("file", quoted(&seen_from(&request.robot, from)), "");
+        let mut table = Table::new("[robot]", "").with("file", quoted(&path_in_study(&request.robot, from)), "");
         if !request.xacro.arguments.is_empty() {
             let arguments: Vec<String> = request
                 .xacro
@@ -270,28 +258,27 @@ impl Recorded {
         table.with_line("joints", format!("[{}]", names.join(", ")), reason, *is_sure)
     }
 
-    fn of_time(&self, request: &NewStudy) -> Table {
+    fn time_table(&self, request: &NewStudy) -> Table {
         let table = Table::new("[format]", "");
         match (&self.time, request.rate_hz) {
             (Some((name, rate_hz)), _) => {
-                let reason =
-                    rate_hz.map_or_else(String::new, |rate_hz| format!("{rate_hz:.4} rows a second on average"));
+                let reason = rate_hz.map_or_else(String::new, |rate_hz| format!("{rate_hz:.4} Hz on average"));
                 table.with("time", time_as_toml(name), reason)
             }
             (None, Some(rate_hz)) => {
-                table.with("rate_hz", format!("{rate_hz:?}"), "As given: no column is a time by its name")
+                table.with("rate_hz", format!("{rate_hz:?}"), "As given: no time column recognised by name")
             }
             (None, None) => table.with_unsure(
                 "rate_hz",
                 "1000.0",
-                "no column is a time by its name: give the rate of the recording, or time = { column = .. }",
+                "no time column recognised by name: give the sample rate, or time = { column = .. }",
             ),
         }
     }
 
-    fn of_position(&self, model: &Model, log: &LogContents) -> Table {
+    fn position_table(&self, model: &Model, log: &LogContents) -> Table {
         let [columns, _] = &self.columns;
-        let table = Table::new("[format.position]", said(&self.position, "positions")).with(
+        let table = Table::new("[format.position]", basis(&self.position, "positions")).with(
             "columns",
             column_list(columns),
             &self.logged.reason,
@@ -299,7 +286,7 @@ impl Recorded {
         if let Some(unit) = self.position.unit.filter(|unit| *unit != "rad") {
             return table.with("unit", quoted(unit), "by the names");
         }
-        // Without a unit in the name: angles of many turns, or beyond the limits, are degrees.
+        // Without a unit in the name, angles of many turns are degrees.
         let range = |name: &String| log.channels.iter().find(|channel| channel.name == *name)?.range;
         let largest = |joint: usize, name: &String| {
             let most = range(name)?.map(f64::abs).into_iter().fold(0.0, f64::max);
@@ -307,17 +294,18 @@ impl Recorded {
         };
         let pairs = self.logged.joints.iter().zip(columns);
         let most = pairs.filter_map(|(&joint, name)| largest(joint, name)).fold(0.0, f64::max);
-        if self.position.unit.is_none() && most > MOST_TURNS * core::f64::consts::TAU {
-            let reason =
-                format!("a joint moves to {most:.1}: too far for radians; degrees, or the motor's side of a gear");
+        if self.position.unit.is_none() && most > self.thresholds.max_radian_turns * core::f64::consts::TAU {
+            let reason = format!(
+                "a joint moves to {most:.1}, which is implausible in radians: degrees, or motor-side positions"
+            );
             return table.with_unsure("unit", quoted("deg"), reason);
         }
         table
     }
 
-    fn of_velocity(&self, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
+    fn velocity_table(&self, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
         let (family, columns) = self.velocity.as_ref().zip(self.velocity_columns.as_ref())?;
-        let table = Table::new("[format.velocity]", "Compared with the positions' derivative");
+        let table = Table::new("[format.velocity]", "Compared with the derivative of the positions");
         let table = self.with_file(table, family, logs, from).with("columns", column_list(columns), "");
         Some(match family.unit.filter(|unit| *unit != "rad/s") {
             Some(unit) => table.with("unit", quoted(unit), "by the names"),
@@ -325,19 +313,19 @@ impl Recorded {
         })
     }
 
-    fn of_torque(&self, logs: &[(&Path, LogContents)], from: &Path) -> Table {
+    fn torque_table(&self, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         let [_, columns] = &self.columns;
-        let table = Table::new("[format.torque]", said(&self.torque, "torques"));
+        let table = Table::new("[format.torque]", basis(&self.torque, "torques"));
         let table = self.with_file(table, &self.torque, logs, from);
         let table = match self.torque.source {
             Source::Commanded => {
                 table.with_unsure("columns", column_list(columns), "commanded, not measured: no other torque was found")
             }
-            Source::Unsaid | Source::Measured => table.with("columns", column_list(columns), ""),
+            Source::Unstated | Source::Measured => table.with("columns", column_list(columns), ""),
         };
         if self.torque.quantity == Quantity::Current {
             let unit = self.torque.unit.unwrap_or("A");
-            let reason = "newton metres per ampere: gear ratio times motor constant, one for each joint; 1 leaves torques in amperes";
+            let reason = "Nm/A: gear ratio times motor constant, one value per joint; with 1 torques remain in amperes";
             return table.with("unit", quoted(unit), "a current").with_unsure("scale", "1.0", reason);
         }
         match self.torque.unit.filter(|unit| *unit != "N m") {
@@ -346,34 +334,33 @@ impl Recorded {
         }
     }
 
-    /// With the file of columns that do not stand beside the positions, as seen from the folder of the positions'.
+    /// Adds the file name for columns in another file than the positions, relative to the folder of the positions.
     fn with_file(&self, table: Table, family: &Family, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         if family.file == self.position.file {
             return table;
         }
         let folder = logs[self.position.file].0.parent().unwrap_or(from);
-        let file = quoted(&seen_from(logs[family.file].0, folder));
-        table.with("file", file, "a file of its own, with as many rows")
+        let file = quoted(&path_in_study(logs[family.file].0, folder));
+        table.with("file", file, "a separate file with the same number of rows")
     }
 
-    fn of_logs(&self, logs: &[(&Path, LogContents)], from: &Path) -> Vec<Table> {
-        let file = |number: usize| quoted(&seen_from(logs[number].0, from));
+    fn log_tables(&self, logs: &[(&Path, LogContents)], from: &Path) -> Vec<Table> {
+        let file = |number: usize| quoted(&path_in_study(logs[number].0, from));
         if let [only] = self.files[..] {
             let part = |[from, to]: [f64; 2]| format!("[{from:?}, {to:?}]");
             return vec![
-                Table::new("[[log]]", "One recording: its first part is fitted to, its last tests the model")
+                Table::new("[[log]]", "One recording: the first part is for training, the last for validation")
                     .with("file", file(only), "")
-                    .with("fraction", part(TRAINING), ""),
-                Table::new("[[log]]", "").with("file", file(only), "").with("fraction", part(TEST), "").with(
-                    "role",
-                    quoted("validate"),
-                    "",
-                ),
+                    .with("fraction", part(self.thresholds.training_fraction), ""),
+                Table::new("[[log]]", "")
+                    .with("file", file(only), "")
+                    .with("fraction", part(self.thresholds.validation_fraction), "")
+                    .with("role", quoted("validate"), ""),
             ];
         }
         let last = self.files.len().saturating_sub(1);
         let table = |(place, &number): (usize, &usize)| {
-            let reason = if place == last { "the last recording tests the model" } else { "" };
+            let reason = if place == last { "the last recording is for validation" } else { "" };
             let table = Table::new("[[log]]", reason).with("file", file(number), "");
             if place == last { table.with("role", quoted("validate"), "") } else { table }
         };
@@ -381,18 +368,16 @@ impl Recorded {
     }
 }
 
-/// The name of an argument as a key of TOML.
 fn key(name: &str) -> String {
     if name.contains(['.', '/']) { quoted(name) } else { name.to_owned() }
 }
 
-/// What says that a family is what it is taken for.
-fn said(family: &Family, what: &str) -> String {
-    let by = if family.by_file_name { "by the file's name" } else { "by the columns' names" };
+fn basis(family: &Family, what: &str) -> String {
+    let by = if family.by_file_name { "by file name" } else { "by column names" };
     let source = match family.source {
         Source::Measured => "measured ",
         Source::Commanded => "commanded ",
-        Source::Unsaid => "",
+        Source::Unstated => "",
     };
     let unit = family.unit.map_or_else(String::new, |unit| format!(", in {unit}"));
     format!("{source}{what} {by}{unit}")

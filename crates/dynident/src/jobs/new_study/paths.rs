@@ -1,9 +1,9 @@
-//! A path as seen from a folder.
+//! Relative paths.
 
 use std::path::{Component, Path, PathBuf};
 
-/// `path` as a study in `folder` names it: relative where both can be found, with strokes as on Unix; else as it is.
-pub(super) fn seen_from(path: &Path, folder: &Path) -> String {
+/// `path` relative to `folder` if both exist, with `/` as separator; otherwise unchanged.
+pub(super) fn path_in_study(path: &Path, folder: &Path) -> String {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let seen = match (path.canonicalize(), folder.canonicalize()) {
         (Ok(path), Ok(folder)) => relative(&path, &folder),
@@ -13,7 +13,6 @@ pub(super) fn seen_from(path: &Path, folder: &Path) -> String {
     seen.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/")
 }
 
-/// From one absolute path to another; none between drives.
 fn relative(path: &Path, folder: &Path) -> Option<PathBuf> {
     let (to, from): (Vec<Component<'_>>, Vec<Component<'_>>) =
         (path.components().collect(), folder.components().collect());
@@ -34,6 +33,6 @@ mod tests {
         let seen = |path: &str, folder: &str| relative(Path::new(path), Path::new(folder)).unwrap();
         assert_eq!(seen("/a/b/c.csv", "/a/b"), Path::new("c.csv"));
         assert_eq!(seen("/a/b/c.csv", "/a/d/e"), Path::new("../../b/c.csv"));
-        assert_eq!(seen_from(Path::new("nowhere/x.csv"), Path::new("nor_here")), "nowhere/x.csv");
+        assert_eq!(path_in_study(Path::new("nowhere/x.csv"), Path::new("nor_here")), "nowhere/x.csv");
     }
 }

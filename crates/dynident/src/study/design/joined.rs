@@ -1,4 +1,4 @@
-//! `family = { kind = "joined", .. }`: families one after another within the duration.
+//! `family = { kind = "joined", .. }`: several families in sequence within the duration.
 
 use super::FamilyChoice;
 use dynident_excitation::families::{FamilyError, JoinedFamily, JoinedSettings};
@@ -6,18 +6,18 @@ use serde::{Deserialize, Serialize};
 
 const NAME: &str = "joined";
 
-/// Parts one after another with a move between each two: for instance a series, then a friction ladder, then static
-/// postures.
+/// Parts in sequence with a transition between consecutive parts, for example a Fourier series, then a friction ladder,
+/// then static postures.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct JoinedChoice {
-    /// The parts in their order, each with its own `kind` and settings; none of them joined itself.
+    /// The parts in order, each with its own `kind` and settings; a part cannot be `joined`.
     pub parts: Vec<FamilyChoice>,
-    /// How the parts share what the moves leave of the duration; equally by default.
+    /// Relative durations of the parts, after the transitions are subtracted from the duration; equal by default.
     #[serde(default)]
     pub shares: Option<Vec<f64>>,
-    /// Seconds of each move; 2 by default.
+    /// Duration of each transition, s; 2 by default.
     #[serde(default = "move_s")]
     pub move_s: f64,
     /// Posture from which the experiment starts at rest, rad (m); by default it starts with the first part.
@@ -33,10 +33,10 @@ fn move_s() -> f64 {
 }
 
 impl JoinedChoice {
-    /// The family, for so many joints and so many seconds in all.
+    /// Builds the family for `joints` joints and a total duration of `duration_s`.
     ///
     /// # Errors
-    /// If a setting of it or of a part has no meaning, or the moves leave no time.
+    /// If a setting is invalid, or the transitions leave no time for the parts.
     pub fn family(&self, joints: usize, duration_s: f64) -> Result<JoinedFamily, FamilyError> {
         let setting = |setting, value, fix| FamilyError::Setting { family: NAME, setting, value, fix };
         let count = self.parts.len();
@@ -48,16 +48,16 @@ impl JoinedChoice {
             return Err(setting("shares", *share, "give 1e-6 to 1e6, one for each part"));
         }
         if let Some(part) = self.parts.iter().position(|part| matches!(part, FamilyChoice::Joined(_))) {
-            return Err(setting("parts", part as f64, "this part is joined itself: list its parts in its place"));
+            return Err(setting("parts", part as f64, "this part is `joined`: list its parts here instead"));
         }
         let moves = count.saturating_sub(1) + usize::from(self.start.is_some()) + usize::from(self.end.is_some());
         let left_s = duration_s - moves as f64 * self.move_s;
-        // False for NaN; that a move has a sensible length is for the family to say.
+        // False for NaN; the family checks the range of `move_s`.
         if !(left_s > 0.0 || self.move_s.is_nan()) {
             return Err(setting(
                 "move_s",
                 self.move_s,
-                "the moves take the whole duration_s: shorten them, or lengthen the motion",
+                "the transitions take the whole duration_s: shorten them, or increase duration_s",
             ));
         }
         let all: f64 = shares.iter().sum();

@@ -1,4 +1,4 @@
-//! `[design]`: which motion is looked for, by what measure, within which limits.
+//! `[design]`: family, criterion, optimiser and limits of an excitation trajectory.
 
 mod joined;
 pub(in crate::study) mod name_or_table;
@@ -28,24 +28,21 @@ use name_or_table::name_or_table;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Longest motion, s of a usual arm: the re-check at 10 kHz looks at every one of its samples.
+/// Longest motion of a 1.2 m arm, s: the final check evaluates the whole motion at 10 kHz.
 const MAX_DURATION_S: f64 = 3600.0;
-/// Longest motion of any robot, s.
-const MOST_DURATION_S: f64 = 1e7;
+const MAX_DURATION_OF_ANY_ROBOT_S: f64 = 1e7;
 
-/// Most samples of a search grid, and of the log that is planned.
+/// Maximum number of samples of the search grid and of the planned log.
 const MAX_SAMPLES: f64 = 1e6;
 
-/// Largest margin to stops, percent.
-const MOST_STOP_MARGIN: f64 = 90.0;
+const MAX_STOP_MARGIN_PERCENT: f64 = 90.0;
 
-/// Most turns of a joint without position limits.
-const MOST_TURNS: f64 = 1e4;
+const MAX_CONTINUOUS_TURNS: f64 = 1e4;
 
-/// Most starts, rounds and evaluations of one start.
+/// Maximum of starts, rounds and evaluations per start.
 const MAX_COUNT: usize = 1_000_000;
 
-/// `[design]`, all of it optional.
+/// `[design]`; every key is optional.
 ///
 /// ```
 /// let section: dynident::study::DesignSection = toml::from_str(
@@ -67,34 +64,34 @@ const MAX_COUNT: usize = 1_000_000;
 pub struct DesignSection {
     /// The trajectory family and its settings; five Fourier harmonics with rest at both ends by default.
     pub family: FamilyChoice,
-    /// How long the motion lasts, s; 10 by default.
+    /// Duration of the motion, s; 10 by default.
     pub duration_s: f64,
-    /// What makes a motion good; `"d-optimal"` by default. A name, or a table with a `kind` and its settings.
+    /// Optimality criterion; `"d-optimal"` by default. A name, or a table with a `kind` and its settings.
     #[serde(deserialize_with = "name_or_table")]
     #[cfg_attr(feature = "schema", schemars(transform = name_or_table::schema))]
     pub criterion: CriterionChoice,
-    /// What looks for it; `"gradient"` by default. A name, or a table with a `kind` and its settings.
+    /// Optimiser; `"gradient"` by default. A name, or a table with a `kind` and its settings.
     #[serde(deserialize_with = "name_or_table")]
     #[cfg_attr(feature = "schema", schemars(transform = name_or_table::schema))]
     pub optimiser: OptimiserChoice,
-    /// Strokes of a windowed design that are to be judged as they are, one a joint; nothing is searched then. Empty by
-    /// default.
+    /// Strokes of a windowed design, one per joint, which are evaluated without a search. Empty by default.
     pub parameters: Vec<GivenStroke>,
-    /// Where the motion starts, and where a family that returns ends; free by default.
+    /// Posture at the start, and at the end for a family that returns to its start; free by default.
     pub start_posture: Option<StartPosture>,
-    /// Name of a known `[[payload]]` that the arm carries in the motion: torque limits include it. None by default.
+    /// Name of a known `[[payload]]` that the arm carries during the motion; torque limits include it. No payload by
+    /// default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub payload: Option<String>,
-    /// What is known before the motion; nothing by default.
+    /// Prior knowledge of the parameters; none by default.
     pub prior: PriorSection,
-    /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the model's order. By default
-    /// 1 % of the joint's effort limit, and 1 where there is none.
+    /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the order of the model. By
+    /// default 1 % of the joint's effort limit, or 1 without an effort limit.
     pub torque_std_nm: Option<TorqueNoise>,
-    /// How much is searched, and how finely; also the rate of the log and the seed.
+    /// Effort and resolution of the search; also the sample rate of the log and the seed.
     pub search: DesignSettings,
-    /// Limits, laid over those of the description.
+    /// Limits, which override those of the robot description.
     pub limits: Limits,
-    /// Limits that are assumed where neither `limits` nor the description says anything.
+    /// Assumed limits where neither `limits` nor the robot description gives one.
     pub defaults: AssumedLimits,
 }
 
@@ -117,7 +114,7 @@ impl Default for DesignSection {
     }
 }
 
-/// A family by its `kind`, with that family's own settings beside it.
+/// A family by its `kind`, with the settings of that family in the same table.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
@@ -130,7 +127,7 @@ pub enum FamilyChoice {
     Quintic(QuinticSettings),
     /// Sines with Schroeder phases.
     Multisine(MultisineSettings),
-    /// Any number of logistic strokes a joint.
+    /// Any number of logistic strokes per joint.
     LogisticStrokes(LogisticStrokesSettings),
     /// The paper's spliced logistic function.
     SplicedLogistic(SplicedLogisticSettings),
@@ -138,9 +135,9 @@ pub enum FamilyChoice {
     FrictionLadder(FrictionLadderSettings),
     /// Postures held one after another, for gravity.
     StaticPostures(StaticPosturesSettings),
-    /// A caller's own code.
+    /// Code of the caller.
     Function(FunctionChoice),
-    /// Families one after another.
+    /// Several families in sequence.
     Joined(JoinedChoice),
 }
 
@@ -161,7 +158,7 @@ impl FamilyChoice {
         }
     }
 
-    /// Names of the functions of a caller that it or its parts are.
+    /// Names of the caller's functions that it or its parts use.
     pub fn functions(&self) -> Vec<String> {
         match self {
             Self::Function(own) => vec![own.function.clone()],
@@ -177,10 +174,10 @@ impl FamilyChoice {
         }
     }
 
-    /// The family itself, for so many joints and seconds.
+    /// Builds the family for `joints` joints and a duration of `duration_s`.
     ///
     /// # Errors
-    /// If a setting has no meaning.
+    /// If a setting is invalid.
     pub fn family(&self, joints: usize, duration_s: f64) -> Result<Box<dyn Family>, FamilyError> {
         Ok(match self {
             Self::Fourier(settings) => Box::new(Fourier::new(joints, duration_s, settings)?),
@@ -197,7 +194,7 @@ impl FamilyChoice {
     }
 }
 
-/// What makes a motion good.
+/// Optimality criterion.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
@@ -209,14 +206,14 @@ pub enum CriterionChoice {
     AOptimal,
     /// The largest variance of any direction: `1 / λ_min(D)`.
     EOptimal,
-    /// The condition number of the stacked base regressor, SI units, every torque counting alike.
+    /// The condition number of the stacked base regressor, in SI units, all torques with equal weight.
     ConditionNumber,
     /// The same after division of each column by its norm.
     ConditionNumberScaled,
     /// V-optimality: the mean square error of the torque that the fitted model will predict on a task.
     Prediction {
-        /// The task: a table with `t_s`, `q1..` and, if at hand, `dq1..` and `ddq1..` (rad, m, s), or positions under
-        /// the joints' names. Found as the study's logs are.
+        /// The task: a table with `t_s`, `q1..` and, if available, `dq1..` and `ddq1..` (rad, m, s), or positions under
+        /// the joint names. The path is resolved in the same way as those of the logs.
         trajectory: PathBuf,
     },
     /// The paper's sum of condition numbers over windows around the mid-points of logistic strokes.
@@ -224,7 +221,7 @@ pub enum CriterionChoice {
 }
 
 impl CriterionChoice {
-    /// The criterion in the forms that a search uses one after another: smooth first, sharp last. None for a task,
+    /// The criterion in the forms that a search uses one after another: smooth first, then sharp. `None` for a task,
     /// which has to be read first.
     pub(crate) fn criteria(&self) -> Option<Vec<Box<dyn Criterion>>> {
         let condition = |scaled| -> Vec<Box<dyn Criterion>> {
@@ -240,30 +237,30 @@ impl CriterionChoice {
         })
     }
 
-    /// Whether torque noise plays no part: the figure is of the regressor itself.
-    pub(crate) fn of_regressor(&self) -> bool {
+    /// Whether the criterion depends on the regressor alone, without torque noise.
+    pub(crate) fn ignores_torque_noise(&self) -> bool {
         matches!(self, Self::ConditionNumber | Self::ConditionNumberScaled | Self::WindowedCondition(_))
     }
 }
 
-/// Torque noise: the same for all joints, or one by one.
+/// Torque noise: one value for all joints, or one per joint.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "a standard deviation in Nm, or a list with one per joint")]
 pub enum TorqueNoise {
-    /// For every joint.
+    /// Value for every joint.
     Same(f64),
-    /// Joint by joint, in the model's order.
+    /// Values in the order of the model's joints.
     Each(Vec<f64>),
 }
 
 impl DesignSection {
-    /// Longest motion of a robot that can be checked, s.
+    /// Longest motion that can be checked for `model`, s.
     pub(crate) fn longest_s(model: &Model) -> f64 {
         model.own_scale().seconds(MAX_DURATION_S)
     }
 
-    /// Where the family's own settings let the motion start, rad (m), joint by joint; empty where they do not say.
+    /// Start position of each joint that the family's settings fix, rad (m); empty if they fix none.
     pub(crate) fn start_of_family(&self) -> Vec<Option<f64>> {
         let own = match &self.family {
             FamilyChoice::SplicedLogistic(own) => own.offsets.as_ref(),
@@ -280,16 +277,16 @@ impl DesignSection {
         own.map_or_else(Vec::new, |start| start.iter().copied().map(Some).collect())
     }
 
-    /// Checks everything that needs no robot.
+    /// Checks all settings that do not depend on the robot.
     ///
     /// # Errors
-    /// The first key whose value has no meaning, with what it may be.
+    /// The first key with an invalid value, with its valid range.
     pub fn validate(&self) -> Result<(), StudyError> {
         let within = |key: &str, value: f64, least: f64, most: f64| Expected::Range(least, most).check(key, value);
-        within("duration_s", self.duration_s, 1e-3, MOST_DURATION_S)?;
+        within("duration_s", self.duration_s, 1e-3, MAX_DURATION_OF_ANY_ROBOT_S)?;
         self.optimiser.validate()?;
         if !self.parameters.is_empty() && !matches!(self.criterion, CriterionChoice::WindowedCondition(_)) {
-            let fix = "they are strokes of a windowed design: give criterion = { kind = \"windowed-condition\" }";
+            let fix = "these are strokes of a windowed design: set criterion = { kind = \"windowed-condition\" }";
             return Err(StudyError::conflict("parameters", fix));
         }
         if self.start_posture.is_some() && matches!(self.criterion, CriterionChoice::WindowedCondition(_)) {
@@ -313,17 +310,17 @@ impl DesignSection {
         if let Some(limit) = search.time_limit_s {
             within("search.time_limit_s", limit, 1e-3, 1e7)?;
         }
-        within("defaults.stop_margin_percent", self.defaults.stop_margin_percent, 0.0, MOST_STOP_MARGIN)?;
-        within("defaults.continuous_turns", self.defaults.continuous_turns, 0.0, MOST_TURNS)?;
+        within("defaults.stop_margin_percent", self.defaults.stop_margin_percent, 0.0, MAX_STOP_MARGIN_PERCENT)?;
+        within("defaults.continuous_turns", self.defaults.continuous_turns, 0.0, MAX_CONTINUOUS_TURNS)?;
         self.prior.validate()?;
-        if !self.prior.is_empty() && self.criterion.of_regressor() {
-            let fix = "a condition number is of the motion's regressor alone; choose the criterion \"d-optimal\", \"a-optimal\", \"e-optimal\" or prediction";
+        if !self.prior.is_empty() && self.criterion.ignores_torque_noise() {
+            let fix = "a condition number does not use a prior: set the criterion to \"d-optimal\", \"a-optimal\", \"e-optimal\" or prediction";
             return Err(StudyError::conflict("prior", fix));
         }
         if let (Some(_), FamilyChoice::Joined(joined)) = (&self.start_posture, &self.family)
             && (joined.start.is_some() || joined.end.is_some())
         {
-            return Err(StudyError::Exclusive { keys: vec!["start_posture", "the joined family's own start or end"] });
+            return Err(StudyError::Exclusive { keys: vec!["start_posture", "start or end of the joined family"] });
         }
         let stds = match &self.torque_std_nm {
             None => &[][..],

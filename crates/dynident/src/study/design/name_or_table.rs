@@ -1,4 +1,4 @@
-//! A key of a study that is a name, or a table for what needs settings.
+//! A study key whose value is a name or a table with settings.
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -6,7 +6,7 @@ use serde::de::value::{MapAccessDeserializer, MapDeserializer};
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
-/// Reads a choice that is tagged by `kind` from a table, or from its name alone.
+/// Reads an enum tagged by `kind` from a table, or from the name alone.
 pub(crate) fn name_or_table<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<T, D::Error> {
     struct NameOrTable<T>(PhantomData<T>);
     impl<'de, T: Deserialize<'de>> Visitor<'de> for NameOrTable<T> {
@@ -27,7 +27,7 @@ pub(crate) fn name_or_table<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from
     from.deserialize_any(NameOrTable(PhantomData))
 }
 
-/// The schema of such a key: a name, or what it was before.
+/// Schema of such a key: a string, or the schema of the table.
 #[cfg(feature = "schema")]
 pub(crate) fn schema(schema: &mut schemars::Schema) {
     let table = core::mem::take(schema.ensure_object());

@@ -1,11 +1,11 @@
-//! `[design] optimiser`: what looks for the motion.
+//! `[design] optimiser`: algorithm of the trajectory search.
 
 use crate::error::StudyError;
 use dynident_excitation::DerivativeFree;
 use dynident_excitation::optimisers::{BinaryGeneticSettings, CmaEsSettings};
 use serde::{Deserialize, Serialize};
 
-/// An optimiser by its `kind`, with its own settings beside it; the name alone stands for the defaults.
+/// An optimiser by its `kind`, with its settings in the same table; the name alone selects the default settings.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
@@ -13,7 +13,7 @@ pub enum OptimiserChoice {
     /// Many starts, exact gradients, augmented Lagrangian.
     #[default]
     Gradient,
-    /// CMA-ES with a penalty in proportion to what is broken.
+    /// CMA-ES with a penalty proportional to the constraint violation.
     CmaEs(CmaEsSettings),
     /// The paper's genetic algorithm.
     Genetic(BinaryGeneticSettings),
@@ -32,7 +32,7 @@ impl OptimiserChoice {
     /// Checks the settings.
     ///
     /// # Errors
-    /// The first that is out of range, and a seed: the search has one already.
+    /// The first setting that is out of range, or a seed, because the search has its own.
     pub fn validate(&self) -> Result<(), StudyError> {
         let (valid, seed) = match self {
             Self::Gradient => return Ok(()),
@@ -46,7 +46,7 @@ impl OptimiserChoice {
         Ok(())
     }
 
-    /// The optimiser for the ordinary problem; none for gradients.
+    /// The optimiser for the standard problem; `None` for the gradient method.
     pub(crate) fn derivative_free(&self) -> Option<DerivativeFree> {
         match self {
             Self::Gradient => None,

@@ -1,4 +1,4 @@
-//! `start_posture`: where the motion begins.
+//! `start_posture`: posture at the start of the motion.
 
 use crate::error::{Expected, StudyError};
 use dynident_excitation::limits::Limits;
@@ -6,23 +6,23 @@ use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Position of joints at the start, rad (m): by name (what is not named stays free), or all joints in the model's
-/// order.
+/// Positions at the start, rad (m): by joint name (other joints stay free), or a list of all joints in the order of the
+/// model.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "positions by joint, { elbow = 1.5 }, or a list with one per joint (rad, m)")]
 pub enum StartPosture {
-    /// By the joints' names.
+    /// By joint name.
     ByJoint(BTreeMap<String, f64>),
     /// All joints, in the model's order.
     List(Vec<f64>),
 }
 
 impl StartPosture {
-    /// The position of every joint that is named under a key of a study.
+    /// Resolves the positions to the joints of the model; `key` is the study key for messages. `None` for a free joint.
     ///
     /// # Errors
-    /// A joint that the model does not have, another number of positions than joints.
+    /// An unknown joint, or a list whose length differs from the number of joints.
     pub(crate) fn named(&self, key: &'static str, model: &Model) -> Result<Vec<Option<f64>>, StudyError> {
         let names: Vec<&str> = model.joints().iter().map(|joint| &*joint.name).collect();
         match self {
@@ -42,12 +42,11 @@ impl StartPosture {
         }
     }
 
-    /// The position of every joint that is named.
+    /// Resolves the positions and checks them against the limits. `None` for a free joint.
     ///
     /// # Errors
-    /// A joint that the model does not have, another number of positions than joints, a position that is not finite or
-    /// that the limits do not allow: at rest in a whole posture every limit is asked, in a part of one those of
-    /// position.
+    /// An unknown joint, a list with the wrong length, a position that is not finite or outside of its limits. A
+    /// posture with all joints is checked at rest against every limit, a partial one against position limits only.
     pub(crate) fn of_joints(&self, model: &Model, limits: &Limits) -> Result<Vec<Option<f64>>, StudyError> {
         let posture = self.named("start_posture", model)?;
         let names = model.joints().iter().map(|joint| &*joint.name);

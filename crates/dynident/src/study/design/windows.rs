@@ -1,9 +1,9 @@
-//! `criterion = { kind = "windowed-condition", .. }`: the paper's criterion over windows, and the strokes that a study
-//! gives.
+//! `criterion = { kind = "windowed-condition", .. }`: the paper's criterion over windows, and strokes given in the
+//! study.
 
 use serde::{Deserialize, Serialize};
 
-/// Which joints move while others rest.
+/// Sequence in which joints move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -19,11 +19,11 @@ pub enum WindowedProblem {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct WindowedCondition {
-    /// Which joints move while others rest; `"step-wise"` is the one there is.
+    /// Sequence in which joints move; `"step-wise"` is the only choice.
     pub problem: WindowedProblem,
-    /// The joints that take part, in the order in which they move. Default: all, from the tip to the base.
+    /// The moving joints in the order of their strokes. Default: all, from the tip to the base.
     pub joints: Option<Vec<String>>,
-    /// ε: what a broken limit adds to the fitness. Default 1000.
+    /// ε: penalty added to the fitness for a violated limit. Default 1000.
     pub penalty: f64,
     /// Bound of velocity and acceleration at rest (equation 17), rad/s and rad/s². Default 1e-4.
     pub rest_limit: f64,
@@ -49,7 +49,7 @@ impl Default for WindowedCondition {
     }
 }
 
-/// A stroke that the study gives, so that nothing is searched.
+/// A stroke given in the study, which is evaluated without a search.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]

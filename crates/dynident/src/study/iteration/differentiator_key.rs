@@ -1,4 +1,4 @@
-//! `differentiator` of `[iteration]`: a way from positions to velocities and accelerations, or `"auto"`.
+//! `differentiator` of `[iteration]`: a method for velocities and accelerations, or `"auto"`.
 
 use dynident_recording::DifferentiatorSettings;
 use serde::de::value::MapAccessDeserializer;
@@ -10,23 +10,23 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Automatic {
-    /// Each run takes the way that leaves the least of its torques.
+    /// Each run uses the method with the smallest torque residual.
     Auto,
 }
 
-/// From positions to velocities and accelerations.
+/// Method for velocities and accelerations from positions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum DifferentiatorKey {
-    /// Chosen by each run.
+    /// Selected in each run.
     Automatic(Automatic),
     /// As stated.
     Stated(DifferentiatorSettings),
 }
 
 impl<'de> Deserialize<'de> for DifferentiatorKey {
-    // By hand, for an untagged enum says of a mistake only that nothing fits.
+    // Written by hand because an untagged enum loses the error of the inner key.
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct KeyVisitor;
         impl<'de> Visitor<'de> for KeyVisitor {

@@ -1,4 +1,4 @@
-//! `held_out` of `[iteration]`: a motion that is never fitted.
+//! `held_out` of `[iteration]`: a validation motion.
 
 use super::super::{CriterionChoice, DesignSection, Study};
 use super::IterationSection;
@@ -6,11 +6,11 @@ use crate::error::{Expected, StudyError};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// What the seed of the study's own design grows by where the held-out motion is looked for.
-const OTHER_STARTS: u64 = 0x5851_f42d_4c95_7f2d;
+/// Added to the seed of the study's design for the search of the held-out motion.
+const HELD_OUT_SEED_OFFSET: u64 = 0x5851_f42d_4c95_7f2d;
 
-/// `held_out`: a motion that is run to judge the newest model and never fitted. Without a key it is looked for as the
-/// study's own, from other random starts, and run before the iteration may end as converged.
+/// `held_out`: a motion that validates the newest model and is never used for a fit. Without keys it is designed as the
+/// study's motion with another seed, and is run before the iteration may end as converged.
 ///
 /// ```
 /// let section: dynident::study::IterationSection = toml::from_str("held_out = { every = 2 }")?;
@@ -21,11 +21,11 @@ const OTHER_STARTS: u64 = 0x5851_f42d_4c95_7f2d;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct HeldOutSection {
-    /// It is run after every so many runs, of those that are good; by default only where all else is met.
+    /// Runs it after every `every` accepted runs; by default only when all other conditions of convergence are met.
     pub every: Option<usize>,
-    /// Its trajectory, as `trajectory` of `[iteration]`.
+    /// Trajectory file, in the format of `trajectory` of `[iteration]`.
     pub trajectory: Option<PathBuf>,
-    /// Its design, in place of the study's `[design]` with another seed.
+    /// Design of this motion; by default the study's `[design]` with another seed.
     pub design: Option<DesignSection>,
 }
 
@@ -33,7 +33,7 @@ impl IterationSection {
     /// Checks `held_out`.
     ///
     /// # Errors
-    /// What keeps a study from having one, with the fix.
+    /// A conflicting key, with the fix.
     pub(crate) fn check_held_out(&self, study: &Study) -> Result<(), StudyError> {
         let Some(own) = &self.held_out else { return Ok(()) };
         if own.trajectory.is_some() && own.design.is_some() {
@@ -47,18 +47,17 @@ impl IterationSection {
             || self.trajectory.is_none() && study.design.as_ref().is_some_and(windowed)
             || own.design.as_ref().is_some_and(windowed);
         if several {
-            let fix =
-                "it takes one motion of which everything counts: take out [[iteration.leg]], or the windowed design";
+            let fix = "it needs one motion without legs or windows: remove [[iteration.leg]], or the windowed design";
             return Err(StudyError::conflict("held_out", fix));
         }
         if own.trajectory.is_none() && own.design.is_none() && study.design.is_none() {
-            let fix = "without [design] another motion cannot be looked for: name a file with held_out = { trajectory = \"...\" }, or give a [design]";
+            let fix = "without [design] no other motion can be designed: name a file with held_out = { trajectory = \"...\" }, or give a [design]";
             return Err(StudyError::missing("held_out.trajectory", fix));
         }
         Ok(())
     }
 
-    /// The study whose trajectory the held-out motion is; none without one.
+    /// The study for the held-out motion; `None` without `held_out`.
     pub(crate) fn held_out_study(&self, study: &Study) -> Option<Study> {
         let own = self.held_out.as_ref()?;
         let mut other = study.clone();
@@ -67,7 +66,7 @@ impl IterationSection {
             Some(design) => other.design = Some(design.clone()),
             None => {
                 if let Some(design) = &mut other.design {
-                    design.search.seed = design.search.seed.wrapping_add(OTHER_STARTS);
+                    design.search.seed = design.search.seed.wrapping_add(HELD_OUT_SEED_OFFSET);
                 }
             }
         }

@@ -1,20 +1,20 @@
-//! `[[iteration.leg]]`: trajectories of which some joints are held, together in every run or one after another.
+//! `[[iteration.leg]]`: several trajectories, each with some joints held, run together or in sequence.
 
 use super::super::DesignSection;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// What becomes of several legs.
+/// Order of several legs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LegOrder {
-    /// Every run has all of them, and is identified from all.
+    /// Every run has all legs; the model is identified from all of them.
     #[default]
     Together,
-    /// Each has an iteration of its own, until that has settled or its runs are used up; what it has found is held in
-    /// those after it. The paper's way: tip first.
+    /// Each leg has a separate iteration until it converges or reaches its maximum of runs; its estimates are then
+    /// fixed in the following legs. The paper's method: tip first.
     OneAfterAnother,
 }
 
@@ -34,20 +34,20 @@ pub enum LegOrder {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct LegSection {
-    /// Joints that are held, and where, rad (m); none by default. Their torque does not count. Of a windowed design
-    /// only the strokes of the other joints are run.
+    /// Held joints with their positions, rad (m); none by default. The torque of held joints is not used. A windowed
+    /// design runs only the strokes of the other joints.
     pub hold: BTreeMap<String, f64>,
-    /// Whether the simulator locks them (the default), or the controller has to hold them. A robot outside gets them as
-    /// joints that are to rest.
+    /// Whether the simulator locks the held joints (true by default), or the controller holds them. A robot outside of
+    /// the simulator receives them as joints that must rest.
     pub locked: bool,
-    /// Its trajectory, in place of the study's.
+    /// Trajectory file; by default that of the study.
     pub trajectory: Option<PathBuf>,
-    /// Its design, in place of the study's `[design]`.
+    /// Design; by default the study's `[design]`.
     pub design: Option<DesignSection>,
-    /// For joints by name the times (from, to; s) that count; what the design says by default, or everything. Joints
-    /// that are not named do not count then.
+    /// Time ranges by joint name (from, to; s) that are used in the fit; by default those of the design, or the whole
+    /// motion. Joints without an entry are then not used.
     pub windows: BTreeMap<String, Vec<[f64; 2]>>,
-    /// The `[[payload]]` that the robot carries on it, by name; none by default.
+    /// Name of the `[[payload]]` that the robot carries; no payload by default.
     pub payload: Option<String>,
 }
 

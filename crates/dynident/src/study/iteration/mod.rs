@@ -1,4 +1,4 @@
-//! `[iteration]`: how a study's robot is run, identified and run again.
+//! `[iteration]`: repeated runs and identification of the study's robot.
 
 mod differentiator_key;
 mod held_out;
@@ -33,31 +33,31 @@ use std::path::PathBuf;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum RobotChoice {
-    /// The simulator, as `[simulation]` says.
+    /// The simulator with the settings of `[simulation]`.
     #[default]
     Simulation,
     /// Another program over the line protocol.
     Process(ProcessSettings),
-    /// A person: files out, a log in.
+    /// A person: Dynident writes files and reads a log.
     Folder(FolderSettings),
-    /// A function of this process, which no file can name: [`iterate_with_robot`](crate::iterate_with_robot).
+    /// A function of the calling program: [`iterate_with_robot`](crate::iterate_with_robot).
     #[serde(skip)]
     Function,
 }
 
-/// What is believed of the bodies before any run.
+/// Prior for the bodies before the first run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum PriorChoice {
-    /// What the description says.
+    /// Inertials of the robot description.
     #[default]
     Description,
-    /// Nothing.
+    /// No prior.
     None,
 }
 
-/// `[iteration]`, all of it optional.
+/// `[iteration]`; every key is optional.
 ///
 /// ```
 /// let section: dynident::study::IterationSection = toml::from_str(
@@ -76,89 +76,87 @@ pub enum PriorChoice {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
-#[allow(clippy::struct_excessive_bools, reason = "keys of a file, each a choice of its own")]
+#[allow(clippy::struct_excessive_bools, reason = "independent keys of a file")]
 pub struct IterationSection {
-    /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of the one that `[design]` leads to.
+    /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of one from `[design]`.
     pub trajectory: Option<PathBuf>,
-    /// Whether every run repeats the first motion (`"repeat"`, the default), or each from the second on is designed
-    /// with what is known (`"redesign"`). A name, or a table with a `kind` and its settings.
+    /// Whether every run repeats the first motion (`"repeat"`, the default), or each later run is designed with the
+    /// current estimate (`"redesign"`). A name, or a table with a `kind` and its settings.
     #[serde(deserialize_with = "name_or_table")]
     #[cfg_attr(feature = "schema", schemars(transform = super::design::name_or_table::schema))]
     pub motion: MotionChoice,
-    /// A motion that is run to judge the newest model and never fitted; none by default.
+    /// A motion that validates the newest model and is never used for a fit; none by default.
     pub held_out: Option<HeldOutSection>,
-    /// Several trajectories, some with joints that are held, in place of one; each takes the study's trajectory or
-    /// design unless it has its own.
+    /// Several trajectories in place of one, some with held joints; each uses the study's trajectory or design unless
+    /// it states its own.
     pub leg: Vec<LegSection>,
-    /// Whether every run has all legs (`"together"`, the default), or each an iteration of its own, with what those
-    /// before it have found held (`"one-after-another"`).
+    /// Whether every run has all legs (`"together"`, the default), or each leg has a separate iteration with the
+    /// estimates of earlier legs fixed (`"one-after-another"`).
     pub order: LegOrder,
-    /// Which robot runs it; the simulator by default.
+    /// The robot that runs the trajectories; the simulator by default.
     pub robot: RobotChoice,
-    /// What is believed of the bodies before any run; what the description says by default.
+    /// Prior for the bodies before the first run; the robot description by default.
     pub prior: PriorChoice,
-    /// Under what the first run is: `"model-free"` (the default; `"prior"` with `bandwidth_hz`) or `"prior"`.
+    /// Controller of the first run: `"model-free"` (the default; `"prior"` with `bandwidth_hz`) or `"prior"`.
     pub start: Option<StartWith>,
-    /// The controller of a first run with the prior, in place of `[controller]`.
+    /// Controller of a first run with the prior; by default `[controller]`.
     pub first: Option<ControllerSettings>,
-    /// All joints at once, or step by step.
+    /// Identification scheme: all joints at once, or step by step.
     pub scheme: Scheme,
-    /// Every sample of every joint counts, also where a windowed design names windows; false by default.
+    /// Uses every sample of every joint, even if a windowed design defines windows; false by default.
     pub every_sample: bool,
-    /// The paper's scheme as it stands: no physically consistent set is asked for, nothing is rejected and runs are not
-    /// pooled. False by default.
+    /// The paper's original scheme: no physically consistent fit, no rejected runs, no pooling. False by default.
     pub literal: bool,
-    /// Whether the model is fitted to all good runs together, each weighted by its own noise; true by default.
-    /// Otherwise to the newest alone.
+    /// Whether the model is fitted to all accepted runs together, each weighted by its residual variance; true by
+    /// default. Otherwise to the newest run only.
     pub pool: bool,
-    /// From positions to velocities and accelerations; `deviation` from the trajectory by default. With `"auto"` each
-    /// run takes the way that leaves the least of its torques, the paper's map among them.
+    /// Method for velocities and accelerations; `deviation` from the trajectory by default. With `"auto"` each run uses
+    /// the method with the smallest torque residual; the candidates include the paper's map.
     pub differentiator: DifferentiatorKey,
-    /// Low-pass and decimation of torque and regressor alike; none by default.
+    /// Low-pass filter and decimation, applied to torque and regressor; none by default.
     pub parallel_filter: Option<DecimationSettings>,
-    /// Whether recorded torques are held from sample to sample; true by default.
+    /// Whether recorded torques are constant between samples (zero-order hold); true by default.
     pub held_torque: bool,
-    /// The controller without a model; joint PD with 16 and 8 by default, of the simulator only: a robot outside has no
-    /// default gains.
+    /// The controller without a model; by default joint PD with gains 16 and 8 in the simulator. A robot outside of the
+    /// simulator has no default gains.
     pub model_free: Option<ControllerSettings>,
-    /// Gains that are not stated come from the description's inertials, critically damped, with this natural frequency
-    /// of each joint, Hz: for all joints one number, or a list.
+    /// Natural frequency of each joint, Hz, for gains that are not stated; these are computed from the inertials of the
+    /// robot description with critical damping. One number for all joints, or a list.
     pub bandwidth_hz: Option<PerJoint>,
-    /// What no sample of a run may leave: a run that does is stopped. Of a robot outside by default the description's
-    /// limits with some room, and a distance from the path of 0.3 rad (0.1 m).
+    /// Limits that stop a run when a sample exceeds them. For a robot outside of the simulator the default is the robot
+    /// description's limits with a margin, and a path error of 0.3 rad (0.1 m).
     pub envelope: EnvelopeSettings,
-    /// How every motion of a robot outside is rehearsed before it is commanded.
+    /// Rehearsal: simulation of every motion before a robot outside of the simulator runs it.
     pub rehearsal: RehearsalSettings,
-    /// Thresholds of oscillations: those that stop a run of a robot outside, and those that are reported for a log.
+    /// Thresholds of oscillation, for stopping a run of a robot outside of the simulator and for reports about a log.
     pub oscillation: OscillationSettings,
-    /// Samples a second of the robot's control loop and of what is handed over; `[simulation] rate_hz` (1000) by
-    /// default.
+    /// Rate of the robot's control loop and of the transferred samples, Hz; `[simulation] rate_hz` (1000) by default.
     pub rate_hz: Option<f64>,
-    /// Shares of its speed at which the motion is run before the first run, as `[0.1, 0.5, 1.0]`; none by default.
+    /// Speed factors at which the motion is run before the first run, for example `[0.1, 0.5, 1.0]`; none by default.
     pub speed_steps: Vec<f64>,
-    /// Where the robot waits between runs, rad (m), all joints by name or in the model's order: every run goes from
-    /// there to its motion and back, within the limits of `[design]`. Without it the robot has to stand where the
-    /// motion begins.
+    /// Home posture between runs, rad (m), all joints by name or in the order of the model: every run moves from there
+    /// to the start of its motion and back, within the limits of `[design]`. Without it the robot must be at the start
+    /// of the motion.
     pub home: Option<StartPosture>,
-    /// Share of the velocity and acceleration limits that the ways from home and back have; 0.2 by default.
+    /// Fraction of the velocity and acceleration limits used between home and the motion; 0.2 by default.
     pub approach_speed: f64,
-    /// How long the motion of a run is made over and over before the first run of a call, s, so that friction is at its
-    /// working temperature; again where the robot has stood longer than this. 0 by default: not at all. Not of a robot
-    /// behind a folder, which a person warms up.
+    /// Duration of warm-up motion before the first run of a call, s, so that friction is at its working temperature;
+    /// repeated after a longer pause. 0 (none) by default. Not available with a robot behind a folder.
     pub warm_up_s: f64,
-    /// Tracking this many times worse than that of the last good run rejects a run.
+    /// Factor on the tracking error of the last accepted run above which a run is rejected.
     pub worse_factor: f64,
-    /// How often a step is halved before the controller without a model comes back.
+    /// Maximum number of step halvings before the iteration returns to the controller without a model.
     pub most_halvings: usize,
-    /// By how much its gains grow each time; 2 by default, and 1 (not at all) of a robot outside.
+    /// Factor on the gains of the controller without a model after each failed run; 2 by default, 1 (unchanged) for a
+    /// robot outside of the simulator.
     pub stiffen: Option<f64>,
-    /// Failed runs without a model before the robot counts as one that cannot follow.
+    /// Maximum number of failed runs without a model; then the iteration ends because the robot cannot follow.
     pub most_model_free: usize,
-    /// Most runs.
+    /// Maximum number of runs.
     pub max_runs: usize,
-    /// When all has settled.
+    /// Convergence thresholds.
     pub settled: SettledSettings,
-    /// When a difference between logged and commanded torque counts.
+    /// Thresholds for the difference between logged and commanded torque.
     pub torque_check: TorqueCheckSettings,
 }
 
@@ -214,11 +212,11 @@ impl Default for IterationSection {
 }
 
 impl IterationSection {
-    /// The settings of the iteration, with the study's `[controller]`; runs are identified as `identification` says,
-    /// with the iteration's own differentiator and filter.
+    /// Builds the iteration settings with the study's `[controller]`; runs are identified with `identification`, with
+    /// the iteration's differentiator and filter.
     ///
     /// # Errors
-    /// What a run cannot be identified with.
+    /// A setting that the identification of a run does not support.
     pub(crate) fn settings(
         &self,
         study: &Study,
@@ -235,7 +233,7 @@ impl IterationSection {
             OffsetChoice::Shared => RunOffsets::WhereSeen,
             OffsetChoice::PerLog => RunOffsets::PerRun,
         };
-        // A controller is to have the friction that the study states, unless a key says otherwise.
+        // The controller uses the friction that the study states, unless `friction = "auto"` is set.
         friction.retain(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
         if self.scheme == Scheme::StepByStep && !estimation.estimator.is_plain() {
             let key = format!("estimator.method = \"{}\"", estimation.estimator.name());
@@ -244,10 +242,10 @@ impl IterationSection {
         let in_turn =
             self.scheme == Scheme::StepByStep || self.order == LegOrder::OneAfterAnother && self.leg.len() > 1;
         if in_turn && !friction.is_empty() {
-            let fix = "only runs that hold information about all joints at once can choose; state the friction, or take out scheme and order of [iteration]";
+            let fix = "the selection needs runs that excite all joints; state the friction, or remove scheme and order from [iteration]";
             return Err(StudyError::conflict("drive.friction = \"auto\"", fix));
         }
-        // A run's estimate is made, not tested.
+        // Tests and essential parameters are for the final identification only.
         (estimation.exogeneity_test, estimation.essential) = (None, None);
         estimation.examine_exogeneity = false;
         if let Estimator::Auto(_) = estimation.estimator {
@@ -277,7 +275,7 @@ impl IterationSection {
             pool: self.pool && !self.literal,
             worse_factor: self.worse_factor,
             most_halvings: self.most_halvings,
-            // Nobody's gains are raised who did not ask for it.
+            // Gains of a robot outside of the simulator increase only on request.
             stiffen: self.stiffen.unwrap_or(if self.is_outside() { 1.0 } else { default.stiffen }),
             most_model_free: self.most_model_free,
             max_runs: self.max_runs,

@@ -1,4 +1,4 @@
-//! `motion` of `[iteration]`: whether runs repeat one motion, or each is designed with what is known.
+//! `motion` of `[iteration]`: one motion for all runs, or a new design for each run.
 
 use super::super::{CriterionChoice, Study};
 use super::IterationSection;
@@ -6,24 +6,24 @@ use crate::error::StudyError;
 use dynident_iteration::{RedesignSettings, Scheme};
 use serde::{Deserialize, Serialize};
 
-/// What the motion of every run is.
+/// Motion of the runs.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum MotionChoice {
-    /// That of the first run, always.
+    /// Repeats the motion of the first run.
     #[default]
     Repeat,
-    /// From the second run on the motion of `[design]`'s family, within its limits, that is to narrow the worst known
-    /// directions most; and further runs for that alone while one is worth it.
+    /// From the second run on, a motion of `[design]`'s family within its limits that reduces the variance of the least
+    /// known directions most. Further runs continue while one improves them enough.
     Redesign(RedesignSettings),
 }
 
 impl IterationSection {
-    /// The settings of a redesign, if one is asked for.
+    /// The settings of a redesign; `None` if not requested.
     ///
     /// # Errors
-    /// What keeps motions from being redesigned, with the fix.
+    /// A key that conflicts with a redesign, with the fix.
     pub(crate) fn redesign(&self, study: &Study) -> Result<Option<&RedesignSettings>, StudyError> {
         let MotionChoice::Redesign(settings) = &self.motion else { return Ok(None) };
         settings.validate().map_err(StudyError::at("iteration.motion"))?;
@@ -31,22 +31,20 @@ impl IterationSection {
         let Some(design) = &study.design else {
             return Err(StudyError::missing(
                 "[design]",
-                "motion = \"redesign\" needs a family of motions and what the robot may do: give [design] with family, duration_s and limits (the first motion may still come from trajectory)",
+                "motion = \"redesign\" needs a family of motions and limits: give [design] with family, duration_s and limits (the first motion may still come from trajectory)",
             ));
         };
         if let CriterionChoice::WindowedCondition(_) = design.criterion {
-            return conflict("a windowed design has strokes of its own: give another criterion in [design]");
+            return conflict("a windowed design has fixed strokes: set another criterion in [design]");
         }
         if !self.leg.is_empty() {
-            return conflict("several legs, or held joints, are run as they are: take out [[iteration.leg]]");
+            return conflict("legs and held joints cannot be redesigned: remove [[iteration.leg]]");
         }
         if self.scheme == Scheme::StepByStep {
-            return conflict("it needs what all joints say together: take out scheme = \"step-by-step\"");
+            return conflict("a redesign uses all joints together: remove scheme = \"step-by-step\"");
         }
         if self.literal || !self.pool {
-            return conflict(
-                "motions that complement each other are to be fitted together: take out literal and pool = false",
-            );
+            return conflict("complementary motions must be fitted together: remove literal and pool = false");
         }
         Ok(Some(settings))
     }

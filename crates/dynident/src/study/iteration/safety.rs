@@ -1,4 +1,4 @@
-//! What `[iteration]` says of a robot that moves for real: its gains, its envelope, the rehearsal.
+//! Settings of `[iteration]` for a real robot: gains, envelope, rehearsal.
 
 use super::{IterationSection, RobotChoice, Study};
 use crate::error::StudyError;
@@ -13,7 +13,7 @@ use dynident_simulation::controllers::PositionLoopSettings;
 use dynident_simulation::{ControllerSettings, Reference};
 
 impl IterationSection {
-    /// Whether the robot is not the simulator.
+    /// Whether the robot is outside of the simulator.
     pub(crate) fn is_outside(&self) -> bool {
         match self.robot {
             RobotChoice::Simulation => false,
@@ -21,21 +21,21 @@ impl IterationSection {
         }
     }
 
-    /// The envelope, where there is one: of a robot outside, or stated.
+    /// The envelope for a robot outside of the simulator, or a stated one; otherwise `None`.
     pub(crate) fn envelope_in_force(&self) -> Option<&EnvelopeSettings> {
         (self.is_outside() || self.envelope != EnvelopeSettings::default()).then_some(&self.envelope)
     }
 
-    /// That a robot outside has gains that somebody stands for: stated, or by a stated bandwidth from a description
-    /// with bodies.
+    /// Checks that a robot outside of the simulator has stated gains, or a stated bandwidth and a description with
+    /// inertials.
     ///
     /// # Errors
-    /// What is missing, and what to write.
+    /// The missing keys, with the fix.
     pub(crate) fn check_gains(&self, study: &Study, robot: &StudyRobot) -> Result<(), StudyError> {
         let controllers = [study.controller.as_ref(), self.model_free.as_ref(), self.first.as_ref()];
         let own_loop = controllers.into_iter().flatten().any(|controller| !controller.can_be_simulated());
         if own_loop && self.steps() {
-            let fix = "here Dynident computes every torque: state what kp and kd of the drives' loop are, or let a \
+            let fix = "Dynident computes every torque here: state kp and kd of the drives' loop, or let a \
                        program run it (mode = \"run\")";
             return Err(StudyError::conflict("kind = \"position-loop\"", fix));
         }
@@ -47,7 +47,7 @@ impl IterationSection {
             if unknown.is_empty() {
                 return Ok(());
             }
-            let fix = "bandwidth_hz makes gains of the description's inertials: give them there, or state the gains";
+            let fix = "bandwidth_hz computes gains from the inertials of the robot description: add them there, or state the gains";
             return Err(StudyError::NoInertials { bodies: unknown.into_iter().map(str::to_owned).collect(), fix });
         }
         let missing = match (&self.model_free, &study.controller) {
@@ -58,14 +58,14 @@ impl IterationSection {
         };
         Err(StudyError::missing(
             format!("gains ({missing})"),
-            "a robot outside has no default gains: what holds one arm drops another. Give bandwidth_hz (gains from the \
+            "a robot outside of the simulator has no default gains, because suitable gains depend on the arm. Give bandwidth_hz (gains from the \
              description's inertials, critically damped, say 2.0), [controller] with kind = \"position-loop\" (the \
              drives' own loop), or model_free = { kind = \"joint-pd\", kp = [..], \
              kd = [..] } and [controller] with gains that this robot has run under",
         ))
     }
 
-    /// Whether the robot waits for every torque, which Dynident computes: there is no delay but what it states.
+    /// Whether Dynident computes every torque in step with the robot, so that only a stated delay exists.
     fn steps(&self) -> bool {
         match &self.robot {
             RobotChoice::Simulation | RobotChoice::Function => true,
@@ -74,8 +74,8 @@ impl IterationSection {
         }
     }
 
-    /// How late a controller of this robot may be, s, where the study does not state it: the simulated one is as late
-    /// as its sensors, and stated gains are those that a robot has run under, with whatever delay it has.
+    /// Assumed delay of the controller, s, if the study does not state it: that of the simulated sensors for the
+    /// simulator. Stated gains have run with the real delay, so they need none.
     fn delay_s(&self, study: &Study, robot: &StudyRobot) -> f64 {
         let simulation = study.simulation.clone().unwrap_or_default();
         let rate_hz = self.rate_hz.unwrap_or(simulation.rate_hz);
@@ -87,11 +87,11 @@ impl IterationSection {
         }
     }
 
-    /// The settings with controllers, envelope and rehearsal of the robot that is to move along `references`, and the
-    /// joints whose derived loops are slower than `bandwidth_hz`.
+    /// Completes the settings with controllers, envelope and rehearsal for the robot and its `references`, and returns
+    /// the joints whose derived loops are slower than `bandwidth_hz`.
     ///
     /// # Errors
-    /// Numbers that do not fit.
+    /// Invalid numbers.
     pub(crate) fn guarded(
         &self,
         mut settings: IterationSettings,
@@ -103,7 +103,7 @@ impl IterationSection {
         self.rehearsal.validate()?;
         let mut lowered = Vec::new();
         let (outside, model) = (self.is_outside(), robot.model());
-        // Before there is a model the drives' loop gets nothing but the path.
+        // Without a model the drives' loop gets only the path.
         if let (Some(ControllerSettings::PositionLoop(own)), None) = (&study.controller, &self.model_free) {
             let own = PositionLoopSettings { feed_forward: false, ..own.clone() };
             settings.model_free = ControllerSettings::PositionLoop(own);
@@ -114,7 +114,7 @@ impl IterationSection {
                 uncertainty_percent: self.rehearsal.uncertainty_percent,
                 delay_s: self.delay_s(study, robot),
                 lightest_drive: if outside { self.rehearsal.lightest_drive() } else { 1.0 },
-                // A robot that waits for every torque has drives and sensors all the same.
+                // A robot in step mode still has real drives and sensors.
                 light_delay_s: self.rehearsal.delay_s(model),
                 tracking_error: self.envelope.tracking_error.clone(),
             };
@@ -128,7 +128,7 @@ impl IterationSection {
                 note("none", &derived.model_free_hz);
                 settings.model_free = derived.model_free;
             }
-            // Gains of the description's bodies: their weight is known as well.
+            // A robot description with bodies also gives gravity compensation.
             if self.start.is_none() && self.model_free.is_none() {
                 settings.start = StartWith::Prior;
             }
@@ -148,7 +148,7 @@ impl IterationSection {
             oscillation: self.oscillation.clone(),
             rehearsal: outside.then(|| RehearsalSettings {
                 delay_s: Some(self.delay_s(study, robot)),
-                // Gains that are stated are those that a robot has run under.
+                // Stated gains have already run on the robot.
                 lightest_drive: self.rehearsal.lightest_drive.or(self.bandwidth_hz.is_none().then_some(1.0)),
                 ..self.rehearsal.clone()
             }),
@@ -160,32 +160,33 @@ impl IterationSection {
         Ok((settings, lowered))
     }
 
-    /// That somebody is there to be asked for passes along the motion.
+    /// Checks that a warm-up is possible.
     ///
     /// # Errors
-    /// A folder: a call makes one run there, and its person knows how warm the robot is.
+    /// A robot behind a folder: each call makes one run, and a person warms the robot up.
     pub(crate) fn check_warm_up(&self) -> Result<(), StudyError> {
         let folder = matches!(self.robot, RobotChoice::Folder(_));
         if folder && self.warm_up_s != 0.0 {
-            let fix = "behind a folder every run is a call of its own: run trajectory.csv some minutes without a log before you log it, and take the key out";
+            let fix = "with a folder every call makes one run: repeat trajectory.csv for some minutes before you record the log, and remove the key";
             return Err(StudyError::conflict("warm_up_s", fix));
         }
         Ok(())
     }
 
-    /// Where the robot waits, and what the ways from there keep.
+    /// Home posture and limits of the approach motion.
     ///
     /// # Errors
-    /// A posture that is none; legs that hold joints locked.
+    /// An incomplete posture, or legs that lock joints.
     pub(crate) fn home_settings(&self, robot: &StudyRobot, limits: Limits) -> Result<Option<HomeSettings>, StudyError> {
         let Some(home) = &self.home else { return Ok(None) };
         let (named, joints) = (home.named("home", robot.model())?, robot.model().joints());
         if let Some((joint, _)) = joints.iter().zip(&named).find(|(_, position)| position.is_none()) {
-            let fix = "the robot waits in one posture: give the position of every joint, rad (m)";
+            let fix = "the home posture is incomplete: give the position of every joint, rad (m)";
             return Err(StudyError::missing(format!("home.{}", joint.name), fix));
         }
         if !self.is_outside() && self.leg.iter().any(|leg| leg.locked && !leg.hold.is_empty()) {
-            let fix = "the simulator locks held joints where a run begins: give the legs locked = false, or no home";
+            let fix =
+                "the simulator locks held joints at the start of a run: set locked = false in the legs, or remove home";
             return Err(StudyError::conflict("home", fix));
         }
         Ok(Some(HomeSettings {
@@ -196,10 +197,9 @@ impl IterationSection {
         }))
     }
 
-    /// The section without what a run does not depend on: who speaks for the robot, how long that may take, what stops
-    /// it, what comes before a run, where a robot outside waits, and when the iteration ends. Runs made before these
-    /// were corrected are still this iteration's.
-    pub(crate) fn of_runs(&self) -> Self {
+    /// The section without settings that do not affect the data of a run: program of the robot and its time limits,
+    /// stop conditions, warm-up, home, end of the iteration. Earlier runs remain valid when these change.
+    pub(crate) fn without_unrelated_settings(&self) -> Self {
         let mut own = self.clone();
         match &mut own.robot {
             RobotChoice::Simulation | RobotChoice::Function => {}
@@ -220,13 +220,13 @@ impl IterationSection {
             held_out.every = None;
         }
         own.oscillation = default.oscillation;
-        // Gains that are made of a bandwidth bear the delay, light drives, and another robot than the description's.
+        // Gains derived from a bandwidth depend on delay, light drives and model uncertainty.
         let RehearsalSettings { uncertainty_percent, delay_s, lightest_drive, .. } = own.rehearsal;
         own.rehearsal = match own.bandwidth_hz {
             Some(_) => RehearsalSettings { uncertainty_percent, delay_s, lightest_drive, ..default.rehearsal },
             None => default.rehearsal,
         };
-        // A robot outside is moved to another place, or at another speed, or warmed up longer; its motion is the same.
+        // Home, approach speed and warm-up of a robot outside of the simulator do not change its motion.
         if self.is_outside() {
             (own.home, own.approach_speed, own.warm_up_s) = (None, default.approach_speed, 0.0);
         }

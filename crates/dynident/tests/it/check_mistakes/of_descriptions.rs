@@ -1,4 +1,4 @@
-//! Mistakes of the description and of what a controller took off by it.
+//! Mistakes in the robot description and in the controller's gravity compensation.
 
 use super::{Row, check_text, problems, read};
 use crate::common::repository;
@@ -7,7 +7,6 @@ use dynident::model::{Model, read_urdf};
 use std::fmt::Write;
 use std::path::Path;
 
-/// The README's example with another description and other rows.
 fn study_with(folder: &Path, urdf: &str, change: impl Fn(&mut Vec<Row>)) -> String {
     std::fs::write(folder.join("robot.urdf"), urdf).unwrap();
     for name in ["train.csv", "test.csv"] {
@@ -26,7 +25,7 @@ fn ur10() -> String {
     std::fs::read_to_string(repository("robots/ur10.urdf")).unwrap()
 }
 
-/// The upper arm half as long left 4.4 % of the shoulder's torque for 2.8 %, and ended with status 0.
+/// An upper arm of half the length increases the unexplained torque of the shoulder only from 2.8 to 4.4 %.
 #[test]
 fn a_link_of_another_length_is_named_with_its_factor() {
     const ELBOW: &str = "xyz=\"0.0 -0.1719 0.612\"";
@@ -40,12 +39,11 @@ fn a_link_of_another_length_is_named_with_its_factor() {
         assert!(kind == "description" && sentence.contains("`elbow_joint`"), "{found:?}");
         let told = sentence.split("has to be times ").nth(1).and_then(|rest| rest.split(':').next()).unwrap();
         let told: f64 = told.trim().parse().unwrap();
-        // To a fifth of the next factor that is tried.
+        // To a fifth of the step between tested factors.
         assert!((told / factor).ln().abs() < 0.1, "{sentence}");
     }
 }
 
-/// The description's gravity at each row's position, taken off its torque.
 fn compensate(model: &Model, rows: &mut [Row]) {
     let mut workspace = Workspace::new(model);
     for row in rows {
@@ -55,13 +53,13 @@ fn compensate(model: &Model, rows: &mut [Row]) {
     }
 }
 
-/// A controller knows gravity by the masses that the description has, and these err: torques without it are not those
-/// of a robot where nothing pulls. They were taken for another unit of torque, another mounting, or for nothing at all.
+/// Gravity compensation with wrong masses: the torques are not those of a robot without gravity, and must not be
+/// mistaken for another torque unit or mounting.
 #[test]
 fn gravity_that_a_controller_took_off_by_its_own_masses_is_named() {
     let urdf = ur10();
     let model = read_urdf(&urdf).unwrap().model;
-    // Masses of the description a quarter too large, those of the robot are what they are.
+    // Masses of the robot description are 25 % too large; the robot has the true masses.
     let heavier = with_bodies_times(1.25, &urdf);
     let controller = read_urdf(&heavier).unwrap().model;
     for (name, urdf, controller) in [("as described", urdf, &model), ("heavier than it is", heavier, &controller)] {
@@ -73,7 +71,6 @@ fn gravity_that_a_controller_took_off_by_its_own_masses_is_named() {
     }
 }
 
-/// A description whose masses and moments of inertia are `factor` times as large.
 fn with_bodies_times(factor: f64, urdf: &str) -> String {
     let mut text = urdf.to_owned();
     for key in ["mass value=\"", "ixx=\"", "iyy=\"", "izz=\"", "ixy=\"", "ixz=\"", "iyz=\""] {
@@ -87,7 +84,7 @@ fn with_bodies_times(factor: f64, urdf: &str) -> String {
     text
 }
 
-/// Rows of the UR10's table: a, alpha, d of the standard convention (its maker's), metres and degrees.
+/// Rows of the UR10's table in the standard convention: a, alpha, d (m and degrees).
 const UR10_ROWS: [[f64; 3]; 6] = [
     [0.0, 90.0, 0.1273],
     [-0.612, 0.0, 0.0],
@@ -97,11 +94,10 @@ const UR10_ROWS: [[f64; 3]; 6] = [
     [0.0, 0.0, 0.0922],
 ];
 
-/// The UR10's Denavit-Hartenberg table, with rows of one convention and the name of one.
 fn table(rows: &str, stated: &str) -> String {
     let mut text = format!("name = \"ur10\"\nconvention = \"{stated}\"\n");
     for (joint, name) in super::JOINTS.iter().enumerate() {
-        // The modified convention has in row i what the standard one has in row i - 1.
+        // Row i of the modified convention contains values of row i - 1 of the standard convention.
         let before = if rows == "standard" { Some(joint) } else { joint.checked_sub(1) };
         let [a, alpha, _] = before.map_or([0.0; 3], |row| UR10_ROWS[row]);
         let d = UR10_ROWS[joint][2];
@@ -110,8 +106,7 @@ fn table(rows: &str, stated: &str) -> String {
     text
 }
 
-/// A table in the other convention was another order of the columns, with keys to write, or one joint's torque that
-/// belongs to no robot.
+/// A table in the other convention must not be reported as another column order or an inconsistent torque.
 #[test]
 fn a_table_in_the_other_convention_is_named() {
     for rows in ["standard", "modified"] {

@@ -1,4 +1,4 @@
-//! Honest logs of robots that are driven slowly, rub as the study does not say, and are described with usual errors.
+//! Correct logs of slow robots with unmodelled friction and usual errors of their descriptions.
 
 use super::{check_text, problems, study_of};
 use crate::common::{Motion, Random, Truth, header, repository};
@@ -9,34 +9,33 @@ use std::fmt::Write;
 use std::path::Path;
 
 const ROBOTS: [&str; 5] = ["ur10", "panda_arm7", "iiwa14", "tx40", "planar2r"];
-/// Peak velocities, rad/s: friction is most of the torque at the least of these, bodies at the most.
+/// Peak velocities, rad/s: friction dominates at the lowest, rigid bodies at the highest.
 const VELOCITIES: [f64; 4] = [0.5, 0.8, 1.2, 2.0];
-/// Widths of steps of dry friction, rad/s; that of a study is a fiftieth.
+/// Widths of friction steps, rad/s; the default of a study is 0.02.
 const WIDTHS: [f64; 5] = [0.002, 0.01, 0.03, 0.05, 0.1];
 const RATES_HZ: [f64; 4] = [50.0, 100.0, 125.0, 250.0];
 const SECONDS: [f64; 3] = [15.0, 20.0, 30.0];
 
-/// Numbers of honest logs whose description is replaced.
+/// Cases with placeholder inertials.
 const PLACEHOLDERS: [usize; 6] = [0, 1, 2, 5, 6, 7];
 
-/// Of motors whose positions are logged.
+/// Gear ratio of motors whose positions are logged.
 const GEAR_RATIO: f64 = 101.0;
 
-/// Friction and drive of one joint.
 struct Drive {
     inertia: f64,
     viscous: f64,
-    /// Coulomb friction to and fro.
+    /// Coulomb friction, forward and backward.
     coulomb: [f64; 2],
-    /// Coulomb friction by each Nm of the bodies' torque.
+    /// Coulomb friction per Nm of rigid-body torque.
     load: f64,
-    /// Friction that is gone at a velocity.
+    /// Stribeck friction: amplitude and velocity.
     stribeck: [f64; 2],
     offset: f64,
 }
 
 impl Drive {
-    /// Friction of one of four laws, of a size with which geared joints of such a torque rub.
+    /// Friction of one of four laws, scaled to the torque of the joint.
     fn new(law: usize, torque: f64, inertia: f64, random: &mut Random) -> Self {
         let coulomb = torque * (0.15 + 0.08 * random.next());
         let asymmetry = if law == 1 { 0.2 + 0.05 * random.next() } else { 0.0 };
@@ -59,7 +58,7 @@ impl Drive {
     }
 }
 
-/// Root mean squares of the bodies' torque in a motion and of the diagonal of the mass matrix.
+/// Root mean square of the rigid-body torque in a motion, and of the diagonal of the mass matrix.
 fn sizes(truth: &Truth, motion: &Motion) -> Vec<[f64; 2]> {
     let mut workspace = Workspace::new(&truth.model);
     let mut squares = vec![[0.0; 2]; truth.model.dof()];
@@ -75,7 +74,6 @@ fn sizes(truth: &Truth, motion: &Motion) -> Vec<[f64; 2]> {
     squares.into_iter().map(|square| square.map(f64::sqrt)).collect()
 }
 
-/// Number `case` of the honest logs, two of them in `folder`, and the study of these.
 fn honest(folder: &Path, case: usize) -> String {
     let mut random = Random(9_000 + case as u64);
     let mut one_of = |values: &[f64]| values[((random.next() + 1.0) * 0.5 * values.len() as f64) as usize];
@@ -114,8 +112,7 @@ fn honest(folder: &Path, case: usize) -> String {
     study_of(&description, dof, &["train.csv", "test.csv"])
 }
 
-/// Of two hundred such studies 39 raised an alarm: descriptions of other robots, other rates, positions in other
-/// units, gains and torques of other robots.
+/// Of 200 such studies 39 once gave false alarms: other robots, rates, position units, gains.
 #[test]
 fn slow_logs_with_friction_of_their_own_raise_no_alarm() {
     let mut alarms = String::new();
@@ -129,8 +126,7 @@ fn slow_logs_with_friction_of_their_own_raise_no_alarm() {
     assert!(alarms.is_empty(), "{alarms}");
 }
 
-/// Descriptions whose bodies all have one kilogram and one kilogram square metre: rates that make up for these were
-/// advised.
+/// Placeholder inertials of 1 kg and 1 kg m² must not lead to proposals that compensate for them.
 #[test]
 fn placeholders_are_no_other_rate() {
     for case in PLACEHOLDERS {
@@ -152,8 +148,8 @@ fn placeholders_are_no_other_rate() {
     }
 }
 
-/// Positions of the motors' side of a slow UR10: a smaller scale makes a wide step of friction narrow, so half of the
-/// scale was advised, without a word that the logs hardly tell.
+/// Motor-side positions of a slow UR10: half of the scale was once proposed without a note about its uncertainty,
+/// because a smaller scale makes a wide friction step narrow.
 #[test]
 fn positions_of_the_motors_side_have_their_gear_ratio() {
     let cases = dynident_testing::count(3, 40);
@@ -174,24 +170,22 @@ fn positions_of_the_motors_side_have_their_gear_ratio() {
         let line = &found.write[0].line;
         let scale = if line.contains("deg") { PI / 180.0 } else { line.rsplit(' ').next().unwrap().parse().unwrap() };
         let [least, greatest] = numbers_between(&found.evidence).unwrap_or([0.9 * scale, 1.1 * scale]);
-        // Ranges of slow logs reach to twice and half of the truth: nearer a scale need not be.
+        // Ranges from slow logs extend to twice and half of the truth.
         if !(least..=greatest).contains(&GEAR_RATIO.recip()) || !(0.5..2.0).contains(&(GEAR_RATIO * scale)) {
             writeln!(wrong, "{case}: {scale}, {}", found.evidence).unwrap();
         }
     }
-    // A range is no interval of confidence: of forty two end some hundredths from the truth, and once another finding
-    // stands first.
+    // The range is not a confidence interval: of 40, two miss the truth by a few hundredths, and in one case another
+    // finding comes first.
     assert!(wrong.lines().count() <= cases / 10, "{wrong}");
 }
 
-/// The two numbers of `between 0.008 and 0.012`.
 fn numbers_between(text: &str) -> Option<[f64; 2]> {
     let (_, rest) = text.split_once("between ")?;
     let (least, rest) = rest.split_once(" and ")?;
     Some([least, rest.split(':').next()?].map(|number| number.parse().unwrap()))
 }
 
-/// A log whose positions are those of motors with gears of [`GEAR_RATIO`].
 fn of_motors_side(log: &str) -> String {
     let mut lines = log.lines();
     let header = lines.next().unwrap();
@@ -207,7 +201,6 @@ fn of_motors_side(log: &str) -> String {
     text
 }
 
-/// A description with one value for every such attribute.
 fn with_all(description: &str, attribute: &str, value: &str) -> String {
     let mut parts = description.split(attribute);
     let first = parts.next().unwrap().to_owned();

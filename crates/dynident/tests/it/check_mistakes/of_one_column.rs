@@ -1,4 +1,4 @@
-//! Mistakes of one joint's column, or of two that belong together.
+//! Mistakes of one column, or of two related columns.
 
 use super::{Case, SAME, TAU, all_are_named, each};
 
@@ -24,11 +24,11 @@ fn units_of_one_joint_are_named() {
             rows: |rows| each(rows, |row| row[2] *= 101.0),
             study: SAME,
             kind: "unit",
-            // 1/101 within three per cent.
+            // 1/101 within 3 %.
             named: &["scale = [1.0, 0.0102", "scale = [1.0, 0.0101", "scale = [1.0, 0.0100", "scale = [1.0, 0.0099"],
         },
         Case {
-            name: "the lift counted by halves",
+            name: "half of the positions of the lift",
             rows: |rows| each(rows, |row| row[2] *= 0.5),
             study: SAME,
             kind: "unit",
@@ -83,14 +83,14 @@ fn columns_that_belong_together_are_named() {
             rows: |rows| each(rows, |row| row[9] = row[8]),
             study: SAME,
             kind: "order",
-            named: &["the torque of joints `shoulder_lift_joint` and `elbow_joint` is one and the same column"],
+            named: &["the torque of joints `shoulder_lift_joint` and `elbow_joint` is the same column"],
         },
         Case {
             name: "one position for two joints, as revolutions",
             rows: |rows| each(rows, |row| row[3] = row[2] / TAU),
             study: SAME,
             kind: "order",
-            named: &["the position of joints `shoulder_lift_joint` and `elbow_joint` is one and the same column"],
+            named: &["the position of joints `shoulder_lift_joint` and `elbow_joint` is the same column"],
         },
         Case {
             name: "magnitudes of the torques",

@@ -1,4 +1,4 @@
-//! Mistakes that the held-out log alone has.
+//! Mistakes in the held-out log only.
 
 use super::{Case, JOINTS, SAME, checked_in, each, problems};
 use crate::common::{Job, repository};
@@ -32,7 +32,7 @@ fn mistakes_of_the_held_out_log_are_named_as_its_own() {
             rows: |rows| each(rows, |row| row[2] += 0.5),
             study: SAME,
             kind: "offset",
-            // Half a radian within three hundredths.
+            // 0.5 rad within 0.03.
             named: &[
                 "offset = [0.0, -0.5, ",
                 "offset = [0.0, -0.49",
@@ -56,7 +56,7 @@ fn mistakes_of_the_held_out_log_are_named_as_its_own() {
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
-/// The torques of two runs of the same length exchanged: no reading explains them, and the model is no model.
+/// Exchanged torques of two runs with equal length: no hypothesis explains them.
 #[test]
 fn torques_of_another_run_make_no_model() {
     let folder = tempfile::tempdir().unwrap();

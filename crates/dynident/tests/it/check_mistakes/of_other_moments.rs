@@ -1,9 +1,9 @@
-//! Channels of other moments, other gains and none: what no reading of single columns explains.
+//! Delayed, scaled, exchanged and dead channels, which no hypothesis about single columns explains.
 
 use super::{Case, Row, SAME, all_are_named, checked, checked_in, each, problems};
 use crate::common::{Job, repository};
 
-/// Every row with what `columns` had `rows` rows before; rows without it are left out.
+/// Delays `columns` by `rows` rows; rows without a value are removed.
 fn late(all: &mut Vec<Row>, columns: core::ops::Range<usize>, rows: isize) {
     let source = all.clone();
     let shifted = |(k, row): (usize, &Row)| {
@@ -15,12 +15,12 @@ fn late(all: &mut Vec<Row>, columns: core::ops::Range<usize>, rows: isize) {
     *all = source.iter().enumerate().filter_map(shifted).collect();
 }
 
-/// A number that is the same every time and has nothing to do with anything, -1 to 1.
+/// Reproducible noise, -1 to 1.
 fn noise(k: usize) -> f64 {
     2.0 * (k as f64 * 0.754_877_666).fract() - 1.0
 }
 
-/// The logs have 125 rows a second.
+/// The logs have 125 Hz.
 #[test]
 fn torques_of_another_moment_are_named() {
     all_are_named(&[
@@ -72,7 +72,7 @@ fn torques_of_another_moment_are_named() {
     ]);
 }
 
-/// A lag that a fit takes off by itself is no mistake.
+/// A lag that the fit compensates is not a mistake.
 #[test]
 fn a_usual_lag_raises_no_alarm() {
     for rows in [|rows: &mut Vec<Row>| late(rows, 7..13, 4), |rows: &mut Vec<Row>| late(rows, 7..13, 10)] {
@@ -104,7 +104,7 @@ fn a_lag_or_a_gain_of_the_held_out_log_is_its_own() {
         let is_right = |(kind, text): &(String, String)| {
             kind == case.kind && text.starts_with("in log `test`") && case.named.iter().any(|name| text.contains(name))
         };
-        // The key for the lag is that of all logs: it would spoil the training logs.
+        // The key for the lag applies to all logs and would spoil the training logs.
         assert!(
             found.first().is_some_and(is_right) && !found[0].1.contains("torque_lag_s"),
             "{}: {found:?}",
@@ -113,7 +113,7 @@ fn a_lag_or_a_gain_of_the_held_out_log_is_its_own() {
     }
 }
 
-/// Another motor's constant: a quarter more or less. Within two hundredths and a half of it.
+/// Another motor constant, 25 % more or less, within 2.5 %.
 #[test]
 fn the_gain_of_one_torque_is_named() {
     all_are_named(&[
@@ -156,7 +156,7 @@ fn channels_that_say_nothing_of_the_motion_are_named() {
             rows: |rows| rows.iter_mut().enumerate().for_each(|(k, row)| row[9] = 50.0 * noise(k)),
             study: SAME,
             kind: "torque",
-            named: &["the torque of joint `elbow_joint` has nothing to do with its motion"],
+            named: &["the torque of joint `elbow_joint` is unrelated to its motion"],
         },
         Case {
             name: "positions in place of torques",
@@ -164,7 +164,7 @@ fn channels_that_say_nothing_of_the_motion_are_named() {
             study: SAME,
             kind: "order",
             named: &[
-                "the position of joint `shoulder_pan_joint` and the torque of joint `shoulder_pan_joint` are one and the same column",
+                "the position of joint `shoulder_pan_joint` and the torque of joint `shoulder_pan_joint` are the same column",
             ],
         },
         Case {
@@ -190,7 +190,7 @@ fn channels_that_say_nothing_of_the_motion_are_named() {
     ]);
 }
 
-/// A torque that drops to zero for two seconds is left out: the model is that of the rest.
+/// A torque that drops to zero for 2 s is removed before the fit.
 #[test]
 fn a_torque_that_drops_out_for_a_while_costs_nothing() {
     let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml"))
@@ -216,6 +216,6 @@ fn a_torque_that_drops_out_for_a_while_costs_nothing() {
         result.validation[0].model.relative_error_percent.unwrap()
     };
     let (as_it_is, spoilt) = (error(false), error(true));
-    // A tenth of one joint's rows less; the review asks for no more than 1.15 times.
+    // A tenth of one joint's rows is missing; the limit is 1.15.
     assert!(spoilt < 1.15 * as_it_is, "{as_it_is} and {spoilt}");
 }

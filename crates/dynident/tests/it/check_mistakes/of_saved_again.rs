@@ -1,4 +1,4 @@
-//! Rows that a model is fitted to prove nothing when it is tested on them, however they were saved.
+//! Training rows in a validation log are rejected, in any file format.
 
 use super::{Row, read};
 use crate::common::repository;
@@ -20,7 +20,6 @@ fn write_rows(path: &Path, header: &str, rows: &[Row], digits: usize) {
     std::fs::write(path, text).unwrap();
 }
 
-/// The README's example with the training rows as they are, and these to test on.
 fn study_with(folder: &Path, held_out: &[Row], digits: usize) -> std::path::PathBuf {
     let (header, rows) = read("train.csv");
     write_rows(&folder.join("train.csv"), &header, &rows, 9);
@@ -54,7 +53,7 @@ fn training_rows_saved_again_are_no_test() {
             assert!(matches!(*source, StudyError::SameSamples { .. }), "{name}: {source}");
         }
     }
-    // The run that is meant to test it does.
+    // A separate run is accepted.
     let folder = tempfile::tempdir().unwrap();
     let path = study_with(folder.path(), &read("test.csv").1, 4);
     check(&Study::load(&path).unwrap(), &path, &options()).unwrap();
@@ -71,7 +70,7 @@ fn a_model_is_not_confirmed_by_what_it_was_fitted_to() {
     std::fs::write(&result_path, serde_json::to_vec(&result).unwrap()).unwrap();
     let honest = validate(&result_path, &study, &path, &options()).unwrap();
     assert!(honest.problems.is_empty(), "{:?}", honest.problems);
-    // The training log alone, under another name.
+    // The training log under another name.
     let other = folder.path().join("again.csv");
     std::fs::copy(folder.path().join("train.csv"), other).unwrap();
     let mut again = study.clone();

@@ -1,5 +1,5 @@
-//! Logs whose samples are spoilt beside another mistake, or alone: lone spikes, rounded stamps, repeated rows, torques
-//! of nothing; a body of the description that weighs ten times too much.
+//! Corrupt samples, alone or with another mistake: spikes, rounded or repeated stamps, noise as torque; a body with ten
+//! times its mass.
 
 use super::{
     Case, JOINTS, Row, SAME, WITH_DRIVES, all_are_named, check_text, checked, checked_in, each, problems, read,
@@ -14,7 +14,7 @@ fn spike(rows: &mut [Row], column: usize, value: f64) {
     rows[middle][column] = value;
 }
 
-/// One absurd sample is replaced or left out, and hides no other mistake.
+/// A spike is repaired or removed, and does not hide another mistake.
 #[test]
 fn lone_samples_hide_no_mistake() {
     all_are_named(&[
@@ -54,7 +54,7 @@ fn lone_samples_hide_no_mistake() {
     }
 }
 
-/// Every torque is noise: nothing explains it, and that is said.
+/// Pure noise as torque is reported as unrelated to the motion.
 #[test]
 fn torques_of_nothing_are_named() {
     let case = Case {
@@ -65,7 +65,7 @@ fn torques_of_nothing_are_named() {
         },
         study: SAME,
         kind: "torque",
-        named: &["nothing to do with the motion"],
+        named: &["unrelated to the motion"],
     };
     all_are_named(&[case]);
 }
@@ -76,7 +76,7 @@ fn each_with(rows: &mut [Row], random: &mut Random) {
     }
 }
 
-/// Parts of an honest log raise no alarm: what a joint's own parameters leave of few instants says nothing.
+/// Parts of a correct log give no problem; few samples per joint are not evidence.
 #[test]
 fn parts_of_a_log_raise_no_alarm() {
     let case = |name, rows| Case { name, rows, study: SAME, kind: "", named: &[] };
@@ -95,7 +95,7 @@ fn parts_of_a_log_raise_no_alarm() {
     }
 }
 
-/// The fitted value of a parameter, held-out error in percent, and the rate of the training log.
+/// Identified value of a parameter, held-out error in percent, and sample rate of the training log.
 fn identified(change: fn(&mut Vec<Row>), decimals: Option<usize>) -> (f64, f64, f64) {
     let folder = tempfile::tempdir().unwrap();
     let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
@@ -123,8 +123,7 @@ fn identified(change: fn(&mut Vec<Row>), decimals: Option<usize>) -> (f64, f64, 
     (value, error, result.logs[0].import.rate_hz)
 }
 
-/// Stamps with two decimals at 125 Hz, and rows that stand twice, give the model of the log as it was: before, rows
-/// were spaced by the steps of the stamps, and inertias came out 1.6 times and more too large.
+/// Time stamps with two decimals at 125 Hz and duplicate rows give the model of the original log.
 #[test]
 fn rounded_stamps_and_repeated_rows_do_no_harm() {
     let (value, error, rate) = identified(|_| {}, None);
@@ -132,14 +131,14 @@ fn rounded_stamps_and_repeated_rows_do_no_harm() {
     for (name, change, decimals) in [("rounded", (|_| {}) as fn(&mut Vec<Row>), Some(2)), ("twice", twice, None)] {
         let (own, own_error, own_rate) = identified(change, decimals);
         assert!((own_rate / rate - 1.0).abs() < 1e-3, "{name}: {own_rate} for {rate} Hz");
-        // Ends of a rounded log lie up to half a step of the stamps elsewhere: some 1e-4 of its length.
+        // Rounding moves the ends of the log by up to half a step, about 1e-4 of its length.
         assert!((own / value - 1.0).abs() < 0.01, "{name}: {own} for {value}");
         assert!(own_error < 1.05 * error, "{name}: {own_error} % for {error} %");
     }
 }
 
-/// One body that weighs ten times too much asks for another unit of every torque: the body is named, as a warning, for
-/// the fit does not suffer, and no unit is advised.
+/// A body with ten times its mass is reported as a warning, because the fit is not affected, and no torque unit is
+/// proposed.
 #[test]
 fn one_wrong_mass_is_no_unit_of_torque() {
     let folder = tempfile::tempdir().unwrap();
@@ -160,7 +159,8 @@ fn one_wrong_mass_is_no_unit_of_torque() {
     assert!(JOINTS.iter().all(|joint| !named.sentence().contains(joint)) && named.write.is_empty());
 }
 
-/// Hundredths of seconds, the gain of one strong joint, and the gear of a harmonic drive are named with their numbers.
+/// Time in hundredths of a second, the gain of one joint, and the gear ratio of a harmonic drive are found with their
+/// numbers.
 #[test]
 fn numbers_between_usual_units_are_found() {
     all_are_named(&[
@@ -183,7 +183,7 @@ fn numbers_between_usual_units_are_found() {
             rows: |rows| each(rows, |row| row[1..7].iter_mut().for_each(|q| *q *= 137.0)),
             study: SAME,
             kind: "unit",
-            // 1/137 within four per cent.
+            // 1/137 within 4 %.
             named: &[
                 "scale = 0.0070",
                 "scale = 0.0071",
@@ -196,7 +196,7 @@ fn numbers_between_usual_units_are_found() {
     ]);
 }
 
-/// Rows in no order of time are said to be; positions and torques that a recorder repeats are a warning.
+/// Unordered rows are reported; repeated positions and torques are a warning.
 #[test]
 fn rows_out_of_order_and_rows_that_repeat_are_told() {
     let (header, rows) = read("train.csv");
@@ -214,7 +214,7 @@ fn rows_out_of_order_and_rows_that_repeat_are_told() {
     };
     std::fs::copy(repository("examples/ur10_simulated/test.csv"), folder.path().join("test.csv")).unwrap();
     let options = RunOptions { data: None, threads: 2, progress: &Silent };
-    // Two of five steps go back.
+    // Two of five steps go back in time.
     let shuffled: Vec<Row> = (0..rows.len()).map(|k| rows[k * 1009 % rows.len()]).collect();
     write(&shuffled);
     let study = Study::load(&path).unwrap();
@@ -234,7 +234,8 @@ fn rows_out_of_order_and_rows_that_repeat_are_told() {
     assert!(told.is_some_and(|finding| finding.level == Level::Warning), "{:?}", check.findings);
 }
 
-/// A body that cannot be stays as described where no log tells: that is said, and is no mistake of the logs.
+/// An inconsistent body that the logs do not determine keeps its description; this is reported, but is not a mistake in
+/// the logs.
 #[test]
 fn bodies_that_cannot_be_are_a_warning() {
     let urdf = std::fs::read_to_string(repository("robots/ur10.urdf")).unwrap();

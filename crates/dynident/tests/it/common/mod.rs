@@ -1,5 +1,4 @@
-//! A robot whose parameters are known, and logs of it: inverse dynamics of the bodies plus friction written out by
-//! hand.
+//! Robots with known parameters and their logs: inverse dynamics of the bodies plus explicit friction.
 use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::model::terms::CoulombShape;
 use dynident::model::{InertialParameters, Model, load_robot};
@@ -19,7 +18,7 @@ impl Random {
         (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    /// A sum of twelve uniform numbers of variance one: near enough to a normal one.
+    /// Approximately standard normal: a sum of twelve uniform numbers.
     pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.next()).sum::<f64>() / 2.0
     }
@@ -33,7 +32,7 @@ pub(crate) struct Truth {
 }
 
 impl Truth {
-    /// The description's own bodies, each made other by `change` of its mass and size, and drives with friction.
+    /// Bodies near the robot description, with masses and sizes scaled randomly by `change`, and drives with friction.
     pub(crate) fn near(description: &Path, change: f64, drive_inertia: bool) -> Self {
         let model = load_robot(description).unwrap().model;
         let mut random = Random(7);
@@ -56,7 +55,7 @@ impl Truth {
         Self { model: model.with_inertials(&inertials).unwrap(), drive }
     }
 
-    /// A robot that can exist: masses up to 30 % from the description's, centres of mass up to a tenth nearer or
+    /// A physically consistent robot: masses up to 30 % from the description, centres of mass up to 10 % nearer or
     /// farther.
     pub(crate) fn other(description: &Path, random: &mut Random) -> Self {
         let mut truth = Self::near(description, 0.0, false);
@@ -70,7 +69,6 @@ impl Truth {
         truth
     }
 
-    /// Width of the step of a joint's Coulomb friction: the default of a study.
     pub(crate) fn coulomb_width(&self, joint: usize) -> f64 {
         let turns = self.model.joints()[joint].turns();
         self.model.own_scale().velocity(turns, CoulombShape::USUAL_WIDTH)
@@ -84,7 +82,7 @@ impl Truth {
         bodies.iter().zip(drives).map(|(body, drive)| body + drive).collect()
     }
 
-    /// What a perfect fit finds: the truth in the robot's base parameters.
+    /// Expected estimate: the true base parameters.
     pub(crate) fn base_values(&self, robot: &StudyRobot) -> Vec<f64> {
         use dynident::model::terms::TorqueTerm;
         let mut all = self.model.parameter_vector();
@@ -99,7 +97,6 @@ impl Truth {
     }
 }
 
-/// Sums of sines, different for every seed.
 pub(crate) struct Motion {
     centre: Vec<f64>,
     amplitude: Vec<[f64; 5]>,
@@ -107,7 +104,7 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// Slowest frequency, Hz; the fastest is five times as high.
+    /// Lowest frequency, Hz; the highest is five times as high.
     const SLOWEST_HZ: f64 = 0.13;
 
     pub(crate) fn new(dof: usize, seed: u64) -> Self {
@@ -118,10 +115,9 @@ impl Motion {
         Self { centre: vec![0.0; dof], amplitude: numbers(0.5), phase: numbers(3.1) }
     }
 
-    /// A motion between the stops of `model` whose joints reach `velocity` (rad/s, m/s), or less where their own limits
-    /// or their range are.
+    /// A motion between the position limits whose joints reach `velocity` (rad/s, m/s), or less if limits require it.
     pub(crate) fn within(model: &Model, velocity: f64, seed: u64) -> Self {
-        /// Share of limits that is used, and the range of a joint without stops, rad.
+        /// Used fraction of the limits, and the range of a joint without position limits, rad.
         const SHARE: f64 = 0.9;
         const RANGE: [f64; 2] = [-2.0, 2.0];
         let mut motion = Self::new(model.dof(), seed);
@@ -156,7 +152,6 @@ impl Motion {
     }
 }
 
-/// A log: what `row` makes of time, position and torque, line by line.
 pub(crate) fn write_log(
     path: &Path,
     truth: &Truth,
@@ -180,18 +175,16 @@ pub(crate) fn write_log(
     std::fs::write(path, text).unwrap();
 }
 
-/// `t,q1,..,tau1,..`.
 pub(crate) fn header(dof: usize) -> String {
     let numbered = |name: &str| (1..=dof).map(|j| format!("{name}{j}")).collect::<Vec<_>>().join(",");
     format!("t,{},{}", numbered("q"), numbered("tau"))
 }
 
-/// Positions and torques as they are.
 pub(crate) fn plain(q: &[f64], tau: &[f64]) -> Vec<f64> {
     [q, tau].concat()
 }
 
-/// Columns, differences exact enough for 1e-6, and nothing else.
+/// Columns and differentiator, accurate to 1e-6, without filters.
 pub(crate) fn format(dof: usize) -> String {
     format!(
         r#"
@@ -211,14 +204,13 @@ pub(crate) struct Job {
 }
 
 impl Job {
-    /// A study file in `folder`.
     pub(crate) fn new(folder: &Path, text: &str) -> Self {
         let path = folder.join("study.toml");
         std::fs::write(&path, text).unwrap();
         Self { study: Study::load(&path).unwrap_or_else(|error| panic!("{error}\n{text}")), path }
     }
 
-    /// What is said of a study file that cannot be read.
+    /// Error message of an unreadable study.
     pub(crate) fn new_error(folder: &Path, text: &str) -> String {
         let path = folder.join("study.toml");
         std::fs::write(&path, text).unwrap();
@@ -241,7 +233,7 @@ impl Job {
     }
 }
 
-/// What is written is read, and written again byte for byte; a file with a schema is as that says.
+/// Checks that a file is read and rewritten identically, and conforms to its schema.
 pub(crate) fn assert_reads_back<T: Serialize + DeserializeOwned>(file: &T) {
     let value = serde_json::to_value(file).unwrap();
     if let Some(schema) = value["schema"].as_str() {
@@ -253,7 +245,7 @@ pub(crate) fn assert_reads_back<T: Serialize + DeserializeOwned>(file: &T) {
     assert_eq!(serde_json::to_string_pretty(&read).unwrap(), text);
 }
 
-/// Every base parameter within `tolerance` of the truth, relative to itself or to a hundredth of its unit.
+/// Checks every base parameter within `tolerance`, relative to itself or to 0.01 of its unit.
 pub(crate) fn assert_recovered(found: &IdentificationOutcome, expected: &[f64], tolerance: f64) {
     assert_eq!(found.result.base_parameters.len(), expected.len());
     for (parameter, truth) in found.result.base_parameters.iter().zip(expected) {

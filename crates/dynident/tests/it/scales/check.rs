@@ -1,4 +1,4 @@
-//! `check`: the same reading, the same findings.
+//! `check`: equal hypotheses and findings at every scale.
 
 use super::{AS_IT_IS, Differences, STATED, Scale, example, scales};
 use dynident::result::StudyCheck;
@@ -10,7 +10,7 @@ fn examined(scale: Scale) -> StudyCheck {
     check(&job.study, &job.path, &options).unwrap().check
 }
 
-/// The score agrees to the accuracy that readings are compared with, a hundredth.
+/// The score agrees within 0.01, the accuracy of comparisons between hypotheses.
 #[test]
 fn a_crane_and_a_watch_are_examined_alike() {
     let expected = examined(AS_IT_IS);

@@ -1,17 +1,17 @@
-//! A crane that is not a scaled log: another robot of that size, with its own friction and noise.
+//! A crane with its own friction and noise, not a scaled log.
 
 use super::{AS_IT_IS, Scale};
 use crate::common::{Job, Motion, Random, Truth, header, repository, write_log};
 use std::path::Path;
 
-/// Masses and friction are a thousand times those of an arm.
+/// Mass and friction relative to an arm.
 const THOUSANDFOLD: f64 = 1e3;
 
 const RATE_HZ: f64 = 250.0;
 const SECONDS: f64 = 16.0;
 
-/// Noise as the logs of real arms have it: positions by encoders of 2¹⁷ counts a turn, torques by motor currents with
-/// noise of 1 to 2 % of their root mean square, which is about 20 kNm at the shoulder and 100 Nm at the wrist.
+/// Noise as in real logs: encoders with 2¹⁷ counts per turn, torque noise of 1 to 2 % of the root mean square, which is
+/// about 20 kNm at the shoulder and 100 Nm at the wrist.
 const COUNT_RAD: f64 = core::f64::consts::TAU / 131_072.0;
 const TORQUE_NOISE: [f64; 6] = [300.0, 300.0, 150.0, 20.0, 10.0, 5.0];
 
@@ -25,8 +25,7 @@ fn recorded(folder: &Path, name: &str, truth: &Truth, seed: u64) {
     write_log(&folder.join(name), truth, &Motion::new(6, seed), (RATE_HZ, SECONDS), &header(6), noisy);
 }
 
-/// Review of trust, section 1: on an arm of that size the exported model had 32.7 % where the free fit had 0.95. Two
-/// percent of the error is what the issue allows.
+/// At this scale the exported model once had 32.7 % error and the estimate 0.95 %. The limit is 2 % of the error.
 #[test]
 fn the_exported_model_of_a_crane_is_as_good_as_the_free_fit() {
     let folder = tempfile::tempdir().unwrap();
@@ -57,6 +56,6 @@ fn the_exported_model_of_a_crane_is_as_good_as_the_free_fit() {
     let error = |report: &dynident::estimation::ValidationReport| report.relative_error_percent.unwrap();
     let (free, exported) = (error(&held_out.model), error(held_out.physical.as_ref().unwrap()));
     assert!(exported <= 1.02 * free, "{exported} % where the free fit has {free} %");
-    // And both are good: the noise alone is 1 to 2 %.
+    // Both are good: the noise alone is 1 to 2 %.
     assert!(free < 5.0, "{free} %");
 }

@@ -1,11 +1,10 @@
-//! `design`: the same motion, scaled, found in as many steps, with the same use of every limit and the same forecast.
+//! `design`: the same scaled motion, number of steps, use of limits and forecast.
 
 use super::{AS_IT_IS, Differences, Scale, binary_scales, binary_sizes};
 use crate::common::{Job, repository};
 use core::ops::ControlFlow;
 use dynident::{DesignFile, DesignOutcome, design_study};
 
-/// What is searched for.
 struct Search {
     family: &'static str,
     criterion: &'static str,
@@ -13,7 +12,6 @@ struct Search {
     limits: fn(Scale) -> String,
 }
 
-/// A short search for the UR10.
 fn designed(scale: Scale, Search { family, criterion, limits }: &Search) -> DesignFile {
     let folder = tempfile::tempdir().unwrap();
     let arm = std::fs::read_to_string(repository("robots/ur10.urdf")).unwrap();
@@ -47,8 +45,8 @@ fn words(sentence: &str) -> String {
     sentence.chars().filter(|c| !c.is_ascii_digit() && !".-e".contains(*c)).collect()
 }
 
-/// Of what is calculated from a motion. The motion itself must be the same to the last bit: factors are powers of two,
-/// and the search takes the same steps.
+/// Tolerance of computed figures. The motion is bit-identical: factors are powers of two, so the search takes the same
+/// steps.
 const TOLERANCE: f64 = 1e-6;
 
 fn compare(scale: Scale, found: &DesignFile, expected: &DesignFile) -> Vec<String> {
@@ -60,7 +58,7 @@ fn compare(scale: Scale, found: &DesignFile, expected: &DesignFile) -> Vec<Strin
         differences.equal("limit", &(found.kind, words(&found.joint)), &(expected.kind, words(&expected.joint)));
         differences.compare(&expected.joint, (found.worst_ratio, expected.worst_ratio), TOLERANCE);
     }
-    // An information is an inverse square of parameters.
+    // Information is an inverse square of parameters.
     let constant: f64 = expected.forecast.iter().map(|parameter| -2.0 * scale.of(&parameter.unit).ln()).sum();
     let log_det = |file: &DesignFile| file.log_det_weighted.unwrap();
     differences.compare("log det", (log_det(found) - constant, log_det(expected)), TOLERANCE * log_det(expected).abs());
@@ -92,8 +90,8 @@ fn assert_all_alike(search: &Search, scales: &[Scale]) {
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
 
-/// With everything that is assumed where a study is silent: floor, self-collision, accelerations, torque noise. Time is
-/// not among the scales: the coefficients of a Fourier series are velocities, and its search takes other steps.
+/// With all default assumptions: floor, self-collision, accelerations, torque noise. Time is not scaled, because the
+/// coefficients of a Fourier series are velocities and its search would take other steps.
 #[test]
 fn a_crane_and_a_watch_move_alike() {
     let limits = |_| String::new();
@@ -101,7 +99,7 @@ fn a_crane_and_a_watch_move_alike() {
     assert_all_alike(&search, &binary_sizes());
 }
 
-/// Among places that the study gives, by a criterion that looks at the worst direction.
+/// Within stated workspace limits, with a worst-direction criterion.
 #[test]
 fn a_crane_and_a_watch_move_alike_in_a_cell() {
     let limits = |Scale { length, .. }: Scale| {

@@ -1,12 +1,12 @@
-//! `identify`: the same model, scaled, with the same bars, choices and findings.
+//! `identify`: the same scaled model, error bars, choices and findings.
 
 use super::{AS_IT_IS, Differences, STATED, Scale, example, scales};
 use dynident::IdentificationOutcome;
 use dynident::result::{BaseParameterResult, ResultFile};
 
-/// What the solvers' own tolerances leave of a relative error.
+/// Relative tolerance of the solvers.
 const TOLERANCE: f64 = 1e-6;
-/// The length of a recording is estimated by the bytes of its text, which has other digits on another scale.
+/// Relative tolerance for quantities that depend on the text length of a recording.
 const OF_TEXTS: f64 = 1e-2;
 
 fn errors(found: &IdentificationOutcome) -> [f64; 2] {
@@ -15,7 +15,7 @@ fn errors(found: &IdentificationOutcome) -> [f64; 2] {
     [of(&held_out.model), of(held_out.physical.as_ref().unwrap())]
 }
 
-/// Parameters in units of their own bars where they are near zero.
+/// Parameters near zero are compared in units of their error bars.
 fn compare_parameters(differences: &mut Differences, found: &ResultFile, expected: &ResultFile) {
     let symbols = |result: &ResultFile| -> Vec<String> {
         result.base_parameters.iter().map(|parameter| parameter.symbol.clone()).collect()
@@ -35,7 +35,7 @@ fn compare_parameters(differences: &mut Differences, found: &ResultFile, expecte
     }
 }
 
-/// Cut-offs and the lag, which are times, and how friction was chosen.
+/// Cut-offs and lag (times), and selected friction.
 fn compare_choices(differences: &mut Differences, found: &ResultFile, expected: &ResultFile) {
     let time = differences.scale.time;
     let cutoffs = |result: &ResultFile| -> Vec<(f64, f64)> {
@@ -104,13 +104,14 @@ fn assert_all_alike(drive: &str, scales: &[Scale]) {
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
 
-/// Review of trust, section 1: the exported model went from 0.953 to 32.7 % on the robot a thousand times as heavy.
+/// The exported model of a robot a thousand times as heavy once had 32.7 % error, compared with 0.953 % at the original
+/// scale.
 #[test]
 fn a_crane_and_a_watch_are_identified_alike() {
     assert_all_alike(STATED, &scales());
 }
 
-/// With grids of velocities and widths that nobody states: those of the robot's own time.
+/// With default grids of velocities and widths, which are scaled to the robot.
 #[test]
 fn a_crane_and_a_watch_choose_friction_alike() {
     assert_all_alike("", &scales()[..dynident_testing::count(2, 8)]);

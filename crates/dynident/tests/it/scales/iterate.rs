@@ -1,4 +1,4 @@
-//! `iterate`: the same runs, choices and verdict, with scaled parameters and bars.
+//! `iterate`: the same runs, choices and status, with scaled parameters and error bars.
 
 use super::{AS_IT_IS, Differences, Scale, binary_scales};
 use crate::common::{Job, Motion, repository};
@@ -25,8 +25,8 @@ fn trajectory(scale: Scale) -> String {
     text + "\n"
 }
 
-/// Three runs of the planar arm with friction, its bodies 20 % off and noise in all sensors, under a controller that
-/// takes its model from the runs before.
+/// Three runs of the planar arm with friction, body errors of 20 % and noise in all sensors; the controller uses the
+/// model of earlier runs.
 fn iterated(scale: Scale) -> IterationsFile {
     let folder = tempfile::tempdir().unwrap();
     let arm = std::fs::read_to_string(repository("robots/planar2r.urdf")).unwrap();
@@ -75,7 +75,7 @@ fn iterated(scale: Scale) -> IterationsFile {
     iterate_study(&job.study, &job.path, &folder.path().join("out"), true, &Job::options(2), &mut watch).unwrap()
 }
 
-/// What the simulation and the solvers leave of a relative error.
+/// Relative tolerance of simulation and solvers.
 const TOLERANCE: f64 = 1e-6;
 
 fn compare(scale: Scale, found: &IterationsFile, expected: &IterationsFile) -> Vec<String> {

@@ -1,5 +1,5 @@
-//! Nothing depends on the size of the robot or on units: the same motion of a robot a thousand times as heavy or
-//! long gives the same model, scaled, with the same bars, choices and findings.
+//! Results do not depend on the size of the robot or on units: the same motion of a robot a thousand times as heavy or
+//! long gives the same scaled model, error bars, choices and findings.
 
 mod check;
 mod crane;
@@ -10,7 +10,6 @@ mod iterate;
 use crate::common::{Job, repository};
 use core::fmt::Write;
 
-/// Factors of mass, length and time.
 #[derive(Clone, Copy, Debug)]
 struct Scale {
     mass: f64,
@@ -20,9 +19,8 @@ struct Scale {
 
 const AS_IT_IS: Scale = Scale { mass: 1.0, length: 1.0, time: 1.0 };
 
-/// A thousand times as heavy, long and slow, and a thousandth: a watch gear and a crane, links of half a millimetre and
-/// of half a kilometre, motions of milliseconds and of hours. Every day two scales of all three at once and those of
-/// time; one by one in long tests.
+/// Factors of 1000 and 0.001 in mass, length and time: from a watch gear to a crane, links of 0.5 mm to 500 m, motions
+/// of ms to hours. By default two scales of all three and those of time; one by one in long tests.
 fn scales_by(less: f64, more: f64) -> Vec<Scale> {
     let mixed =
         [Scale { mass: less, length: more, time: more }, Scale { mass: more, length: less, time: less }].into_iter();
@@ -37,12 +35,10 @@ fn scales() -> Vec<Scale> {
 }
 
 impl Scale {
-    /// Of a torque.
     fn torque(self) -> f64 {
         self.mass * (self.length / self.time).powi(2)
     }
 
-    /// Of a parameter with this unit.
     fn of(self, unit: &str) -> f64 {
         match unit {
             "kg" => self.mass,
@@ -61,7 +57,7 @@ impl Scale {
         for key in ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"] {
             text = times(&text, &format!(" {key}=\""), moment);
         }
-        // Of an axis the length does not matter.
+        // The length scale does not apply to an axis.
         for key in ["xyz=\"", "radius=\"", " length=\"", "size=\""] {
             text = times(&text, key, length);
         }
@@ -73,12 +69,10 @@ impl Scale {
         text
     }
 
-    /// The keys of `[robot]` for a description of this scale.
     fn robot(self, file: &str) -> String {
         format!("file = \"{file}\"\ngravity_m_s2 = [0.0, 0.0, {:e}]", -9.81 * self.length / self.time.powi(2))
     }
 
-    /// A recording of time, six positions and six torques.
     fn log(self, text: &str) -> String {
         let (head, rows) = text.split_once('\n').unwrap();
         let mut scaled = head.to_owned() + "\n";
@@ -94,7 +88,6 @@ impl Scale {
     }
 }
 
-/// The text with all numbers behind `key` times `factor`.
 fn times(text: &str, key: &str, factor: f64) -> String {
     let mut parts = text.split(key);
     let mut scaled = parts.next().unwrap().to_owned();
@@ -106,13 +99,12 @@ fn times(text: &str, key: &str, factor: f64) -> String {
     scaled
 }
 
-/// What tells of two designs and of two iterations whether they are one: powers of two, about 10^±3. Products with them
-/// are exact, so that a search of many steps takes the same ones, and what differs is not rounding grown large.
+/// Scales for designs and iterations: powers of two, about 10^±3. Products with them are exact, so that a long search
+/// takes the same steps.
 fn binary_scales() -> Vec<Scale> {
     scales_by(THOUSANDTH, THOUSAND)
 }
 
-/// The same with the motion's own time.
 fn binary_sizes() -> Vec<Scale> {
     let mass = [THOUSANDTH, THOUSAND].map(|mass| Scale { mass, ..AS_IT_IS });
     let length = [THOUSANDTH, THOUSAND].map(|length| Scale { length, ..AS_IT_IS });
@@ -122,7 +114,7 @@ fn binary_sizes() -> Vec<Scale> {
 const THOUSAND: f64 = 1024.0;
 const THOUSANDTH: f64 = 1.0 / THOUSAND;
 
-/// The README's example on another scale, with further keys of `[drive]`.
+/// The example of README at another scale, with further keys of `[drive]`.
 fn example(scale: Scale, drive: &str) -> (tempfile::TempDir, Job) {
     let folder = tempfile::tempdir().unwrap();
     let read = |name: &str| std::fs::read_to_string(repository(name)).unwrap();
@@ -139,10 +131,9 @@ fn example(scale: Scale, drive: &str) -> (tempfile::TempDir, Job) {
     (folder, job)
 }
 
-/// Viscous friction and a smooth step.
 const STATED: &str = "friction = \"stated\"";
 
-/// What differs by more than its tolerance between a scale and the original.
+/// Differences between a scale and the original beyond the tolerance.
 struct Differences {
     scale: Scale,
     found: Vec<String>,
@@ -153,7 +144,6 @@ impl Differences {
         Self { scale, found: Vec::new() }
     }
 
-    /// `found` against `expected` to `tolerance` of `size`.
     fn compare(&mut self, what: &str, (found, expected): (f64, f64), tolerance: f64) {
         if (found - expected).abs().is_nan() || (found - expected).abs() > tolerance {
             self.found.push(format!("{:?}: {what} {found} for {expected}", self.scale));

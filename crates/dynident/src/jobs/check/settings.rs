@@ -1,0 +1,51 @@
+//! Thresholds of `check`.
+
+use crate::error::{Expected, StudyError};
+
+/// Thresholds of the findings of [`check_with`](crate::check_with).
+#[derive(Clone, Debug, PartialEq)]
+pub struct CheckSettings {
+    /// Largest unexplained share of all torque for an accepted explanation. Default 0.3; most real data sets have 0.1.
+    pub max_unexplained_share: f64,
+    /// The same relative to the study as written, for noisy logs. Default 0.75.
+    pub max_unexplained_ratio: f64,
+    /// Unexplained share of all torque above which torque and motion are unrelated. Default 0.92: a correct study with
+    /// a noisy log of a slow pendulum has 0.81.
+    pub min_unrelated_share: f64,
+    /// Largest ratio between joint factors for one common unit or motor currents. Default 10: motor constants times
+    /// gear ratios of one arm differ by at most 5.
+    pub max_factor_ratio: f64,
+    /// Equations per parameter below which the logs are too short. Default 2.
+    pub too_few_equations: usize,
+    /// Equations per parameter below which the logs are short, a warning. Default 3: ten seconds of slow motion have
+    /// 2.7, and about half of the fits to such logs are usable.
+    pub few_equations: usize,
+}
+
+impl Default for CheckSettings {
+    fn default() -> Self {
+        Self {
+            max_unexplained_share: 0.3,
+            max_unexplained_ratio: 0.75,
+            min_unrelated_share: 0.92,
+            max_factor_ratio: 10.0,
+            too_few_equations: 2,
+            few_equations: 3,
+        }
+    }
+}
+
+impl CheckSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// The first setting that is out of range, with its value.
+    pub fn validate(&self) -> Result<(), StudyError> {
+        Expected::Range(0.0, 1.0).check("max_unexplained_share", self.max_unexplained_share)?;
+        Expected::Range(0.0, 1.0).check("max_unexplained_ratio", self.max_unexplained_ratio)?;
+        Expected::Range(0.0, 1.0).check("min_unrelated_share", self.min_unrelated_share)?;
+        Expected::Range(1.0, 1e6).check("max_factor_ratio", self.max_factor_ratio)?;
+        let few = self.few_equations as f64;
+        Expected::Range(0.0, few).check("too_few_equations", self.too_few_equations as f64)
+    }
+}
