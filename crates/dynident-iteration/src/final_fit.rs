@@ -1,4 +1,4 @@
-//! The robot that all good runs tell: a task for the whole identification.
+//! The final identification from all good runs.
 
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
@@ -11,12 +11,14 @@ use crate::store::IterationStore;
 use dynident_identification::{IdentificationTask, OffsetChoice, Role};
 
 impl Iteration {
-    /// What [`identify`](dynident_identification::identify()) makes the iteration's result of: the logs of all good
-    /// runs in the store (of the last where runs are not pooled), each weighted by its own noise, all joints at once
-    /// whatever the scheme, nothing held. `None` without a good run.
+    /// Returns the task with which [`identify`](dynident_identification::identify()) computes the result of the
+    /// iteration: the logs of all good runs in the store (only the last if runs are not pooled), each weighted by its
+    /// own noise, all joints at once, no parameter fixed. `None` without a good run.
+    ///
     ///
     /// # Errors
-    /// Logs that are not in the store any more, records of another robot.
+    ///
+    /// Logs that are missing in the store, records of another robot.
     pub fn identification_task(
         &self,
         records: &[RunRecord],
@@ -41,7 +43,7 @@ impl Iteration {
         if own_offsets && self.settings().pool {
             identification.settings.offsets = OffsetChoice::PerLog;
         }
-        // The runs that were never fitted test it, each by the log that it left.
+        // The held-out runs validate the result.
         if let Some(held_out) = &self.held_out {
             let joints = task.robot.joint_names();
             let settings = held_out_settings(&settings, records);

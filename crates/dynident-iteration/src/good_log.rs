@@ -1,4 +1,4 @@
-//! The logs of good runs, which further runs are identified together with.
+//! The logs of good runs, for joint identification with later runs.
 
 use crate::estimate::RunEstimate;
 use crate::leg::Leg;
@@ -8,7 +8,7 @@ use crate::run_logs::RunLog;
 use dynident_recording::DifferentiatorSettings;
 use dynident_simulation::Record;
 
-/// A good run's records, kept for those after it.
+/// The logs of a good run.
 #[derive(Clone, Debug)]
 pub(crate) struct GoodLog {
     run: usize,
@@ -20,7 +20,6 @@ pub(crate) struct GoodLog {
 }
 
 impl GoodLog {
-    /// Of a run along these legs.
     pub(crate) fn new(record: &RunRecord, legs: Vec<Leg>, records: Vec<Record>) -> Self {
         let joint_sigma = record.estimate.as_ref().map(|estimate| estimate.joint_sigma.clone()).unwrap_or_default();
         let way = record.estimate.as_ref().and_then(|estimate| estimate.differentiator.as_ref());

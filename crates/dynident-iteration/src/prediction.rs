@@ -1,12 +1,12 @@
-//! What a model says of a run that it was not fitted to.
+//! Prediction of a run that was not used for the fit.
 
 use crate::evidence::Prediction;
 use dynident_identification::rows::{JointRows, RowConsumer, predicted_torque};
 use dynident_identification::{LogError, Logs, RegressorModel};
 use nalgebra::DMatrix;
 
-/// Half the width of a 95 % interval in standard deviations: the runs have far more rows than parameters.
-const WIDTH: f64 = 1.96;
+/// Half width of a 95 % interval in standard deviations; runs have far more rows than parameters.
+const HALF_WIDTH_95_SIGMAS: f64 = 1.96;
 
 /// A model with its error bars.
 pub(crate) struct Known<'a> {
@@ -15,10 +15,13 @@ pub(crate) struct Known<'a> {
     pub(crate) joint_sigma: &'a [f64],
 }
 
-/// How well `known` predicts the torque of the recordings `indices`, joint by joint; `None` for a joint without rows.
+/// Evaluates the prediction of the torque of the recordings `indices` by `known`, joint by joint; `None` for a joint
+/// without rows.
+///
 ///
 /// # Errors
-/// What reading them can give.
+///
+/// As reading the recordings.
 pub(crate) fn predictions(
     logs: &Logs<'_>,
     model: &RegressorModel,
@@ -29,7 +32,7 @@ pub(crate) fn predictions(
     let covariance = DMatrix::from_fn(count, count, |row, column| known.covariance[row][column]);
     let joints = (0..model.dof()).map(|joint| {
         let columns = model.layout().joint_columns(joint);
-        // V = Lᵀ L of the joint's columns; covariances from few segments are singular, so by eigenvalues.
+        // V = Lᵀ L of the joint's columns, by eigenvalues, because covariances from few segments are singular.
         let eigen = covariance.select_rows(columns).select_columns(columns).symmetric_eigen();
         let root = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
         let root = DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose();
@@ -86,7 +89,7 @@ impl RowConsumer for Sums<'_> {
                 (0..columns.len()).map(|place| sums.root[(direction, place)] * panel[place * rows + row]).sum()
             };
             let variance: f64 = (0..sums.root.nrows()).map(|direction| of_direction(direction).powi(2)).sum();
-            let half = WIDTH * (variance + sums.sigma * sums.sigma).sqrt();
+            let half = HALF_WIDTH_95_SIGMAS * (variance + sums.sigma * sums.sigma).sqrt();
             sums.rows += 1;
             sums.inside += usize::from(error.abs() <= half);
             sums.square += error * error;

@@ -180,7 +180,7 @@ impl Redesign {
             let worst = (0..names.len()).max_by(|&a, &b| beyond(a).total_cmp(&beyond(b)));
             let Some(worst) = worst.filter(|&joint| beyond(joint) > 0.0) else { return Ok((reference, torque)) };
             for (joint, taken_off) in taken_off.iter_mut().enumerate() {
-                *taken_off += LESS_TORQUE * beyond(joint).max(0.0);
+                *taken_off += TORQUE_REDUCTION_FACTOR * beyond(joint).max(0.0);
             }
             let (joint, torque, limit) = (names[worst].clone(), torque.of_all[worst], torque_limits[worst]);
             last = Some(NotRedesigned::Torque { joint, torque, limit });
