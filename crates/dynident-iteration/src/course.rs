@@ -5,7 +5,7 @@ use crate::drive::{CorrectedLog, NextRunMotion, PlannedRun};
 use crate::error::IterationError;
 use crate::forecast::MotionForecast;
 use crate::good_log::GoodLog;
-use crate::held_out::HeldOutCame;
+use crate::held_out::HeldOutOutcome;
 use crate::held_out_motion::HeldOutMotion;
 use crate::iteration::Iteration;
 use crate::policy::{Next, RunPlan};

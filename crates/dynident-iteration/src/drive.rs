@@ -1,7 +1,7 @@
 //! The steps of an iteration: the next motion, its run, the examination of its log and the verdict.
 
 use crate::before_motion::motions;
-use crate::commanding::{Came, Prepared, folder_number};
+use crate::commanding::{MotionOutcome, Prepared, folder_number};
 use crate::cut_short::CutShort;
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_runs};

@@ -1,7 +1,7 @@
 //! Runs of a held-out motion, which validate the newest model and are never fitted.
 
 use crate::before_motion::Commanded;
-use crate::commanding::Came;
+use crate::commanding::MotionOutcome;
 use crate::convergence::Shortfall;
 use crate::cut_short::CutShort;
 use crate::error::IterationError;

@@ -19,7 +19,6 @@
 //! | a next motion that excites the least known directions | a [`MotionPlanner`]: [`Redesign`], with [`Iteration::with_planner`] |
 //! | storage, and resuming with the same result | [`IterationStore`] |
 //!
-//!
 //! The crate `dynident` provides it as `dynident iterate`, with trajectories, robots and controllers from a study file.
 //!
 //! ```
@@ -35,7 +34,7 @@
 //! let rod = dynident_model::read_urdf(text)?.model;
 //! let friction = terms_per_joint(&rod, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 //!
-//! // The true pendulum has friction that the controller does not know of.
+//! // The true pendulum has friction that is missing in the controller's model.
 //! let plant = Plant::new(&rod, &friction, &[0.5])?;
 //! let mut robot = SimulatedRobot::new(plant, LoopSettings::default())?;
 //!

@@ -149,13 +149,13 @@ impl IterationStore {
     }
 
     /// Stores the run of the held-out motion after a run in `held_out_k/`: `held_out.json` and the log.
-    pub fn keep_held_out(&self, run: usize, found: &HeldOutRun, came: &RobotRun) -> Result<(), IterationError> {
+    pub fn keep_held_out(&self, run: usize, found: &HeldOutRun, robot_run: &RobotRun) -> Result<(), IterationError> {
         let folder = self.held_out_folder(run);
         let fingerprint = self.fingerprint.clone();
         let file = HeldOutFile { schema: HELD_OUT_SCHEMA.to_owned(), fingerprint, run, found: found.clone() };
         let text = sealed_json(&file)
             .map_err(|error| IterationError::State { path: folder.join(HELD_OUT_FILE), problem: error.to_string() })?;
-        self.keep_whole(&folder, (HELD_OUT_FILE, &text), core::slice::from_ref(came), None)
+        self.keep_whole(&folder, (HELD_OUT_FILE, &text), core::slice::from_ref(robot_run), None)
     }
 
     /// Returns the held-out run after a run, if it exists.

@@ -1,4 +1,4 @@
-//! A robot that is another program: started, spoken to by lines, and given up when it does not answer in time.
+//! A robot behind another program, which is stopped if it does not answer in time.
 
 use super::client::{Client, Started};
 use super::process_settings::{ProcessMode, ProcessSettings};
@@ -10,9 +10,9 @@ use dynident_system::{PermittedProgram, TemporaryFolder};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// A robot behind a program's standard input and output. The program is started with the first run and kept for the
-/// next; after a failure it is killed, and the next run starts it anew. On Unix it has a process group of its own,
-/// which ends with this robot: no process of it is left.
+/// A robot behind a program's standard input and output. The program is started with the first run and reused; after a
+/// failure it is killed, and the next run starts it again. On Unix it has its own process group, which ends with this
+/// robot.
 #[derive(Debug)]
 pub struct ProcessRobot {
     settings: ProcessSettings,
@@ -23,10 +23,12 @@ pub struct ProcessRobot {
 }
 
 impl ProcessRobot {
-    /// The robot of a program, with the model's joints. `program` is the command of the settings, as
-    /// [`ProcessSettings::permitted`] gives it.
+    /// Creates the robot of a program, with the model's joints. `program` is the permitted command of the settings
+    /// ([`ProcessSettings::permitted`]).
+    ///
     ///
     /// # Errors
+    ///
     /// As [`ProcessSettings::validate`].
     pub fn new(
         settings: ProcessSettings,
@@ -65,8 +67,8 @@ impl ProcessRobot {
         };
         let client = match &mut self.client {
             Some(client) => client,
-            none => match Client::start(&self.program, &self.settings, &self.joints, request.stop)? {
-                Started::Ready(client) => none.insert(*client),
+            empty => match Client::start(&self.program, &self.settings, &self.joints, request.stop)? {
+                Started::Ready(client) => empty.insert(*client),
                 Started::StopRequested => return Ok(not_begun),
             },
         };
@@ -105,7 +107,7 @@ impl Robot for ProcessRobot {
             }
             Err(fault) => {
                 let stopping = self.client.as_mut().and_then(|client| client.stop_after(&fault));
-                // Whatever state it is in, the next run must not begin there.
+                // Its state is unknown, so the next run starts a new program.
                 self.client = None;
                 RobotStatus::Failed { fault, stopping }
             }
