@@ -7,7 +7,7 @@ use crate::model_parameters::ModelParameters;
 use crate::near_rest::NearRest;
 use crate::rests::RestMargin;
 use crate::run_logs::{RunLog, identification_settings, recordings};
-use crate::run_offsets::{RunOffset, choices, deviations, seen};
+use crate::run_offsets::{RunOffset, choices, deviations, is_any_significant};
 use crate::settings::{RunIdentificationSettings, Scheme};
 use crate::step_by_step::step_by_step;
 use dynident_dynamics::ParametricModel;
@@ -112,7 +112,7 @@ pub fn identify_runs(
             let shared = fitted(task, runs, settings, shared)?;
             // A failed fit with separate offsets is not an error: the shared offset is used.
             let own = fitted(task, runs, settings, own).ok();
-            Ok(own.filter(|own| own.impossible.is_none() && seen(&own.run_offsets, runs)).unwrap_or(shared))
+            Ok(own.filter(|own| own.impossible.is_none() && is_any_significant(&own.run_offsets, runs)).unwrap_or(shared))
         }
         (Scheme::AllJoints, &[one]) => fitted(task, runs, settings, one),
         _ => fitted(task, runs, settings, OffsetChoice::Shared),

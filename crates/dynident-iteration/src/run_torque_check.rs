@@ -1,4 +1,4 @@
-//! The torque check of a run, with the runs before it where their logs are at hand.
+//! The torque check of a run, together with earlier runs if their logs are available.
 
 use crate::commanding::Prepared;
 use crate::error::IterationError;
@@ -12,14 +12,16 @@ use crate::torque_check::{CheckWith, CheckedRun, LeastDeviation, TorqueCheck, ch
 use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 
-/// What a run was fitted with: the task with the friction in force, the runs, and the settings.
+/// Inputs of the fit of a run: the task with the selected friction, the runs, and the settings.
 pub(crate) type Fitted<'a> = (&'a IterationTask, &'a [RunLog<'a>], &'a RunIdentificationSettings);
 
 impl Iteration {
-    /// Compares the logged torque of a run with the torque that its controller commanded; `fitted` is what it was
-    /// fitted with, if it was.
+    /// Compares the logged torque of a run with the torque that its controller commanded; `fitted` are the inputs of
+    /// its fit, if it was fitted.
+    ///
     ///
     /// # Errors
+    ///
     /// Records of another robot.
     pub(crate) fn torque_check(
         &self,
@@ -45,7 +47,7 @@ impl Iteration {
         });
         let legs: Vec<Leg> = self.legs_of(record)?.into_owned();
         let (controller, model) = (&prepared.controller, prepared.model.as_ref());
-        // A run that ended early has no more records than legs.
+        // A run that ended early may have fewer records than legs.
         let newest = CheckedRun { legs: &legs, records, controller, model };
         let runs: Vec<CheckedRun<'_>> = earlier_runs.chain([newest]).collect();
         let feeds_forward_later =

@@ -93,7 +93,7 @@ impl IterationStore {
     pub fn open(folder: &Path, fingerprint: &str, resume: bool) -> Result<Self, IterationError> {
         let runs = folder.join("runs");
         fs::create_dir_all(&runs).map_err(IterationError::file(&runs))?;
-        let found = RunsFolder::look(&runs)?;
+        let found = RunsFolder::read(&runs)?;
         if !resume {
             found.remove_runs()?;
         }
@@ -101,14 +101,14 @@ impl IterationStore {
         let store = Self { runs, fingerprint: fingerprint.to_owned() };
         let made = store.records()?.len();
         // Remove plans of other runs; they are obsolete.
-        RunsFolder::look(&store.runs)?.remove_plans_but(made + 1)?;
+        RunsFolder::read(&store.runs)?.remove_plans_but(made + 1)?;
         Ok(store)
     }
 
     /// Checks whether a fresh start may remove the existing runs. Changes nothing.
     pub fn may_begin_afresh(folder: &Path) -> Result<(), IterationError> {
         let runs = folder.join("runs");
-        if runs.is_dir() { RunsFolder::look(&runs)?.may_remove_runs() } else { Ok(()) }
+        if runs.is_dir() { RunsFolder::read(&runs)?.may_remove_runs() } else { Ok(()) }
     }
 
     /// Returns the stored runs in order.
@@ -334,7 +334,7 @@ impl IterationStore {
     ///
     /// A folder with foreign files, or one that cannot be removed.
     pub(crate) fn forget_run(&self, run: usize) -> Result<(), IterationError> {
-        RunsFolder::look(&self.runs)?.remove_run(&self.run_folder(run))?;
+        RunsFolder::read(&self.runs)?.remove_run(&self.run_folder(run))?;
         self.forget_held_out(run)
     }
 
@@ -345,7 +345,7 @@ impl IterationStore {
     ///
     /// A folder that cannot be removed.
     pub(crate) fn forget_held_out(&self, run: usize) -> Result<(), IterationError> {
-        RunsFolder::look(&self.runs)?.remove_plans_but(run)
+        RunsFolder::read(&self.runs)?.remove_plans_but(run)
     }
 
     /// Returns the logs of a run, one per leg, at these rates (Hz), bit for bit as recorded.

@@ -1,9 +1,9 @@
-//! When a difference between logged and commanded torque counts.
+//! Settings of the torque check.
 
 use dynident_simulation::{SimulationError, require};
 use serde::{Deserialize, Serialize};
 
-/// When a difference between logged and commanded torque counts.
+/// Thresholds of the comparison of logged and commanded torque.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -11,15 +11,15 @@ pub struct TorqueCheckSettings {
     /// Largest deviation of a joint's torque scale from one, percent. Default 3: correct logs of the campaign's robots
     /// have at most 1.5.
     pub scale_percent: f64,
-    /// Largest difference between logged and commanded torque, root mean square as a percentage of the joint's torque.
-    /// Default 5: correct logs of the campaign's robots have at most 2.
+    /// Largest root mean square of the difference between logged and commanded torque, in percent of the joint's
+    /// torque. Default 5: correct logs of the campaign's robots have at most 2.
     pub difference_percent: f64,
-    /// Largest deviation of a joint's torque scale from that of the other joints, by the parameters that their rows
-    /// share, percent. Default 5.
+    /// Largest deviation of a joint's torque scale from that of the other joints (from the parameters that their rows
+    /// share), percent. Default 5.
     pub row_scale_percent: f64,
     /// Largest deviation of the log's clock from the controller's, percent. Default 0.1.
     pub clock_percent: f64,
-    /// Standard deviations that a deviation must have to count, beside its size. Default 4.
+    /// Smallest significant deviation in standard deviations, in addition to its size. Default 4.
     pub sigmas: f64,
 }
 
@@ -32,7 +32,9 @@ impl Default for TorqueCheckSettings {
 impl TorqueCheckSettings {
     /// Checks the numbers.
     ///
+    ///
     /// # Errors
+    ///
     /// Numbers that are negative or not finite.
     pub fn validate(&self) -> Result<(), SimulationError> {
         let settings = [

@@ -356,7 +356,7 @@ mod tests {
         let arm = planar_2r(1.0, tip, tip);
         let envelope = EnvelopeSettings::default().envelope(&arm).unwrap();
         assert_eq!(envelope.tracking_error, vec![Some(TRACKING_RAD); 2]);
-        let efforts: Vec<_> = arm.joints().iter().map(|joint| joint.limits.effort.map(|x| ROOM * x)).collect();
+        let efforts: Vec<_> = arm.joints().iter().map(|joint| joint.limits.effort.map(|x| LIMIT_FACTOR * x)).collect();
         assert_eq!(envelope.torque, efforts);
         let stated = EnvelopeSettings { tracking_error: Some(vec![0.1, 0.2].into()), ..EnvelopeSettings::default() };
         assert_eq!(stated.envelope(&arm).unwrap().tracking_error, vec![Some(0.1), Some(0.2)]);

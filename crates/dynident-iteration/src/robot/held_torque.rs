@@ -18,11 +18,11 @@ const MIN_SAMPLES: usize = 8;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HeldTorque {
     joint: String,
-    /// Its mean, Nm (N).
+    /// Mean torque, Nm (N).
     torque: f64,
-    /// For how long, s.
+    /// Length of the interval, s.
     duration_s: f64,
-    /// Distance at the begin and at the end, rad (m).
+    /// Tracking error at the begin and at the end, rad (m).
     distances: [f64; 2],
 }
 

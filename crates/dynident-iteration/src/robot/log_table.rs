@@ -32,9 +32,9 @@ pub enum LogTableError {
     Fields {
         /// The line, from 1.
         line: usize,
-        /// Columns of the header.
+        /// Number of columns in the header.
         expected: usize,
-        /// Fields of the row.
+        /// Number of fields in the row.
         found: usize,
     },
     /// A field that is not a finite number.

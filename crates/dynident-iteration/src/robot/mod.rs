@@ -162,8 +162,7 @@ impl<'a> RunRequest<'a> {
 pub struct RobotRun {
     /// How it ended.
     pub status: RobotStatus,
-    /// What was recorded along the motion, up to the end or up to what went wrong. Joints in the model's order, all
-    /// numbers finite.
+    /// The record of the motion, up to its end or the failure. Joints in the model's order, all values finite.
     pub record: Record,
     /// The true motion, if the robot is the simulator.
     pub truth: Option<Run>,

@@ -1,8 +1,9 @@
-//! One cause for all joints, where one explains them all.
+//! Selects one cause for all joints, if one explains them all.
 //!
-//! A log is usually wrong in one way. So the candidates are compared over all joints whose difference matters: one that
-//! explains each of them is named, if it leaves clearly less than every other one that does. Where none explains all,
-//! each joint is judged alone, by a stricter rule.
+//!
+//! A log usually has a single mistake. So the candidates are compared over all joints with a relevant difference: a
+//! candidate that explains each of them is reported if its residual is clearly smaller than that of every other such
+//! candidate. If none explains all joints, each joint is evaluated alone, with stricter thresholds.
 
 use super::explanation::{Explanation, Fitted, TorqueCandidate};
 
@@ -14,16 +15,16 @@ const CLEARLY_BETTER: f64 = 2.0;
 const LEAST_EXPLAINED_ALONE: f64 = 0.95;
 const CLEARLY_BETTER_ALONE: f64 = 4.0;
 
-/// What is named of each joint, and what it leaves.
+/// The reported candidates and the total residual.
 #[derive(Clone, Debug)]
 pub(super) struct Agreement {
-    /// The candidate that is named; none where the difference does not matter or the cause is open.
+    /// The reported candidate of each joint; `None` if the difference is not relevant or the cause is undetermined.
     pub(super) named: Vec<Option<Fitted>>,
-    /// Sum over the joints of what is left of the squared difference, as a share of the squared torque.
+    /// Sum over the joints of the unexplained squared difference, as a share of the squared torque.
     pub(super) left: f64,
 }
 
-/// Names a cause for all joints, or for each.
+/// Selects a cause for all joints, or one per joint.
 pub(super) fn agreement(explanations: &[Explanation]) -> Agreement {
     let named = for_all(explanations).unwrap_or_else(|| each_alone(explanations));
     let left_of = |(own, named): (&Explanation, &Option<Fitted>)| {
@@ -33,8 +34,8 @@ pub(super) fn agreement(explanations: &[Explanation]) -> Agreement {
     Agreement { named, left }
 }
 
-/// A candidate that explains every joint whose difference matters; the outer option is none where there is no such
-/// candidate.
+/// A candidate that explains every joint with a relevant difference; `None` if there is no such candidate. The inner
+/// options are `None` if the best one is not clearly better than the others.
 fn for_all(explanations: &[Explanation]) -> Option<Vec<Option<Fitted>>> {
     let matters: Vec<&Explanation> = explanations.iter().filter(|own| own.matters).collect();
     let find =
@@ -55,15 +56,15 @@ fn for_all(explanations: &[Explanation]) -> Option<Vec<Option<Fitted>>> {
     Some(explanations.iter().map(of).collect())
 }
 
-/// A candidate of each joint whose difference matters; none at all where one of them is open, because what is wrong
-/// there may be wrong everywhere.
+/// A candidate for each joint with a relevant difference; none at all if one joint remains undetermined, because its
+/// mistake may affect all joints.
 fn each_alone(explanations: &[Explanation]) -> Vec<Option<Fitted>> {
     let named: Vec<Option<Fitted>> = explanations.iter().map(alone).collect();
     let is_open = explanations.iter().zip(&named).any(|(own, named)| own.matters && named.is_none());
     if is_open { vec![None; explanations.len()] } else { named }
 }
 
-/// The candidate of one joint, if it explains nearly all and far more than every other.
+/// The candidate of one joint, if it explains nearly all and clearly more than every other.
 fn alone(own: &Explanation) -> Option<Fitted> {
     let best = *own.candidates.first().filter(|best| own.matters && best.explained >= LEAST_EXPLAINED_ALONE)?;
     let left = |of: &Fitted| 1.0 - of.explained;
