@@ -119,7 +119,9 @@ impl Iteration {
         })?;
         *last_motion = Some(Instant::now());
         Ok(match &robot_run.status {
-            RobotStatus::Waiting { .. } => MotionOutcome::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() }),
+            RobotStatus::Waiting { .. } => {
+                MotionOutcome::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() })
+            }
             RobotStatus::Failed { .. } => {
                 let how = format!("run {}: {}", plan.run, robot_run.status);
                 MotionOutcome::CutShort(Some(robot_run), CutShort::Failed(how))

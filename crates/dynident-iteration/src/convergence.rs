@@ -185,7 +185,9 @@ pub enum Shortfall {
 fn length_words(other: &OtherLength) -> String {
     let OtherLength { joint, factor, .. } = other;
     match joint {
-        Some(joint) => format!("the torque indicates that joint {joint} is {factor:.2} times as far from the previous joint as in the robot description"),
+        Some(joint) => format!(
+            "the torque indicates that joint {joint} is {factor:.2} times as far from the previous joint as in the robot description"
+        ),
         None => format!("the torque indicates that all lengths are {factor:.2} times those of the robot description"),
     }
 }
@@ -223,7 +225,9 @@ impl Shortfall {
                 "allow more runs (max_runs); a parameter that keeps changing may depend on temperature or on a missing model term"
             }
             Self::ParameterUncertain { .. } => "use a motion that excites it: a longer one, or another design",
-            Self::Clipping { .. } => "use a slower motion, add a torque limit to [design.limits], or correct the effort limit",
+            Self::Clipping { .. } => {
+                "use a slower motion, add a torque limit to [design.limits], or correct the effort limit"
+            }
             Self::Lag { .. } | Self::LongLag { .. } => {
                 "record positions and torques at the same instant, or correct the delay in the recorder; increase settled.most_lag_s to accept a known constant delay"
             }
@@ -239,9 +243,7 @@ impl Shortfall {
             Self::HeldOutPrediction { .. } => {
                 "look for effects that the fitted motion does not excite: other friction terms (friction = \"auto\"), elasticity, temperature; or use a more exciting motion (motion = \"redesign\")"
             }
-            Self::Prediction { .. } => {
-                "look for changes between the runs: temperature, load, stiction, sensor offsets"
-            }
+            Self::Prediction { .. } => "look for changes between the runs: temperature, load, stiction, sensor offsets",
             Self::Unexplained { .. } => {
                 "add friction terms (friction = \"auto\"), correct lengths and axes in the robot description, or increase settled.most_unexplained_percent"
             }

@@ -54,7 +54,7 @@ pub fn iterate(
     iterate_supervised(iteration, robots, store, &mut Watching(watch))
 }
 
-/// [`iterate()`] with a supervisor, who may stop it and is asked for permission before every motion. A run that is
+/// [`iterate()`] with a supervisor, who may stop it and must permit every motion. A run that is
 /// stopped is not used: its log is kept in a separate folder, and the next call repeats the run.
 ///
 ///
@@ -169,7 +169,8 @@ impl Course<'_> {
         supervisor: &mut dyn Supervisor,
     ) -> Result<Option<IterationStatus>, IterationError> {
         let run = self.records.len();
-        let outcome = self.iteration.held_out_made(held_out, robot, &self.records, supervisor, &mut self.last_motion)?;
+        let outcome =
+            self.iteration.held_out_made(held_out, robot, &self.records, supervisor, &mut self.last_motion)?;
         match outcome {
             HeldOutOutcome::Stopped(status) => Ok(Some(status)),
             HeldOutOutcome::CutShort(runs, why) => {

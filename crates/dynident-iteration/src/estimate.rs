@@ -83,8 +83,8 @@ impl RunEstimate {
         self.near_rest.iter().map(margin).collect()
     }
 
-    /// Geometric mean of the ratio of its error bars to another's, over the parameters that both determine; 1 if there
-    /// are none.
+    /// Geometric mean of the ratio of its error bars to another's, over the parameters that both determine; 1
+    /// without such parameters.
     pub(crate) fn wider_than(&self, other: &Self) -> f64 {
         let pairs = self.std.iter().zip(&other.std).filter(|(own, other)| **own > 0.0 && **other > 0.0);
         let (sum, count) =
@@ -112,7 +112,9 @@ pub fn identify_runs(
             let shared = fitted(task, runs, settings, shared)?;
             // A failed fit with separate offsets is not an error: the shared offset is used.
             let own = fitted(task, runs, settings, own).ok();
-            Ok(own.filter(|own| own.impossible.is_none() && is_any_significant(&own.run_offsets, runs)).unwrap_or(shared))
+            Ok(own
+                .filter(|own| own.impossible.is_none() && is_any_significant(&own.run_offsets, runs))
+                .unwrap_or(shared))
         }
         (Scheme::AllJoints, &[one]) => fitted(task, runs, settings, one),
         _ => fitted(task, runs, settings, OffsetChoice::Shared),

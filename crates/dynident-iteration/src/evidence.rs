@@ -17,7 +17,7 @@ pub struct JointEvidence {
     pub row_noise: f64,
     /// Samples at the drive's limit; `None` without saturation.
     pub clipping: Option<Clipping>,
-    /// Torque oscillation far above the frequencies of the motion; `None` if there is none.
+    /// Torque oscillation far above the frequencies of the motion; `None` otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub oscillation: Option<Oscillation>,
     /// Prediction of this run by the model of the earlier runs, before the run was fitted; `None` for the first.
@@ -67,7 +67,7 @@ pub struct RunEvidence {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub feedback_delay_s: Option<f64>,
     /// A link length that explains the torque of all good runs significantly better than that of the robot description;
-    /// `None` if there is none.
+    /// `None` otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub other_length: Option<OtherLength>,
 }

@@ -59,7 +59,7 @@ impl MotionForecast {
     }
 }
 
-/// Information of all good runs so far, and the units of parameter errors.
+/// Information of all good runs, and the units of parameter errors.
 #[derive(Clone, Debug)]
 pub(crate) struct KnownInformation {
     /// Sum over the good runs.
@@ -217,7 +217,7 @@ mod tests {
         root.tr_mul(&root)
     }
 
-    /// Repeating a run scales every error bar by 1/√2, whatever the covariance; enough runs scale it by the root of
+    /// Repeating a run scales every error bar by 1/√2, for any covariance; enough runs scale it by the root of
     /// their number.
     #[test]
     fn a_repeated_run_narrows_by_the_root_of_the_number() {

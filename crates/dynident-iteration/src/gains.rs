@@ -239,7 +239,12 @@ fn largest_inertia(robot: &ParametricModel, matrices: &[DMatrix<f64>]) -> Result
     }
     for (joint, inertia) in robot.model().joints().iter().zip(&largest) {
         let what = format!("nominal inertia about {}", joint.name);
-        require(*inertia > 0.0 && inertia.is_finite(), what, *inertia, "state the gains: the robot description has no inertia")?;
+        require(
+            *inertia > 0.0 && inertia.is_finite(),
+            what,
+            *inertia,
+            "state the gains: the robot description has no inertia",
+        )?;
     }
     Ok(largest)
 }

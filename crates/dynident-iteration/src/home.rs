@@ -364,7 +364,9 @@ impl<'a> Planner<'a> {
             let Some([speed, acceleration]) = self.fastest[place] else {
                 return Err(HomeError::NoSpeed { joint: joint.name.clone() });
             };
-            duration_s = duration_s.max(QUINTIC_MAX_VELOCITY * way / speed).max((QUINTIC_MAX_ACCELERATION * way / acceleration).sqrt());
+            duration_s = duration_s
+                .max(QUINTIC_MAX_VELOCITY * way / speed)
+                .max((QUINTIC_MAX_ACCELERATION * way / acceleration).sqrt());
             if let Some(jerk) = self.limits.of(&joint.name).and_then(|limit| limit.jerk) {
                 duration_s = duration_s.max((60.0 * way / (self.home.speed * jerk)).cbrt());
             }

@@ -15,7 +15,7 @@
 //! | identification of one run | [`identify_run`]: all joints at once, or joint by joint from tip to base as in the paper |
 //! | joint identification of several runs | [`identify_runs`], each weighted by its own noise |
 //! | unmet conditions | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`Shortfall`]) |
-//! | the next run | [`Iteration::next`], a pure function of the records so far: controller and model, rejection of worse runs, convergence |
+//! | the next run | [`Iteration::next`], a pure function of the records: controller and model, rejection of worse runs, convergence |
 //! | a next motion that excites the least known directions | a [`MotionPlanner`]: [`Redesign`], with [`Iteration::with_planner`] |
 //! | storage, and resuming with the same result | [`IterationStore`] |
 //!

@@ -176,7 +176,8 @@ fn differentiator(settings: &DifferentiatorSettings, q: &[f64], joints: usize, r
 pub(crate) fn on_uniform_clock(record: &Record, values: &[f64]) -> Vec<f64> {
     let (samples, times) = (record.samples, &record.times_s);
     let step = (times[samples - 1] - times[0]) / (samples - 1) as f64;
-    let uniform = times.iter().enumerate().all(|(k, t)| (t - times[0] - k as f64 * step).abs() <= UNIFORM_STEP_TOLERANCE * step);
+    let uniform =
+        times.iter().enumerate().all(|(k, t)| (t - times[0] - k as f64 * step).abs() <= UNIFORM_STEP_TOLERANCE * step);
     if uniform {
         return values.to_vec();
     }

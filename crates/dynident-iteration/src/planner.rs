@@ -21,7 +21,7 @@ pub struct BeforeRun<'a> {
     pub good: &'a [GoodRun<'a>],
     /// Torque limit of each joint, Nm (N), or infinity.
     pub torque_limits: Option<&'a [f64]>,
-    /// Signal on which a search ends with its best result so far.
+    /// Signal on which a search ends with its best result.
     pub stop: Option<&'a StopSignal>,
 }
 

@@ -1,4 +1,4 @@
-//! Calls a planner with the good runs so far.
+//! Calls a planner with the good runs.
 
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;

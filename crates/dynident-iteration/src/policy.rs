@@ -1,4 +1,4 @@
-//! Decision about the next run: a pure function of the records so far.
+//! Decision about the next run: a pure function of the records.
 
 use crate::convergence::{Names, shortfalls, stands_still};
 use crate::estimate::RunEstimate;

@@ -1,4 +1,4 @@
-//! Design of the next motion: excites the directions that the good runs so far determine least.
+//! Design of the next motion: excites the directions that the good runs determine least.
 
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
@@ -245,7 +245,7 @@ impl Redesign {
     }
 
     /// Random states over the workspace, joints independent: positions within their limits and at most half a turn (0.5
-    /// m) to either side; velocities and accelerations within their limits, or up to the maxima of the motions so far.
+    /// m) to either side; velocities and accelerations within their limits, or up to the maxima of the earlier motions.
     fn states(&self, before: &BeforeRun<'_>) -> Motion {
         let joints = before.robot.model().joints();
         let mut random = Random::new(STATES_SEED);

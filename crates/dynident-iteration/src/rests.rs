@@ -129,7 +129,7 @@ mod tests {
         assert_eq!(margin(0.11, 0.5).samples(&dq, 10), one(40..61));
         assert_eq!(margin(0.11, 0.0).samples(&dq, 10), one(45..56));
         assert_eq!(RestMargin::REST.samples(&dq, 10), rests(&dq, 10));
-        // A joint that turns between two samples is at rest in between, whatever its speed at both.
+        // A joint that turns between two samples is at rest in between, at any speed.
         let turned: Vec<f64> = (0..20).map(|k| if k < 10 { 1.0 } else { -1.0 }).collect();
         assert_eq!(margin(0.1, 0.5).samples(&turned, 4), one(7..12));
         // Overlapping ranges are merged.

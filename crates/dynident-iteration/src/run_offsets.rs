@@ -21,11 +21,11 @@ const MIN_DEVIATION_SHARE: f64 = 0.01;
 pub struct RunOffset {
     /// The run.
     pub run: usize,
-    /// The joint's place, from 0.
+    /// Index of the joint, from 0.
     pub joint: usize,
     /// The deviation, Nm (N).
     pub deviation: f64,
-    /// Its standard deviation.
+    /// Its standard deviation, Nm (N).
     pub std: f64,
 }
 
@@ -70,7 +70,8 @@ pub(crate) fn deviations(
 /// Whether a deviation is significant and large enough to be relevant.
 pub(crate) fn is_any_significant(deviations: &[RunOffset], runs: &[RunLog<'_>]) -> bool {
     deviations.iter().any(|own| {
-        own.deviation.abs() > MIN_DEVIATION_SIGMAS * own.std && own.deviation.abs() > MIN_DEVIATION_SHARE * torque_rms(runs, own.joint)
+        own.deviation.abs() > MIN_DEVIATION_SIGMAS * own.std
+            && own.deviation.abs() > MIN_DEVIATION_SHARE * torque_rms(runs, own.joint)
     })
 }
 

@@ -115,14 +115,14 @@ impl RunsFolder {
             return Ok(());
         }
         if self.runs.is_symlink() {
-            let problem =
-                "is a symbolic link, and runs are not removed through links: use another --out, or remove the runs yourself";
+            let problem = "is a symbolic link, and runs are not removed through links: use another --out, or remove the runs yourself";
             return Err(IterationError::State { path: self.runs.clone(), problem: problem.to_owned() });
         }
         for folder in self.removable() {
             for file in files(folder)? {
                 if !is_own(&file) {
-                    let problem = "is not a file of an iteration, so its folder is not removed: move the file to another folder";
+                    let problem =
+                        "is not a file of an iteration, so its folder is not removed: move the file to another folder";
                     return Err(IterationError::State { path: file, problem: problem.to_owned() });
                 }
             }

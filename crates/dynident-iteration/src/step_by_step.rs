@@ -12,7 +12,7 @@ use dynident_identification::rows::{JointRows, RowConsumer};
 use dynident_identification::{EstimationSettings, LogError, Logs, RegressorModel};
 use nalgebra::DMatrix;
 
-/// Results of the steps so far.
+/// Results of the finished steps.
 pub(crate) struct Steps {
     pub(crate) values: Vec<f64>,
     pub(crate) covariance: DMatrix<f64>,

@@ -49,7 +49,7 @@ pub trait Supervisor {
         None
     }
 
-    /// Whether a person is asked for permission before every motion.
+    /// Whether every motion needs the permission of a person.
     fn asks(&self) -> bool {
         false
     }

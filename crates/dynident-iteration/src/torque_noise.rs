@@ -85,7 +85,8 @@ fn octave_density(third: &[f64], q: &[f64], rate_hz: f64, band_hz: [f64; 2]) -> 
     if length < 2 * PERIODS_PER_WINDOW || third.len() < length {
         return None;
     }
-    let bins = PERIODS_PER_WINDOW..((to_hz / rate_hz * length as f64).floor() as usize + 1).min(length / 2).max(PERIODS_PER_WINDOW + 1);
+    let bins = PERIODS_PER_WINDOW
+        ..((to_hz / rate_hz * length as f64).floor() as usize + 1).min(length / 2).max(PERIODS_PER_WINDOW + 1);
     let taper: Vec<f64> = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(2)).collect();
     let power: f64 = taper.iter().map(|x| x * x).sum();
     let turn: Vec<[f64; 2]> = (0..length).map(|k| (TAU * k as f64 / length as f64).sin_cos().into()).collect();

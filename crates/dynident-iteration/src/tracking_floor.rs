@@ -43,7 +43,7 @@ pub(crate) struct KnownLoop<'a> {
 pub(crate) struct TrackingFloor {
     /// Largest explained tracking error of each joint, rad (m).
     pub(crate) floor: Vec<f64>,
-    /// The feedback delay that explains more than half of the error, s; `None` if there is none.
+    /// The feedback delay that explains more than half of the error, s; `None` otherwise.
     pub(crate) feedback_delay_s: Option<f64>,
 }
 

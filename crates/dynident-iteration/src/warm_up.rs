@@ -17,7 +17,7 @@ pub struct WarmUp {
     /// Length of all passes, including the paths from and to home, s.
     pub duration_s: f64,
     /// Mean power loss of all joints in each pass, W: `Σ ∫τ q̇ dt` over the time. For a motion that returns to its
-    /// begin this is the power of friction, whatever the bodies.
+    /// begin this is the power of friction, for any bodies.
     pub lost_power_w: Vec<f64>,
     /// Mean torque in the direction of motion for each pass and joint, Nm (N): `∫τ q̇ dt / ∫|q̇| dt`. It contains the
     /// coupling between joints, which is the same in every pass, so its change is that of friction. Zero for a joint at

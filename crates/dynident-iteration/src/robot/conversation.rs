@@ -160,7 +160,9 @@ pub(super) fn steps(
 ) -> Result<RobotStatus, RobotFault> {
     // Already checked with the request.
     let Ok(reference) = request.whole() else {
-        return Ok(RobotStatus::Stopped { reason: "the paths from and to home do not belong to the motion".to_owned() });
+        return Ok(RobotStatus::Stopped {
+            reason: "the paths from and to home do not belong to the motion".to_owned(),
+        });
     };
     let reference = &*reference;
     let joints = reference.joints();

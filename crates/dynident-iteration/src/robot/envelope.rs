@@ -85,7 +85,9 @@ impl EnvelopeSettings {
             lower: each("lower", &self.lower, false, &|joint| limits(joint).lower)?,
             upper: each("upper", &self.upper, false, &|joint| limits(joint).upper)?,
             speed: each("speed", &self.speed, true, &|joint| limits(joint).velocity.map(|limit| LIMIT_FACTOR * limit))?,
-            torque: each("torque", &self.torque, true, &|joint| limits(joint).effort.map(|limit| LIMIT_FACTOR * limit))?,
+            torque: each("torque", &self.torque, true, &|joint| {
+                limits(joint).effort.map(|limit| LIMIT_FACTOR * limit)
+            })?,
             tracking_error: each("tracking_error", &self.tracking_error, true, &path)?,
             workspace: self.workspace.as_ref().map(|own| own.of(model)).transpose()?,
             speed_span_s: own.seconds(SPEED_SPAN_S),

@@ -61,8 +61,7 @@ impl FolderSettings {
             "forms = [\"current\"] needs the joint torque per ampere, Nm/A (N/A)",
         )?;
         let urscript = self.forms.contains(&FolderForm::Urscript);
-        let fix =
-            "URScript supports only the six joints of a UR arm: remove \"urscript\" from forms, or lock the other joints";
+        let fix = "URScript supports only the six joints of a UR arm: remove \"urscript\" from forms, or lock the other joints";
         require(!urscript || joints == 6, "joints of a robot with forms = [\"urscript\"]", joints as f64, fix)?;
         let urscript_rate_hz = self.urscript_rate_hz.unwrap_or(UrScriptSettings::default().rate_hz);
         let fix = "give 1 to 500 Hz (125 for CB-series, 500 for e-series)";

@@ -77,7 +77,7 @@ impl ControlledRun {
         &self.reference
     }
 
-    /// Number of samples so far.
+    /// Number of recorded samples.
     pub fn samples_done(&self) -> usize {
         self.record.samples
     }

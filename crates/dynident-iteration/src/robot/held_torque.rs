@@ -61,7 +61,9 @@ pub(super) fn held_torque(reference: &Reference, record: &Record, name: &str, ti
     let pushes_back = torque * last < 0.0 && torque.abs() > NOISE_SIGMAS * noise;
     // A response has the same sign as the torque.
     let response = (mean(later) - mean(earlier)) * torque.signum();
-    let is_held = pushes_back && response < MAX_TORQUE_CHANGE * torque.abs() && NOISE_SIGMAS * noise < MAX_TORQUE_CHANGE * torque.abs();
+    let is_held = pushes_back
+        && response < MAX_TORQUE_CHANGE * torque.abs()
+        && NOISE_SIGMAS * noise < MAX_TORQUE_CHANGE * torque.abs();
     is_held.then(|| HeldTorque {
         joint: name.to_owned(),
         torque,

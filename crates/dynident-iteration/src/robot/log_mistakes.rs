@@ -264,7 +264,8 @@ impl<'a> Comparison<'a> {
         // lag.
         let covers = |start: f64| start >= earliest && start <= latest;
         let is_equivalent = |start: f64| {
-            covers(start) && ((start_s - start).abs() <= settings.max_lag_s || at(start) >= correlation - CORRELATION_TOLERANCE)
+            covers(start)
+                && ((start_s - start).abs() <= settings.max_lag_s || at(start) >= correlation - CORRELATION_TOLERANCE)
         };
         let (start_s, early) = if is_equivalent(0.0) {
             (0.0, false)

@@ -470,7 +470,7 @@ pub trait Robot: core::fmt::Debug {
         false
     }
 
-    /// Runs a trajectory. Failures of the robot are reported in the run's [`RobotStatus`], with the record so far.
+    /// Runs a trajectory. Failures of the robot are reported in the run's [`RobotStatus`], with the partial record.
     ///
     ///
     /// # Errors

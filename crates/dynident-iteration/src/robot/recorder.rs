@@ -68,7 +68,7 @@ impl<'a> Recorder<'a> {
         &mut self.parts[self.at].record
     }
 
-    /// Number of samples of all parts so far.
+    /// Number of recorded samples of all parts.
     pub(super) fn samples(&self) -> usize {
         self.parts.iter().map(|part| part.record.samples).sum()
     }

@@ -139,7 +139,10 @@ impl core::fmt::Display for Stopping {
         match self {
             Self::Confirmed => write!(f, "the robot has stopped"),
             Self::Unanswered => {
-                write!(f, "its program did not answer the stop and was killed: the robot may still be moving, check it first")
+                write!(
+                    f,
+                    "its program did not answer the stop and was killed: the robot may still be moving, check it first"
+                )
             }
             Self::Unknown => {
                 write!(f, "the stop was not confirmed: the robot may still be moving, check it first")

@@ -35,7 +35,7 @@ pub(super) struct StreamWatch {
     stream: Option<Stream>,
 }
 
-/// The samples so far.
+/// Statistics of the received samples.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     first: Arrival,

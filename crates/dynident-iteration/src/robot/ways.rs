@@ -60,7 +60,12 @@ impl Ways {
     pub fn validate(&self, motion: &Reference) -> Result<(), SimulationError> {
         for way in [&self.approach, &self.back] {
             require_length("joints of the path", motion.joints(), way.joints())?;
-            require(way.rate_hz() == motion.rate_hz(), "rate_hz of the path", way.rate_hz(), "use the rate of the motion")?;
+            require(
+                way.rate_hz() == motion.rate_hz(),
+                "rate_hz of the path",
+                way.rate_hz(),
+                "use the rate of the motion",
+            )?;
         }
         let (first, last) = (0, motion.samples() - 1);
         for joint in 0..motion.joints() {
@@ -70,7 +75,12 @@ impl Ways {
                 position(&self.back, 0) - position(motion, last),
             ];
             for step in steps {
-                require(step.abs() <= JOIN_TOLERANCE, "step from the path to the motion", step, "use paths that end at the motion")?;
+                require(
+                    step.abs() <= JOIN_TOLERANCE,
+                    "step from the path to the motion",
+                    step,
+                    "use paths that end at the motion",
+                )?;
             }
         }
         Ok(())

@@ -114,7 +114,8 @@ fn limits_in_log(task: &IterationTask, logged: &[Vec<f64>], commanded: &[Vec<f64
         let limits = LOG_LIMIT_SHARES.map(|share| share * highest).into_iter();
         let (torque, least) = limits.map(|limit| (limit, left(limit))).min_by(|a, b| a.1.total_cmp(&b.1))?;
         let beyond = u.iter().filter(|u| u.abs() > MIN_EXCESS_RATIO * torque).count();
-        let explains = least < MAX_LIMITED_RESIDUAL * square(y) && least < MAX_BEST_RESIDUAL_RATIO * left(f64::INFINITY);
+        let explains =
+            least < MAX_LIMITED_RESIDUAL * square(y) && least < MAX_BEST_RESIDUAL_RATIO * left(f64::INFINITY);
         let is_limited = beyond >= MIN_ROWS_AT_LIMIT && explains;
         let joint = task.robot.joint_names()[joint].clone();
         is_limited.then_some(TorqueCause::Clipped { joint, torque, is_commanded: false })
@@ -148,7 +149,8 @@ fn by_command(logged: &[Vec<f64>], commanded: &[Vec<f64>]) -> Vec<Assignment> {
         let mut found: Vec<(f64, Assignment)> = pairs.map(|other| (pair(other), Assignment::Other(other))).collect();
         found.push((share(joint, joint, -1.0), Assignment::Reversed));
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let is_clear = found[0].0 < MAX_EQUAL_DIFFERENCE && found.get(1).is_none_or(|next| found[0].0 < MAX_BEST_RESIDUAL_RATIO * next.0);
+        let is_clear = found[0].0 < MAX_EQUAL_DIFFERENCE
+            && found.get(1).is_none_or(|next| found[0].0 < MAX_BEST_RESIDUAL_RATIO * next.0);
         if is_clear { found[0].1 } else { Assignment::Open }
     };
     (0..joints).map(of_joint).collect()
@@ -240,8 +242,9 @@ fn limit_in_motion(data: &JointData<'_>, joint: usize) -> Option<f64> {
         return None;
     }
     let at_limit = |limit: f64| y.iter().filter(|y| y.abs() > limit).count();
-    let is_possible =
-        |limit: &f64| (MIN_ROWS_AT_LIMIT as f64..=MAX_SHARE_AT_LIMIT * y.len() as f64).contains(&(at_limit(*limit) as f64));
+    let is_possible = |limit: &f64| {
+        (MIN_ROWS_AT_LIMIT as f64..=MAX_SHARE_AT_LIMIT * y.len() as f64).contains(&(at_limit(*limit) as f64))
+    };
     let limits = LIMIT_SHARES.map(|share| highest * share as f64 / ALL_SHARES).filter(is_possible);
     let (limit, left) = limits.map(|limit| (limit, left_at(limit))).min_by(|a, b| a.1.total_cmp(&b.1))?;
     (left < (1.0 - MIN_EXPLAINED_SHARE) * as_logged).then_some(limit)

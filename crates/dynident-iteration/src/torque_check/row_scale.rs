@@ -126,7 +126,9 @@ fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec
             found[worst].is_some_and(|kappa| kappa.value.abs() > least.sigmas * kappa.std * spread)
         };
         if let Some(worst) = worst.filter(|_| 2 * (chosen.len() + 1) <= joints).filter(is_outlier) {
-            let is_rival = |&other: &usize| other != worst && likelihood(other) > likelihood(worst) - MAX_LOG_LIKELIHOOD_DIFFERENCE;
+            let is_rival = |&other: &usize| {
+                other != worst && likelihood(other) > likelihood(worst) - MAX_LOG_LIKELIHOOD_DIFFERENCE
+            };
             wrong.push((worst, open.iter().copied().filter(is_rival).collect()));
             continue;
         }
