@@ -38,7 +38,7 @@ impl Iteration {
     pub fn with_held_out(mut self, held_out: HeldOutMotion) -> Result<Self, SimulationError> {
         let legs = &self.task().legs;
         let one = legs.len() == 1 && legs[0].windows().is_none() && held_out.leg.windows().is_none();
-        require(one, "legs", legs.len() as f64, "held_out needs a task with a single motion without windows")?;
+        require(one, "legs", legs.len() as f64, "held_out needs a task with one motion and without windows")?;
         dynident_simulation::require_length(
             "joints of the held-out motion",
             self.task().robot.dof(),

@@ -44,7 +44,7 @@ impl HeldOutRun {
         let worst = shown.min_by(|a, b| a.1.inside.total_cmp(&b.1.inside));
         let Some((name, worst)) = worst else { return "the held-out run has no usable rows".to_owned() };
         format!(
-            "held-out motion: at least {:.0} % of the torque is inside the 95 % band of the model (lowest at joint {name}: error {:.3} Nm root mean square, band +- {:.3} Nm); largest tracking error {tracking:.2e} rad (m)",
+            "of the held-out motion the model holds {:.0} % of the torque or more in its 95 % band (least at {name}, off by {:.3} Nm root mean square, band {:.3}), largest distance from the path {tracking:.2e} rad (m)",
             100.0 * worst.inside,
             worst.rms_error,
             worst.half_width

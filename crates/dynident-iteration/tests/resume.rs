@@ -163,7 +163,7 @@ fn runs_whose_numbers_do_not_fit_the_robot_are_refused() {
         std::fs::write(&path, &text).unwrap();
         let error = outcome(folder.path()).unwrap_err();
         assert!(matches!(error, IterationError::State { .. }), "{key}: {error}");
-        assert!(error.to_string().contains("run_2") && error.to_string().contains("numbers as"), "{key}: {error}");
+        assert!(error.to_string().contains("run_2") && error.to_string().contains("numbers in"), "{key}: {error}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
     }
     let mut beyond = file;

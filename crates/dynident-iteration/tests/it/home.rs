@@ -167,7 +167,7 @@ fn a_floor_is_gone_around_or_named() {
 /// A path keeps the torque limits for all robots within the uncertainty.
 #[test]
 fn the_torque_of_a_way_has_room() {
-    // Level, the arm needs 15.2 Nm at joint 1; with 30 % more 19.8.
+    // Horizontal, the arm needs 15.2 Nm at joint 1; with 30 % more 19.8 Nm.
     let mut level = home([0.0, 0.0]);
     level.limits.joints[0].torque = Some(18.0);
     let reference = motion([1.0, 0.0], [1.0, 0.0]);

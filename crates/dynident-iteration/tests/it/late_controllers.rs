@@ -119,7 +119,7 @@ fn a_late_controller_is_rehearsed() {
     let fast = joint_pd(&derived(0.0));
     let refused = rehearsed(&fast, None);
     let IterationStatus::Refused { reason } = &refused.status else { panic!("{}", refused.status) };
-    assert!(refused.runs.is_empty() && reason.contains("ms late (rehearsal.delay_s)"), "{reason}");
+    assert!(refused.runs.is_empty() && reason.contains("ms of controller delay (rehearsal.delay_s)"), "{reason}");
     let own_s = RehearsalSettings::default().delay_s(folding().0.model());
     for (gains, delay_s) in [(fast, Some(0.0)), (joint_pd(&derived(own_s)), None)] {
         let commanded = rehearsed(&gains, delay_s);

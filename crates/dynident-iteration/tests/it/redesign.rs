@@ -311,7 +311,7 @@ fn what_cannot_be_redesigned() {
     task.legs = vec![Leg::windowed(reference(), windows).unwrap()];
     let iteration = Iteration::new(task, runs(2)).unwrap().with_planner(Arc::new(redesign(20.0, AMPLE_NM)));
     let error = iterate(&iteration, &mut [&mut robot(1)], None, &mut |_, _| {}).unwrap_err().to_string();
-    assert!(error.contains("run 2") && error.contains("one trajectory"), "{error}");
+    assert!(error.contains("run 2") && error.contains("a single leg"), "{error}");
 
     let mut narrow = limits(AMPLE_NM);
     // Less torque than the uncertainty of the model alone needs.

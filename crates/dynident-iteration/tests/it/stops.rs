@@ -559,7 +559,7 @@ fn a_fresh_start_removes_only_its_own() {
     std::fs::remove_file(link.join("runs")).unwrap();
     std::fs::create_dir(link.join("runs")).unwrap();
     std::os::unix::fs::symlink(own.join("runs/run_1"), link.join("runs/run_1")).unwrap();
-    refused(&link, "move it away");
+    refused(&link, "move it to another folder");
     // A foreign folder that is not a run's is not touched.
     std::fs::create_dir(own.join("runs/run_fast")).unwrap();
     IterationStore::open(&own, "other", false).unwrap();
