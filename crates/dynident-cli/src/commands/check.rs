@@ -12,7 +12,7 @@ use std::path::PathBuf;
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder of the recordings, in place of the study's own.
+    /// Folder of the recordings, if it differs from the study's.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     #[command(flatten)]

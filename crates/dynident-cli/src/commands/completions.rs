@@ -13,7 +13,7 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options, mut command: clap::Command, context: &Context) -> Result<Verdict, String> {
     if context.json {
-        return Err("completions prints a script for a shell, which is no JSON: leave --json out".to_owned());
+        return Err("completions prints a shell script, which is not JSON: omit --json".to_owned());
     }
     let mut script = Vec::new();
     clap_complete::generate(options.shell, &mut command, "dynident", &mut script);

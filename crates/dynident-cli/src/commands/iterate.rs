@@ -34,17 +34,17 @@ const WRITTEN: [&str; 11] = [
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder for iterations.json, report.html, trajectory.json, runs/, and the robot that was found: result.json,
+    /// Folder for iterations.json, report.html, trajectory.json, runs/, and the identified robot: result.json,
     /// identified.urdf (and .toml or .xml), identification.html, controller.json.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Make every run anew: by default runs that are in the folder already are not made again.
+    /// Repeat every run; by default existing runs in the folder are kept.
     #[arg(long)]
     fresh: bool,
-    /// Say in one line how the iteration in the folder stands, and run nothing.
+    /// Print the status of the iteration in the folder in one line, and run nothing.
     #[arg(long, conflicts_with = "fresh")]
     status: bool,
-    /// Seed of the simulated sensors' noise, in place of the study's.
+    /// Seed of the simulated sensor noise, if it differs from the study's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     #[command(flatten)]
@@ -52,12 +52,11 @@ pub(crate) struct Options {
     /// Ask on the terminal before each run.
     #[arg(long)]
     confirm: bool,
-    /// Folder of the robot description, in place of the study's own.
+    /// Folder of the robot description, if it differs from the study's.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
 }
 
-/// Runs the command.
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     if options.status {
         return status(&options.out, context);
@@ -79,7 +78,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     let stop = StopSignal::default();
     interruption::listen(&stop);
-    // A bar would be drawn over the questions.
+    // A progress bar would overwrite the questions.
     let progress: Box<dyn Progress> = if options.confirm { Box::new(Silent) } else { context.progress() };
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context, OnInterrupt::EndsCommand);
@@ -139,11 +138,11 @@ fn ended(file: &IterationsFile, options: &Options, context: &Context) -> Result<
     Ok(if file.converged { Verdict::Good } else { Verdict::Negative })
 }
 
-/// How the iteration in a folder stands.
+/// Prints the status of the iteration in a folder.
 fn status(out: &Path, context: &Context) -> Result<Verdict, String> {
     let path = out.join("iterations.json");
     if !path.is_file() {
-        return Err(format!("{}: no iteration has been here yet", path.display()));
+        return Err(format!("{}: this folder contains no iteration", path.display()));
     }
     let file = IterationsFile::read(&path).map_err(message_of)?;
     if context.json {

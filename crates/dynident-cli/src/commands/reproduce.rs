@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// Options of `reproduce`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// Folder for paper.json, report.html, the pictures and the studies behind them.
+    /// Folder for paper.json, report.html, the figures and their studies.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Seed of the genetic algorithm and of random starts.

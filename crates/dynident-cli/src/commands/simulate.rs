@@ -15,10 +15,10 @@ pub(crate) struct Options {
     /// Folder for log.csv and truth.json.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Seed of the sensors' noise, in place of the study's.
+    /// Seed of the sensor noise, if it differs from the study's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Folder of the robot description, in place of the study's own.
+    /// Folder of the robot description, if it differs from the study's.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     #[command(flatten)]

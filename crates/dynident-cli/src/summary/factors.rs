@@ -3,12 +3,12 @@
 use super::text::{name, table, wrapped};
 use dynident::result::FactorsFile;
 
-/// Digits of a hash that tell logs apart.
+/// Number of digits of a hash that distinguish logs.
 const DIGITS: usize = 8;
-/// Logs that are listed; the others are counted.
-const LISTED: usize = 40;
+/// Largest number of listed logs.
+const MAX_LISTED: usize = 40;
 
-/// What a file of factors holds.
+/// Content of a factor file.
 pub(crate) fn factors(file: &FactorsFile) -> String {
     let rows: u64 = file.logs.iter().map(|log| log.rows).sum();
     let count = file.logs.len();

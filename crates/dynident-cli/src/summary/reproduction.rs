@@ -4,7 +4,7 @@ use super::text::{table, wrapped};
 use dynident_paper::PaperFile;
 use std::path::Path;
 
-/// What was to be reached, and where to look.
+/// The goals, and the location of the report.
 pub(crate) fn reproduction(file: &PaperFile, out: &Path) -> String {
     let header = ["goal", "value", "at most", ""].map(str::to_owned);
     let rows = file
@@ -17,7 +17,7 @@ pub(crate) fn reproduction(file: &PaperFile, out: &Path) -> String {
         })
         .collect();
     let words = format!(
-        "{} tables and {} figures in {:.1} s, {} departures from the paper's text with their reasons: open {}",
+        "{} tables and {} figures in {:.1} s, {} deviations from the paper's text with their reasons: open {}",
         file.tables.len(),
         file.figures.len(),
         file.seconds,

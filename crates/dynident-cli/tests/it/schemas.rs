@@ -1,4 +1,4 @@
-//! The schemas that are shipped are those of the types.
+//! The stored schemas are those of the types.
 
 #[path = "../../examples/schemas.rs"]
 #[expect(dead_code, reason = "the example's own main")]
