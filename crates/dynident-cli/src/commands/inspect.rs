@@ -58,9 +58,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
             ));
             Ok(verdict(&inspection))
         }
-        MendedDescription::NoUrdf => {
-            Err(format!("{}: --fix supports only URDF files", options.robot.display()))
-        }
+        MendedDescription::NoUrdf => Err(format!("{}: --fix supports only URDF files", options.robot.display())),
     }
 }
 

@@ -111,7 +111,10 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
                 log.log
             )),
             None => {
-                terminal::remark(&format!("{}: the torque is always zero, so the relative error is undefined", log.log));
+                terminal::remark(&format!(
+                    "{}: the torque is always zero, so the relative error is undefined",
+                    log.log
+                ));
             }
         }
         verdict = Verdict::Negative;

@@ -172,8 +172,7 @@ pub(crate) fn somebody() -> Result<(), String> {
     if std::io::stdin().is_terminal() {
         return Ok(());
     }
-    Err("--confirm needs a terminal, but standard input is not a terminal: run the command in a terminal"
-        .to_owned())
+    Err("--confirm needs a terminal, but standard input is not a terminal: run the command in a terminal".to_owned())
 }
 
 /// Asks for a line of text; `None` without a terminal, or for an empty answer.

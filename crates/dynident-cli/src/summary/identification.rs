@@ -214,8 +214,7 @@ fn joints(r: &ResultFile) -> String {
 fn between_logs(r: &ResultFile) -> String {
     let Some(found) = r.method.between_logs else { return String::new() };
     let of = |what: &str, k: Option<f64>| {
-        k.filter(|k| *k >= DIFFERING)
-            .map(|k| format!("{what} vary between logs ({k:.1} times their error bars)"))
+        k.filter(|k| *k >= DIFFERING).map(|k| format!("{what} vary between logs ({k:.1} times their error bars)"))
     };
     let said: Vec<String> =
         [of("bodies", found.bodies), of("friction parameters", found.friction)].into_iter().flatten().collect();

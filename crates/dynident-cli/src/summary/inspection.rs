@@ -44,7 +44,10 @@ pub(crate) fn inspection(i: &Inspection) -> String {
         text += &wrapped(&format!("  {}", rounded(expression)), 6);
     }
     if base.numerical_rank != base.count {
-        let doubt = format!("   the regressor at random states has rank {}: the base parameters are not reliable", base.numerical_rank);
+        let doubt = format!(
+            "   the regressor at random states has rank {}: the base parameters are not reliable",
+            base.numerical_rank
+        );
         text += &wrapped(&doubt, 4);
     }
     text

@@ -79,7 +79,10 @@ fn verdict_remarks(file: &IterationsFile) -> String {
     let last_evidence = file.runs.iter().rev().find_map(|run| run.evidence.as_ref());
     if let Some(delay_s) = last_evidence.and_then(|evidence| evidence.feedback_delay_s) {
         text += &wrapped(
-            &format!("A feedback delay of {:.1} ms in the controller causes most of the tracking error.", 1e3 * delay_s),
+            &format!(
+                "A feedback delay of {:.1} ms in the controller causes most of the tracking error.",
+                1e3 * delay_s
+            ),
             4,
         );
     }
@@ -108,7 +111,7 @@ fn parameters(file: &IterationsFile) -> String {
     if file.base_parameters.is_empty() {
         return String::new();
     }
-    let mut text = "\nFound by all good runs together (+- 95 %):\n".to_owned();
+    let mut text = "\nEstimate from all good runs (+- 95 %):\n".to_owned();
     let rows = file.base_parameters.iter().take(MAX_PARAMETERS).map(|one| {
         let bar = if one.excited { format!("{:.2e}", one.bar_95()) } else { "not excited".to_owned() };
         vec![super::text::name(&one.symbol), format!("{:.5}", one.value), bar, one.unit.clone()]

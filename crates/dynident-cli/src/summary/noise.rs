@@ -69,7 +69,7 @@ fn verdict(noise: &NoiseInRegressor, used: bool) -> String {
         .map_or(String::new(), |(f, p)| format!(" (Durbin-Wu-Hausman test: F = {f:.1}, p = {p:.1e})"));
     let followed = noise.fast_motion.map_or(String::new(), |fast| {
         format!(
-            "torque follows {:.0}\u{a0}% of the fast motion, the rest is noise",
+            "{:.0}\u{a0}% of the fast motion agrees with the torque, the rest is noise",
             100.0 * fast.followed.clamp(0.0, 1.0)
         )
     });

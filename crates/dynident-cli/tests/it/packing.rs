@@ -41,7 +41,7 @@ fn shells_read_their_completions() {
     }
     let refused = run_in(Path::new("."), &["completions", "bash", "--json"]);
     assert_eq!((refused.status, refused.stdout.as_str()), (2, ""));
-    assert!(refused.stderr.contains("leave --json out"));
+    assert!(refused.stderr.contains("omit --json"));
     assert_eq!(run_in(Path::new("."), &["completions", "tcsh"]).status, 2);
 }
 

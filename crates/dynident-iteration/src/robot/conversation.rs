@@ -1,6 +1,6 @@
 //! Both modes of a run with a robot program: `run` and `step`.
 
-use super::client::{Client, Heard};
+use super::client::{Client, Received};
 use super::protocol::{EndStatus, ToClient, ToHost, WayFiles};
 use super::recorder::Recorder;
 use super::stop_reason::Stopping;
