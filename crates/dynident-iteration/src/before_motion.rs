@@ -68,9 +68,7 @@ pub(crate) fn motions<'a>(
 
 /// Paths from and to home for each leg; `None` if no home is set.
 ///
-///
 /// # Errors
-///
 /// No path to one of the legs.
 pub(crate) fn ways_of(
     task: &IterationTask,

@@ -10,17 +10,6 @@ use dynident_identification::examination::{LagChoice, TorqueLag};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Largest share of samples at the drive's limit; a limit that is touched briefly at a reversal has no effect.
-const MOST_CLIPPED: f64 = 2e-3;
-
-/// Smallest share of the torque inside the 95 % band of a prediction. Residuals that are correlated over seconds let
-/// the share vary by some percent; a prediction that is off by its noise throughout has 83 %.
-const LEAST_INSIDE: f64 = 0.85;
-
-/// Ratio of the lag difference of two runs to its 95 % interval above which the lags differ; with six joints and some
-/// runs, ratios above 1 occur by chance.
-const CLEARLY_OTHER: f64 = 1.5;
-
 /// A condition that the last run does not meet, with its numbers; [`remedy`](Self::remedy) suggests a fix.
 #[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -320,7 +309,7 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
     }
     found.extend(last.knowledge().and_then(|known| long_lag(&known.lag, names.most_lag_s)));
     for (place, shown) in evidence.joints.iter().enumerate() {
-        if let Some((now, then)) = changed_lag(&good, place) {
+        if let Some((now, then)) = changed_lag(&good, place, limits.verdict.min_lag_change_ratio) {
             let half_width_95_s = now.half_width_95_s.hypot(then.half_width_95_s);
             let (lag_s, before_s) = (now.lag_s, then.lag_s);
             found.push(Shortfall::LagChanges { joint: joint(place), lag_s, before_s, half_width_95_s });
@@ -329,7 +318,7 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
     }
     found.extend(evidence.other_length.clone().map(Shortfall::Length));
     if names.held_out {
-        held_out(&mut found, last, names);
+        held_out(&mut found, last, limits.verdict.min_inside_share, names);
     }
     found
 }
@@ -344,7 +333,9 @@ fn of_joint(
     names: &Names,
 ) {
     let joint = || names.joints[place].clone();
-    if let Some(Clipping { share, torque, stated }) = shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED) {
+    if let Some(Clipping { share, torque, stated }) =
+        shown.clipping.filter(|clipping| clipping.share > limits.verdict.max_clipped_share)
+    {
         let beyond = last.max_tracking_error_rad[place] > limits.tracking_tolerance;
         // Without a stated limit, constant peak torque indicates saturation only if the joint does not follow and no
         // larger torque was commanded.
@@ -353,7 +344,7 @@ fn of_joint(
         }
     }
     let of_run = shown.prediction.filter(|_| !names.held_out);
-    if let Some(prediction) = of_run.filter(|prediction| prediction.inside < LEAST_INSIDE) {
+    if let Some(prediction) = of_run.filter(|prediction| prediction.inside < limits.verdict.min_inside_share) {
         found.push(Shortfall::Prediction {
             joint: joint(),
             inside_percent: 100.0 * prediction.inside,
@@ -374,7 +365,7 @@ fn of_joint(
 }
 
 /// Conditions that the held-out run after the last run does not meet.
-fn held_out(found: &mut Vec<Shortfall>, last: &RunRecord, names: &Names) {
+fn held_out(found: &mut Vec<Shortfall>, last: &RunRecord, min_inside_share: f64, names: &Names) {
     let Some(run) = &last.held_out else {
         found.push(Shortfall::NotHeldOut);
         return;
@@ -386,7 +377,7 @@ fn held_out(found: &mut Vec<Shortfall>, last: &RunRecord, names: &Names) {
     };
     for (place, shown) in evidence.joints.iter().enumerate() {
         let Some(prediction) = shown.prediction else { continue };
-        if prediction.inside < LEAST_INSIDE {
+        if prediction.inside < min_inside_share {
             found.push(Shortfall::HeldOutPrediction {
                 joint: names.joints[place].clone(),
                 inside_percent: 100.0 * prediction.inside,
@@ -408,7 +399,7 @@ fn unexplained_lag(lag: &LagChoice, log_rates_hz: &[f64]) -> Option<TorqueLag> {
 
 /// Lags of a joint in the last good run and in the run that differs most from it, if a lag was compensated and they
 /// differ significantly.
-fn changed_lag(good: &[&RunRecord], joint: usize) -> Option<(TorqueLag, TorqueLag)> {
+fn changed_lag(good: &[&RunRecord], joint: usize, min_ratio: f64) -> Option<(TorqueLag, TorqueLag)> {
     let (last, before) = good.split_last()?;
     let taken_off = good.iter().filter_map(|record| record.estimate.as_ref()).chain(last.knowledge());
     if taken_off.into_iter().all(|estimate| estimate.lag.taken_off().is_none()) {
@@ -418,7 +409,7 @@ fn changed_lag(good: &[&RunRecord], joint: usize) -> Option<(TorqueLag, TorqueLa
     let now = lag_of(last)?;
     let bars = |then: &TorqueLag| (now.lag_s - then.lag_s).abs() / now.half_width_95_s.hypot(then.half_width_95_s);
     let then = before.iter().filter_map(|record| lag_of(record)).max_by(|a, b| bars(a).total_cmp(&bars(b)))?;
-    (bars(&then) > CLEARLY_OTHER).then_some((now, then))
+    (bars(&then) > min_ratio).then_some((now, then))
 }
 
 /// Reports the parameter that changed most, if it changed too much, and the parameter with the widest error bar, if it

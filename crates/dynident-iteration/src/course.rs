@@ -36,13 +36,10 @@ pub struct IterationOutcome {
 /// ones is halved; if that does not help, the iteration falls back to the controller without a model, with higher
 /// gains.
 ///
-///
 /// `robots` contains one robot for all legs, or one per leg. With a `store`, stored runs are not repeated, and each new
 /// run is stored before the next begins. `watch` is called after every new run.
 ///
-///
 /// # Errors
-///
 /// Settings that do not fit together, files that cannot be written. Faults of the robot are reported in the records and
 /// the status.
 pub fn iterate(
@@ -57,9 +54,7 @@ pub fn iterate(
 /// [`iterate()`] with a supervisor, who may stop it and must permit every motion. A run that is
 /// stopped is not used: its log is kept in a separate folder, and the next call repeats the run.
 ///
-///
 /// # Errors
-///
 /// As [`iterate()`].
 pub fn iterate_supervised(
     iteration: &Iteration,

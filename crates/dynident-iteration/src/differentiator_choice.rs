@@ -1,6 +1,5 @@
 //! Selection of the differentiator of a run.
 //!
-//!
 //! All candidates yield rows for the same torques, so the best one has the smallest residual: noise of velocities and
 //! accelerations, motion that a filter removes, and a wrong map all increase the residual.
 
@@ -83,9 +82,7 @@ fn candidates() -> [(&'static str, DifferentiatorSettings); 4] {
 /// Selects the differentiator with the smallest torque residual of a run. Friction is selected for each candidate if
 /// the settings request it.
 ///
-///
 /// # Errors
-///
 /// A run to which no candidate can be applied.
 pub(crate) fn choose_differentiator(
     task: &IterationTask,

@@ -83,7 +83,7 @@ impl Iteration {
     /// Returns a run for an additional motion, if the iteration has converged, motions are planned, and a run is left.
     pub(crate) fn further(&self, status: &IterationStatus, records: &[RunRecord]) -> Option<RunPlan> {
         let open = self.planner.is_some() && status.is_converged() && records.len() < self.settings.max_runs;
-        open.then(|| policy::further(records)).flatten()
+        open.then(|| policy::further(records, &self.settings.settled.verdict)).flatten()
     }
 
     /// Makes one run: each leg on its robot, then the identification.
@@ -215,7 +215,8 @@ impl Iteration {
         let is_judged = known.is_some() && record.controller.model.is_some();
         if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
             add_tracking_floors(evidence, &task, records, &self.settings, after, &in_force.friction_before, errors);
-            evidence.other_length = other_length(&task, &runs, &settings, after)?;
+            let thresholds = &self.settings.settled.verdict.lengths;
+            evidence.other_length = other_length(&task, &runs, &settings, after, thresholds)?;
         }
         let fitted = Some((&task, &runs[..], &*settings));
         record.torque_check = self.torque_check(record, records, before, earlier, prepared, fitted)?;
@@ -225,7 +226,11 @@ impl Iteration {
     /// Accepts or rejects the run.
     fn judge(&self, record: &mut RunRecord, before: &[RunRecord]) -> Result<(), IterationError> {
         let names = self.names(&*self.robot(before)?, before)?;
-        let following = following_limits(&self.legs_of(record)?, self.task.robot.dof());
+        let following = following_limits(
+            &self.legs_of(record)?,
+            self.task.robot.dof(),
+            self.settings.settled.verdict.following_error_bounds,
+        );
         match policy::verdict(record, before, &self.settings, &following, &names) {
             Ok(()) => record.accepted = true,
             Err(reason) => record.reason = Some(reason.to_string()),

@@ -98,9 +98,7 @@ impl RunEstimate {
 /// has less weight. Residuals are those of the last run; delays are those of all runs. If the offset of a run differs
 /// from the others, each run gets its own offset ([`RunOffsets`](super::RunOffsets)).
 ///
-///
 /// # Errors
-///
 /// As [`identify_run`](crate::identify_run).
 pub fn identify_runs(
     task: &IterationTask,
@@ -122,7 +120,6 @@ pub fn identify_runs(
 }
 
 /// Fits with a shared offset per joint, or one per run.
-///
 ///
 /// Friction that is selected from rows with a lag can compensate the lag, differently at each joint, so that the common
 /// lag becomes insignificant. Therefore, if friction was selected and no lag was compensated, the fit is repeated with

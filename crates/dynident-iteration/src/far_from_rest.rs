@@ -1,6 +1,5 @@
 //! Exclusion of rows near rest, joint by joint, if they increase the residual.
 //!
-//!
 //! Near rest a joint with dry friction sticks, breaks loose and jumps, but its smoothed motion does not. The difference
 //! has the same sign in every run, so more rows narrow the error bars but do not reduce the error: it biases drive
 //! inertias and looks like a lag of individual joints. Where this happens, rows near rest have larger residuals than
@@ -38,9 +37,7 @@ const MIN_RESIDUAL_RATIO: f64 = 1.05;
 
 /// Estimates the base parameters from a run, without rows near rest where friction does not explain them.
 ///
-///
 /// # Errors
-///
 /// As [`identify_run`](crate::identify_run).
 pub(crate) fn without_near_rest(
     task: &IterationTask,

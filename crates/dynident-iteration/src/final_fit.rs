@@ -15,9 +15,7 @@ impl Iteration {
     /// iteration: the logs of all good runs in the store (only the last if runs are not pooled), each weighted by its
     /// own noise, all joints at once, no parameter fixed. `None` without a good run.
     ///
-    ///
     /// # Errors
-    ///
     /// Logs that are missing in the store, records of another robot.
     pub fn identification_task(
         &self,

@@ -98,16 +98,13 @@ pub fn lowered_bandwidths(
 ///   inertia, the model and M_jj use that of a typical drive (the effort limit accelerates it by 300 rad/s²);
 /// * * computed torque with an identified model: `K_p = ω²`, `K_d = 2 ω`.
 ///
-///
 /// So the lightest robot within the uncertainty is not faster than requested: under computed torque in all postures,
 /// under joint PD in the posture with the largest inertia of the joint (in others it is faster, and overdamped). A
 /// heavier robot is slower and sags more; the rehearsal shows whether it follows well enough.
 ///
-///
 /// A delayed loop becomes unstable where it is fast: under joint PD, a folded arm has a tenth of the inertia for which
 /// the gains are designed. So `ω` is reduced, first for each joint, then for all together, until every posture along
 /// the motions has a phase margin of 30 degrees at this delay. It is never increased.
-///
 ///
 /// A drive without described inertia may be much lighter than a typical one: a gripper of 30 Nm had a tenth of the
 /// typical inertia, which makes the loop ten times as fast. With `lightest_drive` times the typical inertia and a delay
@@ -115,9 +112,7 @@ pub fn lowered_bandwidths(
 /// reduced. `ω` stays high enough that typical friction (5 % of the effort limit, and as much at full velocity) holds
 /// the joint at most 80 % of `tracking_error` from its path.
 ///
-///
 /// # Errors
-///
 /// A bandwidth that is not positive, an uncertainty of 100 % or more, a nominal model without inertia, or a negative
 /// delay.
 pub fn derived_controllers(

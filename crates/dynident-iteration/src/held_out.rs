@@ -31,9 +31,7 @@ pub(crate) enum HeldOutOutcome {
 impl Iteration {
     /// Returns the iteration with validation by runs of a held-out motion.
     ///
-    ///
     /// # Errors
-    ///
     /// A task with several legs or with windows, a motion with other joints, or `every` = 0.
     pub fn with_held_out(mut self, held_out: HeldOutMotion) -> Result<Self, SimulationError> {
         let legs = &self.task().legs;

@@ -67,7 +67,7 @@ pub enum HomeError {
         begins: bool,
     },
     /// A posture breaks a limit.
-    #[error("{posture} breaks the limit of {kind} of {subject} (ratio {ratio:.3}, 1 is the limit): {fix}")]
+    #[error("{posture} itself breaks the limit of {kind} of {subject} (ratio {ratio:.3}, 1 is the limit): {fix}")]
     Posture {
         /// The posture.
         posture: &'static str,
@@ -122,9 +122,7 @@ pub struct FoundWays {
 impl HomeSettings {
     /// Checks the settings for `joints` joints.
     ///
-    ///
     /// # Errors
-    ///
     /// A posture with another number of joints, or a speed outside of 0 to 1.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         require_length("home", joints, self.posture.len())?;
@@ -142,9 +140,7 @@ impl HomeSettings {
     /// two random via postures (at most 500, fixed seed), at rest in each. All limits are checked by [`check_limits`].
     /// If the robot is already there the path has one sample.
     ///
-    ///
     /// # Errors
-    ///
     /// No path exists; nothing has moved.
     pub fn ways(&self, model: &Model, motion: &Reference, envelope: Option<&Envelope>) -> Result<FoundWays, HomeError> {
         self.ways_until(model, motion, envelope, &|| false)

@@ -13,9 +13,7 @@ use dynident_simulation::Record;
 /// rows are omitted; known columns are fixed. The differentiator is selected if the settings request it, and rows near
 /// rest are used where friction explains them ([`NearRest`](crate::NearRest)).
 ///
-///
 /// # Errors
-///
 /// Records that do not belong to the task, a differentiator that cannot be applied, rows that are not sufficient for an
 /// estimate. A missing physically consistent model is part of the result, not an error.
 pub fn identify_run(

@@ -142,9 +142,7 @@ impl Iteration {
 
     /// Returns the robot with the friction that an earlier run selected.
     ///
-    ///
     /// # Errors
-    ///
     /// Friction terms that do not fit this robot: the run belongs to another robot.
     pub fn robot(&self, records: &[RunRecord]) -> Result<Cow<'_, ParametricModel>, IterationError> {
         let choices = records.iter().filter_map(|record| Some((record.run, &record.estimate.as_ref()?.friction)));
@@ -176,9 +174,7 @@ impl Iteration {
 
     /// Returns the controller model with these parameters, after these records.
     ///
-    ///
     /// # Errors
-    ///
     /// Parameters of another robot.
     pub fn controller_model(
         &self,

@@ -20,9 +20,7 @@ pub struct Leg {
 impl Leg {
     /// Creates a leg of which all samples of all joints are used.
     ///
-    ///
     /// # Errors
-    ///
     /// A reference with a single sample.
     pub fn whole(reference: Reference) -> Result<Self, FilterError> {
         Self::new(reference, None)
@@ -31,9 +29,7 @@ impl Leg {
     /// Creates a leg of which the torque of joint j is used only in the time intervals `windows[j]` (from, to; s): the
     /// paper's ±δ around mid-strokes, while the joint moves alone.
     ///
-    ///
     /// # Errors
-    ///
     /// A reference with a single sample.
     pub fn windowed(reference: Reference, windows: Vec<Vec<[f64; 2]>>) -> Result<Self, FilterError> {
         Self::new(reference, Some(windows))
@@ -51,9 +47,7 @@ impl Leg {
 
     /// Returns a copy along another trajectory, with the same windows, payload and custom differentiator.
     ///
-    ///
     /// # Errors
-    ///
     /// A reference with a single sample.
     pub fn along(&self, reference: Reference) -> Result<Self, FilterError> {
         let other = Self::new(reference, self.windows.clone())?;
@@ -131,9 +125,7 @@ pub struct IterationTask {
 impl IterationTask {
     /// Creates a task for all joints with one trajectory, without windows or known parameters.
     ///
-    ///
     /// # Errors
-    ///
     /// A reference with a single sample.
     pub fn new(robot: ParametricModel, reference: Reference) -> Result<Self, FilterError> {
         Ok(Self { robot, legs: vec![Leg::whole(reference)?], known: Vec::new(), torque_limits: None })
@@ -141,9 +133,7 @@ impl IterationTask {
 
     /// Checks that legs and known columns belong to the robot.
     ///
-    ///
     /// # Errors
-    ///
     /// No legs, wrong numbers of joints, empty windows, unknown columns, values that are not finite.
     pub fn validate(&self) -> Result<(), SimulationError> {
         let dof = self.robot.dof();

@@ -1,6 +1,5 @@
 //! Detection of a link length that differs from the robot description.
 //!
-//!
 //! The size of the residual does not reveal a wrong length, because unmodelled friction causes a similar residual. But
 //! only a wrong length is corrected by fitting another length. So the runs are fitted again with one length changed by
 //! ±[`LENGTH_STEP`]. `Σ_j n_j σ_j(s)² / σ_j(0)²`, the squared residuals relative to those of the described lengths, is
@@ -11,6 +10,7 @@ use crate::estimate::RunEstimate;
 use crate::leg::IterationTask;
 use crate::run_logs::{RunLog, identification_settings, recordings};
 use crate::settings::{RunIdentificationSettings, Scheme};
+use crate::verdict_settings::LengthSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_identification::estimators::estimate;
 use dynident_identification::{Execution, IdentificationSettings, Logs, Recording, RegressorModel, training_rows};
@@ -20,15 +20,6 @@ use serde::{Deserialize, Serialize};
 const LENGTH_STEP: f64 = 0.03;
 /// Largest relative change for which the parabola is used.
 const MAX_LENGTH_CHANGE: f64 = 0.3;
-/// Smallest relative change that is reported; bearings and dimension tables are not more accurate.
-const MIN_LENGTH_CHANGE: f64 = 0.01;
-/// Largest ratio of a joint's residual with the other length to that with the described length. Unmodelled friction is
-/// not mistaken for a length: by chance, residuals vary by some tenths of a percent per fitted parameter.
-const MAX_RESIDUAL_RATIO: f64 = 0.8;
-/// Smallest share of the squared residuals of all joints that another length explains: a length affects several joints,
-/// whereas unmodelled friction in one light joint is explained by a length in that joint only. A correct arm of the
-/// test campaign reaches 0.06.
-const MIN_EXPLAINED_SHARE: f64 = 0.12;
 /// Smallest offset that is tested, as a share of the longest; shorter offsets have too little effect on the torque.
 const MIN_OFFSET_SHARE: f64 = 0.02;
 
@@ -51,15 +42,14 @@ pub struct OtherLength {
 /// Returns the change of one length, or of all lengths by the same factor, that explains the torque of some runs best,
 /// if it does so significantly. `task` includes the selected friction; `known` is the estimate of the runs.
 ///
-///
 /// # Errors
-///
 /// Records that do not belong to the task.
 pub(crate) fn other_length(
     task: &IterationTask,
     runs: &[RunLog<'_>],
     settings: &RunIdentificationSettings,
     known: &RunEstimate,
+    thresholds: &LengthSettings,
 ) -> Result<Option<OtherLength>, IterationError> {
     let model = task.robot.model();
     let cannot = settings.scheme != Scheme::AllJoints || !task.known.is_empty() || !settings.payloads.is_empty();
@@ -91,15 +81,15 @@ pub(crate) fn other_length(
         let (shorter, longer) = (misfit(&shorter), misfit(&longer));
         let (slope, bend) = (0.5 * (longer - shorter), longer - 2.0 * as_described + shorter);
         let change = (-slope / bend * LENGTH_STEP).clamp(-MAX_LENGTH_CHANGE, MAX_LENGTH_CHANGE);
-        if bend <= 0.0 || change.is_nan() || change.abs() < MIN_LENGTH_CHANGE {
+        if bend <= 0.0 || change.is_nan() || change.abs() < thresholds.min_change {
             continue;
         }
         let Some(there) = fitted(joint, change) else { continue };
         let share = |place: &usize| there.sigma[*place] / described.sigma[*place];
         let explained =
             (0..model.dof()).filter(|&place| described.sigma[place] > 0.0).min_by(|a, b| share(a).total_cmp(&share(b)));
-        let Some(place) = explained.filter(|place| share(place) < MAX_RESIDUAL_RATIO) else { continue };
-        let most = (1.0 - MIN_EXPLAINED_SHARE) * as_described;
+        let Some(place) = explained.filter(|place| share(place) < thresholds.max_residual_ratio) else { continue };
+        let most = (1.0 - thresholds.min_explained_share) * as_described;
         if misfit(&there) < best.as_ref().map_or(most, |(least, _)| *least) {
             let name = |joint: usize| model.joints()[joint].name.clone();
             let found = OtherLength {

@@ -128,6 +128,7 @@ mod torque_noise;
 mod torque_of_all;
 mod tracking_floor;
 mod typical_drives;
+mod verdict_settings;
 mod warm_up;
 
 pub use convergence::Shortfall;
@@ -166,6 +167,7 @@ pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
 pub use supervision::{NextMotion, NextWays, Supervisor};
 pub use torque_check::{CommandSource, JointTorqueCheck, TorqueCandidate, TorqueCause, TorqueCheck};
-pub use torque_check_settings::TorqueCheckSettings;
+pub use torque_check_settings::{CauseSettings, TorqueCheckSettings};
 pub use typical_drives::with_typical_drives;
+pub use verdict_settings::{LengthSettings, VerdictSettings};
 pub use warm_up::WarmUp;

@@ -31,7 +31,6 @@ fn omega_with_margin(ratio: f64, delay_s: f64, margin: f64, damping: f64) -> f64
 /// Factor (at most 1) on the natural frequencies `omega` (rad/s) at which joints with velocity gains `kd` (Nms/rad)
 /// keep that margin in a posture with mass matrix `M`. `None` if `M` is not positive definite.
 ///
-///
 /// The coupled loops may be too fast although each single loop is slow enough: the fastest motion of all joints crosses
 /// over at `λ`, the largest eigenvalue of `M⁻¹ K_d`, like a single joint with `r = λ / 2ω`.
 pub(crate) fn share_of_all(matrix: &DMatrix<f64>, kd: &[f64], omega: &[f64], delay_s: f64) -> Option<f64> {

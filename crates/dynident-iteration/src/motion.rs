@@ -22,9 +22,7 @@ const UNIFORM_STEP_TOLERANCE: f64 = 1e-6;
 /// steps). Torque of joints with a margin in `margins` (joints with dry friction) is excluded while the joint is closer
 /// to rest than the margin, because static friction is undetermined there.
 ///
-///
 /// # Errors
-///
 /// A record with other joints or too few samples, a differentiator that does not exist at its rate or lacks an input.
 pub fn measured_motion(
     record: &Record,
@@ -154,7 +152,6 @@ fn raw_samples(
 
 /// Torque at a sample that corresponds to the smooth curve through the positions, if the torques u are held from each
 /// sample to the next.
-///
 ///
 /// With I q̈ + G(q) = u, second differences of the positions contain the mean `ū` of the two values and G over the
 /// triangle of both steps: `I δ²q/h² + G + h² G''/12 = ū`. With `δ²q/h² = q̈ + h² q⁗/12` this is `ū - h²/12 (I q⁗ +

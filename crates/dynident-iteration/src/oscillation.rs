@@ -1,7 +1,6 @@
 //! Detection of oscillations of a joint: a signal that alternates far faster than any motion, as from a control loop
 //! that is too fast for its delay or a drive that switches between two torques.
 //!
-//!
 //! The signal without its moving mean over one period of the lowest frequency alternates when it passes `+h` and `-h`
 //! in turn. Oscillations are regular: over [`SWINGS`] alternations the period lengths differ little. The periods of
 //! noise vary by as much as their length.
@@ -65,9 +64,7 @@ impl Default for OscillationSettings {
 impl OscillationSettings {
     /// Checks the numbers.
     ///
-    ///
     /// # Errors
-    ///
     /// Numbers out of range.
     pub fn validate(&self) -> Result<(), SimulationError> {
         let lowest_hz = self.lowest_hz.unwrap_or(LOWEST_HZ);

@@ -48,9 +48,7 @@ pub trait MotionPlanner: core::fmt::Debug + Send + Sync {
     /// Plans the motion of a run that follows a good one. It is called once per run: the plan is stored with the
     /// iteration, so it need not be reproducible.
     ///
-    ///
     /// # Errors
-    ///
     /// A task for which motions cannot be planned. If no better motion is found, the plan repeats the last one.
     fn plan(&self, before: &BeforeRun<'_>) -> Result<PlannedMotion, IterationError>;
 }

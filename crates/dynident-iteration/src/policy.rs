@@ -8,19 +8,10 @@ use crate::record::RunRecord;
 use crate::settings::{IterationSettings, StartWith};
 use crate::status::IterationStatus;
 use crate::torque_check::TorqueCause;
+use crate::verdict_settings::VerdictSettings;
 use dynident_simulation::PerJoint;
 use dynident_simulation::controllers::{ControllerSettings, JointPdSettings, JointPidSettings};
 use thiserror::Error;
-
-/// Largest ratio of a good run's error bars to those of an earlier estimate for which the new estimate is used.
-const MAX_WIDTH_RATIO_OF_GOOD_RUN: f64 = 3.0;
-
-/// Largest ratio of a rejected run's error bars to those of a good run for which its estimate is used.
-const MAX_WIDTH_RATIO_OF_REJECTED_RUN: f64 = 0.5;
-
-/// Share of a joint's samples at the drive's limit above which a run that left its trajectory proves that no controller
-/// can follow it.
-const MIN_SATURATED_SHARE: f64 = 0.05;
 
 /// The next step.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,7 +93,7 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     let untried = |model: &ModelParameters| {
         !records.iter().any(|record| !record.accepted && record.controller.model.as_ref() == Some(model))
     };
-    let trusted = most_trusted(records).and_then(model_of);
+    let trusted = most_trusted(records, &settings.settled.verdict).and_then(model_of);
     if let Some(model) = trusted.into_iter().chain(newest.filter(|_| last.accepted)).find(untried) {
         return Next::Run(RunPlan::with_model(run, model, 1.0));
     }
@@ -119,7 +110,9 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
         let share = 0.5_f64.powi(halvings as i32);
         return Next::Run(RunPlan::with_model(run, ModelParameters::between(&good, &new, share), share));
     }
-    if let Some(clipped) = rejected.iter().rev().find_map(|record| helpless(record, names)) {
+    if let Some(clipped) =
+        rejected.iter().rev().find_map(|record| helpless(record, settings.settled.verdict.min_saturated_share, names))
+    {
         return Next::Finished(IterationStatus::Refused { reason: clipped });
     }
     let before = records.iter().filter(|record| record.controller.model.is_none()).count();
@@ -127,8 +120,8 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
 }
 
 /// Returns a further run for an additional motion after all conditions are met; `None` if no run has a model.
-pub(crate) fn further(records: &[RunRecord]) -> Option<RunPlan> {
-    let model = most_trusted(records).and_then(model_of)?;
+pub(crate) fn further(records: &[RunRecord], thresholds: &VerdictSettings) -> Option<RunPlan> {
+    let model = most_trusted(records, thresholds).and_then(model_of)?;
     Some(RunPlan::with_model(records.len() + 1, model, 1.0))
 }
 
@@ -138,11 +131,11 @@ fn model_of(record: &RunRecord) -> Option<ModelParameters> {
 }
 
 /// Reports that a run with a model left its trajectory while its drives were saturated.
-fn helpless(record: &RunRecord, names: &Names) -> Option<String> {
+fn helpless(record: &RunRecord, min_saturated_share: f64, names: &Names) -> Option<String> {
     let joints = &record.evidence.as_ref().filter(|_| record.done && record.controller.model.is_some())?.joints;
     let clipped = joints.iter().enumerate().filter_map(|(joint, shown)| Some((joint, shown.clipping?)));
     let (joint, Clipping { share, torque, .. }) = clipped.max_by(|a, b| a.1.share.total_cmp(&b.1.share))?;
-    (share >= MIN_SATURATED_SHARE).then(|| {
+    (share >= min_saturated_share).then(|| {
         format!(
             "{}: the drive of joint {} was saturated at {torque:.3} Nm in {:.0} % of the samples: use a slower motion, or add a torque limit to [design.limits]",
             failed(record),
@@ -155,9 +148,13 @@ fn helpless(record: &RunRecord, names: &Names) -> Option<String> {
 /// The run with the best estimate: the newest good run, unless its error bars are much wider than those of an earlier
 /// run, or a rejected run with clearly narrower error bars. Bad tracking indicates a bad model in the controller, not a
 /// bad estimate: a joint with large tracking errors may be excited better than one that hardly moves.
-fn most_trusted(records: &[RunRecord]) -> Option<&RunRecord> {
+fn most_trusted<'r>(records: &'r [RunRecord], thresholds: &VerdictSettings) -> Option<&'r RunRecord> {
     records.iter().filter(|record| model_of(record).is_some()).reduce(|best, record| {
-        let most = if record.accepted { MAX_WIDTH_RATIO_OF_GOOD_RUN } else { MAX_WIDTH_RATIO_OF_REJECTED_RUN };
+        let most = if record.accepted {
+            thresholds.max_width_ratio_of_good_run
+        } else {
+            thresholds.max_width_ratio_of_rejected_run
+        };
         let (Some(old), Some(new)) = (best.knowledge(), record.knowledge()) else { return best };
         if new.wider_than(old) <= most { record } else { best }
     })

@@ -61,9 +61,7 @@ impl Default for RedesignSettings {
 impl RedesignSettings {
     /// Checks the number.
     ///
-    ///
     /// # Errors
-    ///
     /// A percentage out of range.
     pub fn validate(&self) -> Result<(), SimulationError> {
         let percent = self.least_gain_percent;
@@ -128,9 +126,7 @@ impl Redesign {
     /// Creates a planner for motions of a family within limits, which replace the motion of `leg` (the only leg of the
     /// task).
     ///
-    ///
     /// # Errors
-    ///
     /// Settings out of range, or a family with other joints.
     pub fn new(
         family: Box<dyn Family>,

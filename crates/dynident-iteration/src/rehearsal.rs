@@ -65,9 +65,7 @@ impl Default for RehearsalSettings {
 impl RehearsalSettings {
     /// Checks the numbers.
     ///
-    ///
     /// # Errors
-    ///
     /// Numbers out of range.
     pub fn validate(&self) -> Result<(), SimulationError> {
         let percent = self.uncertainty_percent;
@@ -224,9 +222,7 @@ pub(crate) struct Rehearsed<'a> {
 impl Rehearsed<'_> {
     /// Rehearses until `stop` returns true.
     ///
-    ///
     /// # Errors
-    ///
     /// Invalid numbers; a failed rehearsal is part of the result.
     pub(crate) fn run(
         &self,

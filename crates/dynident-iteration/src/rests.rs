@@ -12,7 +12,6 @@ pub(crate) const MOVING: f64 = 0.02;
 
 /// Distance from rest above which the torque of a joint is used.
 ///
-///
 /// A joint with dry friction sticks, breaks loose and jumps, but its smoothed velocity does not. The resulting error
 /// lasts as long as the smoothing window. So samples at which the joint is slower than `speed_share` of its highest
 /// speed are excluded, and `smoothing_periods` periods of the smoother's cut-off before and after them.

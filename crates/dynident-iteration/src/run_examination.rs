@@ -18,13 +18,9 @@ use dynident_identification::{Execution, Logs, RegressorModel};
 use dynident_recording::{cutoff, position_noise};
 use dynident_simulation::Record;
 
-/// Range of the largest tracking error with which a joint follows its trajectory, rad (m): half of the joint's range of
-/// motion, within these bounds. Beyond it, other effects may occur than along the motion: end stops, other contacts,
-/// friction at other speeds.
-const FOLLOWING_ERROR_BOUNDS: [f64; 2] = [0.1, 1.0];
-
-/// The largest tracking error of each joint with which it still follows, rad (m).
-pub(crate) fn following_limits(legs: &[Leg], dof: usize) -> Vec<f64> {
+/// The largest tracking error of each joint with which it still follows, rad (m): half of its range of motion, within
+/// these bounds.
+pub(crate) fn following_limits(legs: &[Leg], dof: usize, [low_rad, high_rad]: [f64; 2]) -> Vec<f64> {
     let range = |joint: usize| {
         let of_leg = |leg: &Leg| {
             let motion = leg.reference().motion();
@@ -34,15 +30,13 @@ pub(crate) fn following_limits(legs: &[Leg], dof: usize) -> Vec<f64> {
         };
         legs.iter().map(of_leg).fold(0.0, f64::max)
     };
-    (0..dof).map(|joint| (0.5 * range(joint)).clamp(FOLLOWING_ERROR_BOUNDS[0], FOLLOWING_ERROR_BOUNDS[1])).collect()
+    (0..dof).map(|joint| (0.5 * range(joint)).clamp(low_rad, high_rad)).collect()
 }
 
 /// Examines the records of a run, including the prediction by `known` (the estimate before the run), without rows
 /// within the margins around rests; `task` includes the selected friction.
 ///
-///
 /// # Errors
-///
 /// Records that do not belong to the task.
 pub(crate) fn examined(
     task: &IterationTask,

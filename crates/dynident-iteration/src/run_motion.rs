@@ -41,9 +41,7 @@ impl RunMotion {
 
     /// Reads the samples of the tables in a folder, for `joints` joints.
     ///
-    ///
     /// # Errors
-    ///
     /// A table that is missing or invalid.
     pub(crate) fn with_tables(self, folder: &Path, joints: usize) -> Result<Self, IterationError> {
         let of_leg = |(leg, rate_hz): (usize, &f64)| read_table(&folder.join(table_name(leg)), joints, *rate_hz);
@@ -54,9 +52,7 @@ impl RunMotion {
 
 /// The legs of a run: those of the task, or along the run's own trajectories.
 ///
-///
 /// # Errors
-///
 /// A motion with another number of legs.
 pub(crate) fn legs_along<'a>(
     task: &'a IterationTask,

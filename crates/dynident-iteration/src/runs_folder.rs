@@ -41,9 +41,7 @@ pub(crate) struct RunsFolder {
 impl RunsFolder {
     /// Reads the folder; changes nothing.
     ///
-    ///
     /// # Errors
-    ///
     /// Foreign content at the path of a run, where no run can be stored.
     pub(crate) fn read(runs: &Path) -> Result<Self, IterationError> {
         let (mut kept, mut planned, mut unfinished) = (Vec::new(), Vec::new(), Vec::new());
@@ -79,9 +77,7 @@ impl RunsFolder {
 
     /// Removes the runs and their plans, if the folders contain only files of an iteration.
     ///
-    ///
     /// # Errors
-    ///
     /// A folder behind a symbolic link, or foreign files; nothing is removed then.
     pub(crate) fn remove_runs(&self) -> Result<(), IterationError> {
         self.may_remove_runs()?;
@@ -90,9 +86,7 @@ impl RunsFolder {
 
     /// Removes one run, if its folder contains only files of an iteration.
     ///
-    ///
     /// # Errors
-    ///
     /// As [`remove_runs`](Self::remove_runs).
     pub(crate) fn remove_run(&self, folder: &Path) -> Result<(), IterationError> {
         self.may_remove_runs()?;
@@ -106,9 +100,7 @@ impl RunsFolder {
 
     /// Checks that [`remove_runs`](Self::remove_runs) is possible.
     ///
-    ///
     /// # Errors
-    ///
     /// As [`remove_runs`](Self::remove_runs).
     pub(crate) fn may_remove_runs(&self) -> Result<(), IterationError> {
         if self.removable().next().is_none() {
@@ -132,9 +124,7 @@ impl RunsFolder {
 
     /// Removes the plans of all runs but `next`, which are obsolete, and the held-out runs after removed runs.
     ///
-    ///
     /// # Errors
-    ///
     /// Errors of the operating system.
     pub(crate) fn remove_plans_but(&self, next: usize) -> Result<(), IterationError> {
         let own = |folder: &PathBuf| files(folder).is_ok_and(|files| files.iter().all(|file| is_own(file)));
@@ -147,9 +137,7 @@ impl RunsFolder {
 
     /// Removes incomplete folders of a killed iteration.
     ///
-    ///
     /// # Errors
-    ///
     /// Errors of the operating system.
     pub(crate) fn remove_unfinished(&self) -> Result<(), IterationError> {
         let own = |folder: &&PathBuf| files(folder).is_ok_and(|files| files.iter().all(|file| is_own(file)));
@@ -186,9 +174,7 @@ fn is_own(file: &Path) -> bool {
 
 /// Removes the files in a folder, then the folder.
 ///
-///
 /// # Errors
-///
 /// Errors of the operating system.
 pub(crate) fn remove(folder: &Path) -> Result<(), IterationError> {
     for file in files(folder)? {

@@ -33,9 +33,7 @@ pub struct SafetySettings {
 impl SafetySettings {
     /// Checks the settings for `joints` joints.
     ///
-    ///
     /// # Errors
-    ///
     /// Shares outside of (0, 1]; [`RehearsalSettings::validate`], [`HomeSettings::validate`].
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         let warm_up_s = self.warm_up_s;

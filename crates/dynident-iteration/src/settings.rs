@@ -2,6 +2,7 @@
 
 use crate::safety::SafetySettings;
 use crate::torque_check_settings::TorqueCheckSettings;
+use crate::verdict_settings::VerdictSettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;
@@ -147,6 +148,9 @@ pub struct SettledSettings {
     /// its time constant; bus delay does not shrink with the arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_lag_s: Option<f64>,
+    /// Thresholds of the verdict on a run. Not part of study files.
+    #[serde(skip)]
+    pub verdict: VerdictSettings,
 }
 
 /// Default of the longest accepted lag, seconds, for arms of up to 1.2 m.
@@ -170,6 +174,7 @@ impl Default for SettledSettings {
             floor_ratio: 2.0,
             most_unexplained_percent: 5.0,
             most_lag_s: None,
+            verdict: VerdictSettings::default(),
         }
     }
 }
@@ -259,9 +264,7 @@ impl IterationSettings {
 
     /// Checks the settings for `joints` joints.
     ///
-    ///
     /// # Errors
-    ///
     /// Numbers out of range, controllers with the wrong number of gains, or a `model_free` controller that needs a
     /// model.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
@@ -281,6 +284,7 @@ impl IterationSettings {
         within("most_model_free", self.most_model_free as f64, 1.0, 50.0, "give 1 to 50")?;
         within("max_runs", self.max_runs as f64, 1.0, 1000.0, "give 1 to 1000")?;
         let settled = &self.settled;
+        settled.verdict.validate()?;
         within("settled.parameter_sigmas", settled.parameter_sigmas, 0.0, 1e3, "give 0 to 1000")?;
         within("settled.parameter_tolerance", settled.parameter_tolerance, 0.0, 1.0, "give 0 to 1")?;
         within("settled.most_uncertain", settled.most_uncertain, 0.0, 1e6, "give 0 or a positive share")?;

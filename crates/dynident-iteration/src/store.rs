@@ -86,9 +86,7 @@ impl IterationStore {
     /// belong to another iteration. Without `resume`, existing runs are removed: only files that an iteration writes,
     /// and never through a symbolic link.
     ///
-    ///
     /// # Errors
-    ///
     /// A folder that cannot be written, runs of another iteration, or foreign files in a run's folder.
     pub fn open(folder: &Path, fingerprint: &str, resume: bool) -> Result<Self, IterationError> {
         let runs = folder.join("runs");
@@ -113,9 +111,7 @@ impl IterationStore {
 
     /// Returns the stored runs in order.
     ///
-    ///
     /// # Errors
-    ///
     /// A file that cannot be read or does not belong to this iteration.
     pub fn records(&self) -> Result<Vec<RunRecord>, IterationError> {
         let mut records = Vec::new();
@@ -177,9 +173,7 @@ impl IterationStore {
 
     /// Returns the log of the held-out run after a run.
     ///
-    ///
     /// # Errors
-    ///
     /// A log that is missing or invalid.
     pub(crate) fn held_out_log(&self, run: usize, joints: &[String], rate_hz: f64) -> Result<Record, IterationError> {
         let path = self.held_out_log_path(run);
@@ -202,9 +196,7 @@ impl IterationStore {
     /// `return_log.csv` if the run had approach and return paths, and `motion.csv` of each motion that differs from the
     /// task. Removes the plan of the run.
     ///
-    ///
     /// # Errors
-    ///
     /// A folder that cannot be written; the run is then not stored.
     pub fn keep(&self, record: &RunRecord, runs: &[RobotRun]) -> Result<(), IterationError> {
         let file = RunFile {
@@ -224,9 +216,7 @@ impl IterationStore {
     /// Stores the planned motion of a run in `planned_k/` (`plan.json` and `motion.csv`), so that a resumed iteration
     /// runs the same motion.
     ///
-    ///
     /// # Errors
-    ///
     /// A folder that cannot be written.
     pub fn keep_planned(&self, run: usize, planned: &PlannedMotion) -> Result<(), IterationError> {
         let PlannedMotion { motion, forecast } = planned.clone();
@@ -240,9 +230,7 @@ impl IterationStore {
 
     /// Returns the motion that was planned earlier for this run, if any.
     ///
-    ///
     /// # Errors
-    ///
     /// A folder that cannot be read or has other content.
     pub fn planned(&self, run: usize, joints: usize) -> Result<Option<PlannedMotion>, IterationError> {
         let folder = self.plan_folder(run);
@@ -265,9 +253,7 @@ impl IterationStore {
     /// Stores the logs of a run that was stopped early and `interrupted.json` in `interrupted_k/`. Returns the folder,
     /// or `None` if nothing was recorded.
     ///
-    ///
     /// # Errors
-    ///
     /// A folder that cannot be written.
     pub fn keep_interrupted(
         &self,
@@ -329,9 +315,7 @@ impl IterationStore {
 
     /// Removes the newest run, whose log was corrected, and everything that followed from it.
     ///
-    ///
     /// # Errors
-    ///
     /// A folder with foreign files, or one that cannot be removed.
     pub(crate) fn forget_run(&self, run: usize) -> Result<(), IterationError> {
         RunsFolder::read(&self.runs)?.remove_run(&self.run_folder(run))?;
@@ -340,9 +324,7 @@ impl IterationStore {
 
     /// Removes the held-out run after the newest run and the plans that followed from it.
     ///
-    ///
     /// # Errors
-    ///
     /// A folder that cannot be removed.
     pub(crate) fn forget_held_out(&self, run: usize) -> Result<(), IterationError> {
         RunsFolder::read(&self.runs)?.remove_plans_but(run)
@@ -350,9 +332,7 @@ impl IterationStore {
 
     /// Returns the logs of a run, one per leg, at these rates (Hz), bit for bit as recorded.
     ///
-    ///
     /// # Errors
-    ///
     /// A log that is missing or invalid.
     pub fn logs(&self, run: usize, joints: &[String], rates_hz: &[f64]) -> Result<Vec<Record>, IterationError> {
         let of_leg = |(leg, rate_hz): (usize, &f64)| {

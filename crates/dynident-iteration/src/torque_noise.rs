@@ -1,12 +1,10 @@
 //! Noise of a logged torque, without torque that the model may not explain.
 //!
-//!
 //! Friction changes stepwise at reversals, and a step has a spectrum up to half the sample rate. Noise is always
 //! present. So the spectral density of the torque is computed over windows, octave by octave from the end of the
 //! motion's spectrum, each with windows as short as the octave allows. The lower quartile over the windows is used, of
 //! windows without a reversal if there are enough. Below the motion's end the noise has the density of the first
 //! octave.
-//!
 //!
 //! Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70; Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931)
 //! 684, for the quartile of the means of several densities.

@@ -1,6 +1,5 @@
 //! The tracking floor: the tracking error that noise, friction and delay explain.
 //!
-//!
 //! A delay between the encoders and the controller is not visible in the log, because its positions and torques have
 //! the same time. But it causes a tracking error: a controller that receives positions `d` seconds late pushes the
 //! joint ahead by about `d q̇`. So the delay is estimated by matching simulated tracking errors to those of the run.

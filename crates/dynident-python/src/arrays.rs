@@ -1,6 +1,5 @@
 //! Conversion between NumPy arrays and slices.
 //!
-//!
 //! Vectors over joints are in the last axis; all axes before it are samples. Results have the same leading axes: one
 //! posture gives a vector, a thousand postures give a table.
 

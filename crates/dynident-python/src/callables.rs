@@ -1,6 +1,5 @@
 //! Python functions in a study: a torque, a differentiator, an estimator, a family of motions.
 //!
-//!
 //! An exception in such a function ends the job: it unwinds to [`guarded`] at the begin of the job, and is raised there
 //! with its traceback. So does a result with a wrong shape, or one that is not finite.
 
@@ -284,7 +283,6 @@ impl MotionFunction for Trajectory {
 }
 
 /// Rows for a custom estimator: ``W @ theta`` and ``tau``.
-///
 ///
 /// They are the triangular factors of all rows of the logs, one block per joint: for every ``theta`` the sum of squares
 /// ``‖tau - W theta‖²`` and the gradient ``Wᵀ (tau - W theta)`` of a joint's block equal those of all its samples.

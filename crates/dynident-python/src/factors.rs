@@ -15,7 +15,6 @@ use std::path::Path;
 
 /// Logs as factors: small files that contain all information for a fit, and can be merged in any order.
 ///
-///
 /// Created by ``dynident.fleet.reduce``, combined by ``merged``, identified by ``dynident.fleet.identify``. The bytes
 /// are those of the file: versioned, with a hash at the end.
 #[pyclass(frozen, module = "dynident")]

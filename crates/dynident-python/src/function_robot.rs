@@ -30,7 +30,6 @@ impl Raised {
 
 /// One run of a robot: the motion to follow, and the controller that computes the torque.
 ///
-///
 /// The function moves its robot to ``q[0]``. At every sample it calls ``torque`` with the measured state and applies
 /// the result; it returns after the last sample. It runs at ``rate_hz``.
 #[pyclass(frozen, module = "dynident")]

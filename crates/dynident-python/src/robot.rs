@@ -31,10 +31,8 @@ type Matrices<'py> = (Array<'py>, Array<'py>, Array<'py>);
 
 /// A robot on a fixed base: links, joints, gravity.
 ///
-///
 /// Created by ``Robot.load(path)``, or by ``from_urdf``, ``from_mjcf``, ``from_sdf``, ``from_dh`` from a path or a
 /// text. Keyword arguments are the keys of ``[robot]`` of a study: moving joints, mimic joints, direction of gravity.
-///
 ///
 /// Vectors over joints follow ``joint_names``; SI units, rad. All methods take one posture, shape ``(n,)``, or any
 /// number of them, shape ``(..., n)``, and return the same leading axes.

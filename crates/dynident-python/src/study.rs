@@ -22,7 +22,6 @@ type Columns<'py> = (Vec<String>, Vec<Bound<'py, PyArrayDyn<f64>>>);
 
 /// A study: robot, drives, logs and settings, as ``[robot]``, ``[drive]``, ``[[log]]`` and so on of a study file.
 ///
-///
 /// Read with ``Study.load(path)`` or ``Study.parse(text)``, or created from objects with ``dynident.study(...)``.
 #[pyclass(frozen, module = "dynident")]
 #[allow(clippy::struct_field_names, reason = "the wrapped study")]

@@ -20,7 +20,6 @@ fn raised(error: OnlineError) -> PyErr {
 
 /// Online monitor of a robot, created by ``Model.online``.
 ///
-///
 /// ``update`` takes one sample or an array of samples; detected events are in ``alarms``. Without velocities and
 /// accelerations these are computed from the positions, and results are delayed by ``delay_s``.
 #[pyclass(frozen, module = "dynident", name = "Watch")]

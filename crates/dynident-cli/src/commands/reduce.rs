@@ -14,7 +14,7 @@ pub(crate) struct Options {
     /// The factor file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Reduce only this log of the study, whatever its role; may be given several times. Default: all logs with the
+    /// Reduce only this log of the study, in any role; may be given several times. Default: all logs with the
     /// role "identify".
     #[arg(long = "log", value_name = "NAME")]
     logs: Vec<String>,

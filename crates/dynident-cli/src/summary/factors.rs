@@ -21,9 +21,9 @@ pub(crate) fn factors(file: &FactorsFile) -> String {
         vec![name(&log.name), name(&or_none(&log.arm)), or_none(&log.recorded_at), digits, log.rows.to_string()]
     };
     let header = ["log", "arm", "recorded", "hash", "rows"].map(str::to_owned);
-    text += &table(&header, 4..5, file.logs.iter().take(LISTED).map(row).collect());
-    if count > LISTED {
-        text += &wrapped(&format!("  and {} more", count - LISTED), 2);
+    text += &table(&header, 4..5, file.logs.iter().take(MAX_LISTED).map(row).collect());
+    if count > MAX_LISTED {
+        text += &wrapped(&format!("  and {} more", count - MAX_LISTED), 2);
     }
     text
 }

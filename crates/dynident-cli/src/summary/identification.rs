@@ -143,7 +143,7 @@ fn bands(r: &ResultFile) -> String {
 fn beside(r: &ResultFile) -> String {
     let Some(fit) = &r.physical.fit else { return String::new() };
     let free = |log: &LogValidation| format!("{}\u{a0}%", percent(log.model.relative_error_percent));
-    let mut errors: Vec<String> = r.validation.iter().take(COLUMNS).map(free).collect();
+    let mut errors: Vec<String> = r.validation.iter().take(MAX_LOG_COLUMNS).map(free).collect();
     if errors.is_empty() {
         errors.push(format!("{}\u{a0}%", percent(r.training.relative_error_percent)));
     }
@@ -172,8 +172,8 @@ fn prior_of(log: &LogValidation, joint: Option<usize>) -> Option<f64> {
 
 /// Errors joint by joint.
 fn joints(r: &ResultFile) -> String {
-    let logs = &r.validation[..r.validation.len().min(COLUMNS)];
-    let detailed = logs.len() <= WITH_DETAILS;
+    let logs = &r.validation[..r.validation.len().min(MAX_LOG_COLUMNS)];
+    let detailed = logs.len() <= MAX_DETAILED_LOGS;
     let mut header = vec!["torque error".to_owned(), "fit %".to_owned()];
     for number in 1..=logs.len() {
         header.push(format!("[{number}] %"));
@@ -204,8 +204,8 @@ fn joints(r: &ResultFile) -> String {
     };
     let rows = (0..r.training.joints.len()).map(|joint| row(Some(joint))).chain([row(None)]).collect();
     let mut text = table(&header, 1..header.len(), rows);
-    if r.validation.len() > COLUMNS {
-        let _ = writeln!(text, "  {} more held-out logs in result.json", r.validation.len() - COLUMNS);
+    if r.validation.len() > MAX_LOG_COLUMNS {
+        let _ = writeln!(text, "  {} more held-out logs in result.json", r.validation.len() - MAX_LOG_COLUMNS);
     }
     text
 }
@@ -214,7 +214,8 @@ fn joints(r: &ResultFile) -> String {
 fn between_logs(r: &ResultFile) -> String {
     let Some(found) = r.method.between_logs else { return String::new() };
     let of = |what: &str, k: Option<f64>| {
-        k.filter(|k| *k >= DIFFERING).map(|k| format!("{what} vary between logs ({k:.1} times their error bars)"))
+        k.filter(|k| *k >= MIN_REPORTED_RATIO)
+            .map(|k| format!("{what} vary between logs ({k:.1} times their error bars)"))
     };
     let said: Vec<String> =
         [of("bodies", found.bodies), of("friction parameters", found.friction)].into_iter().flatten().collect();
@@ -255,7 +256,12 @@ fn friction(r: &ResultFile) -> String {
             candidate.map_or_else(String::new, |candidate| format!("{:.3}", candidate.cv_error_nm))
         };
         let chosen = joint.candidates.iter().find(|candidate| candidate.chosen);
-        vec![name(&joint.joint), error(chosen), error(joint.candidates.first()), shortened(&joint.chosen, EXPRESSION)]
+        vec![
+            name(&joint.joint),
+            error(chosen),
+            error(joint.candidates.first()),
+            shortened(&joint.chosen, EXPRESSION_COLUMNS),
+        ]
     });
     let mut text = if chosen.is_empty() { String::new() } else { table(&header, 1..3, rows.collect()) };
     // Combine joints with the same reason.
@@ -281,10 +287,10 @@ fn parameters(r: &ResultFile) -> String {
         ),
         2,
     );
-    let rows = order.iter().take(SHOWN).map(|&index| {
+    let rows = order.iter().take(MAX_SHOWN).map(|&index| {
         let p = &r.base_parameters[index];
         let [value, half_width] = with_deviation(p.value, p.bar_95());
-        vec![value, half_width, p.unit.clone(), shortened(&p.expression, EXPRESSION)]
+        vec![value, half_width, p.unit.clone(), shortened(&p.expression, EXPRESSION_COLUMNS)]
     });
     let header = ["value", "+- (95 %)", "unit", "base parameter"].map(str::to_owned);
     text += &table(&header, 0..2, rows.collect());
@@ -299,7 +305,7 @@ fn parameters(r: &ResultFile) -> String {
             &format!(
                 "{} parameters are poorly determined (error bar larger than the value), worst first: {}; use a more exciting motion (`dynident design`)",
                 vague.len(),
-                listed(&vague, SHOWN)
+                listed(&vague, MAX_SHOWN)
             ),
             2,
         );
@@ -309,7 +315,7 @@ fn parameters(r: &ResultFile) -> String {
     }
     if !r.method.not_excited.is_empty() {
         let names: Vec<&str> = r.method.not_excited.iter().map(String::as_str).collect();
-        let held = format!("not excited by these logs, fixed at the prior: {}", listed(&names, 2 * SHOWN));
+        let held = format!("not excited by these logs, fixed at the prior: {}", listed(&names, 2 * MAX_SHOWN));
         text += &wrapped(&held, 2);
         text += &conditional(r);
     }
@@ -335,7 +341,7 @@ fn conditional(r: &ResultFile) -> String {
         let words = format!(
             "{} estimates depend on parameters fixed at the prior: {}; {bars}",
             dependent.len(),
-            listed(&all, SHOWN)
+            listed(&all, MAX_SHOWN)
         );
         text += &wrapped(&words, 2);
     }
@@ -344,7 +350,7 @@ fn conditional(r: &ResultFile) -> String {
         let words = format!(
             "no log moves {} more than the encoder noise: record a motion of all joints (use `dynident design`; \
              with `prior.result = \"result.json\"` in [design] it excites the parameters that these logs do not determine)",
-            listed(&joints, SHOWN)
+            listed(&joints, MAX_SHOWN)
         );
         text += &wrapped(&words, 2);
     }
@@ -395,4 +401,4 @@ fn data(log: &LogSummary) -> String {
     )
 }
 
-const _: () = assert!(EXPRESSION + 34 <= WIDTH, "value, deviation, unit and their gaps take 34 columns");
+const _: () = assert!(EXPRESSION_COLUMNS + 34 <= WIDTH, "value, deviation, unit and their gaps take 34 columns");

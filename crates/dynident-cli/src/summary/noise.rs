@@ -5,7 +5,7 @@ use dynident::ResultFile;
 use dynident::identification::estimators::{NoiseInRegressor, NoiseVerdict};
 
 /// The verdict on noise in the regressor, the rows with low weight in a robust estimator, and results of special
-/// estimators; empty if there are none.
+/// estimators; otherwise empty.
 pub(crate) fn noise(r: &ResultFile) -> String {
     let mut text = String::new();
     if let Some(noise) = &r.noise_in_regressor {

@@ -17,7 +17,7 @@ const ONLY_IN: [(&[&str], &[&str], &str); 4] = [
     (
         &["NamedTempFile", "TempDir", "tempdir(", "tempdir_in(", "tempfile("],
         &["dynident-system/src/temporary_folder.rs", "dynident-system/src/whole_file.rs"],
-        "what a killed program leaves has to be removed: dynident_system::write_whole, TemporaryFolder",
+        "temporary files of a killed program must be removed: dynident_system::write_whole, TemporaryFolder",
     ),
     (
         &["format_rfc3339", "SystemTime::now"],

@@ -60,9 +60,7 @@ impl EnvelopeSettings {
 
     /// Returns the envelope of a robot: stated values, else the limits of the robot description, else the defaults.
     ///
-    ///
     /// # Errors
-    ///
     /// Lists of a wrong length, limits that are not positive, positions that are not finite.
     pub fn envelope(&self, model: &Model) -> Result<Envelope, SimulationError> {
         let percent = self.search_margin_percent.unwrap_or(SEARCH_MARGIN_PERCENT);

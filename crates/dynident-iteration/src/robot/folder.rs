@@ -74,12 +74,10 @@ impl FolderSettings {
 /// (`t_s, q1.., tau1..`). If the robot was stopped early, `run_k/stopped.txt` contains the reason, and the log may be
 /// shorter.
 ///
-///
 /// A log is read when it is complete: its last line is terminated, and it reaches the end of the trajectory. Unchanged
 /// files are not written again. If the files of a run change although a log exists, the log belongs to another run and
 /// is rejected. The paths from and to home are in `approach.csv` and `return.csv`; their logs `approach_log.csv` and
 /// `return_log.csv` are checked if they exist.
-///
 ///
 /// Each log is first compared with the motion ([`examine_log`]): wrong units, signs, columns or time stamps are
 /// reported, and the run waits for the corrected file. If a log is corrected later, the next call reads it again.
@@ -96,9 +94,7 @@ pub struct FolderRobot {
 impl FolderRobot {
     /// Creates the robot of a folder, with the model's joints.
     ///
-    ///
     /// # Errors
-    ///
     /// A waiting time that is negative or not finite, formats that lack a setting or do not fit the robot.
     pub fn new(settings: FolderSettings, joints: Vec<String>) -> Result<Self, SimulationError> {
         let wait = settings.wait_s;

@@ -202,7 +202,7 @@ impl ControlledRun {
 }
 
 /// A robot that is a function of this process. The function receives the controlled run, moves the robot to the first
-/// sample of the reference, requests and applies a torque at every sample, and returns when there is none left. If it
+/// sample of the reference, requests and applies a torque at every sample, and returns after the last sample. If it
 /// returns an error, the run is stopped with that reason.
 pub struct FunctionRobot<F> {
     joints: Vec<String>,

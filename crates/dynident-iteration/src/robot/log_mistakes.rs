@@ -1,6 +1,5 @@
 //! Mistakes in a recording that follow from a comparison with the commanded motion: units, signs, columns, time stamps.
 //!
-//!
 //! The clock is determined first, by the correlation of recorded and commanded positions, which is independent of unit,
 //! offset and sign. Positions are then compared joint by joint, and torques with those of a model along the motion.
 
@@ -134,7 +133,6 @@ const CORRELATION_TOLERANCE: f64 = 0.01;
 
 /// Compares a recording with the commanded motion. `torque` contains the model torque at every sample of the reference,
 /// joint by joint, if there is a model.
-///
 ///
 /// A constant offset of the time stamps and an early start of the recorder are removed, because they do not affect the
 /// result. Other mistakes are reported and not corrected. A recording that does not resemble the motion is returned

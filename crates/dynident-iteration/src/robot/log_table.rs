@@ -66,9 +66,7 @@ pub enum LogTableError {
 /// Reads a log of the joints: columns `t_s`, `q1..`, `tau1..` in any order, other columns ignored; seconds, rad (m), Nm
 /// (N).
 ///
-///
 /// # Errors
-///
 /// [`LogTableError`] with the line; [`LogTableError::Incomplete`] if the last line is unfinished.
 pub fn read_log_table(path: &std::path::Path, joints: &[String], rate_hz: f64) -> Result<Record, LogTableError> {
     read_log_with_currents(path, joints, rate_hz, None)
@@ -77,9 +75,7 @@ pub fn read_log_table(path: &std::path::Path, joints: &[String], rate_hz: f64) -
 /// Reads a log as [`read_log_table`] does. With torque constants, Nm/A (N/A), it may have currents `i1..`, A, instead
 /// of `tau1..`.
 ///
-///
 /// # Errors
-///
 /// As [`read_log_table`].
 pub(super) fn read_log_with_currents(
     path: &std::path::Path,

@@ -123,9 +123,7 @@ impl<'a> RunRequest<'a> {
 
     /// Returns the complete commanded trajectory: approach, motion and return, or only the motion.
     ///
-    ///
     /// # Errors
-    ///
     /// Paths that belong to another motion.
     pub fn whole(&self) -> Result<Cow<'a, Reference>, SimulationError> {
         let whole = self.ways.map(|ways| ways.around(self.reference)).transpose()?;
@@ -139,9 +137,7 @@ impl<'a> RunRequest<'a> {
 
     /// Checks that reference, controller and model fit `joints` joints.
     ///
-    ///
     /// # Errors
-    ///
     /// [`SimulationError`].
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         require_length("joints of the reference", joints, self.reference.joints())?;
@@ -472,9 +468,7 @@ pub trait Robot: core::fmt::Debug {
 
     /// Runs a trajectory. Failures of the robot are reported in the run's [`RobotStatus`], with the partial record.
     ///
-    ///
     /// # Errors
-    ///
     /// An invalid request ([`RunRequest::validate`]), or settings of the robot that contradict it.
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError>;
 }

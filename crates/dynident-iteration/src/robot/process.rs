@@ -26,9 +26,7 @@ impl ProcessRobot {
     /// Creates the robot of a program, with the model's joints. `program` is the permitted command of the settings
     /// ([`ProcessSettings::permitted`]).
     ///
-    ///
     /// # Errors
-    ///
     /// As [`ProcessSettings::validate`].
     pub fn new(
         settings: ProcessSettings,

@@ -69,9 +69,7 @@ pub struct ProcessSettings {
 impl ProcessSettings {
     /// Returns the permission to start the command.
     ///
-    ///
     /// # Errors
-    ///
     /// [`ProgramRefused`] if it may not be started.
     pub fn permitted(&self, permission: ProgramPermission<'_>) -> Result<PermittedProgram, ProgramRefused> {
         permission.permit(ProgramRequest::new(ProgramPurpose::Robot, self.command.iter().cloned()))

@@ -86,9 +86,7 @@ impl<'a> Recorder<'a> {
 
     /// Begins a part; later samples belong to it.
     ///
-    ///
     /// # Errors
-    ///
     /// A part that this run does not have, or an earlier one; an incomplete current part.
     pub(super) fn enter(&mut self, part: RunPart) -> Result<(), RobotFault> {
         let expected = self.parts[self.at].which;
@@ -108,9 +106,7 @@ impl<'a> Recorder<'a> {
 
     /// Checks that every part was recorded to its end.
     ///
-    ///
     /// # Errors
-    ///
     /// The first incomplete part.
     pub(super) fn require_whole(&mut self) -> Result<(), RobotFault> {
         loop {

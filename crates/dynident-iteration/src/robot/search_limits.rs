@@ -16,9 +16,7 @@ impl EnvelopeSettings {
     /// by this share of that error times the lever arm, at most of half the box; stated velocity and torque by this
     /// share of themselves. Torque is limited only if the robot description has the inertials of all bodies.
     ///
-    ///
     /// # Errors
-    ///
     /// As [`envelope`](Self::envelope).
     pub fn narrow(&self, mut limits: Limits, model: &Model, margin: f64) -> Result<Limits, SimulationError> {
         let envelope = self.envelope(model)?;

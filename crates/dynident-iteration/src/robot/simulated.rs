@@ -18,9 +18,7 @@ pub struct SimulatedRobot {
 impl SimulatedRobot {
     /// Creates a simulated robot.
     ///
-    ///
     /// # Errors
-    ///
     /// As [`LoopSettings::validate`].
     pub fn new(plant: Plant, settings: LoopSettings) -> Result<Self, SimulationError> {
         settings.validate(plant.dof())?;
@@ -30,9 +28,7 @@ impl SimulatedRobot {
 
     /// Locks the named joints where a run begins, as [`Plant::with_locked`].
     ///
-    ///
     /// # Errors
-    ///
     /// A joint that does not exist.
     pub fn with_locked(self, joints: &[String]) -> Result<Self, SimulationError> {
         Ok(Self { plant: self.plant.with_locked(joints)?, ..self })

@@ -53,9 +53,7 @@ pub struct Ways {
 impl Ways {
     /// Checks that they fit a motion: same joints and rate, and no steps between the parts.
     ///
-    ///
     /// # Errors
-    ///
     /// Paths of another motion.
     pub fn validate(&self, motion: &Reference) -> Result<(), SimulationError> {
         for way in [&self.approach, &self.back] {
@@ -88,9 +86,7 @@ impl Ways {
 
     /// Returns the paths at a share of their speed.
     ///
-    ///
     /// # Errors
-    ///
     /// As [`Reference::slowed`].
     pub fn slowed(&self, speed: f64) -> Result<Self, SimulationError> {
         Ok(Self { approach: self.approach.slowed(speed)?, back: self.back.slowed(speed)? })
@@ -98,9 +94,7 @@ impl Ways {
 
     /// Returns approach, motion and return as one reference, for a controller that runs all of them without a pause.
     ///
-    ///
     /// # Errors
-    ///
     /// As [`validate`](Self::validate).
     pub fn around(&self, motion: &Reference) -> Result<Reference, SimulationError> {
         self.validate(motion)?;

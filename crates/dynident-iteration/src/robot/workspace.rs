@@ -34,9 +34,7 @@ impl Default for WorkspaceSettings {
 impl WorkspaceSettings {
     /// Returns the box with the watched points of a robot: the origins of all moving links, and the tool.
     ///
-    ///
     /// # Errors
-    ///
     /// Bounds that are not numbers or leave no space, a tool that is not finite.
     pub fn of(&self, model: &Model) -> Result<WorkspaceBox, SimulationError> {
         for (low, high) in self.lower.into_iter().zip(self.upper) {

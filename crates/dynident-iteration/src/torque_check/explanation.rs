@@ -1,6 +1,5 @@
 //! Candidates that explain why the logged torque of a joint differs from the commanded torque.
 //!
-//!
 //! Each candidate is a correction of the commanded torque `u` with few unknowns and a free constant. A candidate
 //! explains the share `1 − RSS_c / RSS_0` of the squared difference. It is reported only if it explains nearly all, and
 //! clearly more than every other.

@@ -1,14 +1,11 @@
 //! Compares the logged torque of a run with the torque that its controller commanded.
 //!
-//!
 //! Identification uses the logged torque as the torque of the drives. The log alone cannot confirm this: a wrong scale,
 //! a reversed sign or subtracted gravity yields the model of another robot, which may even track well. But controller,
 //! model and reference of a run are known, so the commanded torque follows from the logged positions. For a correct log
 //! both agree except for noise, delays and the offset of the torque sensor:
 //!
-//!
 //! `τ_log,j(t) = s_j τ_cmd,j(t − l; q(t − l − d_q), q̇(t − l − d_v), (1 + ε)(t − l)) + c_j`
-//!
 //!
 //! with the scale `s_j` = 1, two delays of the feedback, a lag of the logged torque and a rate ε of the log's clock
 //! that all joints share. Drives that close their own loop have unknown gains `k`: there
@@ -38,7 +35,7 @@ pub(crate) use row_scale::{LeastDeviation, RowScale, row_scales};
 
 use crate::leg::{IterationTask, Leg};
 use crate::settings::RunIdentificationSettings;
-use crate::torque_check_settings::TorqueCheckSettings;
+use crate::torque_check_settings::{CauseSettings, TorqueCheckSettings};
 use agreement::agreement;
 use command::{CommandLaw, ObservedLeg, shared_parameters};
 use dynident_simulation::Record;
@@ -141,7 +138,7 @@ pub(crate) struct CheckWith<'a> {
     pub(crate) ended_early: bool,
 }
 
-/// Compares logged with commanded torque; `None` if too little was recorded. `runs` are the runs so far, the newest
+/// Compares logged with commanded torque; `None` if too little was recorded. `runs` are all runs, the newest
 /// last; earlier ones are only used to determine the gains of drives with their own loop. `task` includes the selected
 /// friction.
 pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>) -> Option<TorqueCheck> {
@@ -184,7 +181,7 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
         (0..dof).map(|joint| explain(&data, joint, with.settings)).collect()
     };
     let mut explanations = explained(&fit.columns);
-    let mut found = agreement(&explanations);
+    let mut found = agreement(&explanations, &with.settings.causes);
     if explanations.iter().any(|own| own.matters) {
         // Missing torque biases the timing, so the timing is fitted again together with the torques that may be
         // missing.
@@ -198,7 +195,7 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
             let own = other.columns.iter().zip(&fit.columns);
             let columns: Vec<Vec<Vec<f64>>> = own.map(|(all, base)| all[..base.len()].to_vec()).collect();
             let then = explained(&columns);
-            let agreed = agreement(&then);
+            let agreed = agreement(&then, &with.settings.causes);
             if agreed.left < MAX_RESIDUAL_RATIO * found.left {
                 (explanations, found) = (then, agreed);
                 fit = SeparableFit { columns, ..other };

@@ -1,13 +1,10 @@
 //! Scale of each joint's torque from the parameters that several joints share.
 //!
-//!
 //! Masses and inertias of a body affect the torque of all joints before it. If the torque of one joint is scaled, its
 //! rows require other values of these parameters than the rows of the other joints. Around an estimate θ̂ the torque of
 //! joint j with the scale `1 + κ_j` is
 //!
-//!
 //! `τ_j = (1 + κ_j) W_j θ ≈ W_j θ + κ_j W_j θ̂`
-//!
 //!
 //! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so it is not
 //! detectable. Each joint is tested against all others: its κ is free, the others are zero. The joint whose κ maximises
@@ -64,9 +61,7 @@ pub(crate) struct LeastDeviation {
 /// The relative torque scale of each joint from all `runs`; `None` if it is not determined. `task` includes the
 /// selected friction, `known` is the estimate of these runs.
 ///
-///
 /// # Errors
-///
 /// Records that do not belong to the task.
 pub(crate) fn row_scales(
     task: &IterationTask,

@@ -1,7 +1,6 @@
 //! Separable least squares: a few nonlinear timing parameters that all joints share, and linear coefficients of each
 //! joint.
 //!
-//!
 //! `min Σ_j ‖y_j − A_j(p) c_j‖² / σ_j² + Σ_i p_i² / s_i²` over the shared p and the coefficients c_j. The coefficients
 //! are eliminated (Golub and Pereyra, Inverse Problems 19 (2003) R1, variable projection); p follows from Gauss-Newton
 //! steps with finite differences of the projected residuals. σ_j is the residual of joint j, so that a joint that no p

@@ -161,7 +161,7 @@ fn a_floor_is_gone_around_or_named() {
     assert!((share - 0.5).abs() < 0.2, "{error}");
     assert!(error.to_string().contains("floor of link2"), "{error}");
     let error = below(-0.65, [1.5, 0.0]).ways(&model(), &reference, None).map(|_| ()).unwrap_err();
-    assert!(error.to_string().starts_with("home breaks the limit of floor"), "{error}");
+    assert!(error.to_string().starts_with("home itself breaks the limit of floor"), "{error}");
 }
 
 /// A path keeps the torque limits for all robots within the uncertainty.
@@ -433,7 +433,7 @@ fn a_way_is_rehearsed() {
         });
     }
     let reason = refused(settings);
-    assert!(reason.contains("run 1 is not commanded: home breaks the limit of position of joint1"), "{reason}");
+    assert!(reason.contains("run 1 is not commanded: home itself breaks the limit of position of joint1"), "{reason}");
 }
 
 /// A stop request ends the search for paths at once.

@@ -45,7 +45,7 @@ fn marked(folder: &Path) -> String {
             Err(_) => std::thread::sleep(Duration::from_millis(2)),
         }
     }
-    panic!("the program never came to its mark");
+    panic!("the program never wrote its marker");
 }
 
 /// Whether a process with this id runs (zombies excluded).
