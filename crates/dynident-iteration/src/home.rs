@@ -147,6 +147,9 @@ impl HomeSettings {
     }
 
     /// As [`ways`](Self::ways), but the search ends with [`HomeError::Interrupted`] once `stop` returns true.
+    ///
+    /// # Errors
+    /// As [`ways`](Self::ways).
     pub fn ways_until(
         &self,
         model: &Model,
@@ -480,8 +483,8 @@ mod tests {
     fn the_quintic_and_its_peaks() {
         assert_eq!(quintic(0.0)[..3], [0.0; 3]);
         assert!(quintic(1.0).iter().zip([1.0, 0.0, 0.0]).all(|(a, b)| (a - b).abs() < 1e-15));
-        assert!((quintic(0.5)[1] - FASTEST).abs() < 1e-15);
-        assert!((quintic((3.0 - 3.0_f64.sqrt()) / 6.0)[2] - HARDEST).abs() < 1e-12);
+        assert!((quintic(0.5)[1] - QUINTIC_MAX_VELOCITY).abs() < 1e-15);
+        assert!((quintic((3.0 - 3.0_f64.sqrt()) / 6.0)[2] - QUINTIC_MAX_ACCELERATION).abs() < 1e-12);
         for k in 1..20 {
             let (x, h) = (f64::from(k) / 20.0, 1e-5);
             for order in 0..3 {

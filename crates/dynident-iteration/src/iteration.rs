@@ -35,6 +35,9 @@ pub struct Iteration {
 
 impl Iteration {
     /// Creates the iteration of a task.
+    ///
+    /// # Errors
+    /// As [`IterationTask::validate`] and [`IterationSettings::validate`].
     pub fn new(task: IterationTask, settings: IterationSettings) -> Result<Self, SimulationError> {
         task.validate()?;
         settings.validate(task.robot.dof())?;
@@ -65,12 +68,18 @@ impl Iteration {
     }
 
     /// Returns the legs of a run: those of the task, or along the run's own trajectories if it had some.
+    ///
+    /// # Errors
+    /// A record of another task.
     pub fn legs_of(&self, record: &RunRecord) -> Result<Cow<'_, [Leg]>, IterationError> {
         legs_along(&self.task, record.motion.as_ref())
     }
 
     /// Returns the next step, as a pure function of these records. With a motion planner, a converged iteration may
     /// continue with a motion that is worth a run.
+    ///
+    /// # Errors
+    /// Records of another robot.
     pub fn next(&self, records: &[RunRecord]) -> Result<Next, IterationError> {
         let robot = self.robot(records)?;
         let next = policy::next(records, &self.settings, robot.nominal(), &self.names(&robot, records)?);
@@ -84,6 +93,9 @@ impl Iteration {
     }
 
     /// Returns the conditions that are not met after these records; empty if the iteration has converged.
+    ///
+    /// # Errors
+    /// Records of another robot.
     pub fn shortfalls(&self, records: &[RunRecord]) -> Result<Vec<Shortfall>, IterationError> {
         let robot = self.robot(records)?;
         Ok(shortfalls(records, &self.settings, &self.names(&robot, records)?))

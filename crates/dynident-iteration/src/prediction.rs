@@ -8,6 +8,13 @@ use nalgebra::DMatrix;
 /// Half width of a 95 % interval in standard deviations; runs have far more rows than parameters.
 const HALF_WIDTH_95_SIGMAS: f64 = 1.96;
 
+/// L with `Lᵀ L` the covariance of some columns, by eigenvalues, because covariances from few segments are singular.
+pub(crate) fn covariance_root(covariance: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
+    let eigen = covariance.select_rows(columns).select_columns(columns).symmetric_eigen();
+    let root = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+    DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose()
+}
+
 /// A model with its error bars.
 pub(crate) struct Known<'a> {
     pub(crate) theta: &'a [f64],
@@ -30,11 +37,11 @@ pub(crate) fn predictions(
     let covariance = DMatrix::from_fn(count, count, |row, column| known.covariance[row][column]);
     let joints = (0..model.dof()).map(|joint| {
         let columns = model.layout().joint_columns(joint);
-        // V = Lᵀ L of the joint's columns, by eigenvalues, because covariances from few segments are singular.
-        let eigen = covariance.select_rows(columns).select_columns(columns).symmetric_eigen();
-        let root = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
-        let root = DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose();
-        JointSums { root, sigma: known.joint_sigma[joint], ..JointSums::default() }
+        JointSums {
+            root: covariance_root(&covariance, columns),
+            sigma: known.joint_sigma[joint],
+            ..JointSums::default()
+        }
     });
     let mut sums =
         Sums { model, theta: known.theta, joints: joints.collect(), counted: Vec::new(), buffer: Vec::new() };

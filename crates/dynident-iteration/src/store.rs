@@ -15,6 +15,7 @@ use crate::runs_folder::{
 use crate::sealed::{sealed_json, unsealed};
 use dynident_simulation::Record;
 use dynident_system::TemporaryFolder;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io::Write;
@@ -104,6 +105,9 @@ impl IterationStore {
     }
 
     /// Checks whether a fresh start may remove the existing runs. Changes nothing.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open) without `resume`.
     pub fn may_begin_afresh(folder: &Path) -> Result<(), IterationError> {
         let runs = folder.join("runs");
         if runs.is_dir() { RunsFolder::read(&runs)?.may_remove_runs() } else { Ok(()) }
@@ -117,14 +121,8 @@ impl IterationStore {
         let mut records = Vec::new();
         loop {
             let path = self.run_folder(records.len() + 1).join(RUN_FILE);
-            let text = match dynident_files::read_text(&path, MAX_FILE_BYTES) {
-                Ok(text) => text,
-                Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(records),
-                Err(error) => return Err(IterationError::file(&path)(error)),
-            };
+            let Some(file) = read_sealed::<RunFile>(&path, "a run")? else { return Ok(records) };
             let state = |problem: String| IterationError::State { path: path.clone(), problem };
-            let file: RunFile = unsealed(&text)
-                .map_err(|error| state(format!("is not a run of an iteration ({error}); remove its folder")))?;
             if file.schema != RUN_SCHEMA {
                 return Err(state(format!("has the schema {}, not {RUN_SCHEMA}", file.schema)));
             }
@@ -145,6 +143,9 @@ impl IterationStore {
     }
 
     /// Stores the run of the held-out motion after a run in `held_out_k/`: `held_out.json` and the log.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
     pub fn keep_held_out(&self, run: usize, found: &HeldOutRun, robot_run: &RobotRun) -> Result<(), IterationError> {
         let folder = self.held_out_folder(run);
         let fingerprint = self.fingerprint.clone();
@@ -157,16 +158,9 @@ impl IterationStore {
     /// Returns the held-out run after a run, if it exists.
     fn held_out(&self, run: usize) -> Result<Option<HeldOutRun>, IterationError> {
         let path = self.held_out_folder(run).join(HELD_OUT_FILE);
-        let text = match dynident_files::read_text(&path, MAX_FILE_BYTES) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(IterationError::file(&path)(error)),
-        };
-        let wrong = |problem: String| IterationError::State { path: path.clone(), problem };
-        let file: HeldOutFile = unsealed(&text)
-            .map_err(|error| wrong(format!("is not a held-out run of an iteration ({error}); remove its folder")))?;
+        let Some(file) = read_sealed::<HeldOutFile>(&path, "a held-out run")? else { return Ok(None) };
         if file.schema != HELD_OUT_SCHEMA || file.fingerprint != self.fingerprint || file.run != run {
-            return Err(wrong("belongs to another iteration, version or run: remove its folder".to_owned()));
+            return Err(IterationError::State { path, problem: OF_ANOTHER.to_owned() });
         }
         Ok(Some(file.found))
     }
@@ -235,16 +229,9 @@ impl IterationStore {
     pub fn planned(&self, run: usize, joints: usize) -> Result<Option<PlannedMotion>, IterationError> {
         let folder = self.plan_folder(run);
         let path = folder.join(PLAN_FILE);
-        let text = match dynident_files::read_text(&path, MAX_FILE_BYTES) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(IterationError::file(&path)(error)),
-        };
-        let wrong = |problem: String| IterationError::State { path: path.clone(), problem };
-        let file: PlanFile = unsealed(&text)
-            .map_err(|error| wrong(format!("is not a planned motion of an iteration ({error}); remove its folder")))?;
+        let Some(file) = read_sealed::<PlanFile>(&path, "a planned motion")? else { return Ok(None) };
         if file.schema != PLAN_SCHEMA || file.fingerprint != self.fingerprint || file.run != run {
-            return Err(wrong("belongs to another iteration, version or run: remove its folder".to_owned()));
+            return Err(IterationError::State { path, problem: OF_ANOTHER.to_owned() });
         }
         let motion = file.motion.map(|motion| motion.with_tables(&folder, joints)).transpose()?;
         Ok(Some(PlannedMotion { motion, forecast: file.forecast }))
@@ -365,6 +352,21 @@ impl IterationStore {
     pub fn run_folder(&self, run: usize) -> PathBuf {
         self.runs.join(format!("run_{run}"))
     }
+}
+
+/// Problem of a file of another iteration.
+const OF_ANOTHER: &str = "belongs to another iteration, version or run: remove its folder";
+
+/// Reads a sealed file of an iteration; `None` if it does not exist.
+fn read_sealed<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<Option<T>, IterationError> {
+    let text = match dynident_files::read_text(path, MAX_FILE_BYTES) {
+        Ok(text) => text,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(IterationError::file(path)(error)),
+    };
+    let problem = |error: String| format!("is not {kind} of an iteration ({error}); remove its folder");
+    let state = |error| IterationError::State { path: path.to_owned(), problem: problem(error) };
+    unsealed(&text).map(Some).map_err(state)
 }
 
 /// File name of the log of a leg (0-based).

@@ -2,10 +2,11 @@
 
 use crate::estimate::RunEstimate;
 use crate::forecast::covariance;
+use crate::prediction::covariance_root;
 use dynident_dynamics::{BatchWorkspace, Panels, ParametricModel, regressor_panels};
 use dynident_excitation::Motion;
 use dynident_simulation::Reference;
-use nalgebra::{DMatrix, DMatrixView, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
 /// Number of samples whose regressor is stored at once.
 const SAMPLES_AT_ONCE: usize = 2048;
@@ -40,15 +41,8 @@ pub(crate) fn largest_torque(
     let width = chi_squared_95(directions).sqrt();
     let mut centres = vec![DVector::from_vec(known.values.clone())];
     centres.extend(known.possible.as_ref().map(|all| DVector::from_vec(robot.base().values(all))));
-    // V = Lᵀ L of each joint's columns, by eigenvalues, because covariances from few segments are singular.
-    let roots: Vec<DMatrix<f64>> = (0..dof)
-        .map(|joint| {
-            let columns = robot.layout().joint_columns(joint);
-            let eigen = SymmetricEigen::new(spread.select_rows(columns).select_columns(columns));
-            let root = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
-            DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose()
-        })
-        .collect();
+    let roots: Vec<DMatrix<f64>> =
+        (0..dof).map(|joint| covariance_root(&spread, robot.layout().joint_columns(joint))).collect();
     let (mut workspace, mut panels) = (BatchWorkspace::new(robot.model()), Panels::default());
     let mut largest = LargestTorque { of_all: vec![0.0; dof], beyond_search: vec![0.0; dof] };
     let whole = reference.motion();

@@ -5,8 +5,8 @@ use dynident_simulation::{SimulationError, require};
 /// Thresholds of the verdict on a run and on its estimate. They are not part of study files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VerdictSettings {
-    /// Largest share of a joint's samples at the drive's limit, 0 to 1. Default 0.002: a limit that is touched briefly at
-    /// a reversal has no effect.
+    /// Largest share of a joint's samples at the drive's limit, 0 to 1. Default 0.002: a limit that is touched briefly
+    /// at a reversal has no effect.
     pub max_clipped_share: f64,
     /// Smallest share of the torque inside the 95 % band of a prediction, 0 to 1. Default 0.85: residuals that are
     /// correlated over seconds let the share vary by some percent; a prediction that is off by its noise throughout has
@@ -23,9 +23,9 @@ pub struct VerdictSettings {
     /// Share of a joint's samples at the drive's limit above which a run that left its trajectory proves that no
     /// controller can follow it, 0 to 1. Default 0.05.
     pub min_saturated_share: f64,
-    /// Bounds of the largest tracking error with which a joint follows its trajectory, rad (m): half of the joint's range
-    /// of motion, within these bounds. Default 0.1 and 1: beyond them other effects may occur than along the motion
-    /// (end stops, other contacts, friction at other speeds).
+    /// Bounds of the largest tracking error with which a joint follows its trajectory, rad (m): half of the joint's
+    /// range of motion, within these bounds. Default 0.1 and 1: beyond them other effects may occur than along the
+    /// motion (end stops, other contacts, friction at other speeds).
     pub following_error_bounds: [f64; 2],
     /// Detection of a link length that differs from the robot description.
     pub lengths: LengthSettings,
@@ -84,9 +84,9 @@ pub struct LengthSettings {
     /// unmodelled friction is not mistaken for a length, because residuals vary by some tenths of a percent per fitted
     /// parameter by chance.
     pub max_residual_ratio: f64,
-    /// Smallest share of the squared residuals of all joints that another length explains, 0 to 1. Default 0.12: a length
-    /// affects several joints, whereas unmodelled friction in one light joint is explained by a length in that joint
-    /// only. A correct arm of the test campaign reaches 0.06.
+    /// Smallest share of the squared residuals of all joints that another length explains, 0 to 1. Default 0.12: a
+    /// length affects several joints, whereas unmodelled friction in one light joint is explained by a length in that
+    /// joint only. A correct arm of the test campaign reaches 0.06.
     pub min_explained_share: f64,
 }
 

@@ -1,6 +1,6 @@
 //! The summary of `log`.
 
-use super::text::{table, wrapped};
+use super::text::{end_of_name, table, wrapped};
 use core::fmt::Write;
 use dynident::result::{LogChannel, LogContents};
 
@@ -34,7 +34,7 @@ pub(crate) fn log(found: &LogContents) -> String {
             let name = channel.name.strip_prefix(&topic).unwrap_or(&channel.name);
             let [low, high] = channel.range.map_or(["-".to_owned(), "-".to_owned()], |range| range.map(shown));
             vec![
-                shortened(name),
+                end_of_name(name, MAX_NAME_COLUMNS),
                 channel.unit.clone().unwrap_or_default(),
                 low,
                 high,
@@ -57,15 +57,6 @@ pub(crate) fn log(found: &LogContents) -> String {
     text += "\nsuggested begin of a study:\n\n";
     text += &found.study_format;
     text
-}
-
-/// The end of a long name is kept, because it distinguishes joints.
-fn shortened(name: &str) -> String {
-    let length = name.chars().count();
-    if length <= MAX_NAME_COLUMNS {
-        return name.to_owned();
-    }
-    format!("..{}", name.chars().skip(length - MAX_NAME_COLUMNS + 2).collect::<String>())
 }
 
 fn shown(value: f64) -> String {

@@ -48,13 +48,18 @@ pub(super) fn table(header: &[String], numbers: core::ops::Range<usize>, rows: V
     lines.join("\n") + "\n"
 }
 
-/// A name that fits its column: the end is kept, because it distinguishes joints.
+/// A name that fits its column.
 pub(super) fn name(name: &str) -> String {
+    end_of_name(name, MAX_NAME_COLUMNS)
+}
+
+/// A name of at most `columns` columns: the end is kept, because it distinguishes joints.
+pub(super) fn end_of_name(name: &str, columns: usize) -> String {
     let length = name.chars().count();
-    if length <= MAX_NAME_COLUMNS {
+    if length <= columns {
         return name.to_owned();
     }
-    format!("..{}", name.chars().skip(length - MAX_NAME_COLUMNS + 2).collect::<String>())
+    format!("..{}", name.chars().skip(length - columns + 2).collect::<String>())
 }
 
 /// A percentage without its sign.

@@ -42,6 +42,7 @@ pub struct FolderSettings {
 }
 
 impl FolderSettings {
+    /// Creates settings for a folder, with default values.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into(), wait_s: 0.0, forms: Vec::new(), urscript_rate_hz: None, torque_constants: None }
     }

@@ -4,6 +4,7 @@ use super::envelope::target_at;
 use super::stop_reason::JointOscillation;
 use super::ways::RunPart;
 use crate::oscillation::{OscillationLimits, OscillationWatch, growing_oscillation};
+use crate::rests::highest_speeds;
 use dynident_simulation::{Record, Reference};
 
 /// Number of samples from which the rate of a log is computed.
@@ -12,10 +13,8 @@ const RATE_SAMPLES: usize = 32;
 const REST_SPEED_SHARE: f64 = 0.1;
 
 /// Highest speed of each joint in a trajectory, rad/s (m/s), with a substitute for joints at rest.
-fn highest_speeds(reference: &Reference) -> Vec<f64> {
-    let motion = reference.motion();
-    let of_joint = |joint: usize| motion.dq[motion.of(joint)].iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
-    let highest: Vec<f64> = (0..motion.joints).map(of_joint).collect();
+fn reference_speeds(reference: &Reference) -> Vec<f64> {
+    let highest = highest_speeds([reference]);
     let fastest = highest.iter().copied().fold(0.0, f64::max);
     highest.into_iter().map(|own| if own > 0.0 { own } else { REST_SPEED_SHARE * fastest }).collect()
 }
@@ -56,7 +55,7 @@ impl RunOscillations {
                 let least = limits.speed_share * speed;
                 (least > 0.0).then(|| OscillationWatch::new(rate_hz, limits.lowest_hz, least)).flatten()
             };
-            self.joints = highest_speeds(reference).into_iter().map(watch).collect();
+            self.joints = reference_speeds(reference).into_iter().map(watch).collect();
         }
         let step_s = time_s - before_s;
         let pairs = self.newest.1.iter().zip(&before).map(|(new, old)| (new - old) / step_s);
@@ -104,7 +103,7 @@ pub(super) fn oscillation_at_end(reference: &Reference, record: &Record, lowest_
         let own = growing_oscillation(&deviations, rate_hz, lowest_hz)?;
         Some((own.amplitude / speed.max(f64::MIN_POSITIVE), joint, own))
     };
-    let all = highest_speeds(reference).into_iter().enumerate().filter_map(of_joint);
+    let all = reference_speeds(reference).into_iter().enumerate().filter_map(of_joint);
     let (_, joint, own) = all.max_by(|one, other| one.0.total_cmp(&other.0))?;
     Some(JointOscillation {
         joint: record.joints[joint].clone(),
