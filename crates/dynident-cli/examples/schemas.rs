@@ -25,7 +25,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_all(&std::env::args_os().nth(1).map_or_else(default, PathBuf::from))
 }
 
-/// Writes all schemas into a folder, which is created if necessary.
 pub(crate) fn write_all(folder: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder)?;
     let files = [

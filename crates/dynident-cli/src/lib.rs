@@ -92,7 +92,6 @@ enum Command {
     Man(commands::manual::Options),
 }
 
-/// Outcome of a command that was executed.
 enum Verdict {
     /// Success: exit status 0.
     Good,
@@ -154,7 +153,6 @@ fn refused(error: &clap::Error) {
     }
 }
 
-/// Converts the outcome to the exit status.
 fn ended(outcome: Result<Verdict, String>) -> u8 {
     match outcome {
         Ok(Verdict::Good) => 0,

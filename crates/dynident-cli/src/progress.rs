@@ -15,7 +15,6 @@ const WITHOUT_ROWS: &str = "{msg} {spinner} {elapsed}";
 /// Template for a stage with an unknown total.
 const WITH_ROWS: &str = "{msg} {spinner} {human_pos} rows  {elapsed}";
 
-/// Shows the current stage on standard error.
 #[derive(Default)]
 pub(crate) struct Bar {
     stage: Mutex<Option<Stage>>,

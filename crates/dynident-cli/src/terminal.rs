@@ -49,7 +49,6 @@ pub(crate) fn complain(message: &str) {
     let _ = writeln!(out, "error: {}", readable(&dynident::shortened_message(message)));
 }
 
-/// Prints a remark on standard error.
 pub(crate) fn remark(message: &str) {
     let mut out = io::stderr().lock();
     let _ = writeln!(out, "note: {}", readable(&dynident::shortened_message(message)));

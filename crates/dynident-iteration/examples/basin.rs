@@ -24,7 +24,6 @@ use std::error::Error;
 const STROKE: [f64; 2] = [1.991, 1.046];
 const DELTA_S: f64 = 5.74;
 const RATE_HZ: f64 = 100.0;
-/// Number of runs of a scheme.
 const RUNS: usize = 10;
 /// Largest error of a base parameter, as a share of the largest parameter, for which an arm is found.
 const FOUND: f64 = 0.01;
@@ -38,7 +37,6 @@ struct Start {
     feasible: bool,
 }
 
-/// Result of a scheme on a start.
 #[derive(Clone, Copy, PartialEq)]
 enum Verdict {
     Found,
@@ -49,7 +47,6 @@ enum Verdict {
 /// Windows of each joint: from, to; s.
 type Windows = Vec<Vec<[f64; 2]>>;
 
-/// A scheme's verdict on a start, and its number of runs.
 type Scheme = fn(&Start) -> Result<(Verdict, usize), Box<dyn Error>>;
 
 fn reference(order: &[usize]) -> Result<(Reference, Windows), Box<dyn Error>> {

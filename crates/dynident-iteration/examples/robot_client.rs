@@ -103,7 +103,6 @@ fn numbers(value: &Value) -> Result<Vec<f64>> {
     Ok(serde_json::from_value(value.clone())?)
 }
 
-/// A vector in reverse order.
 fn turned(values: &[f64]) -> Vec<f64> {
     values.iter().rev().copied().collect()
 }
@@ -134,7 +133,6 @@ impl Client {
         Ok(std::fs::rename(unfinished, &self.marker)?)
     }
 
-    /// Whether a stop has arrived, or the host is gone.
     fn stop_asked(&self) -> bool {
         match self.messages.try_recv() {
             Ok(message) => message["type"] == "stop",
@@ -228,7 +226,6 @@ impl Client {
         Ok(false)
     }
 
-    /// Runs the controller from the files.
     fn run(&mut self, message: &Value) -> Result<()> {
         let file = |key: &str| std::fs::read_to_string(message[key].as_str().unwrap_or_default());
         let controller: Value = serde_json::from_str(&file("controller")?)?;
@@ -304,7 +301,6 @@ impl Client {
         send(&json!({ "type": "end", "status": "done" }))
     }
 
-    /// Applies the received torques.
     fn steps(&mut self, begin: &Value) -> Result<()> {
         self.plant.set_state(0.0, &turned(&numbers(&begin["q"])?), &turned(&numbers(&begin["dq"])?));
         let rate_hz = begin["rate_hz"].as_f64().ok_or("no rate")?;
@@ -332,7 +328,6 @@ impl Client {
     }
 }
 
-/// The reference of an input table.
 fn table(text: &str, dof: usize, rate_hz: f64) -> Result<Reference> {
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for line in text.lines().skip(1) {
@@ -351,7 +346,6 @@ fn table(text: &str, dof: usize, rate_hz: f64) -> Result<Reference> {
     Ok(Reference::new(rate_hz, motion)?)
 }
 
-/// The first sample of each joint.
 fn first(values: &[f64], samples: usize) -> Vec<f64> {
     values.chunks(samples).map(|own| own[0]).collect()
 }

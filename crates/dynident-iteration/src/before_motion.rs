@@ -18,7 +18,6 @@ use std::borrow::Cow;
 /// A motion before a run (speed step, warm-up), or the run itself.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Commanded<'a> {
-    /// Index of the leg, from 0.
     pub(crate) place: usize,
     pub(crate) leg: &'a Leg,
     /// Share of the leg's speed.
@@ -33,12 +32,10 @@ impl<'a> Commanded<'a> {
         if self.speed < 1.0 { reference.slowed(self.speed).map(Cow::Owned) } else { Ok(Cow::Borrowed(reference)) }
     }
 
-    /// Whether this motion is the run itself.
     pub(crate) fn is_run(&self) -> bool {
         self.speed == 1.0 && !matches!(self.purpose, RunPurpose::WarmUp { .. })
     }
 
-    /// Begin of a message about a motion before a run.
     pub(crate) fn words(&self) -> String {
         match self.purpose {
             RunPurpose::WarmUp { pass, of } => format!("in pass {pass} of {of} of the warm-up"),

@@ -1,5 +1,3 @@
-//! Detection of torque saturation in a log.
-
 use crate::evidence::Clipping;
 use dynident_simulation::Record;
 
@@ -82,7 +80,6 @@ fn is_constant(torques: impl Iterator<Item = f64>, noise: f64) -> bool {
     1.48 * middle(&mut apart) <= MAX_COLOURED_NOISE_RATIO * noise / (block as f64).sqrt() + ROUNDING_SHARE * typical
 }
 
-/// Torque of a joint in the samples where it moves.
 fn moving_torques(record: &Record, joint: usize) -> Vec<f64> {
     let (q, tau) = (&record.q[record.of(joint)], &record.tau[record.of(joint)]);
     let apart = ((STEP_SHARE * q.len() as f64) as usize).max(1);

@@ -1,5 +1,3 @@
-//! Commands a motion: preparation, permission, run, outcome.
-
 use crate::before_motion::{Commanded, next_motion, rehearsed, ways_of};
 use crate::cut_short::CutShort;
 use crate::error::IterationError;
@@ -15,21 +13,16 @@ use crate::supervision::Supervisor;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use std::time::Instant;
 
-/// The prepared parts of a plan.
 #[derive(Debug)]
 pub(crate) struct Prepared {
     pub(crate) controller: ControllerSettings,
     pub(crate) model: Option<ControllerModel>,
-    /// Paths from and to home, leg by leg.
     pub(crate) ways: Vec<Option<FoundWays>>,
     pub(crate) rehearsal: Option<Rehearsal>,
 }
 
-/// Outcome of a motion.
 pub(crate) enum MotionOutcome {
-    /// A run, completed or not.
     Run(RobotRun),
-    /// The iteration ends here.
     Stopped(IterationStatus),
     /// The motion was interrupted or failed: its log if it had begun, and the reason.
     CutShort(Option<RobotRun>, CutShort),
@@ -77,7 +70,6 @@ impl Iteration {
         }
     }
 
-    /// Commands one motion of a plan, if the supervisor allows it and no stop is requested.
     pub(crate) fn commanded(
         &self,
         robot: &mut dyn Robot,

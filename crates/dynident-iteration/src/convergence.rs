@@ -193,7 +193,6 @@ fn clipping_words(stated: bool) -> &'static str {
 }
 
 impl Shortfall {
-    /// Whether it names a cause of the misfit rather than the misfit itself.
     fn is_cause(&self) -> bool {
         matches!(self, Self::Lag { .. } | Self::LongLag { .. } | Self::LagChanges { .. } | Self::Length(_))
     }
@@ -277,7 +276,6 @@ fn long_lag(lag: &LagChoice, allowed_s: f64) -> Option<Shortfall> {
     (lag.certain_s() > allowed_s).then(|| Shortfall::LongLag { lag_s: lag.longest_s(), allowed_s })
 }
 
-/// Unmet conditions other than the torque check.
 fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<Shortfall> {
     let good: Vec<&RunRecord> = records.iter().filter(|record| record.accepted).collect();
     let Some(last) = records.last() else { return Vec::new() };

@@ -124,21 +124,17 @@ enum NextStep {
     Declined(IterationStatus, Option<MotionForecast>),
 }
 
-/// State of an iteration between two runs.
 struct Course<'a> {
     iteration: &'a Iteration,
     store: Option<&'a IterationStore>,
     records: Vec<RunRecord>,
     /// Logs of the good runs, loaded when first needed.
     good: Option<Vec<GoodLog>>,
-    /// Why the newest run ended early, if it did.
     stopped: Option<String>,
-    /// When the robot last moved in this call.
     last_motion: Option<Instant>,
 }
 
 impl Course<'_> {
-    /// The outcome of an iteration that ends here.
     fn outcome(self, status: IterationStatus) -> Result<IterationOutcome, IterationError> {
         let shortfalls = self.iteration.shortfalls(&self.records)?;
         Ok(IterationOutcome { status, shortfalls, runs: self.records, declined: None })
@@ -186,7 +182,6 @@ impl Course<'_> {
         }
     }
 
-    /// Returns the next run and its motion, or how the iteration ends.
     fn next(&self, stop: Option<&StopSignal>) -> Result<NextStep, IterationError> {
         let (iteration, records) = (self.iteration, &self.records);
         match iteration.next(records)? {

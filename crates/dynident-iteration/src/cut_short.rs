@@ -9,9 +9,7 @@ use crate::store::IterationStore;
 /// Why a run was cut short, with its outcome in words.
 #[derive(Clone, Debug)]
 pub(crate) enum CutShort {
-    /// A stop was requested.
     Interrupted(String),
-    /// The communication with the robot failed.
     Failed(String),
 }
 

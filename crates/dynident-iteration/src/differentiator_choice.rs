@@ -64,7 +64,6 @@ impl DifferentiatorChoice {
     }
 }
 
-/// The candidates, starting with the default.
 fn candidates() -> [(&'static str, DifferentiatorSettings); 4] {
     let reference = ReferenceSettings::default;
     let smoother = Box::default;
@@ -147,7 +146,6 @@ pub(crate) fn choose_differentiator(
     Ok(DifferentiatorChoice { taken, name, candidates })
 }
 
-/// Number of usable samples of a motion.
 fn usable(recording: &Recording) -> usize {
     match &recording.samples {
         Samples::Motion(record) if record.usable.is_empty() => record.motion.rows,

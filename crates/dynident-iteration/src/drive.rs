@@ -35,7 +35,6 @@ pub(crate) struct NextRunMotion {
     pub(crate) forecast: Option<MotionForecast>,
 }
 
-/// The result of a planned run.
 pub(crate) enum PlannedRun {
     Run(Box<RunRecord>, Vec<RobotRun>),
     Stopped(IterationStatus),
@@ -43,7 +42,6 @@ pub(crate) enum PlannedRun {
     CutShort(Vec<RobotRun>, CutShort),
 }
 
-/// The log that a person corrected after it had been read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CorrectedLog {
     Run,
@@ -223,7 +221,6 @@ impl Iteration {
         Ok(())
     }
 
-    /// Accepts or rejects the run.
     fn judge(&self, record: &mut RunRecord, before: &[RunRecord]) -> Result<(), IterationError> {
         let names = self.names(&*self.robot(before)?, before)?;
         let following = following_limits(
@@ -319,7 +316,6 @@ impl Iteration {
         self.logs_of(&records.iter().filter(good).collect::<Vec<_>>(), store)
     }
 
-    /// Returns the logs of these runs.
     pub(crate) fn logs_of(
         &self,
         records: &[&RunRecord],

@@ -1,5 +1,3 @@
-//! Identification of several runs together.
-
 use crate::differentiator_choice::DifferentiatorChoice;
 use crate::error::IterationError;
 use crate::leg::IterationTask;
@@ -153,13 +151,11 @@ fn fitted(
     Ok(other.ok().filter(|other| other.schwarz < found.schwarz).unwrap_or(found).estimate)
 }
 
-/// A fit and its Bayesian information criterion.
 struct RunsEstimate {
     estimate: RunEstimate,
     schwarz: f64,
 }
 
-/// Runs that are fitted together.
 struct RunsFit<'a> {
     task: &'a IterationTask,
     runs: &'a [RunLog<'a>],

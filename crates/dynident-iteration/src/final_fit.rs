@@ -1,5 +1,3 @@
-//! The final identification from all good runs.
-
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::good_log::GoodLog;
@@ -35,13 +33,11 @@ impl Iteration {
         identification.payloads.clone_from(&settings.payloads);
         identification.settings = identification_settings(&task, &settings, runs.len());
         identification.settings.estimation.held.clear();
-        // As in the last fit of all runs.
         let own_offsets =
             good.last().and_then(|last| last.pooled.as_ref()).is_some_and(|all| !all.run_offsets.is_empty());
         if own_offsets && self.settings().pool {
             identification.settings.offsets = OffsetChoice::PerLog;
         }
-        // The held-out runs validate the result.
         if let Some(held_out) = &self.held_out {
             let joints = task.robot.joint_names();
             let settings = held_out_settings(&settings, records);

@@ -4,7 +4,6 @@ use crate::estimate::RunEstimate;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
-/// Largest number of directions in a forecast.
 const MAX_DIRECTIONS: usize = 10;
 
 /// Forecast for a motion from the estimate before it.
@@ -125,7 +124,6 @@ impl KnownInformation {
     }
 }
 
-/// Forecast of a run.
 pub(crate) struct Expected {
     pub(crate) directions: Vec<ForecastDirection>,
     /// Error bars before and after by information alone, direction by direction.
@@ -211,7 +209,6 @@ mod tests {
         }
     }
 
-    /// The mean information of the states to be predicted.
     fn needed() -> DMatrix<f64> {
         let root = DMatrix::from_row_slice(3, 3, &[1.0, 0.2, 0.5, 0.0, 2.0, -0.4, 0.3, 0.0, 9.0]);
         root.tr_mul(&root)

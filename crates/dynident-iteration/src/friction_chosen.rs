@@ -1,5 +1,3 @@
-//! The friction that was selected in the iteration.
-
 use crate::record::RunRecord;
 use dynident_identification::friction::JointFriction;
 

@@ -1,5 +1,3 @@
-//! The logs of good runs, for joint identification with later runs.
-
 use crate::estimate::RunEstimate;
 use crate::leg::Leg;
 use crate::record::RunRecord;
@@ -8,7 +6,6 @@ use crate::run_logs::RunLog;
 use dynident_recording::DifferentiatorSettings;
 use dynident_simulation::Record;
 
-/// The logs of a good run.
 #[derive(Clone, Debug)]
 pub(crate) struct GoodLog {
     run: usize,
@@ -28,7 +25,6 @@ impl GoodLog {
         Self { run: record.run, legs, records, joint_sigma, differentiator, rest_margins }
     }
 
-    /// Number of the run.
     pub(crate) fn run(&self) -> usize {
         self.run
     }

@@ -21,7 +21,6 @@ use dynident_simulation::{SimulationError, require};
 use std::borrow::Cow;
 use std::time::Instant;
 
-/// Outcome of a held-out run.
 pub(crate) enum HeldOutOutcome {
     Run(HeldOutRun, Box<RobotRun>),
     Stopped(IterationStatus),
@@ -60,7 +59,6 @@ impl Iteration {
         Ok(due.then_some(held_out))
     }
 
-    /// Makes a held-out run after the last of `records`.
     pub(crate) fn held_out_made(
         &self,
         held_out: &HeldOutMotion,

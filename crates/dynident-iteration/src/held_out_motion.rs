@@ -1,5 +1,3 @@
-//! The held-out motion and the evidence of its runs.
-
 use crate::evidence::RunEvidence;
 use crate::leg::Leg;
 use serde::{Deserialize, Serialize};

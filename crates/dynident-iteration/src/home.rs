@@ -184,7 +184,6 @@ impl HomeSettings {
     }
 }
 
-/// Reverses a motion in time.
 fn backwards(motion: &Motion) -> Motion {
     let turned = |values: &[f64], sign: f64| -> Vec<f64> {
         values
@@ -202,7 +201,6 @@ fn backwards(motion: &Motion) -> Motion {
     }
 }
 
-/// Planner of the paths.
 struct Planner<'a> {
     home: &'a HomeSettings,
     model: &'a Model,
@@ -247,7 +245,6 @@ impl<'a> Planner<'a> {
         Ok(Self { home, model, rate_hz: motion.rate_hz(), fastest, limits, set, stop })
     }
 
-    /// Checks that the motion is at rest at a sample.
     fn at_rest(&self, motion: &Reference, sample: usize) -> Result<(), HomeError> {
         let own = motion.motion();
         for (place, joint) in self.model.joints().iter().enumerate() {
@@ -260,7 +257,6 @@ impl<'a> Planner<'a> {
         Ok(())
     }
 
-    /// Checks that no stop was requested.
     fn check_stop(&self) -> Result<(), HomeError> {
         if (self.stop)() { Err(HomeError::Interrupted) } else { Ok(()) }
     }
@@ -319,7 +315,6 @@ impl<'a> Planner<'a> {
         Err(HomeError::NotClear { posture, kind, subject, share, ratio, tried: POSTURES_TRIED })
     }
 
-    /// The path through via postures, at rest in each.
     fn over(&self, from: &[f64], over: &[Vec<f64>], to: &[f64]) -> Result<Motion, HomeError> {
         let mut way = self.piece(from, from)?;
         let mut last = from;
@@ -330,7 +325,6 @@ impl<'a> Planner<'a> {
         Ok(way)
     }
 
-    /// Quick check of the direct path between two postures.
     fn sees(&self, from: &[f64], to: &[f64]) -> Result<bool, HomeError> {
         self.check_stop()?;
         Ok(self.looks_clear(&self.piece(from, to)?))

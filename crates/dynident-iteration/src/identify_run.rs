@@ -1,5 +1,3 @@
-//! The identification of one run.
-
 use crate::differentiator_choice::choose_differentiator;
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;

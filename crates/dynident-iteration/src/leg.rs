@@ -161,7 +161,6 @@ impl IterationTask {
         Ok(())
     }
 
-    /// The known value of each base column, if any.
     pub(crate) fn known_values(&self) -> Vec<Option<f64>> {
         let mut values = vec![None; self.robot.base().count()];
         for (column, value) in &self.known {

@@ -105,11 +105,9 @@ pub(crate) fn other_length(
     Ok(best.map(|(_, found)| found))
 }
 
-/// Residuals of a fit.
 struct Residuals {
     /// σ_j, Nm (N); zero for a joint without rows.
     sigma: Vec<f64>,
-    /// Number of rows of each joint.
     rows: Vec<usize>,
 }
 

@@ -1,5 +1,3 @@
-//! Parameters of a controller's model.
-
 use serde::{Deserialize, Serialize};
 
 /// Parameters of a controller's model.

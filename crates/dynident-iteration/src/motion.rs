@@ -1,5 +1,3 @@
-//! Computes the motion for the regressor from a record.
-
 use crate::error::IterationError;
 use crate::leg::Leg;
 use crate::rests::RestMargin;
@@ -106,13 +104,11 @@ fn rate_of(record: &Record) -> Option<f64> {
     Some(if (rate_hz / record.rate_hz - 1.0).abs() < UNIFORM_STEP_TOLERANCE { record.rate_hz } else { rate_hz })
 }
 
-/// Motion and torque of `count` values, all zero.
 fn zeros(count: usize) -> MotionBlock {
     let zeros = || vec![0.0; count];
     MotionBlock { q: zeros(), dq: zeros(), ddq: zeros(), tau: zeros(), ..MotionBlock::default() }
 }
 
-/// Excludes the torque of a joint while it is near rest.
 fn set_rests_aside(motion: &mut MotionBlock, joint: usize, margin: RestMargin, smoothing: usize) {
     let own = joint * motion.rows..(joint + 1) * motion.rows;
     for rest in margin.samples(&motion.dq[own.clone()], smoothing) {

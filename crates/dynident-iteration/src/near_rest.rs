@@ -1,5 +1,3 @@
-//! A joint whose rows near rest are excluded.
-
 use crate::rests::RestMargin;
 use serde::{Deserialize, Serialize};
 

@@ -112,14 +112,11 @@ pub struct Oscillation {
     pub share: f64,
 }
 
-/// Thresholds of the detection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Search {
-    /// Lowest frequency, Hz.
     pub(crate) lowest_hz: f64,
     /// Smallest amplitude, in the unit of the signal.
     pub(crate) least: f64,
-    /// Smallest share of oscillating samples.
     pub(crate) least_share: f64,
     /// Standard deviation of the signal's noise; 0 if unknown, then only regular oscillations are detected.
     pub(crate) noise: f64,
@@ -205,14 +202,11 @@ fn swings(
     (alternations > 0 && samples > 0).then_some((samples, alternations, peaks))
 }
 
-/// A passage from one side to the other.
 #[derive(Clone, Copy, Debug)]
 struct Alternation {
     /// The sample at which the threshold of the other side is passed.
     sample: usize,
-    /// Samples since the previous alternation.
     length: usize,
-    /// The largest magnitude since the previous alternation.
     peak: f64,
 }
 
@@ -233,7 +227,6 @@ impl AlternationCounter {
         Self { threshold, longest, sample: 0, side: None, last: VecDeque::with_capacity(SWINGS) }
     }
 
-    /// Adds a value; returns true if it completes an alternation.
     fn add(&mut self, x: f64) -> bool {
         let sample = self.sample;
         self.sample += 1;
@@ -299,7 +292,6 @@ fn without_mean(values: &[f64], window: usize) -> Vec<f64> {
 pub(crate) struct OscillationWatch {
     counter: AlternationCounter,
     rate_hz: f64,
-    /// The newest deviations, for their mean.
     window: VecDeque<f64>,
     sum: f64,
     /// Squares of the deviations from the mean, since the oldest alternation in use.

@@ -1,5 +1,3 @@
-//! Relative size of parameters, by their torque.
-
 use crate::leg::Leg;
 use crate::run_information::{RunNoise, run_information};
 use dynident_dynamics::ParametricModel;

@@ -1,5 +1,3 @@
-//! Interface of motion planners.
-
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::forecast::MotionForecast;

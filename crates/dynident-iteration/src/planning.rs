@@ -1,5 +1,3 @@
-//! Calls a planner with the good runs.
-
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::leg::{IterationTask, Leg};

@@ -125,7 +125,6 @@ pub(crate) fn further(records: &[RunRecord], thresholds: &VerdictSettings) -> Op
     Some(RunPlan::with_model(records.len() + 1, model, 1.0))
 }
 
-/// The model of a controller from a run.
 fn model_of(record: &RunRecord) -> Option<ModelParameters> {
     record.knowledge().and_then(RunEstimate::for_controller)
 }
@@ -160,22 +159,16 @@ fn most_trusted<'r>(records: &'r [RunRecord], thresholds: &VerdictSettings) -> O
     })
 }
 
-/// Why a run is rejected.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub(crate) enum Rejection {
-    /// It was not completed.
     #[error("{outcome}")]
     NotDone { outcome: String },
-    /// It has no estimate.
     #[error("{reason}")]
     NoEstimate { reason: String },
-    /// Its parameters are not physically consistent.
     #[error("no physically consistent model fits it: {reason}")]
     Inconsistent { reason: String },
-    /// A joint left its trajectory, rad (m).
     #[error("joint {joint} left its trajectory: error {error:.3} rad, limit {limit:.3} rad")]
     LeftTrajectory { joint: String, error: f64, limit: f64 },
-    /// Its tracking is worse than that of the last good run, rad (m).
     #[error("it tracks worse: {now:.3e} rad after {then:.3e} rad")]
     TracksWorse { now: f64, then: f64 },
 }

@@ -1,5 +1,3 @@
-//! A robot at one sample of a motion.
-
 use dynident_simulation::Reference;
 use dynident_simulation::controllers::ControllerModel;
 use nalgebra::DMatrix;
@@ -23,7 +21,6 @@ pub(crate) fn inertia_matrix(model: &mut ControllerModel, q: &[f64]) -> DMatrix<
     0.5 * (&matrix + matrix.transpose())
 }
 
-/// Positions, velocities and accelerations of all joints at a sample.
 pub(crate) fn at_sample(reference: &Reference, sample: usize) -> [Vec<f64>; 3] {
     let motion = reference.motion();
     [&motion.q, &motion.dq, &motion.ddq]

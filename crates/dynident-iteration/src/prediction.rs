@@ -1,5 +1,3 @@
-//! Prediction of a run that was not used for the fit.
-
 use crate::evidence::Prediction;
 use dynident_identification::rows::{JointRows, RowConsumer, predicted_torque};
 use dynident_identification::{LogError, Logs, RegressorModel};
@@ -15,7 +13,6 @@ pub(crate) fn covariance_root(covariance: &DMatrix<f64>, columns: &[usize]) -> D
     DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose()
 }
 
-/// A model with its error bars.
 pub(crate) struct Known<'a> {
     pub(crate) theta: &'a [f64],
     pub(crate) covariance: &'a [Vec<f64>],

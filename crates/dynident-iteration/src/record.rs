@@ -1,5 +1,3 @@
-//! The stored record of a run.
-
 use crate::estimate::RunEstimate;
 use crate::evidence::RunEvidence;
 use crate::forecast::MotionForecast;

@@ -77,13 +77,10 @@ impl RedesignSettings {
 /// Why the last motion is repeated instead of a new one.
 #[derive(Clone, Debug, PartialEq, Error)]
 enum NotRedesigned {
-    /// The limits contradict each other.
     #[error("no motion within the limits: {0}")]
     Limits(#[from] LimitError),
-    /// The search found no motion.
     #[error("the search found no motion: {0}")]
     Search(#[from] OptimiserError),
-    /// The best motion breaks a limit.
     #[error("the best motion breaks a limit of {what} by {percent:.2} %")]
     Broken { what: String, percent: f64 },
     /// A model within the uncertainty exceeds a torque limit.
@@ -91,16 +88,13 @@ enum NotRedesigned {
         "joint {joint} may need {torque:.3} Nm along every motion found (models within the uncertainty), its limit is {limit:.3} Nm"
     )]
     Torque { joint: String, torque: f64, limit: f64 },
-    /// The motion ends at another posture than it begins.
     #[error("the family does not return joint {joint} to where it began")]
     Ends { joint: String },
-    /// The search was interrupted.
     #[error("the search was interrupted")]
     Interrupted,
     /// Repeating the last motion brings as much information.
     #[error("the best other motion reduces the error bars by only {percent:.0} %")]
     NoBetter { percent: f64 },
-    /// Invalid numbers.
     #[error(transparent)]
     Numbers(#[from] SimulationError),
 }
@@ -324,7 +318,6 @@ impl MotionPlanner for Redesign {
         let information = KnownInformation::new(total, &needed);
         let expected =
             |reference: &Reference| information.after(&run_information(before.robot, reference, &noise), before.known);
-        // Compare repeating the last motion with the best new one.
         let again = expected(repeated);
         let repeat_gain_percent = again.gain_percent();
         let model = found_bodies(before.robot, before.known)?;

@@ -167,12 +167,10 @@ fn room_words(verdict: &RunStatus) -> &'static str {
     }
 }
 
-/// One simulated robot of a rehearsal.
 #[derive(Clone, Copy)]
 struct Rehearsing {
     /// 0 for the model, otherwise the number of the deviating robot.
     number: usize,
-    /// Delay of its controller, s.
     delay_s: f64,
     /// Whether its drives have the smallest inertia.
     is_light: bool,
@@ -203,7 +201,6 @@ impl Rehearsing {
     }
 }
 
-/// Input of a rehearsal.
 pub(crate) struct Rehearsed<'a> {
     pub(crate) robot: &'a ParametricModel,
     /// The complete commanded trajectories, including the paths from and to home.
@@ -243,7 +240,6 @@ impl Rehearsed<'_> {
         let (model, terms) = (self.robot.model(), self.robot.terms());
         let own = self.believed.map(|all| ControllerModel::from_parameters(model, terms, all)).transpose()?;
         let Some(mut known) = self.model.cloned().or(own) else { return Ok(Ok(shown)) };
-        // Mass matrix over the workspace and along the motion.
         let mut random = Random::new(settings.seed);
         for q in self.postures(settings.postures, &mut random) {
             if stop() {
@@ -256,7 +252,6 @@ impl Rehearsed<'_> {
             }
             shown.smallest_eigenvalue = shown.smallest_eigenvalue.min(smallest);
         }
-        // Torque along the motion.
         let mut tau = vec![0.0; dof];
         for reference in self.references {
             for sample in 0..reference.samples() {
@@ -269,7 +264,6 @@ impl Rehearsed<'_> {
                 shown.largest_torque.iter_mut().zip(&tau).for_each(|(most, tau)| *most = most.max(tau.abs()));
             }
         }
-        // Closed loop without and with the delay.
         if let Some(believed) = self.believed.filter(|_| self.controller.can_be_simulated()) {
             let in_drives = matches!(self.controller, ControllerSettings::PositionLoop(_));
             let delay_s = if in_drives { 0.0 } else { settings.delay_s(self.robot.model()) };
@@ -295,7 +289,6 @@ impl Rehearsed<'_> {
         Ok(Ok(shown))
     }
 
-    /// Simulates one robot along all motions.
     fn simulate(
         &self,
         believed: &[f64],

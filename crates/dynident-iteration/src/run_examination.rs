@@ -102,7 +102,6 @@ fn torque_noises(records: &[Record], dof: usize) -> Vec<TorqueNoise> {
     most
 }
 
-/// The cut-off of the parallel filter, Hz; `None` without a filter.
 fn row_cutoff_hz(records: &[Record], settings: &RunIdentificationSettings) -> Option<f64> {
     let (filter, record) = settings.parallel_filter.as_ref().zip(records.first())?;
     let cutoff_hz = filter.cutoff_hz.unwrap_or(0.4 * record.rate_hz / filter.factor.max(1) as f64);
@@ -130,7 +129,6 @@ fn predict(
     let model = model.clone().with_load_of_estimate(&model, &known.values);
     let added =
         known_payloads(&settings.payloads, &model).map_err(dynident_identification::IdentificationError::from)?;
-    // Group the legs by payload.
     let mut groups: Vec<(Vec<f64>, Vec<usize>)> = Vec::new();
     for index in all {
         let theta = match &recordings[index].payload {
@@ -148,7 +146,6 @@ fn predict(
     for (theta, legs) in groups {
         let known = Known { theta: &theta, covariance: &known.covariance, joint_sigma: &known.joint_sigma };
         for (joint, found) in joints.iter_mut().zip(predictions(&logs, &model, &legs, &known)?) {
-            // Keep the worst of several.
             let better = |old: &crate::evidence::Prediction| found.is_none_or(|new| old.inside <= new.inside);
             joint.prediction = joint.prediction.filter(better).or(found);
         }

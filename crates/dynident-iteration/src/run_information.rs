@@ -1,5 +1,3 @@
-//! Information about the parameters in the motion of a run.
-
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::{Information, Motion};
 use dynident_simulation::Reference;
@@ -16,7 +14,6 @@ const MIN_NOISE: f64 = 1e-9;
 pub(crate) struct RunNoise {
     /// Standard deviation of each joint's residual in the rows of the estimate, Nm (N).
     pub(crate) joint_sigma: Vec<f64>,
-    /// Rows of each joint per second.
     pub(crate) rows_per_s: f64,
 }
 

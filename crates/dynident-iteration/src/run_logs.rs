@@ -60,7 +60,6 @@ pub(crate) fn recordings(
     Ok(recordings)
 }
 
-/// The settings of the identification.
 pub(crate) fn identification_settings(
     task: &IterationTask,
     settings: &RunIdentificationSettings,

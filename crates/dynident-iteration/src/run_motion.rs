@@ -65,12 +65,10 @@ pub(crate) fn legs_along<'a>(
     Ok(Cow::Owned(legs?))
 }
 
-/// File name of the table of a leg (0-based).
 fn table_name(leg: usize) -> String {
     if leg == 0 { "motion.csv".to_owned() } else { format!("motion_{}.csv", leg + 1) }
 }
 
-/// Largest table, bytes.
 const MAX_TABLE_BYTES: u64 = 1 << 30;
 
 fn read_table(path: &Path, joints: usize, rate_hz: f64) -> Result<Reference, IterationError> {

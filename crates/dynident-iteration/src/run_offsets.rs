@@ -75,7 +75,6 @@ pub(crate) fn is_any_significant(deviations: &[RunOffset], runs: &[RunLog<'_>]) 
     })
 }
 
-/// Root mean square of a joint's torque over all runs, Nm (N).
 fn torque_rms(runs: &[RunLog<'_>], joint: usize) -> f64 {
     let records = || runs.iter().flat_map(|run| run.records);
     let square: f64 =

@@ -5,35 +5,23 @@ use dynident_system::names;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Prefix of an incomplete run's folder.
 pub(crate) const UNFINISHED: &str = ".unfinished-";
-/// Prefix of a run's folder.
 const RUN: &str = "run_";
-/// Prefix of the folder of an interrupted run.
 pub(crate) const INTERRUPTED: &str = "interrupted_";
-/// Prefix of the folder of a planned motion.
 pub(crate) const PLANNED: &str = "planned_";
-/// Prefix of the folder of a held-out run.
 pub(crate) const HELD_OUT: &str = "held_out_";
-/// File of a held-out run.
 pub(crate) const HELD_OUT_FILE: &str = "held_out.json";
-/// File of a planned motion.
 pub(crate) const PLAN_FILE: &str = "plan.json";
-/// File of a run.
 pub(crate) const RUN_FILE: &str = "run.json";
-/// File of an interrupted run.
 pub(crate) const INTERRUPTED_FILE: &str = "interrupted.json";
 
 /// Prefixes of the logs of a run's approach and return paths.
 pub(crate) const WAYS: [&str; 2] = ["approach", "return"];
 
-/// The folders of an iteration.
 pub(crate) struct RunsFolder {
     runs: PathBuf,
     kept: Vec<PathBuf>,
-    /// Planned motions with the numbers of their runs.
     planned: Vec<(usize, PathBuf)>,
-    /// Held-out runs with the numbers of the runs before them.
     held_out: Vec<(usize, PathBuf)>,
     unfinished: Vec<PathBuf>,
 }
@@ -93,7 +81,6 @@ impl RunsFolder {
         if self.kept.iter().any(|kept| kept == folder) { remove(folder) } else { Ok(()) }
     }
 
-    /// The folders of runs and plans.
     fn removable(&self) -> impl Iterator<Item = &PathBuf> {
         self.kept.iter().chain(self.planned.iter().chain(&self.held_out).map(|(_, folder)| folder))
     }
@@ -155,7 +142,6 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, IterationError> {
     Ok(names.into_iter().map(|name| folder.join(name)).collect())
 }
 
-/// Whether it is a file with a name that an iteration uses.
 fn is_own(file: &Path) -> bool {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let numbered = |rest: &str| rest.strip_suffix(".csv").is_some_and(|number| number.parse::<usize>().is_ok());

@@ -1,5 +1,3 @@
-//! Safety settings of runs.
-
 use crate::home::HomeSettings;
 use crate::oscillation::OscillationSettings;
 use crate::rehearsal::RehearsalSettings;

@@ -7,10 +7,8 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// Key of the hash.
 const KEY: &str = "content_sha256";
 
-/// A file with the hash of its other content.
 #[derive(Serialize)]
 struct Sealed<'a, T> {
     #[serde(flatten)]

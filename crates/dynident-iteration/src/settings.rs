@@ -1,5 +1,3 @@
-//! Settings of an iteration.
-
 use crate::safety::SafetySettings;
 use crate::torque_check_settings::TorqueCheckSettings;
 use crate::verdict_settings::VerdictSettings;
@@ -157,7 +155,6 @@ pub struct SettledSettings {
 const MOST_LAG_S: f64 = 0.01;
 
 impl SettledSettings {
-    /// Returns the longest accepted lag for this robot, seconds.
     pub(crate) fn most_lag_s(&self, model: &Model) -> f64 {
         self.most_lag_s.unwrap_or_else(|| model.own_scale().seconds(MOST_LAG_S).max(MOST_LAG_S))
     }

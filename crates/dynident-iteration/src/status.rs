@@ -1,5 +1,3 @@
-//! How an iteration ended.
-
 use serde::{Deserialize, Serialize};
 
 /// How an iteration ended, or why it is paused.

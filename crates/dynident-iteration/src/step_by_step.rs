@@ -12,12 +12,10 @@ use dynident_identification::rows::{JointRows, RowConsumer};
 use dynident_identification::{EstimationSettings, LogError, Logs, RegressorModel};
 use nalgebra::DMatrix;
 
-/// Results of the finished steps.
 pub(crate) struct Steps {
     pub(crate) values: Vec<f64>,
     pub(crate) covariance: DMatrix<f64>,
     pub(crate) joint_sigma: Vec<f64>,
-    /// Whether each column was estimated.
     pub(crate) found: Vec<bool>,
     pub(crate) rows: usize,
 }
@@ -193,7 +191,6 @@ fn propagate(
     }
 }
 
-/// The least squares estimator of the settings.
 fn least_squares(problem: &LinearProblem, settings: &EstimationSettings) -> Result<Estimate, IterationError> {
     let (rank, covariance) = (settings.rank, settings.covariance);
     Ok(match settings.estimator {
@@ -202,7 +199,6 @@ fn least_squares(problem: &LinearProblem, settings: &EstimationSettings) -> Resu
     })
 }
 
-/// Passes rows to a function.
 struct Visit<F>(F);
 
 impl<F: FnMut(&JointRows<'_>) -> Result<(), LogError>> RowConsumer for Visit<F> {

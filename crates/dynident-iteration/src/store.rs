@@ -21,22 +21,17 @@ use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Schema of `runs/interrupted_k/interrupted.json`.
 const INTERRUPTED_SCHEMA: &str = "dynident/interrupted/1";
 
-/// Largest file that is read, bytes.
 const MAX_FILE_BYTES: u64 = 1 << 30;
 
 /// Schema of `runs/run_k/run.json`.
 pub const RUN_SCHEMA: &str = "dynident/run/1";
 
-/// Schema of `runs/planned_k/plan.json`.
 const PLAN_SCHEMA: &str = "dynident/planned-motion/1";
 
-/// Schema of `runs/held_out_k/held_out.json`.
 const HELD_OUT_SCHEMA: &str = "dynident/held-out-run/1";
 
-/// Content of `runs/held_out_k/held_out.json`.
 #[derive(Serialize, Deserialize)]
 struct HeldOutFile {
     schema: String,
@@ -46,7 +41,6 @@ struct HeldOutFile {
     found: HeldOutRun,
 }
 
-/// Content of `runs/planned_k/plan.json`: the motion of a run that has not been executed yet.
 #[derive(Serialize, Deserialize)]
 struct PlanFile {
     schema: String,
@@ -99,7 +93,6 @@ impl IterationStore {
         found.remove_unfinished()?;
         let store = Self { runs, fingerprint: fingerprint.to_owned() };
         let made = store.records()?.len();
-        // Remove plans of other runs; they are obsolete.
         RunsFolder::read(&store.runs)?.remove_plans_but(made + 1)?;
         Ok(store)
     }
@@ -155,7 +148,6 @@ impl IterationStore {
         self.keep_whole(&folder, (HELD_OUT_FILE, &text), core::slice::from_ref(robot_run), None)
     }
 
-    /// Returns the held-out run after a run, if it exists.
     fn held_out(&self, run: usize) -> Result<Option<HeldOutRun>, IterationError> {
         let path = self.held_out_folder(run).join(HELD_OUT_FILE);
         let Some(file) = read_sealed::<HeldOutFile>(&path, "a held-out run")? else { return Ok(None) };
@@ -354,7 +346,6 @@ impl IterationStore {
     }
 }
 
-/// Problem of a file of another iteration.
 const OF_ANOTHER: &str = "belongs to another iteration, version or run: remove its folder";
 
 /// Reads a sealed file of an iteration; `None` if it does not exist.
@@ -369,7 +360,6 @@ fn read_sealed<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<Option<T>
     unsealed(&text).map(Some).map_err(state)
 }
 
-/// File name of the log of a leg (0-based).
 fn log_name(leg: usize) -> String {
     if leg == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", leg + 1) }
 }

@@ -63,7 +63,6 @@ pub trait Supervisor {
     fn made(&mut self, _record: &RunRecord, _runs: &[RobotRun]) {}
 }
 
-/// A supervisor that only receives the runs.
 pub(crate) struct Watching<'a>(pub(crate) &'a mut dyn FnMut(&RunRecord, &[RobotRun]));
 
 impl Supervisor for Watching<'_> {

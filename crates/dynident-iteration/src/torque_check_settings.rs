@@ -1,5 +1,3 @@
-//! Settings of the torque check.
-
 use dynident_simulation::{SimulationError, require};
 use serde::{Deserialize, Serialize};
 

@@ -24,7 +24,6 @@ const MIN_MOTION_DENSITY_RATIO: f64 = 8.0;
 /// A joint reverses in a window if a quarter of it moves the joint less than this share of the mean of the quarters.
 const MIN_QUARTER_SHARE: f64 = 0.1;
 
-/// Noise of one torque signal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TorqueNoise {
     /// Standard deviation of one sample, Nm (N).
@@ -39,7 +38,6 @@ impl TorqueNoise {
         (self.density * cutoff_hz).sqrt()
     }
 
-    /// The larger of two.
     pub(crate) fn or(self, other: Self) -> Self {
         Self { of_sample: self.of_sample.max(other.of_sample), density: self.density.max(other.density) }
     }

@@ -8,7 +8,6 @@ use dynident_excitation::Motion;
 use dynident_simulation::Reference;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
-/// Number of samples whose regressor is stored at once.
 const SAMPLES_AT_ONCE: usize = 2048;
 
 /// Approximate rate of the evaluated samples, Hz for an arm of 1.2 m; rigid-body torques change little in between.
@@ -17,7 +16,6 @@ const RATE_HZ: f64 = 500.0;
 /// One-sided 95 % point of the standard normal distribution.
 const NORMAL_95: f64 = 1.644_853_6;
 
-/// The largest torque of each joint along a trajectory, Nm (N).
 #[derive(Clone, Debug)]
 pub(crate) struct LargestTorque {
     /// Over all models in the 95 % ellipsoid of the parameters: `|wᵀθ| + √χ² √(wᵀ C w)`, the largest `|wᵀϑ|` with `(ϑ -

@@ -23,11 +23,8 @@ const MAX_SQUARED_ERROR_RATIO: f64 = 0.25;
 /// Largest relative deviation of the log's rate from the controller's.
 const MAX_RATE_DEVIATION: f64 = 1e-3;
 
-/// The known closed loop.
 pub(crate) struct KnownLoop<'a> {
-    /// Joints and terms.
     pub(crate) robot: &'a ParametricModel,
-    /// All estimated parameters of the robot.
     pub(crate) parameters: &'a [f64],
     /// The selected friction, with the uncertainty of its constants; empty if the friction was stated.
     pub(crate) friction: &'a [JointFriction],
@@ -38,7 +35,6 @@ pub(crate) struct KnownLoop<'a> {
     pub(crate) delay_s: f64,
 }
 
-/// The explained part of a run's tracking error.
 pub(crate) struct TrackingFloor {
     /// Largest explained tracking error of each joint, rad (m).
     pub(crate) floor: Vec<f64>,
@@ -68,7 +64,6 @@ pub(crate) fn tracking_floor(reference: &Reference, record: &Record, known: &Kno
     })
 }
 
-/// The floor of a robot with these terms and parameters.
 fn floor_with(
     friction: (&[TorqueTerm], &[f64]),
     reference: &Reference,

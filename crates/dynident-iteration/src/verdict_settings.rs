@@ -1,5 +1,3 @@
-//! Thresholds of the verdict on runs.
-
 use dynident_simulation::{SimulationError, require};
 
 /// Thresholds of the verdict on a run and on its estimate. They are not part of study files.

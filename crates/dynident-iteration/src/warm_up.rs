@@ -84,7 +84,6 @@ pub(crate) fn passes(
     (wanted_s / pass_s(legs, ways).max(f64::MIN_POSITIVE)).ceil().max(1.0) as usize
 }
 
-/// Length of one pass, s.
 fn pass_s(legs: &[Leg], ways: &[Option<FoundWays>]) -> f64 {
     let motions: f64 = legs.iter().map(|leg| leg.reference().duration_s()).sum();
     let ways = ways.iter().flatten().map(|found| &found.ways);
@@ -132,7 +131,6 @@ impl WarmUpWatch {
         }
     }
 
-    /// The result; `None` without passes.
     pub(crate) fn shown(&self) -> Option<WarmUp> {
         let torque = |pass: &Pass| -> Vec<f64> {
             pass.work.iter().zip(&pass.path).map(|(work, path)| if *path > 0.0 { work / path } else { 0.0 }).collect()

@@ -180,10 +180,8 @@ fn runs_of_another_iteration_are_refused() {
     outcome(folder.path()).unwrap();
     let error = IterationStore::open(folder.path(), "other", true).unwrap_err();
     assert!(matches!(error, IterationError::State { .. }), "{error}");
-    // After a fresh start they are removed.
     let store = IterationStore::open(folder.path(), "other", false).unwrap();
     assert!(store.records().unwrap().is_empty());
-    // An interrupted run is not read as a run.
     std::fs::create_dir(store.run_folder(1)).unwrap();
     std::fs::write(store.run_folder(1).join("run.json"), "{\"schema\":").unwrap();
     assert!(matches!(store.records(), Err(IterationError::State { .. })));

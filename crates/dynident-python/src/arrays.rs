@@ -53,7 +53,6 @@ impl<'py> Samples<'py> {
         Err(PyValueError::new_err(format!("{name} has samples in {found:?}, where the first array has {expected:?}")))
     }
 
-    /// The leading axes.
     pub(crate) fn lead(&self) -> &[usize] {
         &self.lead
     }
@@ -105,7 +104,6 @@ impl<'py> Motion<'py> {
         Ok(Self { q, dq, ddq })
     }
 
-    /// The leading axes.
     pub(crate) fn lead(&self) -> &[usize] {
         self.q.lead()
     }
@@ -177,7 +175,6 @@ impl<'py> Motion<'py> {
     }
 }
 
-/// Converts sample-major to joint-major values.
 pub(crate) fn joint_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f64> {
     let mut out = vec![0.0; rows.len()];
     for (sample, row) in rows.chunks_exact(joints.max(1)).enumerate() {
@@ -188,7 +185,6 @@ pub(crate) fn joint_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f6
     out
 }
 
-/// Converts joint-major to sample-major values.
 pub(crate) fn sample_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f64> {
     joint_major(rows, joints, samples)
 }

@@ -28,7 +28,6 @@ pub(crate) fn assembled(
     Ok(study)
 }
 
-/// A dictionary of keyword arguments as JSON.
 pub(crate) fn json_of(py: Python<'_>, settings: &Bound<'_, PyDict>) -> PyResult<String> {
     py.import("json")?.call_method1("dumps", (settings,))?.extract()
 }

@@ -18,17 +18,14 @@ create_exception!(dynident, ResultError, Error, "A result that does not belong t
 
 create_exception!(dynident, StopRun, Error, "The robot has to be stopped: the run is over.");
 
-/// The exception of a robot description.
 pub(crate) fn robot(error: impl core::fmt::Display) -> PyErr {
     RobotError::new_err(error.to_string())
 }
 
-/// The exception of recordings.
 pub(crate) fn log(error: impl core::fmt::Display) -> PyErr {
     LogError::new_err(error.to_string())
 }
 
-/// The exception of factors.
 pub(crate) fn factors(error: impl core::fmt::Display) -> PyErr {
     ResultError::new_err(error.to_string())
 }

@@ -79,7 +79,6 @@ impl Factors {
     }
 }
 
-/// Reduces the training logs of a study.
 #[pyfunction]
 #[pyo3(signature = (study, like=None, arm=None, recorded_at_s=None, segments=16, threads=None, progress=None))]
 pub(crate) fn _reduce(
@@ -98,7 +97,6 @@ pub(crate) fn _reduce(
     })
 }
 
-/// Identifies the model from all logs of the factors.
 #[pyfunction]
 #[pyo3(signature = (factors, threads=None, progress=None))]
 pub(crate) fn _identify_factors(

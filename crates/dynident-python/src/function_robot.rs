@@ -15,14 +15,12 @@ type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 pub(crate) struct Raised(Arc<Mutex<Option<PyErr>>>);
 
 impl Raised {
-    /// Stores an exception, if it is the first.
     pub(crate) fn keep(&self, outcome: PyResult<()>) {
         if let (Err(error), Ok(mut kept)) = (outcome, self.0.lock()) {
             kept.get_or_insert(error);
         }
     }
 
-    /// Returns the exception, if there was one.
     pub(crate) fn taken(&self) -> Option<PyErr> {
         self.0.lock().ok().and_then(|mut kept| kept.take())
     }

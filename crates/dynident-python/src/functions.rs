@@ -26,7 +26,6 @@ use std::sync::Arc;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// A value as JSON.
 fn json(value: &impl serde::Serialize) -> Result<String, Error> {
     dynident::text::json::to_string(value)
         .map_err(|error| Error::Result { path: PathBuf::from("<result>"), message: error.to_string() })
@@ -46,7 +45,6 @@ pub(crate) fn of_study<T: Send + 'static>(
     })
 }
 
-/// Whether a search continues.
 fn unless(is_over: bool) -> ControlFlow<()> {
     if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
@@ -66,7 +64,6 @@ pub(crate) fn _identify(
     })
 }
 
-/// Examines a study with its robot and logs: JSON.
 #[pyfunction]
 #[pyo3(signature = (study, threads=None, progress=None))]
 pub(crate) fn _check(
@@ -77,7 +74,6 @@ pub(crate) fn _check(
     of_study(study, threads, progress, |study, path, options, _| json(&check(&study, &path, options)?))
 }
 
-/// Validates a model on the logs of a study: JSON.
 #[pyfunction]
 #[pyo3(signature = (model, study, threads=None, progress=None))]
 pub(crate) fn _validate(
@@ -96,7 +92,6 @@ pub(crate) fn _validate(
 /// acceleration.
 type Designed<'py> = (String, String, String, Array<'py>, [Array<'py>; 3]);
 
-/// Designs the motion of a study, sampled at `rate_hz`.
 #[pyfunction]
 #[pyo3(signature = (study, rate_hz=None, threads=None))]
 pub(crate) fn _design<'py>(

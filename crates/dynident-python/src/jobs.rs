@@ -30,12 +30,10 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Whether the job was cancelled.
     pub(crate) fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }
 
-    /// Unwinds a cancelled job.
     fn unwind_if_cancelled(&self) {
         if self.is_cancelled() {
             resume_unwind(Box::new(Cancelled));

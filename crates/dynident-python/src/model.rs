@@ -19,7 +19,6 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Name of a result in memory in messages.
 pub(crate) const RESULT: &str = "<model>";
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
@@ -27,7 +26,6 @@ type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 /// The robot description with the new values: URDF, D-H table, MJCF, SDF, if available.
 type Descriptions = [Option<String>; 4];
 
-/// State of a pickled model.
 type Reduced<'py> = (Bound<'py, PyAny>, (String, Study, Descriptions, String));
 
 /// A result with its study: the basis of ``dynident.Model``. The report and the predictor are created when first
@@ -43,11 +41,9 @@ pub(crate) struct FittedModel {
     predictor: OnceLock<TorquePredictor>,
 }
 
-/// The report of a result.
 enum Page {
     /// To be generated from the torques over time, which the result does not contain.
     Of(Vec<LogTrace>),
-    /// As stored.
     Written(String),
 }
 

@@ -38,11 +38,9 @@ type Matrices<'py> = (Array<'py>, Array<'py>, Array<'py>);
 /// number of them, shape ``(..., n)``, and return the same leading axes.
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct Robot {
-    /// As read.
     description: Description,
     /// Keys of ``[robot]`` in addition to the file, as JSON.
     settings: String,
-    /// The model with these keys.
     model: Model,
     /// Base parameters of the bodies, computed when first needed.
     base: OnceLock<BaseParameters>,
@@ -96,7 +94,6 @@ impl Robot {
         Ok(Self { description, settings, model, base, singles, batches, panels, layouts })
     }
 
-    /// The robot description without the keys of ``[robot]``.
     pub(crate) fn description(&self) -> &Description {
         &self.description
     }

@@ -17,7 +17,6 @@ use std::path::{Path, PathBuf};
 /// Samples of one log: names of the columns, and the columns.
 type Samples<'py> = (Vec<String>, Vec<PyReadonlyArray1<'py, f64>>);
 
-/// The same as output.
 type Columns<'py> = (Vec<String>, Vec<Bound<'py, PyArrayDyn<f64>>>);
 
 /// A study: robot, drives, logs and settings, as ``[robot]``, ``[drive]``, ``[[log]]`` and so on of a study file.

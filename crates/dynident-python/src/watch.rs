@@ -40,7 +40,6 @@ struct Watched {
     alarms: Vec<Alarm>,
 }
 
-/// A detected event.
 #[derive(Clone, Copy)]
 struct Alarm {
     time_s: f64,

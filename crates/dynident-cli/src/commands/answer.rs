@@ -3,7 +3,6 @@
 
 use crate::terminal;
 
-/// Message if Ctrl-C ends the wait for an answer.
 #[cfg(unix)]
 const GIVEN_UP: &str = "a stop was requested: the question is treated as answered with no";
 

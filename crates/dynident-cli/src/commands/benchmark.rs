@@ -6,7 +6,6 @@ use dynident::{OutputSet, check_writable};
 use dynident_benchmark::accuracy::{BenchmarkSettings, benchmark, cells_csv};
 use std::path::PathBuf;
 
-/// Options of `benchmark`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// Robots, comma-separated; all by default.

@@ -7,7 +7,6 @@ use dynident::recording::Level;
 use dynident::{RunOptions, check};
 use std::path::PathBuf;
 
-/// Options of `check`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file.

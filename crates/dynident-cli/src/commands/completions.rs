@@ -4,7 +4,6 @@ use super::Context;
 use crate::{Verdict, terminal};
 use clap_complete::Shell;
 
-/// Options of `completions`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The shell.

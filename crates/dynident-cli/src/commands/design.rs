@@ -18,7 +18,6 @@ use std::path::PathBuf;
 
 /// The motion; not written if it was given.
 const TRAJECTORY: &str = "trajectory.csv";
-/// All files that may be written.
 const FILES: [&str; 9] = [
     "design.json",
     TRAJECTORY,
@@ -34,7 +33,6 @@ const FILES: [&str; 9] = [
 const OPTIONAL_FILES: [&str; 6] =
     [TRAJECTORY, "fitness.csv", "fitness.svg", "trajectory.ros2.yaml", "waypoints.csv", "trajectory.script"];
 
-/// Options of `design`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file; its [design] states the objective.
@@ -151,7 +149,6 @@ fn writable_formats(options: &Options, study: &Study) -> Result<(), String> {
     if joints == UR_JOINTS { Ok(()) } else { Err(format!("--to urscript: {}", ExportError::SixJoints { joints })) }
 }
 
-/// Number of joints of a URScript program.
 const UR_JOINTS: usize = 6;
 
 /// The files next to design.json, all generated before the first is written.

@@ -9,7 +9,6 @@ use dynident::result::{EVALUATION_SCHEMA, EvaluationFile};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Options of `evaluate`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// URDF, MJCF, SDF, or D-H table in TOML.

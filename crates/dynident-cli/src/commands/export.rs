@@ -9,7 +9,6 @@ use dynident::result::{EXPORT_SCHEMA, ExportFile};
 use dynident::{ResultFile, export_payload_of, export_result, export_simulator_of, study_inputs};
 use std::path::PathBuf;
 
-/// Options of `export`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The result.json of an identification.
@@ -72,7 +71,6 @@ enum Form {
     PayloadAbb,
 }
 
-/// Kind of output.
 enum Kind {
     Model(Target),
     SimulatorJson,

@@ -11,7 +11,6 @@ pub(super) fn read(path: &Path) -> Result<Factors, String> {
     Factors::from_bytes(&bytes).map_err(|error| format!("{}: {error}", path.display()))
 }
 
-/// Reads and merges the logs of several files.
 pub(super) fn read_all(paths: &[PathBuf]) -> Result<Factors, String> {
     let parts: Vec<Factors> = paths.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     Factors::merged(parts).map_err(|error| error.to_string())

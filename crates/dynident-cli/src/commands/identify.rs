@@ -15,7 +15,6 @@ const MJCF: &str = "identified.xml";
 /// The same as an SDF, if the user's robot file is one.
 const SDF: &str = "identified.sdf";
 
-/// Options of `identify`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file.
@@ -83,7 +82,6 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(if result.problems.is_empty() { within } else { Verdict::Negative })
 }
 
-/// Identifies the model of a study from its logs.
 fn of_study(path: &Path, options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
     let study = options.programs.load_study(path, options.data.as_deref())?;
     let named = (&study, path, options.data.as_deref());
@@ -93,7 +91,6 @@ fn of_study(path: &Path, options: &Options, run: &RunOptions<'_>) -> Result<Iden
     identify(&study, path, run).map_err(known_in(path))
 }
 
-/// Identifies the model from factors.
 fn of_factors(options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
     let outputs = FILES.map(|name| options.out.join(name));
     dynident::refuse_overwriting(&outputs, &options.factors).map_err(message_of)?;
@@ -105,7 +102,6 @@ fn of_factors(options: &Options, run: &RunOptions<'_>) -> Result<IdentificationO
     identify_factors(&all, run).map_err(message_of)
 }
 
-/// The logs of one robot.
 fn of_arm(all: &Factors, arm: &str) -> Result<Factors, String> {
     let own = all.only(|log| log.arm.as_deref() == Some(arm));
     if own.logs().is_empty() {

@@ -8,7 +8,6 @@ use dynident::{
 };
 use std::path::PathBuf;
 
-/// Options of `inspect`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// URDF, MJCF, SDF, or D-H table in TOML.

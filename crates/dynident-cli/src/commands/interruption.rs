@@ -7,13 +7,11 @@ use std::cell::Cell;
 use std::sync::{Mutex, Once, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Exit status of an interrupted program.
 pub(crate) const STATUS: u8 = 130;
 
 /// A second Ctrl-C within this time is ignored: held keys repeat, and a robot needs some time to brake.
 const REPEAT_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Time of the first Ctrl-C.
 static FIRST_PRESS: OnceLock<Instant> = OnceLock::new();
 /// The signal that Ctrl-C sets.
 static STOP: Mutex<Option<StopSignal>> = Mutex::new(None);
@@ -71,7 +69,6 @@ pub(crate) fn while_program_runs<R>(job: impl FnOnce(&dyn Fn() -> bool) -> Resul
     outcome
 }
 
-/// Whether Ctrl-C was pressed.
 pub(crate) fn pressed() -> bool {
     FIRST_PRESS.get().is_some()
 }

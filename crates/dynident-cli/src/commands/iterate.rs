@@ -14,7 +14,6 @@ use dynident::{
 };
 use std::path::{Path, PathBuf};
 
-/// Files and folders of every iteration.
 const WRITTEN: [&str; 11] = [
     "iterations.json",
     "report.html",
@@ -29,7 +28,6 @@ const WRITTEN: [&str; 11] = [
     "controller.json",
 ];
 
-/// Options of `iterate`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file.
@@ -118,14 +116,12 @@ fn written_files(study: &Study) -> Vec<String> {
     WRITTEN.into_iter().map(str::to_owned).chain(legs).collect()
 }
 
-/// The largest number of runs of a study.
 fn most_runs(study: &Study) -> u64 {
     let section = study.iteration.clone().unwrap_or_default();
     let iterations = if section.order == LegOrder::OneAfterAnother { section.leg.len().max(1) } else { 1 };
     (section.max_runs * iterations) as u64
 }
 
-/// Prints the result of an iteration that has ended.
 fn ended(file: &IterationsFile, options: &Options, context: &Context) -> Result<Verdict, String> {
     if context.json {
         terminal::print_document(&json(file)?)?;
@@ -138,7 +134,6 @@ fn ended(file: &IterationsFile, options: &Options, context: &Context) -> Result<
     Ok(if file.converged { Verdict::Good } else { Verdict::Negative })
 }
 
-/// Prints the status of the iteration in a folder.
 fn status(out: &Path, context: &Context) -> Result<Verdict, String> {
     let path = out.join("iterations.json");
     if !path.is_file() {

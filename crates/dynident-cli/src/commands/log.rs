@@ -4,7 +4,6 @@ use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};
 use std::path::PathBuf;
 
-/// Options of `log`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// A recording in any supported format, or the folder of a rosbag2 recording.

@@ -4,7 +4,6 @@ use super::{Context, message_of};
 use crate::Verdict;
 use std::path::PathBuf;
 
-/// Options of `man`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The folder, which is created if necessary.

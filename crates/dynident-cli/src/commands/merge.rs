@@ -4,7 +4,6 @@ use super::{Context, factors, message_of};
 use crate::Verdict;
 use std::path::PathBuf;
 
-/// Options of `merge`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// Factor files from `reduce` or `merge`, of one robot and one study.

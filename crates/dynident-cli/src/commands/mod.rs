@@ -33,7 +33,6 @@ use std::path::{Path, PathBuf};
 /// Largest number of problems on standard error.
 const MAX_PROBLEMS_SHOWN: usize = 8;
 
-/// Global options of a command.
 pub(crate) struct Context {
     pub(crate) json: bool,
     pub(crate) quiet: bool,
@@ -47,7 +46,6 @@ impl Context {
     }
 }
 
-/// Runs `job` in a pool of `threads` threads.
 pub(crate) fn with_threads<R: Send>(threads: usize, job: impl FnOnce() -> R + Send) -> R {
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(job),
@@ -68,7 +66,6 @@ pub(crate) fn pretty_json<T: Serialize>(value: &T) -> Result<Vec<u8>, String> {
     Ok((text + "\n").into_bytes())
 }
 
-/// An error's message.
 #[allow(clippy::needless_pass_by_value, reason = "required by map_err")]
 pub(crate) fn message_of(error: dynident::Error) -> String {
     error.to_string()

@@ -7,7 +7,6 @@ use dynident::result::{StudyChange, Unsure};
 use dynident::{NewStudy, RunOptions, new_study};
 use std::path::PathBuf;
 
-/// Options of `new`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The robot: URDF, MJCF, SDF, or D-H table in TOML.
@@ -96,6 +95,6 @@ fn line_stated(change: &StudyChange, reason: &str) -> Option<StudyChange> {
         if answer.is_well_formed() {
             return Some(answer);
         }
-        question = format!("   invalid TOML value (valid is for example {value}); {key}:");
+        question = format!("  invalid TOML value (valid is for example {value}); {key}:");
     }
 }

@@ -58,7 +58,6 @@ impl XacroOptions {
 }
 
 impl ProgramOptions {
-    /// Creates the decisions of a command.
     pub(crate) fn decisions(&self) -> Decisions {
         Decisions { is_allowed: self.allow_command, made: RefCell::default() }
     }
@@ -129,7 +128,6 @@ fn permission_question(request: &ProgramRequest) -> String {
     format!("{}:\n  {command}\n{which}Start it?", request.purpose)
 }
 
-/// Asks before a motion.
 pub(crate) fn for_motion(motion: &NextMotion) -> bool {
     let (leg, legs) = motion.leg;
     let of = if legs > 1 { format!(", trajectory {} of {legs}", leg + 1) } else { String::new() };
@@ -146,8 +144,8 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
     let ways = motion.ways.as_ref().map_or_else(String::new, |ways| {
         let over = |way: usize| match ways.over_postures[way] {
             0 => String::new(),
-            1 => "  through one via posture".to_owned(),
-            several => format!("  through {several} via postures"),
+            1 => " through one via posture".to_owned(),
+            several => format!(" through {several} via postures"),
         };
         format!(
             "\n  from home {:.1} s{}, back {:.1} s{}; largest velocities on these paths: {}",

@@ -6,7 +6,6 @@ use crate::Verdict;
 use dynident::{ReduceSettings, ResultFile, Role, RunOptions, Study, reduce, seconds_of};
 use std::path::{Path, PathBuf};
 
-/// Options of `reduce`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file; it must state cut-off and friction, or use --like.
@@ -64,7 +63,6 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(Verdict::Good)
 }
 
-/// Folder and name of a file.
 fn place(out: &Path) -> Result<(&Path, &str), String> {
     let name = out.file_name().and_then(|name| name.to_str());
     let name = name.ok_or_else(|| format!("{}: give the name of a file", out.display()))?;

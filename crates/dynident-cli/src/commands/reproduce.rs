@@ -6,7 +6,6 @@ use dynident::RunOptions;
 use dynident_paper::reproduce;
 use std::path::PathBuf;
 
-/// Options of `reproduce`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// Folder for paper.json, report.html, the figures and their studies.

@@ -9,9 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Effect of Ctrl-C on a search.
 #[derive(Clone, Copy)]
 pub(crate) enum OnInterrupt {
-    /// The search ends with the best motion found.
     KeepsBest,
-    /// The command ends without a result of the search.
     EndsCommand,
 }
 
@@ -24,7 +22,6 @@ impl OnInterrupt {
     }
 }
 
-/// A progress line of a search.
 pub(crate) struct Search {
     line: Option<ProgressBar>,
     on_interrupt: OnInterrupt,
@@ -45,7 +42,6 @@ impl Search {
         if interruption::pressed() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// Clears the line.
     pub(crate) fn end(self) {
         if let Some(line) = self.line {
             line.finish_and_clear();
@@ -53,7 +49,6 @@ impl Search {
     }
 }
 
-/// The progress line.
 fn line() -> ProgressBar {
     let line = ProgressBar::new_spinner();
     if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}") {

@@ -7,7 +7,6 @@ use crate::{Verdict, summary, terminal};
 use dynident::{OutputSet, RunOptions, check_writable, simulate_study};
 use std::path::PathBuf;
 
-/// Options of `simulate`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file.

@@ -6,7 +6,6 @@ use crate::{Verdict, summary, terminal};
 use dynident::{ResultFile, RunOptions, validate_result};
 use std::path::PathBuf;
 
-/// Options of `validate`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The result.json of an identification.

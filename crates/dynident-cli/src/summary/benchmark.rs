@@ -1,5 +1,3 @@
-//! The summary of `benchmark`.
-
 use super::text::{table, wrapped};
 use dynident_benchmark::accuracy::BenchmarkFile;
 

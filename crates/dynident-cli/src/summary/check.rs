@@ -1,5 +1,3 @@
-//! The summary of `check`.
-
 use super::text::{name, table, wrapped};
 use core::fmt::Write;
 use dynident::CheckFile;
@@ -11,11 +9,8 @@ pub(crate) fn check(file: &CheckFile) -> String {
     let mut text = String::new();
     let problems = check.findings.iter().filter(|finding| finding.level == Level::Problem).count();
     if problems == 0 {
-        let _ = writeln!(
-            text,
-            "study, robot and logs fit together: none of {} tested mistakes explains the logs better",
-            check.tried
-        );
+        let _ =
+            writeln!(text, "study, robot and logs fit together: none of {} tested mistakes fits better", check.tried);
     }
     for finding in &check.findings {
         let level = if finding.level == Level::Problem { "PROBLEM" } else { "warning" };
@@ -25,7 +20,7 @@ pub(crate) fn check(file: &CheckFile) -> String {
             text += &wrapped(&format!("  under {} write: {}", change.place(), change.line), 4);
         }
         for other in &finding.or {
-            text += &wrapped(&format!("   not distinguishable with these logs: {other}"), 4);
+            text += &wrapped(&format!("  not distinguishable with these logs: {other}"), 4);
         }
     }
     if let Some(written) = &check.as_written {

@@ -1,5 +1,3 @@
-//! The summary of `design`.
-
 use super::text::{name, percent, shortened, table, wrapped};
 use core::fmt::Write;
 use dynident::DesignFile;
@@ -104,7 +102,6 @@ fn strokes(w: &WindowedFile) -> String {
     text
 }
 
-/// The limits with the highest use.
 fn limits(d: &DesignFile) -> String {
     let mut used: Vec<_> = d.limits.iter().collect();
     used.sort_by(|a, b| b.worst_ratio.total_cmp(&a.worst_ratio));
@@ -147,7 +144,7 @@ fn forecast(d: &DesignFile) -> String {
     let columns = if with_prior { 5 } else { 4 };
     text += &table(&heads[..columns], 1..columns, rows);
     if !dark.is_empty() {
-        text += &wrapped(&format!("   not excited: {}", dark.join(", ")), 4);
+        text += &wrapped(&format!("  not excited: {}", dark.join(", ")), 4);
     }
     text
 }

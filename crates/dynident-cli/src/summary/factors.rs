@@ -1,14 +1,10 @@
-//! The summary of `reduce` and `merge`.
-
 use super::text::{name, table, wrapped};
 use dynident::result::FactorsFile;
 
 /// Number of digits of a hash that distinguish logs.
 const DIGITS: usize = 8;
-/// Largest number of listed logs.
 const MAX_LISTED: usize = 40;
 
-/// Content of a factor file.
 pub(crate) fn factors(file: &FactorsFile) -> String {
     let rows: u64 = file.logs.iter().map(|log| log.rows).sum();
     let count = file.logs.len();

@@ -24,8 +24,7 @@ pub(super) fn findings(logs: &[LogSummary]) -> String {
     problems + spoilt + &warnings(logs)
 }
 
-/// Note below problems.
-const PROBLEM_NOTE: &str = "   A PROBLEM invalidates the result: fix it before you use any value shown here.\n";
+const PROBLEM_NOTE: &str = "  A PROBLEM invalidates the result: fix it before you use any value shown here.\n";
 
 /// All problems of a result's model; equal findings of several joints and logs are combined.
 pub(super) fn problems(r: &ResultFile) -> String {
@@ -36,7 +35,6 @@ pub(super) fn problems(r: &ResultFile) -> String {
     if text.is_empty() { text } else { text + PROBLEM_NOTE }
 }
 
-/// Warnings of all logs.
 pub(super) fn warnings(logs: &[LogSummary]) -> String {
     of_level(logs, Level::Warning)
 }

@@ -1,5 +1,3 @@
-//! The summary of `identify`.
-
 use super::findings::{problems, warnings};
 use super::noise::noise;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
@@ -82,7 +80,6 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
     text
 }
 
-/// The estimator in words.
 fn estimator(name: &str) -> String {
     match name {
         "instrumental" => "instrumental variables".to_owned(),
@@ -93,7 +90,6 @@ fn estimator(name: &str) -> String {
     }
 }
 
-/// The most important values.
 fn headline(r: &ResultFile) -> String {
     let fitted = r.training.physical.as_ref();
     let fit = percent(fitted.map_or(r.training.relative_error_percent, |fitted| fitted.relative_error_percent));
@@ -158,7 +154,7 @@ fn beside(r: &ResultFile) -> String {
     };
     wrapped(
         &format!(
-            "   these errors are those of the written, physically consistent model; the unconstrained fit has {}{verdict}",
+            "  these errors are those of the written, physically consistent model; the unconstrained fit has {}{verdict}",
             errors.join(", ")
         ),
         4,
@@ -170,7 +166,6 @@ fn prior_of(log: &LogValidation, joint: Option<usize>) -> Option<f64> {
     joint.map_or(prior.relative_error_percent, |j| prior.joints[j].relative_error_percent)
 }
 
-/// Errors joint by joint.
 fn joints(r: &ResultFile) -> String {
     let logs = &r.validation[..r.validation.len().min(MAX_LOG_COLUMNS)];
     let detailed = logs.len() <= MAX_DETAILED_LOGS;
@@ -388,7 +383,6 @@ fn masses(intervals: &[ParameterInterval]) -> String {
     table(&header, 1..4, rows.collect())
 }
 
-/// How a log was used.
 fn data(log: &LogSummary) -> String {
     let motion = log.motion_cutoff_hz.map_or(String::new(), |cutoff| format!(", motion below {cutoff:.1}\u{a0}Hz"));
     format!(

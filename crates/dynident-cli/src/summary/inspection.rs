@@ -1,5 +1,3 @@
-//! The summary of `inspect`.
-
 use super::text::{name, rounded, table, wrapped};
 use core::fmt::Write;
 use dynident::Inspection;
@@ -45,7 +43,7 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     }
     if base.numerical_rank != base.count {
         let doubt = format!(
-            "   the regressor at random states has rank {}: the base parameters are not reliable",
+            "  the regressor at random states has rank {}: the base parameters are not reliable",
             base.numerical_rank
         );
         text += &wrapped(&doubt, 4);
@@ -53,7 +51,6 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     text
 }
 
-/// A mistake, its evidence and its corrections.
 fn of_slip(slip: &SlipEntry) -> String {
     let mut text = wrapped(&format!("  SLIP ({}): {}", slip.slip, slip.what), 4);
     text += &wrapped(&format!("    evidence: {}", slip.evidence), 6);
@@ -70,7 +67,6 @@ fn of_slip(slip: &SlipEntry) -> String {
     text
 }
 
-/// Summary of a corrected copy.
 pub(crate) fn mended(before: &Inspection, after: &Inspection, out: &Path) -> String {
     let numbers: usize = before.slips.iter().map(|slip| slip.corrections.len()).sum();
     let problems = |i: &Inspection| i.audit.iter().filter(|entry| entry.level == "problem").count();

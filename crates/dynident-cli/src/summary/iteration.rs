@@ -1,11 +1,8 @@
-//! The summaries of `iterate` and `simulate`.
-
 use super::text::{table, wrapped};
 use dynident::result::IterationRun;
 use dynident::{IterationsFile, SimulationFile};
 use std::path::Path;
 
-/// Largest number of parameters shown.
 const MAX_PARAMETERS: usize = 20;
 
 /// An iteration: its verdict, its runs, and the written files.
@@ -16,7 +13,7 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     let header = ["run", "controller", "tracking", "change", "error", "verdict"].map(str::to_owned);
     let rows = file.runs.iter().enumerate().map(|(place, run)| row(run, place.checked_sub(1).map(|k| &file.runs[k])));
     text += &table(&header, 2..5, rows.collect());
-    text += "   tracking: largest tracking error, rad (m); change: largest change of a parameter,\n  in error bars; error: largest, if the truth is known; both for the joint fit of\n  all good runs up to this one\n\n";
+    text += "  tracking: largest tracking error, rad (m); change: largest change of a\n  parameter, in error bars; error: largest, if the truth is known; both for the\n  joint fit of all good runs up to this one\n\n";
     text += &run_remarks(file);
     text += &verdict_remarks(file);
     text += &parameters(file);
@@ -106,7 +103,6 @@ fn verdict_remarks(file: &IterationsFile) -> String {
     text
 }
 
-/// The base parameters from all good runs together.
 fn parameters(file: &IterationsFile) -> String {
     if file.base_parameters.is_empty() {
         return String::new();
@@ -152,7 +148,6 @@ fn row(run: &IterationRun, before: Option<&IterationRun>) -> Vec<String> {
     ]
 }
 
-/// A simulated run.
 pub(crate) fn simulation(file: &SimulationFile, out: &Path) -> String {
     let mut text = wrapped(
         &format!(

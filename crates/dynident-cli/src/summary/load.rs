@@ -4,7 +4,6 @@ use super::text::{name, table, with_deviation, wrapped};
 use dynident::ResultFile;
 use dynident::identification::payload::{Measured, PayloadResult};
 
-/// Payloads and drive gains; empty without any.
 pub(super) fn loads(r: &ResultFile) -> String {
     let mut text = String::new();
     for payload in &r.payloads {

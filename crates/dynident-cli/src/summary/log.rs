@@ -1,12 +1,9 @@
-//! The summary of `log`.
-
 use super::text::{end_of_name, table, wrapped};
 use core::fmt::Write;
 use dynident::result::{LogChannel, LogContents};
 
 /// Largest number of channels shown per group; JSON contains all.
 const MAX_SHOWN: usize = 64;
-/// Widest name in the table.
 const MAX_NAME_COLUMNS: usize = 34;
 /// Number of characters for the course of a channel.
 const COURSE_COLUMNS: usize = 16;

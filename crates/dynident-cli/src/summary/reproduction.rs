@@ -1,10 +1,7 @@
-//! The summary of `reproduce`.
-
 use super::text::{table, wrapped};
 use dynident_paper::PaperFile;
 use std::path::Path;
 
-/// The goals, and the location of the report.
 pub(crate) fn reproduction(file: &PaperFile, out: &Path) -> String {
     let header = ["goal", "value", "at most", ""].map(str::to_owned);
     let rows = file

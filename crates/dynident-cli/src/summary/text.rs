@@ -2,7 +2,6 @@
 
 use comfy_table::{CellAlignment, Table, presets};
 
-/// Largest width of a summary in columns.
 pub(super) const WIDTH: usize = 80;
 
 /// Longest name of a joint or body in a table.

@@ -9,7 +9,6 @@ use dynident::result::LogSummary;
 /// Significance level of the residual tests.
 const SIGNIFICANCE: f64 = 0.01;
 
-/// A model's errors on every log.
 pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> String {
     let mut text = String::new();
     for log in logs {
@@ -62,7 +61,7 @@ pub(super) fn residuals(log: &LogValidation) -> String {
         format!("; {:.1} % of the torque is inside the 95 % band", mean(&covered))
     };
     let mut text = wrapped(
-        &format!("   residuals: correlated in {coloured} of {all} joints, not normal in {odd}{reversal}{band}"),
+        &format!("  residuals: correlated in {coloured} of {all} joints, not normal in {odd}{reversal}{band}"),
         4,
     );
     text += &at_rest(log);
@@ -87,7 +86,7 @@ fn at_rest(log: &LogValidation) -> String {
     match most {
         Some((share, rest, fast, name)) if share > MIN_REPORTED_SHARE => wrapped(
             &format!(
-                "   {:.0} % of the squared error occurs while {} is at rest ({rest:.2} Nm, in motion {fast:.2} Nm): the torque of stiction does not follow from the positions",
+                "  {:.0} % of the squared error occurs while {} is at rest ({rest:.2} Nm, in motion {fast:.2} Nm): the torque of stiction does not follow from the positions",
                 100.0 * share,
                 self::name(name)
             ),

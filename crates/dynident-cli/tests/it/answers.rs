@@ -10,7 +10,6 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// The command on its own terminal.
 struct OnTerminal {
     program: Child,
     keyboard: File,
@@ -64,7 +63,6 @@ impl OnTerminal {
         panic!("{words} not {times} times on the screen: {}", self.screen());
     }
 
-    /// Returns the exit status, within a minute.
     fn ends(&mut self) -> Option<i32> {
         for _ in 0..6000 {
             if let Some(status) = self.program.try_wait().unwrap() {
@@ -126,7 +124,6 @@ fn what_was_typed_before_a_question_is_no_answer() {
     std::thread::sleep(Duration::from_millis(500));
     assert_eq!(std::fs::read_to_string(folder.path().join("moved")).unwrap(), "x", "{}", terminal.screen());
     assert!(terminal.program.try_wait().unwrap().is_none(), "{}", terminal.screen());
-    // The question is still open.
     terminal.types("n\n");
     assert_eq!(terminal.ends(), Some(1), "{}", terminal.screen());
     assert_eq!(std::fs::read_to_string(folder.path().join("moved")).unwrap(), "x");

@@ -2,13 +2,11 @@
 use crate::common::{broken, run_in};
 use std::time::{Duration, Instant};
 
-/// The lines of a table in `tests/broken`.
 fn table(name: &str) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(broken().join(name)).unwrap();
     text.lines().map(|line| line.split('\t').map(str::to_owned).collect()).collect()
 }
 
-/// Time limit for one broken input.
 const LIMIT: Duration = Duration::from_secs(10);
 
 fn check(file: &str, arguments: &[&str], expected: &str) -> Option<String> {

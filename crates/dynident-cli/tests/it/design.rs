@@ -8,7 +8,6 @@ use std::path::Path;
 const SMALL: &str =
     "search = { starts = 3, rounds = 0, evaluations_per_start = 60, polish_evaluations = 150, search_samples = 81 }";
 
-/// Only the stated limits.
 const NO_DEFAULTS: &str =
     "[design.defaults]\nfloor = false\nself_collision = false\nacceleration = false\nstop_margin_percent = 0\n";
 

@@ -4,7 +4,6 @@ use crate::common::{CommandOutcome, repository, run_in};
 use serde_json::Value;
 use std::path::Path;
 
-/// Runs the example with some replacements in `folder`.
 fn run(folder: &Path, example: &str, changes: &[(&str, &str)]) -> (CommandOutcome, Option<Value>) {
     let robot = repository("examples/robots/paper_2r.toml").canonicalize().unwrap();
     let mut text = std::fs::read_to_string(repository(&format!("examples/{example}"))).unwrap();
@@ -18,7 +17,6 @@ fn run(folder: &Path, example: &str, changes: &[(&str, &str)]) -> (CommandOutcom
     (ran, file.map(|file| serde_json::from_str(&file).unwrap()))
 }
 
-/// The example's optimiser.
 const GENETIC: &str = "optimiser = { kind = \"genetic\", bits = 20, population = 40, generations = 500, crossover = 0.5, mutation = 0.01, elite = false }";
 
 #[test]

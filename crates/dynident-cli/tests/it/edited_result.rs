@@ -4,13 +4,11 @@ use super::common::{CommandOutcome, broken, run_in};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A change of a result.
 type Edit<'a> = &'a dyn Fn(&mut Value);
 
 const STUDY: &str = "[robot]\nfile = \"arm.urdf\"\n[format]\ntime = { column = \"t\" }\nposition = { columns = \"q{1..2}\" }\n\
     torque = { columns = \"tau{1..2}\" }\n[drive]\nfriction = \"stated\"\n[[log]]\nfile = \"log.csv\"\n";
 
-/// A folder with a study and its result.
 fn identified() -> (tempfile::TempDir, Value) {
     let folder = tempfile::tempdir().unwrap();
     for name in ["arm.urdf", "log.csv"] {

@@ -19,7 +19,6 @@ const FORMS: [(&str, &str); 12] = [
     ("simulator-table", "| joint | armature | damping | frictionloss |"),
 ];
 
-/// A folder with the fixture's study and its result.
 fn identified() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for name in ["arm.urdf", "log.csv", "good.toml"] {

@@ -4,7 +4,6 @@ use crate::common::{broken, command, repository, run_in};
 use serde_json::Value;
 use std::path::Path;
 
-/// A folder with the fixture's robot, log and study, and a state table.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for name in ["arm.urdf", "log.csv", "good.toml"] {
@@ -15,7 +14,6 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// Every file of a folder with its content.
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut files: Vec<(String, Vec<u8>)> = std::fs::read_dir(folder)
         .unwrap()
@@ -100,7 +98,6 @@ fn nothing_from_outside_steers_the_terminal() {
         let ran = run_in(at, arguments);
         assert!(!steers(&ran.stdout) && !steers(&ran.stderr), "{arguments:?}: {:?} {:?}", ran.stdout, ran.stderr);
     }
-    // JSON contains the exact name.
     let ran = run_in(at, &["inspect", "arm.urdf", "--json"]);
     let file: Value = serde_json::from_str(&ran.stdout).unwrap();
     assert_eq!(file["joints"][0]["name"], "s\u{9b}31m\u{202e}houlder");

@@ -114,7 +114,6 @@ fn has(program: &str, arguments: &[&str]) -> bool {
     found
 }
 
-/// Runs a program in a folder and returns its output.
 fn run(folder: &Path, program: &str, arguments: &[&str]) -> String {
     let output = Command::new(program).args(arguments).current_dir(folder).output().unwrap();
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -343,7 +342,6 @@ fn names_are_no_elements_of_descriptions() {
     }
 }
 
-/// The user's own files with new values.
 fn rewritten(name: &str) {
     let own = raw(name);
     let note = own.replace("--", "- -").replace("--", "- -").replace("&#xd;", " ");
@@ -422,7 +420,6 @@ fn tables_and_json_hold_names_as_names() {
         assert_eq!((header.len(), table.records().flatten().count()), (3, 3), "{waypoints}");
         assert!(header.iter().all(|field| !field.starts_with(['=', '+', '-', '@'])), "{waypoints}");
 
-        // Input files of a robot.
         let reference = Reference::new(10.0, motion.clone()).unwrap();
         let gain = PerJoint::All(1.0);
         let settings = ControllerSettings::JointPd(JointPdSettings { kp: gain.clone(), kd: gain });
@@ -471,7 +468,6 @@ fn tables_and_json_hold_names_as_names() {
         assert_eq!(again["name"].as_str(), Some(&**name));
         tables += 1;
     }
-    // An empty name is rejected.
     assert!(tables > 200, "{tables}");
 }
 
@@ -579,7 +575,6 @@ fn names_are_no_markup_of_pages() {
     }
 }
 
-/// A result with other names.
 fn renamed(value: &Value, name: &str) -> Value {
     match value {
         Value::String(text) => {
@@ -659,7 +654,6 @@ fn the_command_executes_no_name() {
     }
 }
 
-/// Only one module writes JSON.
 #[test]
 fn there_is_one_writer_of_json() {
     fn sources(folder: &Path, found: &mut Vec<std::path::PathBuf>) {

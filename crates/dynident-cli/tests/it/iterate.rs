@@ -48,7 +48,6 @@ fn the_papers_example_converges_and_resumes() {
     std::fs::remove_dir_all(out.path().join(format!("runs/run_{}", runs.len()))).unwrap();
     assert_eq!(dynident(&["iterate"], &study, out.path()).status.code(), Some(0));
     assert_eq!(std::fs::read(&file).unwrap(), whole);
-    // Other settings do not resume it.
     let other = dynident(&["iterate", "--seed", "9"], &study, out.path());
     assert_eq!(other.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&other.stderr).contains("other settings"));

@@ -70,7 +70,6 @@ fn following_the_advice_keeps_the_runs() {
     assert_eq!(status, 0, "{words}");
     assert_eq!(std::fs::read(at.join("out/runs/run_1/run.json")).unwrap(), first);
     assert!(at.join("out/runs/run_2/run.json").exists());
-    // Other gains are another iteration.
     std::fs::write(at.join("study.toml"), text.replace("kp = 25.0", "kp = 24.0")).unwrap();
     let (status, words) = iterate(at, &[]);
     assert_eq!(status, 2, "{words}");
@@ -88,7 +87,6 @@ fn the_controller_that_was_found_has_the_envelope() {
     assert_eq!(file["envelope"]["tracking_error"], serde_json::json!([0.9, 0.9]), "{}", file["envelope"]);
 }
 
-/// A refused fresh start removes nothing.
 #[test]
 fn a_refused_fresh_start_removes_nothing() {
     let folder = tempfile::tempdir().unwrap();

@@ -4,7 +4,6 @@ use super::common::{repository, run_in};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Commands that `--help` lists.
 fn listed() -> Vec<String> {
     let help = run_in(Path::new("."), &["--help"]).stdout;
     let commands = help.split("Commands:").nth(1).unwrap().split("\n\n").next().unwrap();
@@ -13,7 +12,6 @@ fn listed() -> Vec<String> {
     lines.map(|line| line.split_whitespace().next().unwrap().to_owned()).filter(|name| name != "help").collect()
 }
 
-/// The program of a shell, if installed.
 #[allow(clippy::print_stdout, reason = "a test says that it was skipped")]
 fn shell(name: &str) -> Option<Command> {
     let there = Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());

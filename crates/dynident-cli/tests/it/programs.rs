@@ -38,7 +38,6 @@ pub(crate) fn folder(rest: &str) -> tempfile::TempDir {
 
 pub(crate) const EXPANDS: &str = "cat \"$here/expanded.urdf\"";
 
-/// The command with the script on its PATH.
 pub(crate) fn with_xacro(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = command(folder, arguments);
     command.env("PATH", format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap()));
@@ -136,7 +135,6 @@ fn permitted_macros_are_expanded_once_with_their_arguments() {
     assert_eq!((outcome.status, outcome.stdout), (0, plain.stdout), "{}", outcome.stderr);
 }
 
-/// Arguments that nothing uses, or that would be options of the program, are rejected before anything is started.
 #[test]
 fn xacro_arguments_are_checked() {
     let folder = folder(EXPANDS);

@@ -53,7 +53,6 @@ fn iterate(study: &Path, further: &[&str]) -> Child {
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits for a file while the program runs.
 pub(crate) fn awaited(file: &Path, program: &mut Child) {
     while !file.exists() {
         assert!(program.try_wait().unwrap().is_none(), "it ended before {}", file.display());
@@ -69,7 +68,6 @@ pub(crate) fn said(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
-/// Whether a process with the number in the file runs.
 pub(crate) fn runs(file: &Path) -> bool {
     let id = std::fs::read_to_string(file).unwrap();
     let state = Command::new("ps").args(["-o", "stat=", "-p", id.trim()]).output().unwrap();

@@ -7,7 +7,6 @@ mod example;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// All files of a folder by name.
 fn files(folder: &Path) -> BTreeMap<String, String> {
     let read = |entry: std::io::Result<std::fs::DirEntry>| {
         let entry = entry.unwrap();

@@ -50,7 +50,6 @@ fn programs_folders_and_clocks_are_used_in_one_place() {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(&crates).unwrap() {
         let folder = entry.unwrap().path();
-        // Test helpers.
         if !folder.ends_with("dynident-testing") {
             sources(&folder.join("src"), &mut files);
         }

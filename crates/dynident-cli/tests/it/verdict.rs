@@ -66,7 +66,6 @@ fn a_data_folder_that_is_none_is_an_error() {
     assert!(ran.stderr.contains("/nonexistent"), "{}", ran.stderr);
 }
 
-/// The outputs of `identify` in a separate folder.
 fn outputs(folder: &Path) -> Vec<Vec<u8>> {
     let names = ["found/result.json", "found/report.html", "found/identified.urdf"];
     names.iter().map(|name| std::fs::read(folder.join(name)).unwrap()).collect()

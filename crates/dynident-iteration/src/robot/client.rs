@@ -33,35 +33,26 @@ enum LineError {
     NotText,
 }
 
-/// A line, or why it cannot be read.
 type Line = Result<String, LineError>;
 
-/// Event in the queue of a client.
 #[derive(Debug)]
 enum Event {
-    /// A line of its standard output.
     Line(Line),
-    /// Its standard output has ended.
     Closed,
     /// A stop was requested; this event only wakes the reader.
     Woken,
 }
 
-/// Result of waiting for a message.
 #[derive(Debug)]
 pub(super) enum Received {
-    /// A message.
     Message(ToHost),
     /// A stop was requested, and no stop message has been sent yet.
     StopRequested,
 }
 
-/// Result of starting a client.
 #[derive(Debug)]
 pub(super) enum Started {
-    /// The client has sent its hello.
     Ready(Box<Client>),
-    /// A stop was requested before its hello.
     StopRequested,
 }
 
@@ -82,7 +73,6 @@ pub(super) struct Client {
     pub(super) runs_ways: bool,
     run_ends: Option<(Instant, f64)>,
     stop: Option<StopSignal>,
-    /// Unregisters when dropped.
     listening: Option<Listening>,
     /// Whether a motion was started and has not ended yet.
     moving: bool,
@@ -172,12 +162,10 @@ impl Client {
         self.run_ends = run_ends;
     }
 
-    /// Time limit of each message, s.
     pub(super) fn message_s(&self) -> f64 {
         self.limits.message_s
     }
 
-    /// Longest stated silence of a streaming program, s.
     pub(super) fn silence_s(&self) -> Option<f64> {
         self.limits.silence_s
     }
@@ -306,7 +294,6 @@ impl Drop for Client {
     }
 }
 
-/// Factors from logged values to torque.
 fn torque_per_unit(logs: &LoggedTorque, joints: usize) -> Result<Vec<f64>, RobotFault> {
     let fault = |what: String, fix: &str| RobotFault::LoggedTorque { what, fix: fix.to_owned() };
     match logs {
@@ -348,7 +335,6 @@ fn pass_lines(output: impl Read, sender: &SyncSender<Event>) {
         if line.as_ref().is_ok_and(|line| line.trim().is_empty()) {
             continue;
         }
-        // The receiver was dropped with the robot.
         if sender.send(Event::Line(line)).is_err() {
             return;
         }

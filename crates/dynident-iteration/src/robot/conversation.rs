@@ -71,7 +71,6 @@ pub(super) fn run(
     }
 }
 
-/// Writes the files of a run and sends its request to the client.
 fn send_run(client: &mut Client, request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<(), RobotFault> {
     let [trajectory, controller] = handover::write(request, joints, folder)?;
     let paths = handover::write_ways(request, folder)?;
@@ -132,7 +131,6 @@ fn stopped(client: &mut Client, recorder: &mut Recorder<'_>, most: usize, reason
     })
 }
 
-/// Time, positions, velocities and torques of a sample, as sent by a client.
 type SentSample<'a> = (Option<f64>, &'a [Option<f64>], Option<&'a [Option<f64>]>, &'a [Option<f64>]);
 
 /// Appends a sample to the record and returns its velocities, if any.
@@ -226,7 +224,6 @@ pub(super) fn steps(
     ended(client, recorder)
 }
 
-/// Waits for the end of a run after its last sample.
 fn ended(client: &mut Client, recorder: &mut Recorder<'_>) -> Result<RobotStatus, RobotFault> {
     match client.next("end", client.message_s())? {
         Received::Message(ToHost::End { status: EndStatus::Done, .. }) => Ok(RobotStatus::Done),

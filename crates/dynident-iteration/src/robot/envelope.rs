@@ -16,7 +16,6 @@ const SPEED_SPAN_S: f64 = 0.01;
 pub(crate) const TRACKING_RAD: f64 = 0.3;
 /// Default of the largest tracking error of a prismatic joint, m, for an arm of 1.2 m.
 pub(crate) const TRACKING_M: f64 = 0.1;
-/// Margin that motion searches keep inside the envelope, percent.
 const SEARCH_MARGIN_PERCENT: f64 = 10.0;
 /// Factor on the velocity and effort limits of the robot description, for overshoot and sensor noise.
 const LIMIT_FACTOR: f64 = 1.1;
@@ -230,7 +229,6 @@ pub(super) fn target_at(reference: &Reference, joint: usize, time_s: f64) -> f64
     target[from] + (place - from as f64) * (target[next] - target[from])
 }
 
-/// Checks each sample when it arrives.
 #[derive(Debug)]
 pub(super) struct EnvelopeWatch<'a> {
     envelope: Option<&'a Envelope>,

@@ -15,7 +15,6 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Largest length of `stopped.txt`, bytes.
 const MAX_STOPPED_BYTES: u64 = 1 << 20;
 
 /// Settings of a folder robot.
@@ -47,7 +46,6 @@ impl FolderSettings {
         Self { folder: folder.into(), wait_s: 0.0, forms: Vec::new(), urscript_rate_hz: None, torque_constants: None }
     }
 
-    /// Settings of the formats for this number of joints.
     fn form_settings(&self, joints: usize) -> Result<FormSettings, SimulationError> {
         let constants = self.torque_constants.as_ref().map(|constants| {
             let holds = |value: f64| value.is_finite() && value != 0.0;
@@ -157,7 +155,6 @@ impl FolderRobot {
         }
     }
 
-    /// Checks once for a log.
     fn check(&self, request: &RunRequest<'_>, folder: &Path) -> Result<RobotRun, RobotFault> {
         let log = folder.join("log.csv");
         let waiting = |reason: String| {
@@ -213,7 +210,6 @@ impl FolderRobot {
         Ok(RobotRun { status, record, truth: None, ways, note })
     }
 
-    /// The logs of both paths, if they exist.
     fn way_records(&self, request: &RunRequest<'_>, folder: &Path) -> Result<Option<WayRecords>, RobotFault> {
         let paths = ["approach_log.csv", "return_log.csv"].map(|name| folder.join(name));
         if request.ways.is_none() || !paths.iter().all(|path| path.exists()) {
@@ -227,7 +223,6 @@ impl FolderRobot {
     }
 }
 
-/// The first breach on the paths.
 fn breach_of_ways(request: &RunRequest<'_>, records: Option<&WayRecords>) -> Option<Breach> {
     let (ways, records) = (request.ways?, records?);
     let parts = [(RunPart::Approach, &ways.approach, &records.approach), (RunPart::Return, &ways.back, &records.back)];

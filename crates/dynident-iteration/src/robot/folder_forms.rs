@@ -30,7 +30,6 @@ pub enum FolderForm {
     Current,
 }
 
-/// The formats and their settings.
 #[derive(Clone, Debug)]
 pub(super) struct FormSettings {
     pub(super) forms: Vec<FolderForm>,

@@ -1,5 +1,3 @@
-//! A robot that is a function of this process.
-
 use super::envelope::EnvelopeWatch;
 use super::oscillation_watch::RunOscillations;
 use super::recorder::{empty_record, joint_major};
@@ -28,11 +26,9 @@ pub struct ControlledRun {
     record: Record,
     /// The newest sample, for the check of the envelope.
     now: Record,
-    /// Why the run ended early.
     end: Option<RunEnd>,
 }
 
-/// Why a run ended before its last sample.
 #[derive(Debug)]
 enum RunEnd {
     Interrupted,
@@ -136,7 +132,6 @@ impl ControlledRun {
         }
     }
 
-    /// The record of a part.
     fn recorded(&self, wanted: RunPart) -> Record {
         let own = (0..self.record.samples).filter(|&sample| self.part_of(sample).0 == wanted);
         let (Some(first), joints) = (own.clone().next(), self.record.joints.len()) else {

@@ -120,7 +120,6 @@ fn fed_forward<'a>(request: &RunRequest<'a>) -> Option<&'a ControllerModel> {
     request.model.filter(|_| !path_alone)
 }
 
-/// Paths and contents of the two files of a request.
 fn files(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[(PathBuf, String); 2], RobotFault> {
     let [trajectory, controller] = ["trajectory.csv", "controller.json"].map(|name| folder.join(name));
     let mut text = dynident_text::json::to_string_pretty(&controller_json(request, joints))
@@ -165,7 +164,6 @@ fn of_the_run(text: &str) -> Result<Value, &str> {
     Ok(Value::Object(file))
 }
 
-/// Largest existing file that is compared, bytes.
 const MAX_FILE_BYTES: u64 = 1 << 30;
 
 /// Writes a file completely or not at all; an identical file is not touched.

@@ -11,7 +11,6 @@ const BEGIN_ERROR_SHARE: f64 = 0.5;
 const MAX_TORQUE_CHANGE: f64 = 0.1;
 /// Number of standard deviations within which noise may hide a response.
 const NOISE_SIGMAS: f64 = 2.0;
-/// Smallest number of samples in the interval.
 const MIN_SAMPLES: usize = 8;
 
 /// A joint's torque while its tracking error doubled.
@@ -20,7 +19,6 @@ pub(super) struct HeldTorque {
     joint: String,
     /// Mean torque, Nm (N).
     torque: f64,
-    /// Length of the interval, s.
     duration_s: f64,
     /// Tracking error at the begin and at the end, rad (m).
     distances: [f64; 2],

@@ -168,7 +168,6 @@ struct Clock {
     start_s: f64,
     /// Whether the recording begins before the motion.
     early: bool,
-    /// Mean correlation over the moving joints.
     correlation: f64,
 }
 
@@ -395,7 +394,6 @@ mod tests {
     const RATE_HZ: f64 = 200.0;
     const DURATION_S: f64 = 6.0;
 
-    /// Two joints from rest to rest, of different shape.
     fn reference() -> Reference {
         let samples = (DURATION_S * RATE_HZ) as usize + 1;
         let mut motion = Motion::default();
@@ -501,7 +499,6 @@ mod tests {
         }
         let found = examined(rubbing).mistakes;
         assert!(found.len() == 1 && found[0].to_string().contains("mNm"), "{found:?}");
-        // Several mistakes at once.
         let mut several = scaled(57.295_78, |record| &mut record.q);
         several.times_s.iter_mut().for_each(|time| *time *= 1e3);
         several.tau.iter_mut().for_each(|tau| *tau *= 1e3);

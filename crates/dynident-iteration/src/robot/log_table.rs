@@ -4,7 +4,6 @@ use dynident_files::quoted;
 use dynident_simulation::Record;
 use thiserror::Error;
 
-/// Largest log, bytes.
 const MAX_LOG_BYTES: u64 = 1 << 30;
 
 /// An error in a log.

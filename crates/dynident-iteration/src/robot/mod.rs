@@ -258,7 +258,6 @@ impl RobotStatus {
         *self == Self::Done
     }
 
-    /// Whether a limit of a joint ended the run.
     fn is_stopped_by_a_limit(&self) -> bool {
         match self {
             Self::Simulated { verdict } => !verdict.is_done(),

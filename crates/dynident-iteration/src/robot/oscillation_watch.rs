@@ -1,5 +1,3 @@
-//! Detects oscillations of a running robot, sample by sample.
-
 use super::envelope::target_at;
 use super::stop_reason::JointOscillation;
 use super::ways::RunPart;
@@ -19,7 +17,6 @@ fn reference_speeds(reference: &Reference) -> Vec<f64> {
     highest.into_iter().map(|own| if own > 0.0 { own } else { REST_SPEED_SHARE * fastest }).collect()
 }
 
-/// Monitors all joints along one trajectory.
 #[derive(Debug)]
 pub(crate) struct RunOscillations {
     limits: Option<OscillationLimits>,

@@ -37,7 +37,6 @@ impl ProcessRobot {
         Ok(Self { settings, joints, program, client: None, temporary: None })
     }
 
-    /// The folder of a run's files.
     fn folder(&mut self, name: &str) -> Result<PathBuf, RobotFault> {
         let file = |path: PathBuf| move |error: std::io::Error| RobotFault::File { path, reason: error.to_string() };
         let base = if let Some(folder) = &self.settings.folder {
@@ -54,7 +53,6 @@ impl ProcessRobot {
     }
 
     fn converse(&mut self, request: &RunRequest<'_>, recorder: &mut Recorder<'_>) -> Result<RobotStatus, RobotFault> {
-        // Nothing moves yet.
         let not_begun = RobotStatus::Interrupted { stopping: Stopping::Confirmed };
         if request.stop_requested() {
             return Ok(not_begun);

@@ -1,5 +1,3 @@
-//! Settings of a robot program.
-
 use dynident_simulation::{SimulationError, require};
 use dynident_system::{PermittedProgram, ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
 use serde::{Deserialize, Serialize};

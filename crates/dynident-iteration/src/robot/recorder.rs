@@ -21,14 +21,12 @@ pub(super) fn joint_major(mut record: Record) -> Record {
     record
 }
 
-/// One part of a run.
 #[derive(Debug)]
 struct Part<'a> {
     which: RunPart,
     reference: &'a Reference,
     /// Number of its samples by the controller's count; samples that it shares with the motion belong to the motion.
     samples: usize,
-    /// Sample-major.
     record: Record,
     watch: EnvelopeWatch<'a>,
     oscillations: RunOscillations,
@@ -38,7 +36,6 @@ struct Part<'a> {
 #[derive(Debug)]
 pub(super) struct Recorder<'a> {
     parts: Vec<Part<'a>>,
-    /// Index of the current part.
     at: usize,
     /// Time of the sample at which the current part begins, by the robot's clock, s.
     zero_s: f64,
@@ -68,7 +65,6 @@ impl<'a> Recorder<'a> {
         &mut self.parts[self.at].record
     }
 
-    /// Number of recorded samples of all parts.
     pub(super) fn samples(&self) -> usize {
         self.parts.iter().map(|part| part.record.samples).sum()
     }
@@ -158,7 +154,6 @@ impl<'a> Recorder<'a> {
         Some(JointOscillation { joint: record.joints[joint].clone(), part: *which, ..found })
     }
 
-    /// Returns the run with its records.
     pub(super) fn into_run(self, status: RobotStatus) -> RobotRun {
         let (mut approach, mut motion, mut back) = (None, None, None);
         for own in self.parts {

@@ -1,5 +1,3 @@
-//! The built-in simulator as a robot.
-
 use super::ways::{WayRecords, cut};
 use super::{Robot, RobotRun, RobotStatus, RunPurpose, RunRequest, Stopping};
 use dynident_simulation::Plant;

@@ -30,7 +30,6 @@ impl core::fmt::Display for Breach {
     }
 }
 
-/// A joint or link that left its envelope, by name.
 #[derive(Debug)]
 pub(super) struct SampleBreach {
     pub(super) name: String,

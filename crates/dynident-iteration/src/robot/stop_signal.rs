@@ -1,5 +1,3 @@
-//! A stop request while a robot runs.
-
 use core::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -26,7 +24,6 @@ struct Shared {
     listeners: Mutex<Vec<Listener>>,
 }
 
-/// A running robot.
 struct Listener {
     number: u64,
     wake: Box<dyn Fn() + Send>,
@@ -67,7 +64,6 @@ impl StopSignal {
         Listening { signal: self.clone(), number }
     }
 
-    /// Calls a function for each listener; returns their number.
     fn each(&self, call: impl Fn(&Listener)) -> usize {
         let Ok(listeners) = self.shared.listeners.lock() else { return 0 };
         listeners.iter().for_each(call);

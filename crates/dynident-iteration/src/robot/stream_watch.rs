@@ -18,11 +18,9 @@ const MIN_STREAMING_RATIO: f64 = 5.0;
 const MAX_DELAY_VARIATION_S: f64 = 0.005;
 const MAX_CLOCK_DRIFT_SHARE: f64 = 0.005;
 
-/// A sample that has arrived.
 #[derive(Clone, Copy, Debug)]
 struct Arrival {
     at: Instant,
-    /// Time of the motion, s.
     motion_s: f64,
 }
 
@@ -30,12 +28,10 @@ struct Arrival {
 /// than real time, never streams.
 #[derive(Debug)]
 pub(super) struct StreamWatch {
-    /// The stated limit, s.
     silence_s: Option<f64>,
     stream: Option<Stream>,
 }
 
-/// Statistics of the received samples.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     first: Arrival,
@@ -62,7 +58,6 @@ impl StreamWatch {
         Self { silence_s, stream: None }
     }
 
-    /// Adds a sample with the motion time `motion_s`.
     pub(super) fn arrived(&mut self, at: Instant, motion_s: f64) {
         let new = Arrival { at, motion_s };
         let usual_s = self.usual_s();

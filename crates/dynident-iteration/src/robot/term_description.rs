@@ -1,5 +1,3 @@
-//! JSON description of a torque term, for external programs.
-
 use dynident_model::Model;
 use dynident_model::terms::{CoulombShape, TermConstant, TorqueTerm};
 use serde_json::{Value, json};

@@ -104,7 +104,6 @@ pub struct WorkspaceBox {
 }
 
 impl WorkspaceBox {
-    /// Workspace for [`breach`](Self::breach).
     pub(super) fn arrays(&self) -> Arrays {
         Arrays::new(&self.model)
     }

@@ -7,7 +7,6 @@
 use super::CauseSettings;
 use super::explanation::{Explanation, Fitted, TorqueCandidate};
 
-/// The reported candidates and the total residual.
 #[derive(Clone, Debug)]
 pub(super) struct Agreement {
     /// The reported candidate of each joint; `None` if the difference is not relevant or the cause is undetermined.

@@ -25,12 +25,7 @@ const DELAYS_S: &[f64] = &[-0.03, -0.02, -0.015, -0.01, -0.0075, -0.005, -0.0025
 #[derive(Clone, Copy, Debug)]
 pub(super) enum CommandLaw<'a> {
     /// A completely known control law: one column, the commanded torque.
-    Known {
-        /// The law.
-        controller: &'a ControllerSettings,
-        /// Its model, if it has one.
-        model: Option<&'a ControllerModel>,
-    },
+    Known { controller: &'a ControllerSettings, model: Option<&'a ControllerModel> },
     /// The drives close their own position loop with unknown gains. The columns are the feed-forward torque, the
     /// position error, its rate and its integral.
     OwnLoop {
@@ -122,12 +117,10 @@ impl<'a> ObservedLeg<'a> {
         (observed.rows() > 0).then_some(observed)
     }
 
-    /// Number of rows after decimation.
     pub(super) fn rows(&self) -> usize {
         self.torque.first().map_or(0, Vec::len)
     }
 
-    /// One column for each joint, filtered and decimated.
     fn decimated(&self, panel: &[f64]) -> Vec<Vec<f64>> {
         let count = self.motion.joints;
         let mut decimator = self.decimator.with_columns(count);
@@ -160,7 +153,6 @@ impl<'a> ObservedLeg<'a> {
 }
 
 impl LoggedMotion<'_> {
-    /// The commanded torque, joint-major.
     pub(super) fn commanded(
         &self,
         controller: &ControllerSettings,

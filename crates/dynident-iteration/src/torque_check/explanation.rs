@@ -49,22 +49,18 @@ pub enum TorqueCandidate {
 }
 
 impl TorqueCandidate {
-    /// All candidates.
     pub(super) const ALL: [Self; 6] =
         [Self::Scale, Self::Sign, Self::Exchanged, Self::Gravity, Self::Friction, Self::Clipped];
 }
 
-/// A candidate with its numbers for one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitted {
     pub(super) candidate: TorqueCandidate,
     /// Scale, torque limit (Nm, N), or index of the other joint.
     pub(super) value: f64,
-    /// Explained share of the squared difference.
     pub(super) explained: f64,
 }
 
-/// Result of the comparison of one joint.
 #[derive(Clone, Debug)]
 pub(super) struct Explanation {
     pub(super) scale: Option<f64>,
@@ -72,7 +68,6 @@ pub(super) struct Explanation {
     pub(super) difference_percent: f64,
     /// The commanded torque, including the constant.
     pub(super) commanded: Vec<f64>,
-    /// Whether the difference is relevant.
     pub(super) matters: bool,
     /// Squared difference as a share of the squared torque.
     pub(super) difference_share: f64,
@@ -142,7 +137,6 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     out
 }
 
-/// The fit of a joint's torque by all of its columns.
 struct Free<'a> {
     coefficients: &'a [f64],
     /// Whether the scale has an error bar.

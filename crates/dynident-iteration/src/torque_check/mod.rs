@@ -53,7 +53,6 @@ const MAX_POINTS: usize = 150;
 const MIN_CYCLES_PER_RUN: f64 = 12.0;
 /// Largest ratio of the squared differences for which another timing is used.
 const MAX_RESIDUAL_RATIO: f64 = 0.5;
-/// Smallest number of rows per joint for a verdict.
 const MIN_ROWS: usize = 20;
 
 /// Source of the commanded torque.
@@ -113,7 +112,6 @@ pub struct TorqueCheck {
     pub causes: Vec<TorqueCause>,
 }
 
-/// One run as input of the comparison.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CheckedRun<'a> {
     pub(crate) legs: &'a [Leg],
@@ -122,7 +120,6 @@ pub(crate) struct CheckedRun<'a> {
     pub(crate) model: Option<&'a ControllerModel>,
 }
 
-/// Settings and other inputs of the comparison.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CheckWith<'a> {
     pub(crate) settings: &'a TorqueCheckSettings,
@@ -134,7 +131,6 @@ pub(crate) struct CheckWith<'a> {
     /// Whether drives with their own loop get feed-forward torque in later runs, which determines each joint's own
     /// scale.
     pub(crate) feeds_forward_later: bool,
-    /// Whether the newest run ended early.
     pub(crate) ended_early: bool,
 }
 
@@ -156,7 +152,6 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
     Some(TorqueCheck { causes, ..check })
 }
 
-/// Compares the torques if enough was recorded.
 fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>) -> Option<TorqueCheck> {
     let newest = runs.last()?;
     let source = source_of(newest);
@@ -217,7 +212,6 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
     Some(check)
 }
 
-/// The compared legs, each with its control law.
 struct Observed<'a> {
     dof: usize,
     legs: Vec<(CommandLaw<'a>, ObservedLeg<'a>)>,
@@ -239,7 +233,6 @@ impl<'a> Observed<'a> {
         self.legs.iter().map(|(_, leg)| leg.rows()).sum()
     }
 
-    /// A quantity of each joint, over all legs.
     fn joined(&self, of: &dyn Fn(&ObservedLeg<'_>) -> Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let mut out = vec![Vec::new(); self.dof];
         for (_, leg) in &self.legs {

@@ -21,7 +21,6 @@ const SMOOTHING_SHARE: f64 = 0.2;
 const MIN_SMOOTHED_SAMPLES: usize = 30;
 /// Time before the stop that is compared, s; earlier the robot still followed.
 const BEFORE_STOP_S: f64 = 1.0;
-/// Smallest number of samples of a run that ended early.
 const MIN_SAMPLES: usize = 5;
 /// Trial delays of positions and velocities in the controller, s; a filter makes velocities later.
 const DELAYS_S: [[f64; 2]; 8] = [
@@ -63,7 +62,6 @@ const ALL_SHARES: f64 = 40.0;
 const MIN_EXPLAINED_SHARE: f64 = 0.65;
 /// Smallest relative residual without a limit for which a limit is fitted.
 const MIN_RELATIVE_RESIDUAL: f64 = 0.01;
-/// Smallest number of rows per unknown of the model.
 const MIN_ROWS_PER_UNKNOWN: usize = 3;
 /// Smallest number of rows at the limit, and their largest share.
 const MIN_ROWS_AT_LIMIT: usize = 4;

@@ -45,7 +45,6 @@ const DEFAULT_SPREAD: f64 = 2.0;
 pub(crate) struct RowScale {
     pub(crate) value: f64,
     pub(crate) std: f64,
-    /// Whether it is significantly different from one.
     pub(crate) is_wrong: bool,
     /// Joints whose scale explains the rows nearly as well, if it is wrong.
     pub(crate) or: Vec<usize>,
@@ -155,12 +154,10 @@ fn spread(found: &[Option<Kappa>], chosen: &[usize]) -> f64 {
     if sizes.len() < MIN_OTHER_JOINTS { DEFAULT_SPREAD } else { (sizes[sizes.len() / 2] / MEDIAN_TO_STD).max(1.0) }
 }
 
-/// The deviation of a joint's scale.
 #[derive(Clone, Copy, Debug)]
 struct Kappa {
     value: f64,
     std: f64,
-    /// Log-likelihood of all rows with it.
     log_likelihood: f64,
 }
 

@@ -18,7 +18,6 @@ const MIN_RESIDUAL_SHARE: f64 = 1e-4;
 /// Singular values below this share of the largest one are treated as zero.
 const RANK_TOLERANCE: f64 = 1e-9;
 
-/// Number of shared parameters.
 pub(super) const SHARED: usize = 5;
 
 /// One joint's columns, each with the same number of rows.
@@ -33,11 +32,9 @@ pub(super) struct SharedParameter {
 
 #[derive(Clone, Debug)]
 pub(super) struct SeparableFit {
-    /// The shared parameters.
     pub(super) shared: [f64; SHARED],
     /// Their covariance for independent rows; `None` if it does not exist.
     pub(super) covariance: Option<DMatrix<f64>>,
-    /// Columns of each joint at these parameters.
     pub(super) columns: Vec<JointColumns>,
 }
 
@@ -128,7 +125,6 @@ fn slopes(
     slopes
 }
 
-/// The linear equations of one Gauss-Newton step.
 struct NormalEquations {
     normal: DMatrix<f64>,
     right: DVector<f64>,
@@ -203,7 +199,6 @@ pub(super) fn rms(values: &[f64]) -> f64 {
     if values.is_empty() { 0.0 } else { (square(values) / values.len() as f64).sqrt() }
 }
 
-/// Subtracts the mean.
 pub(super) fn centred(values: &[f64]) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     values.iter().map(|value| value - mean).collect()

@@ -19,7 +19,6 @@ fn prior() -> ControllerModel {
     ControllerModel::from_parameters(robot.model(), robot.terms(), robot.nominal()).unwrap()
 }
 
-/// A correct log of a run with the first controller.
 fn recorded() -> Record {
     let (controller, model, reference) = (settings().first.unwrap(), prior(), reference());
     let request = RunRequest { model: Some(&model), ..RunRequest::new(1, &reference, &controller) };
@@ -96,7 +95,6 @@ fn mistakes_of_a_log_are_named_before_the_envelope() {
     assert!(run.status.is_done() && run.record == right && run.note.is_none(), "{}", run.status);
 }
 
-/// A run with a wrong log is evaluated again once the file is corrected, under the same number.
 #[test]
 fn a_corrected_log_is_read_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -186,7 +184,6 @@ fn every_form_of_a_motion_is_in_its_folder() {
     assert!(message.contains("six joints"), "{message}");
 }
 
-/// A pipe without a writer at the path of a log does not block.
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_no_log() {

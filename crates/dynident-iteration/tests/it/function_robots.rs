@@ -6,7 +6,6 @@ use dynident_iteration::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, S
 
 type Outcome = Result<(), String>;
 
-/// A run with `function`, which receives the controlled run and returns its outcome.
 fn run(
     envelope: bool,
     stop: Option<&StopSignal>,
@@ -25,7 +24,6 @@ fn run(
     (run, asked)
 }
 
-/// Stays at the reference for a number of samples.
 fn standing(run: &mut ControlledRun, samples: usize) {
     for sample in 0..samples {
         if run.torque(sample as f64 / 500.0, &[-0.4, 0.3], &[0.0, 0.0]).is_none() {
@@ -45,7 +43,6 @@ fn what_it_asks_with_is_the_record() {
             let expected = [200.0 * (-0.4 - q[0]) - 20.0 * 0.1, 0.0];
             assert!((tau[0] - expected[0]).abs() < 1e-9 && tau[1].abs() < 1e-9, "{tau:?}");
         }
-        // No further sample.
         assert!(run.torque(0.5, &[-0.4, 0.3], &[0.0, 0.0]).is_none());
         Ok(())
     });
@@ -64,7 +61,6 @@ fn it_is_stopped_before_the_next_torque() {
         Ok(())
     });
     assert!(matches!(found.status, RobotStatus::LeftEnvelope { .. }), "{}", found.status);
-    // The sample that left the envelope is recorded.
     assert_eq!((asked, found.record.samples), (11, 11));
 
     let stop = StopSignal::default();

@@ -145,13 +145,11 @@ fn held_out_runs_belong_to_their_runs() {
     let again = iterate(&iteration, &mut [&mut robot], Some(&store), &mut |_, _| {}).unwrap();
     assert_eq!(again.runs, outcome.runs);
     assert_eq!(robot.commanded, [(runs, RunPurpose::HeldOut)]);
-    // The last run is removed.
     std::fs::remove_dir_all(store.run_folder(runs)).unwrap();
     let store = IterationStore::open(folder.path(), "test", true).unwrap();
     assert!(!of_run(runs).exists() && of_run(runs - 1).exists());
     let again = iterate(&iteration, &mut [&mut Noted::new()], Some(&store), &mut |_, _| {}).unwrap();
     assert_eq!(again.runs, outcome.runs);
-    // A fresh start removes everything.
     IterationStore::open(folder.path(), "test", false).unwrap();
     assert!(!of_run(1).exists());
 }

@@ -109,7 +109,6 @@ fn ways_are_as_fast_as_they_may_be() {
         // Rounding to multiples of 100 samples may make the path slower.
         assert!(most <= 1.0 + 1e-9 && most > 0.5, "{most}");
     }
-    // If the robot is already there, the path has one sample.
     let there = home(START).ways(&model(), &motion(START, START), None).unwrap().ways;
     assert_eq!((there.approach.samples(), there.back.samples()), (1, 1));
     // Without stated velocity limits, those of the motion are used.
@@ -147,7 +146,6 @@ fn a_floor_is_gone_around_or_named() {
     };
     assert!(lowest(&found.ways.approach) >= -0.65 && lowest(&found.ways.back) >= -0.65);
     assert!(tip_m([1.55, 0.0]) < -0.85, "the direct path is far below");
-    // A resumed iteration finds the same paths.
     assert_eq!(below(-0.65, from).ways(&model(), &reference, None).unwrap(), found);
     // No motion of the elbow avoids a floor that is this high.
     let error = below(-0.3, from).ways(&model(), &reference, None).map(|_| ()).unwrap_err();
@@ -175,7 +173,6 @@ fn the_torque_of_a_way_has_room() {
     assert!(matches!(&error, HomeError::Posture { kind: LimitKind::Torque, posture: "home", .. }), "{error}");
     level.uncertainty_percent = 0.0;
     assert!(level.ways(&model(), &reference, None).is_ok());
-    // A motion that begins at nonzero velocity is rejected.
     let mut moving = reference.motion().clone();
     moving.dq.fill(0.3);
     let moving = Reference::new(500.0, moving).unwrap();
@@ -210,7 +207,6 @@ fn every_robot_runs_the_ways() {
             let kept = theirs.ways.unwrap();
             assert!(kept.approach.q == parts.approach.q && kept.back.tau == parts.back.tau, "{mode:?}");
         }
-        // Without paths as before.
         assert!(run(&mut robot, None, None).status.is_done());
     }
     let tables = ["approach.csv", "trajectory.csv", "return.csv"]
@@ -306,7 +302,6 @@ fn a_way_that_is_not_run_to_its_end() {
     assert!(matches!(&late, RobotStatus::Failed { fault: RobotFault::OutOfTurn { .. }, .. }), "{late}");
 }
 
-/// A person finds the paths next to the trajectory; logs of the paths are checked if they exist.
 #[test]
 fn a_folder_holds_the_ways() {
     let folder = tempfile::tempdir().unwrap();
@@ -339,7 +334,6 @@ fn a_folder_holds_the_ways() {
     assert_eq!((breach.part, breach.quantity), (RunPart::Approach, EnvelopeQuantity::Position));
 }
 
-/// Records the requests for permission.
 struct Asked(Vec<NextMotion>);
 
 impl Supervisor for Asked {
@@ -355,7 +349,6 @@ impl Supervisor for Asked {
     }
 }
 
-/// The arm of the iteration's tests, with a home posture to the side.
 fn with_home(posture: [f64; 2]) -> dynident_iteration::IterationSettings {
     let mut settings = simulated_arm::settings();
     settings.safety.home = Some(HomeSettings {
@@ -395,7 +388,6 @@ fn an_iteration_from_home() {
     assert!(highest("joint1") > 0.0);
     let files = ["log.csv", "approach_log.csv", "return_log.csv"].map(|name| store.run_folder(1).join(name));
     assert!(files.iter().all(|file| file.exists()));
-    // Two of its runs are removed and repeated with the same result.
     let runs = outcome.runs.len();
     std::fs::remove_dir_all(store.run_folder(runs)).unwrap();
     let again = iterate(&iteration, &mut [&mut simulated.robot()], Some(&store), &mut |_, _| {}).unwrap();
@@ -404,7 +396,6 @@ fn an_iteration_from_home() {
     assert!(!files[0].exists());
 }
 
-/// A path is rehearsed with its motion; without a path nothing is commanded.
 #[test]
 fn a_way_is_rehearsed() {
     let simulated = Simulated::default();
@@ -436,7 +427,6 @@ fn a_way_is_rehearsed() {
     assert!(reason.contains("run 1 is not commanded: home itself breaks the limit of position of joint1"), "{reason}");
 }
 
-/// A stop request ends the search for paths at once.
 #[test]
 fn a_search_for_ways_ends() {
     for at in 1..=5 {

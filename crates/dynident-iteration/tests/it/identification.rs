@@ -27,7 +27,6 @@ fn arm(tip_kg: f64) -> Model {
     planar_2r(1.0, rod, tip)
 }
 
-/// Viscous and Coulomb friction of both joints with this step.
 fn friction(shape: CoulombShape) -> Vec<TorqueTerm> {
     let of_joint = |joint| [TorqueTerm::Viscous(Viscous { joint }), TorqueTerm::Coulomb(Coulomb { joint, shape })];
     (0..2).flat_map(of_joint).collect()
@@ -88,7 +87,6 @@ fn settings(estimator: Estimator) -> RunIdentificationSettings {
     RunIdentificationSettings { estimation: EstimationSettings::of(estimator), ..RunIdentificationSettings::default() }
 }
 
-/// Viscous and Coulomb friction of both joints, and their error bars.
 fn friction_of(task: &IterationTask, estimate: &RunEstimate) -> Vec<[f64; 2]> {
     let symbols: Vec<String> = task.robot.layout().columns().iter().map(dynident_dynamics::Column::symbol).collect();
     let value = |symbol: &str| {
@@ -163,7 +161,6 @@ fn friction_is_chosen_once_and_kept_by_the_runs_after() {
     let text = serde_json::to_string(&outcome.runs).unwrap();
     let read: Vec<dynident_iteration::RunRecord> = serde_json::from_str(&text).unwrap();
     assert_eq!(iteration.robot(&read).unwrap().terms(), chosen.terms());
-    // Friction of a joint that this robot does not have is rejected.
     let mut of_another = read;
     let friction = &mut of_another[0].estimate.as_mut().unwrap().friction;
     friction[0].terms = Some(vec![TorqueTerm::Viscous(Viscous { joint: 7 })]);

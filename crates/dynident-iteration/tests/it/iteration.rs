@@ -1,5 +1,3 @@
-//! The paper's planar arm in a complete iteration.
-
 #![allow(clippy::print_stdout, reason = "tests")]
 
 use dynident_dynamics::ParametricModel;
@@ -49,7 +47,6 @@ fn exact() -> LoopSettings {
     LoopSettings { integrator: Integrator::Rk4 { steps_per_sample: 1 }, ..LoopSettings::default() }
 }
 
-/// Without nominal inertials.
 fn unknown_arm() -> ParametricModel {
     ParametricModel::new(paper_arm(), Vec::new()).unwrap().with_nominal(vec![0.0; 20]).unwrap()
 }
@@ -100,7 +97,6 @@ fn the_papers_arm_is_found_in_both_orders_of_work() {
         // inactive.
         let possible = outcome.runs[5].estimate.as_ref().unwrap().possible.as_ref().unwrap();
         assert!(worst(&unknown_arm().base().values(possible)) < 1e-5);
-        // The better model tracks better.
         let [first, last] = [0, 5].map(|run: usize| outcome.runs[run].tracking_error());
         assert!(last < 1e-3 * first, "{first} {last}");
     }
@@ -156,7 +152,6 @@ fn known_parameters_are_held() {
     }
 }
 
-/// A controller that cannot hold the arm: the iteration is refused, and all runs are kept.
 #[test]
 fn an_arm_that_cannot_follow_is_refused() {
     let limits = RunLimits { tracking_error: Some(1e-4.into()), ..RunLimits::default() };
@@ -169,7 +164,6 @@ fn an_arm_that_cannot_follow_is_refused() {
     assert_eq!(stiffness, [1.0, 2.0, 4.0, 8.0]);
 }
 
-/// A record without usable rows gives no estimate and no convergence.
 #[test]
 fn rows_that_do_not_count_are_no_estimate() {
     let (reference, _) = reference(&[1, 0], 100.0);

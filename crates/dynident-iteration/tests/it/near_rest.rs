@@ -35,7 +35,6 @@ fn record(seed: u64) -> Record {
     robot.run(&RunRequest::new(1, &reference, &pd)).unwrap().record
 }
 
-/// Identifies such a run with viscous and dry friction in the model.
 fn identified(record: &Record, set_aside_near_rest: bool) -> (ParametricModel, RunEstimate) {
     let robot = ParametricModel::new(arm(1.0, 1.0), friction(DRY)).unwrap();
     let task = IterationTask::new(robot.clone(), reference()).unwrap();

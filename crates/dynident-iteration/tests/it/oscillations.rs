@@ -47,7 +47,6 @@ fn arm() -> ParametricModel {
     ParametricModel::new(read_urdf(&text).unwrap().model, terms.collect()).unwrap()
 }
 
-/// Both joints back and forth in 4 s, twice.
 fn reference() -> Reference {
     let samples = 4001;
     let mut motion = Motion::default();

@@ -1,5 +1,3 @@
-//! Decision about the next run from the records.
-
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
 use dynident_identification::examination::{LagChoice, TorqueLag};
@@ -20,7 +18,6 @@ fn iteration() -> Iteration {
     Iteration::new(task, IterationSettings::default()).unwrap()
 }
 
-/// An estimate of six equal parameters.
 fn estimate(value: f64, std: f64) -> RunEstimate {
     RunEstimate {
         values: vec![value; 6],
@@ -63,7 +60,6 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
     }
 }
 
-/// Evidence without any unmet condition.
 fn evidence() -> RunEvidence {
     let joint = JointEvidence {
         torque_rms: 10.0,
@@ -111,7 +107,6 @@ fn a_model_that_was_tried_and_rejected_is_not_tried_again() {
     assert_eq!((model(&plan), plan.damping), (Some(1.5), 0.5));
 }
 
-/// A poor run of the controller without a model does not replace a good estimate.
 #[test]
 fn a_poor_run_does_not_take_the_place_of_a_good_one() {
     let precise = run(2, Some(1.0), 2.0, false, estimate(3.0, 0.1));
@@ -134,7 +129,6 @@ fn what_is_hardly_known_has_not_settled() {
     assert_eq!(iteration().next(&records(0.01)).unwrap(), Next::Finished(IterationStatus::Converged));
 }
 
-/// Two runs that meet all conditions.
 fn good_pair() -> [RunRecord; 2] {
     [1, 2].map(|number| run(number, Some(1.0), 1e-4, true, estimate(1.0, 0.01)))
 }
@@ -170,7 +164,6 @@ fn tracking_at_its_floor_is_met() {
     }
 }
 
-/// Each condition alone prevents convergence, and is reported with joint and numbers.
 #[test]
 fn every_condition_counts_by_itself() {
     assert!(shortfalls(&good_pair()).is_empty());
@@ -213,7 +206,6 @@ fn every_condition_counts_by_itself() {
     assert!(shortfalls(&records).is_empty());
 }
 
-/// With pooled runs the next model is that of all good runs.
 #[test]
 fn the_next_model_is_that_of_all_good_runs() {
     let mut last = run(2, Some(1.0), 0.1, true, estimate(3.0, 0.1));

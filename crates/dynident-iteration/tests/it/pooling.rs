@@ -1,5 +1,3 @@
-//! Pooling: all good runs in one fit.
-
 use crate::simulated_arm::{Simulated, described, iterated, settings};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::{IterationSettings, RunEstimate};
@@ -58,7 +56,6 @@ fn bars_narrow_with_every_run_and_hold() {
     assert!((inside - 95.0).abs() <= 2.0 + 2.0 * 100.0 * (0.05 * 0.95 / numbers).sqrt(), "{inside}");
 }
 
-/// Without pooling every run is fitted alone, as in the paper.
 #[test]
 fn runs_may_stand_alone() {
     let mut settings = four_runs();

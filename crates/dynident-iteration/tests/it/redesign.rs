@@ -67,7 +67,6 @@ fn redesigned(settings: IterationSettings) -> Iteration {
     repeated(settings).with_planner(Arc::new(redesign(20.0, AMPLE_NM)))
 }
 
-/// Settings for a number of runs without convergence.
 fn runs(count: usize) -> IterationSettings {
     let mut settings = settings();
     settings.settled.parameter_sigmas = 0.0;
@@ -224,7 +223,6 @@ fn every_model_in_the_uncertainty_keeps_the_limits() {
     assert!((0..2).any(|joint| forecast[joint] >= 0.8 * SCARCE_NM[joint]), "{forecast:?}");
 }
 
-/// A planner that fails: the plan must come from the store.
 #[derive(Debug)]
 struct Never;
 
@@ -234,7 +232,6 @@ impl MotionPlanner for Never {
     }
 }
 
-/// Permits the first runs only.
 struct Until(usize);
 
 impl Supervisor for Until {
@@ -260,15 +257,12 @@ fn a_resumed_iteration_has_the_same_motions() {
         assert!(planned.join("motion.csv").is_file() && planned.join("plan.json").is_file());
     }
     let resumed = run(&repeated(runs(3)).with_planner(Arc::new(Never)), &mut robot(1), Some(&open()));
-    // Not printed because it is long.
     assert!(resumed.runs[1].motion == whole.runs[1].motion, "the motion of run 2");
     assert!(resumed == whole, "some number of a record");
     assert!(!folder.path().join("runs/planned_3").exists());
-    // The folder contains the complete result, including motions.
     let kept: Vec<RunRecord> = open().records().unwrap();
     assert!(kept == whole.runs, "what the folder holds");
     assert!(kept[0].motion.is_none() && kept[1].motion != kept[2].motion);
-    // A missing motion is reported by name, and a fresh start removes all runs.
     std::fs::remove_file(folder.path().join("runs/run_2/motion.csv")).unwrap();
     let error = open_error(folder.path());
     assert!(error.contains("run_2/motion.csv") && error.contains("put the file back"), "{error}");
@@ -303,7 +297,6 @@ fn goes_on_while_a_motion_is_worth_a_run() {
     }
 }
 
-/// Unsuitable tasks are reported; if the limits allow no motion, the last motion is repeated, with the reason.
 #[test]
 fn what_cannot_be_redesigned() {
     let windows = vec![vec![[0.0, 20.0]]; 2];

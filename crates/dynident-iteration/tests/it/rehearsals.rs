@@ -20,7 +20,6 @@ fn robot() -> ParametricModel {
     ParametricModel::new(model(), Vec::new()).unwrap()
 }
 
-/// The simulator, which records the speed and the duration of each commanded motion.
 #[derive(Debug)]
 struct Noted {
     inner: SimulatedRobot,
@@ -92,7 +91,6 @@ fn a_motion_up_to_the_stops_is_told_to_keep_off_them() {
     assert!(reason.contains("stop_margin_percent"), "{reason}");
 }
 
-/// A motion that needs too much torque or leaves the envelope is not commanded.
 #[test]
 fn a_motion_outside_of_the_envelope_is_not_commanded() {
     let settings = |envelope: Envelope| IterationSettings {
@@ -108,7 +106,6 @@ fn a_motion_outside_of_the_envelope_is_not_commanded() {
     assert!(reason.contains("motion leaves") && reason.contains("position of joint1"), "{reason}");
 }
 
-/// A model that is not physically consistent is not loaded.
 #[test]
 fn a_model_without_a_mass_matrix_is_not_loaded() {
     let mut parameters = robot().nominal().to_vec();
@@ -180,7 +177,6 @@ fn gains_come_from_inertia_and_bandwidth() {
     assert!(error.contains("nominal inertia") && error.contains(&joints()[0]), "{error}");
 }
 
-/// Only before the first run, slowest first, and not identified.
 #[test]
 fn slow_runs_come_first() {
     let steps = SafetySettings { speed_steps: vec![0.1, 0.5, 1.0], ..SafetySettings::default() };

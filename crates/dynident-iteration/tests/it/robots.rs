@@ -71,7 +71,6 @@ fn fault(mode: ProcessMode, name: &str) -> (RobotFault, RobotRun) {
     (fault, run)
 }
 
-/// The robot of a permitted program.
 pub(crate) fn process_robot(settings: ProcessSettings, joints: Vec<String>) -> Result<ProcessRobot, SimulationError> {
     let program = settings.permitted(ProgramPermission::Allow).unwrap();
     ProcessRobot::new(settings, joints, program)
@@ -95,7 +94,6 @@ fn programs_give_what_the_simulator_gives() {
     }
 }
 
-/// Every failure of a program has its own verdict, and the samples before it are kept.
 #[test]
 fn programs_that_fail_have_a_verdict() {
     let at_50: [(&str, IsExpected); 9] = [
@@ -126,7 +124,6 @@ fn programs_that_fail_have_a_verdict() {
     }
     let (died, run) = fault(ProcessMode::Step, "die");
     assert!(matches!(died, RobotFault::Died { .. }) && run.record.samples == 50, "{died}");
-    // A stop that the robot reports is not a fault.
     let stopped = self::run(&mut process_robot(settings(ProcessMode::Run, "stop"), joints()).unwrap());
     assert!(matches!(&stopped.status, RobotStatus::Stopped { reason } if reason == "protective stop"));
     assert_eq!(stopped.record.samples, 50);
@@ -178,7 +175,6 @@ fn a_folder_waits_for_its_log() {
     let simulated = run(&mut SimulatedRobot::new(plant, LoopSettings::default()).unwrap());
     let csv = simulated.record.csv();
     let log = own.join("log.csv");
-    // A file that is still being copied: half a line, half a log.
     std::fs::write(&log, &csv[..csv.len() / 2]).unwrap();
     waiting(&run(&mut robot), "not complete");
     let half: String = csv.lines().take(100).flat_map(|line| [line, "\n"]).collect();
@@ -191,7 +187,6 @@ fn a_folder_waits_for_its_log() {
     let done = run(&mut robot);
     assert!(done.status.is_done());
     assert_eq!(done.record, simulated.record);
-    // The log of another trajectory is rejected.
     let other = Reference::standing(&[-0.4, 0.31], 500.0, 0.4).unwrap();
     let controller = pd();
     let request = RunRequest::new(1, &other, &controller);
@@ -286,7 +281,6 @@ fn what_is_handed_over_is_enough() {
     let inertial: Vec<f64> = serde_json::from_value(file["model"]["joints"][1]["inertial"].clone()).unwrap();
     assert_eq!(inertial, model.inertials()[1].0);
     assert_eq!(file["model"]["joints"][1]["parent"], "joint1");
-    // Invalid requests are rejected before any message is sent.
     let mut robot = process_robot(settings(ProcessMode::Run, ""), joints()).unwrap();
     assert!(robot.run(&RunRequest { model: None, ..request }).is_err());
 }

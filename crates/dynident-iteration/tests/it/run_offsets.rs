@@ -1,5 +1,3 @@
-//! A torque offset of one run.
-
 use super::simulated_arm::{Simulated, friction, reference, settings};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::{
@@ -9,7 +7,6 @@ use dynident_model::terms::{CoulombShape, Offset, TorqueTerm};
 use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerSettings, JointPdSettings};
 
-/// The arm with torque offsets in the model.
 fn described() -> ParametricModel {
     let mut terms = friction(CoulombShape::Smooth { width: 0.1 });
     terms.extend([0, 1].map(|joint| TorqueTerm::Offset(Offset { joint })));
@@ -60,7 +57,6 @@ fn apart(one: &RunEstimate, other: &RunEstimate) -> (f64, f64) {
     (bars, offset)
 }
 
-/// The offset of one run is estimated with its error bar and does not affect other parameters.
 #[test]
 fn an_offset_of_one_run_is_its_own() {
     let records = records(2.0);

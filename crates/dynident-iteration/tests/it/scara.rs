@@ -15,7 +15,6 @@ use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, R
 
 const RATE_HZ: f64 = 250.0;
 
-/// Two links in the plane, the vertical slide, and the tool that turns about it.
 fn model() -> Model {
     let joint = |name: &str, kind: &str, parent: &str, child: &str, x: f64| {
         format!(
@@ -54,7 +53,6 @@ fn terms(shape: CoulombShape) -> Vec<TorqueTerm> {
     (0..4).flat_map(of_joint).collect()
 }
 
-/// Sums of sines from rest to rest, 10 s.
 fn reference() -> Reference {
     let samples = (10.0 * RATE_HZ) as usize + 1;
     let mut motion = Motion::default();

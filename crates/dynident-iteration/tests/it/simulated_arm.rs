@@ -56,7 +56,6 @@ impl Simulated {
         SimulatedRobot::new(plant, settings).unwrap()
     }
 
-    /// All true parameters: bodies, then friction.
     pub(crate) fn parameters(&self) -> Vec<f64> {
         let [one, two] = self.coulomb;
         let mut all = arm(1.0, self.tip_kg).parameter_vector();
@@ -64,7 +63,6 @@ impl Simulated {
         all
     }
 
-    /// True base parameters, in the columns of the described robot.
     pub(crate) fn truth(&self, described: &ParametricModel) -> Vec<f64> {
         described.base().values(&self.parameters())
     }

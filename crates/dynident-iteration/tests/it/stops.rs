@@ -36,7 +36,6 @@ fn settings(mode: ProcessMode, command: Vec<String>) -> ProcessSettings {
     ProcessSettings { command, mode, limits, folder: None }
 }
 
-/// Content of the program's marker file, once it exists.
 fn marked(folder: &Path) -> String {
     // Fail instead of waiting forever.
     for _ in 0..30_000 {
@@ -55,7 +54,6 @@ fn runs(id: &str) -> bool {
     !state.is_empty() && !state.starts_with('Z')
 }
 
-/// A run that is stopped once the program has written its marker.
 fn stopped_at_the_mark(robot: &mut ProcessRobot, folder: &Path) -> RobotRun {
     let stop = StopSignal::default();
     std::thread::scope(|scope| {
@@ -77,7 +75,6 @@ fn a_stop_reaches_the_robot_in_every_mode() {
         let run = stopped_at_the_mark(&mut robot, folder.path());
         assert_eq!(run.status, RobotStatus::Interrupted { stopping: Stopping::Confirmed }, "{mode:?}");
         assert_eq!((run.record.samples, run.record.q.len()), (50, 100), "{mode:?}");
-        // The next run is not started.
         let stop = StopSignal::default();
         stop.request();
         let (reference, controller) = (reference(), pd());
@@ -183,7 +180,6 @@ fn no_process_of_a_robot_is_left() {
     assert!(!runs(&marked(folder.path())));
 }
 
-/// A second Ctrl-C does not wait: the program's group is killed from another thread.
 #[test]
 fn robots_can_be_killed_at_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -252,14 +248,12 @@ fn a_sample_outside_of_the_envelope_stops_the_run() {
             assert!(marked(folder.path()).ends_with(&format!("after {last} torques")));
         }
     }
-    // A torque beyond the envelope is never sent.
     let folder = tempfile::tempdir().unwrap();
     let weak = Envelope { torque: vec![Some(1.0), Some(1.0)], ..envelope() };
     let run = watched(ProcessMode::Step, &weak, folder.path(), false);
     assert!(matches!(&run.status, RobotStatus::LeftEnvelope { breach, .. }
         if breach.quantity == EnvelopeQuantity::Torque && breach.value.abs() > 1.0));
     assert!(run.record.samples > 1, "at rest on the path a joint PD asks for nothing");
-    // Inside a wide envelope nothing is stopped.
     let wide = Envelope { tracking_error: vec![Some(3.0); 2], speed: vec![Some(50.0); 2], ..envelope() };
     for mode in BOTH {
         assert!(watched(mode, &wide, folder.path(), false).status.is_done());
@@ -310,7 +304,6 @@ fn a_link_that_leaves_the_workspace_stops_the_run() {
     let told = serde_json::to_value(boxed(limit)).unwrap();
     assert_eq!(told["workspace"]["lower"], serde_json::json!([null, null, limit]));
     assert_eq!(told["workspace"]["points"][1]["link"], "the tool");
-    // The built-in simulator reports it after the run.
     let plant = Plant::new(&model, &[], &[]).unwrap();
     let mut simulator = SimulatedRobot::new(plant, LoopSettings::default()).unwrap();
     let (reference, controller) = (reference(), pd());
@@ -351,7 +344,6 @@ fn a_folders_log_is_watched_afterwards() {
     std::fs::write(robot.run_folder(1).join("log.csv"), simulated.record.csv()).unwrap();
     let status = robot.run(&request).unwrap().status;
     assert!(matches!(status, RobotStatus::LeftEnvelope { stopping: Stopping::SeenAfterwards, .. }), "{status}");
-    // With another envelope the log is still accepted.
     let wide = Envelope { tracking_error: vec![Some(3.0); 2], ..envelope() };
     let run = robot.run(&RunRequest { envelope: Some(&wide), ..request }).unwrap();
     assert!(run.status.is_done(), "{}", run.status);
@@ -408,7 +400,6 @@ fn watcher(stop_after: usize) -> Watcher {
     Watcher { stop: StopSignal::default(), stop_after, asked: Vec::new(), made: 0 }
 }
 
-/// Between two runs: the next one is not commanded, and a later call continues with it.
 #[test]
 fn a_stop_between_runs_ends_the_iteration() {
     let folder = tempfile::tempdir().unwrap();
@@ -544,13 +535,11 @@ fn a_fresh_start_removes_only_its_own() {
         let error = IterationStore::open(folder, "other", false).unwrap_err().to_string();
         assert!(error.contains(what), "{error}");
     };
-    // Notes of a person and everything else remain.
     let notes = own.join("runs/run_1/notes.txt");
     std::fs::write(&notes, "cable loose").unwrap();
     refused(&own, "notes.txt");
     assert!(own.join("runs/run_1/run.json").exists());
     std::fs::remove_file(notes).unwrap();
-    // Runs behind a link remain.
     let link = folder.path().join("linked");
     std::fs::create_dir(&link).unwrap();
     std::os::unix::fs::symlink(own.join("runs"), link.join("runs")).unwrap();
@@ -560,7 +549,6 @@ fn a_fresh_start_removes_only_its_own() {
     std::fs::create_dir(link.join("runs")).unwrap();
     std::os::unix::fs::symlink(own.join("runs/run_1"), link.join("runs/run_1")).unwrap();
     refused(&link, "move it to another folder");
-    // A foreign folder that is not a run's is not touched.
     std::fs::create_dir(own.join("runs/run_fast")).unwrap();
     IterationStore::open(&own, "other", false).unwrap();
     assert!(own.join("runs/run_fast").exists() && !own.join("runs/run_1").exists());

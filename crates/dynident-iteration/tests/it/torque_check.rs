@@ -10,7 +10,6 @@ use dynident_iteration::{
 use dynident_simulation::controllers::PositionLoopSettings;
 use dynident_simulation::{ControllerSettings, Record, SensorSettings, SimulationError};
 
-/// A robot with a wrong log.
 struct Faulty<'a> {
     inner: SimulatedRobot,
     fault: &'a dyn Fn(&mut Record),
@@ -45,7 +44,6 @@ fn iterated(simulated: &Simulated, settings: IterationSettings, fault: &dyn Fn(&
     iterate(&iteration, &mut [&mut robot], None, &mut |_, _| {}).unwrap()
 }
 
-/// Multiplies the torque of the joints.
 fn scaled(record: &mut Record, factors: [f64; 2]) {
     for (joint, factor) in factors.into_iter().enumerate() {
         let own = record.of(joint);
@@ -53,7 +51,6 @@ fn scaled(record: &mut Record, factors: [f64; 2]) {
     }
 }
 
-/// Subtracts the gravity torque of the true robot.
 fn without_gravity(record: &mut Record) {
     let model = arm(1.0, Simulated::default().tip_kg);
     let mut workspace = Workspace::new(&model);
@@ -67,7 +64,6 @@ fn without_gravity(record: &mut Record) {
     }
 }
 
-/// Subtracts the friction of the drives.
 fn without_friction(record: &mut Record) {
     let times = record.times_s.clone();
     for (joint, (viscous, dry)) in [(0.8, 1.5), (0.5, 1.0)].into_iter().enumerate() {
@@ -206,7 +202,6 @@ fn the_scale_of_drives_with_their_own_loop_is_found() {
     assert!(joint == "joint2" && (factor - 1.12).abs() < 0.02, "{joint} {factor}");
 }
 
-/// The records alone decide: a run with a wrong log ends the iteration, with the way to continue.
 #[test]
 fn after_a_wrong_log_no_run_is_planned() {
     let iteration = Iteration::new(simulated_arm::task(), simulated_arm::settings()).unwrap();

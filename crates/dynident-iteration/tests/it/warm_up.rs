@@ -1,5 +1,3 @@
-//! Warm-up before a run, and its evidence about friction.
-
 use super::simulated_arm::{self, RATE_HZ, Simulated};
 use dynident_iteration::{
     Iteration, IterationStatus, IterationStore, NextMotion, Robot, RobotRun, RobotStatus, RunPurpose, RunRequest,
@@ -13,7 +11,6 @@ struct Cold {
     coulomb: [f64; 2],
     inner: SimulatedRobot,
     commanded: Vec<(usize, RunPurpose, f64)>,
-    /// The pass that a brake ends.
     stops_in: Option<usize>,
 }
 
@@ -102,9 +99,7 @@ fn passes_come_before_the_first_run_of_a_call() {
     assert!(joint == 0 && (torque + 0.5625).abs() < 0.05, "{torque}");
     let sentence = shown.sentence(&["one".to_owned(), "two".to_owned()]);
     assert!(sentence.contains("3 times, 60 s") && sentence.contains("most at one"), "{sentence}");
-    // The result is stored with the run, but no log of the passes.
     assert_eq!(store.records().unwrap()[0].warm_up.as_ref(), Some(shown));
-    // A further call warms up before its first run only.
     let mut settings = simulated_arm::settings();
     settings.safety.warm_up_s = 10.0;
     settings.max_runs = 3;
@@ -117,7 +112,6 @@ fn passes_come_before_the_first_run_of_a_call() {
     assert_eq!(cold.commanded, expected);
 }
 
-/// Constant friction shows no drift, also with sensor noise.
 #[test]
 fn a_warm_robot_shows_no_drift() {
     let mut robot = Simulated::default().robot();

@@ -1,9 +1,7 @@
-//! Helpers to run the command.
 pub(crate) use dynident_testing::repository;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Outcome of the command.
 pub(crate) struct CommandOutcome {
     pub(crate) status: i32,
     pub(crate) stdout: String,
@@ -15,7 +13,6 @@ pub(crate) fn broken() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/broken")
 }
 
-/// The command, in a folder.
 pub(crate) fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dynident"));
     command.current_dir(folder).args(arguments);
