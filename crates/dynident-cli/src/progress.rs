@@ -1,5 +1,3 @@
-//! A progress bar with the remaining time, once a stage takes longer than a second.
-
 use crate::terminal;
 use dynident::Progress;
 use indicatif::{ProgressBar, ProgressStyle};

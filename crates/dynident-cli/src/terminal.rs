@@ -62,7 +62,6 @@ pub(crate) fn ask(question: &str) {
     let _ = out.flush();
 }
 
-/// Whether standard error is a terminal.
 pub(crate) fn watched() -> bool {
     io::stderr().is_terminal()
 }

@@ -125,7 +125,6 @@ pub(crate) fn rehearsed<'a>(
     Ok(rehearsed.run(rehearsal, stop)?.map(Some))
 }
 
-/// Describes a motion for the person who allows it.
 pub(crate) fn next_motion(
     task: &IterationTask,
     plan: &RunPlan,

@@ -1,5 +1,3 @@
-//! The unmet conditions of an iteration; it has converged if none is left.
-
 use crate::estimate::RunEstimate;
 use crate::evidence::{Clipping, JointEvidence};
 use crate::lengths::OtherLength;
@@ -362,7 +360,6 @@ fn of_joint(
     }
 }
 
-/// Conditions that the held-out run after the last run does not meet.
 fn held_out(found: &mut Vec<Shortfall>, last: &RunRecord, min_inside_share: f64, names: &Names) {
     let Some(run) = &last.held_out else {
         found.push(Shortfall::NotHeldOut);

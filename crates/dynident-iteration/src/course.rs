@@ -1,5 +1,3 @@
-//! Sequence of an iteration: corrected logs, held-out runs, planned runs and stops.
-
 use crate::convergence::Shortfall;
 use crate::drive::{CorrectedLog, NextRunMotion, PlannedRun};
 use crate::error::IterationError;
@@ -152,7 +150,6 @@ impl Course<'_> {
         Ok((!is_finished).then_some(IterationStatus::Waiting { reason }))
     }
 
-    /// Makes a held-out run; returns the status if the iteration ends there.
     fn run_held_out(
         &mut self,
         held_out: &HeldOutMotion,
@@ -201,7 +198,6 @@ impl Course<'_> {
         }
     }
 
-    /// Makes a planned run; returns the status if the iteration ends there.
     fn run(
         &mut self,
         robots: &mut [&mut dyn Robot],

@@ -1,5 +1,3 @@
-//! The steps of an iteration: the next motion, its run, the examination of its log and the verdict.
-
 use crate::before_motion::motions;
 use crate::commanding::{MotionOutcome, Prepared, folder_number};
 use crate::cut_short::CutShort;
@@ -38,7 +36,6 @@ pub(crate) struct NextRunMotion {
 pub(crate) enum PlannedRun {
     Run(Box<RunRecord>, Vec<RobotRun>),
     Stopped(IterationStatus),
-    /// Logs of a run that is not used, and the reason.
     CutShort(Vec<RobotRun>, CutShort),
 }
 
@@ -49,7 +46,6 @@ pub(crate) enum CorrectedLog {
 }
 
 impl Iteration {
-    /// Returns the motion of the run after `records`: the stored plan, or a new one.
     pub(crate) fn next_motion(
         &self,
         records: &[RunRecord],
@@ -84,7 +80,6 @@ impl Iteration {
         open.then(|| policy::further(records, &self.settings.settled.verdict)).flatten()
     }
 
-    /// Makes one run: each leg on its robot, then the identification.
     pub(crate) fn made(
         &self,
         robots: &mut [&mut dyn Robot],

@@ -164,7 +164,6 @@ struct RunsFit<'a> {
 }
 
 impl RunsFit<'_> {
-    /// Repeats the fit until the rows show no further lag that affects the parameters.
     fn rounds(
         &self,
         identification: &IdentificationSettings,

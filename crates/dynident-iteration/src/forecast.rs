@@ -1,5 +1,3 @@
-//! Forecast of the error bars after a run, before it is made.
-
 use crate::estimate::RunEstimate;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};

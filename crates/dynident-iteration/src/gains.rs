@@ -1,5 +1,3 @@
-//! Gains of a first controller from the nominal model, its uncertainty, and a bandwidth.
-
 use crate::loop_delay::{highest_omega, highest_omega_if_light, share_of_all};
 use crate::posture::{at_sample, inertia_matrix};
 use crate::robot::{TRACKING_M, TRACKING_RAD};

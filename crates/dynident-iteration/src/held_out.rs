@@ -1,5 +1,3 @@
-//! Runs of a held-out motion, which validate the newest model and are never fitted.
-
 use crate::before_motion::Commanded;
 use crate::commanding::MotionOutcome;
 use crate::convergence::Shortfall;
@@ -108,7 +106,6 @@ impl Iteration {
         Ok(HeldOutOutcome::Run(found, Box::new(robot_run)))
     }
 
-    /// Evidence in its log, by the same identification as that of runs.
     fn held_out_evidence(
         &self,
         held_out: &HeldOutMotion,

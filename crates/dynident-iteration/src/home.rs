@@ -270,7 +270,6 @@ impl<'a> Planner<'a> {
         Ok(())
     }
 
-    /// Path from home to a posture, with its via postures.
     fn way(&self, to: &[f64], posture: &'static str) -> Result<(Motion, Vec<Vec<f64>>), HomeError> {
         let fix = "the motion breaks it, too: use another motion, or correct the obstacles in [design] (limits; defaults such as floor = false)";
         self.clear_posture(to, posture, fix)?;

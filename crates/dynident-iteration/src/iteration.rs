@@ -1,5 +1,3 @@
-//! An iteration: a task, its settings, and the results that follow from the records of its runs.
-
 use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;

@@ -1,5 +1,3 @@
-//! The trajectories of a run, and the rows that are used.
-
 use dynident_dynamics::ParametricModel;
 use dynident_recording::{Differentiator, FilterError};
 use dynident_simulation::Reference;

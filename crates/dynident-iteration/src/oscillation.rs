@@ -122,7 +122,6 @@ pub(crate) struct Search {
     pub(crate) noise: f64,
 }
 
-/// Detects the oscillation of a uniformly sampled signal.
 pub(crate) fn oscillation(values: &[f64], rate_hz: f64, search: Search) -> Option<Oscillation> {
     let half_period = half_period(rate_hz, search.lowest_hz)?;
     let swinging = without_mean(values, 2 * half_period);
@@ -287,14 +286,12 @@ fn without_mean(values: &[f64], window: usize) -> Vec<f64> {
     values.iter().enumerate().map(|(k, value)| value - mean(k)).collect()
 }
 
-/// Monitors the velocity error of one joint during a run.
 #[derive(Debug)]
 pub(crate) struct OscillationWatch {
     counter: AlternationCounter,
     rate_hz: f64,
     window: VecDeque<f64>,
     sum: f64,
-    /// Squares of the deviations from the mean, since the oldest alternation in use.
     squares: VecDeque<f64>,
 }
 

@@ -1,5 +1,3 @@
-//! Decision about the next run: a pure function of the records.
-
 use crate::convergence::{Names, shortfalls, stands_still};
 use crate::estimate::RunEstimate;
 use crate::evidence::Clipping;

@@ -1,5 +1,3 @@
-//! Design of the next motion: excites the directions that the good runs determine least.
-
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::forecast::{KnownInformation, MotionForecast};
@@ -74,7 +72,6 @@ impl RedesignSettings {
     }
 }
 
-/// Why the last motion is repeated instead of a new one.
 #[derive(Clone, Debug, PartialEq, Error)]
 enum NotRedesigned {
     #[error("no motion within the limits: {0}")]
@@ -83,7 +80,6 @@ enum NotRedesigned {
     Search(#[from] OptimiserError),
     #[error("the best motion breaks a limit of {what} by {percent:.2} %")]
     Broken { what: String, percent: f64 },
-    /// A model within the uncertainty exceeds a torque limit.
     #[error(
         "joint {joint} may need {torque:.3} Nm along every motion found (models within the uncertainty), its limit is {limit:.3} Nm"
     )]
@@ -92,7 +88,6 @@ enum NotRedesigned {
     Ends { joint: String },
     #[error("the search was interrupted")]
     Interrupted,
-    /// Repeating the last motion brings as much information.
     #[error("the best other motion reduces the error bars by only {percent:.0} %")]
     NoBetter { percent: f64 },
     #[error(transparent)]
@@ -139,7 +134,6 @@ impl Redesign {
         Ok(Self { family, rate_hz: reference.rate_hz(), returns, limits, search, settings })
     }
 
-    /// Finds the best motion and the largest torques along it.
     fn search(
         &self,
         before: &BeforeRun<'_>,
@@ -178,7 +172,6 @@ impl Redesign {
         Err(last.unwrap_or(NotRedesigned::Search(OptimiserError::Start)))
     }
 
-    /// Torque limit of each joint: the smaller of the limits of the design and the drive.
     fn torque_limits(&self, before: &BeforeRun<'_>, names: &[String]) -> Vec<f64> {
         let of_design = |name: &String| {
             let limit = self.limits.of(name);
@@ -195,7 +188,6 @@ impl Redesign {
         KnownTorque::new(before.robot.terms().iter().cloned().zip(values.iter().copied()))
     }
 
-    /// The limits, with torques reduced for the model of the search.
     fn with_torque(&self, names: &[String], torque_limits: &[f64], known: &KnownTorque, taken_off: &[f64]) -> Limits {
         let mut limits = Limits { known_torque: known.clone(), ..self.limits.clone() };
         for ((name, limit), taken_off) in names.iter().zip(torque_limits).zip(taken_off) {
@@ -355,7 +347,6 @@ fn noise_of(estimate: &RunEstimate, reference: &Reference) -> RunNoise {
     RunNoise::new(&estimate.joint_sigma, estimate.rows, reference.duration_s())
 }
 
-/// The robot with the estimated bodies, or the nominal ones if there is no estimate.
 fn found_bodies(robot: &ParametricModel, known: &RunEstimate) -> Result<Model, SimulationError> {
     let Some(all) = &known.possible else { return Ok(robot.model().clone()) };
     let of_body = |own: &[f64]| InertialParameters(core::array::from_fn(|k| own[k]));

@@ -211,7 +211,6 @@ pub(crate) struct Rehearsed<'a> {
     pub(crate) believed: Option<&'a [f64]>,
     /// The same with the smallest drive inertia; `None` if all drive inertias are known.
     pub(crate) light: Option<&'a [f64]>,
-    /// Oscillation that would stop a run.
     pub(crate) oscillation: Option<OscillationLimits>,
     pub(crate) envelope: Option<&'a Envelope>,
 }

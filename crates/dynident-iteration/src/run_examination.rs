@@ -1,5 +1,3 @@
-//! Evidence in the log of a run: clipping, noise, oscillation, and the prediction by the earlier model.
-
 use crate::clipping::clipping;
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
@@ -87,7 +85,6 @@ pub(crate) fn examined(
     })
 }
 
-/// The largest noise of the torque over the legs, joint by joint.
 fn torque_noises(records: &[Record], dof: usize) -> Vec<TorqueNoise> {
     let mut most = vec![TorqueNoise::default(); dof];
     for record in records.iter().filter(|record| record.samples > 0) {
@@ -108,7 +105,6 @@ fn row_cutoff_hz(records: &[Record], settings: &RunIdentificationSettings) -> Op
     Some(cutoff_hz.min(0.5 * record.rate_hz))
 }
 
-/// Predictions for the legs without unknown payload.
 fn predict(
     joints: &mut [JointEvidence],
     task: &IterationTask,

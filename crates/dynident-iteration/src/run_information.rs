@@ -9,7 +9,6 @@ const MAX_SAMPLES: usize = 4_000;
 /// Smallest noise of a joint, Nm (N); simulated logs without noise have less.
 const MIN_NOISE: f64 = 1e-9;
 
-/// Noise and row rate of a run, which turn a motion into information.
 #[derive(Clone, Debug)]
 pub(crate) struct RunNoise {
     /// Standard deviation of each joint's residual in the rows of the estimate, Nm (N).

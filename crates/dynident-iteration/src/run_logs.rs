@@ -1,5 +1,3 @@
-//! Converts records of runs to recordings, and settings of runs to identification settings.
-
 use crate::error::IterationError;
 use crate::leg::{IterationTask, Leg};
 use crate::motion::measured_motion;

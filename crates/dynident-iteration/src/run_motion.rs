@@ -1,5 +1,3 @@
-//! The motion of a run that differs from the task, and its table on disk.
-
 use crate::error::IterationError;
 use crate::leg::{IterationTask, Leg};
 use crate::robot::trajectory_csv;

@@ -1,5 +1,3 @@
-//! Torque offsets of individual runs, for example from drifting sensor zeros or the pull of a cable.
-
 use crate::run_logs::RunLog;
 use crate::settings::RunOffsets;
 use dynident_dynamics::ParametricModel;
@@ -29,7 +27,6 @@ pub struct RunOffset {
     pub std: f64,
 }
 
-/// The fits that are compared: a shared offset per joint, one per run, or both.
 pub(crate) fn choices(robot: &ParametricModel, runs: &[RunLog<'_>], asked: RunOffsets) -> &'static [OffsetChoice] {
     let has_offset = robot.terms().iter().any(|term| matches!(term, TorqueTerm::Offset(_)));
     // With several legs each would need its own offset, but joints at rest do not determine it.

@@ -1,5 +1,3 @@
-//! The torque check of a run, together with earlier runs if their logs are available.
-
 use crate::commanding::Prepared;
 use crate::error::IterationError;
 use crate::good_log::GoodLog;
@@ -12,7 +10,6 @@ use crate::torque_check::{CheckWith, CheckedRun, LeastDeviation, TorqueCheck, ch
 use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 
-/// Inputs of the fit of a run: the task with the selected friction, the runs, and the settings.
 pub(crate) type Fitted<'a> = (&'a IterationTask, &'a [RunLog<'a>], &'a RunIdentificationSettings);
 
 impl Iteration {
@@ -61,7 +58,6 @@ impl Iteration {
         Ok(check_torque(&self.task, &runs, &with))
     }
 
-    /// The controller of an earlier run, with its model if it had one.
     fn of_earlier(
         &self,
         log: &GoodLog,

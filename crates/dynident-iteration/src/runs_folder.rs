@@ -132,7 +132,6 @@ impl RunsFolder {
     }
 }
 
-/// A folder, but not a link to one.
 fn is_folder(path: &Path) -> bool {
     path.symlink_metadata().is_ok_and(|found| found.is_dir())
 }

@@ -1,5 +1,3 @@
-//! Files of an iteration with a hash of their content; an edited or damaged file is rejected.
-
 use core::fmt::Write;
 use dynident_text::json;
 use serde::Serialize;
@@ -16,7 +14,6 @@ struct Sealed<'a, T> {
     content_sha256: String,
 }
 
-/// Serialises `file` (a JSON object) with the hash of its content.
 pub(crate) fn sealed_json<T: Serialize>(file: &T) -> Result<String, serde_json::Error> {
     let content_sha256 = content_sha256(&serde_json::to_value(file)?);
     json::to_string_pretty(&Sealed { file, content_sha256 })

@@ -97,7 +97,6 @@ impl Default for RunIdentificationSettings {
 }
 
 impl RunIdentificationSettings {
-    /// Returns a copy with this differentiator and without selection.
     #[must_use]
     pub(crate) fn with_differentiator(&self, differentiator: &DifferentiatorSettings) -> Self {
         Self { differentiator: differentiator.clone(), choose_differentiator: false, ..self.clone() }

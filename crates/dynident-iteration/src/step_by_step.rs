@@ -82,7 +82,6 @@ pub(crate) fn step_by_step(
     Ok(steps)
 }
 
-/// The columns of one joint, as indices among them.
 struct Places<'a> {
     columns: &'a [usize],
     /// Stated, or estimated at an outer joint.
@@ -149,7 +148,6 @@ fn joint_factors(
     Ok(Factors { factor, wide })
 }
 
-/// Adds the covariance of this step, including the part inherited from earlier steps.
 fn propagate(
     steps: &mut Steps,
     globals: &[usize],

@@ -1,5 +1,3 @@
-//! Storage of an iteration. Every run is stored completely or not at all.
-
 use crate::error::IterationError;
 use crate::fingerprint::other_settings;
 use crate::forecast::MotionForecast;
@@ -265,7 +263,6 @@ impl IterationStore {
         Ok(Some(folder))
     }
 
-    /// Writes a folder with a file, the logs and the motion, completely or not at all.
     fn keep_whole(
         &self,
         folder: &Path,
@@ -326,7 +323,6 @@ impl IterationStore {
         rates_hz.iter().enumerate().map(of_leg).collect()
     }
 
-    /// Returns the error that the iteration cannot continue from run number `run`.
     pub(crate) fn refused(&self, run: usize, problem: String) -> IterationError {
         IterationError::State { path: self.run_folder(run).join(RUN_FILE), problem }
     }
@@ -370,7 +366,6 @@ fn write_synced(path: &Path, contents: &[u8]) -> Result<(), IterationError> {
     file.sync_all().map_err(IterationError::file(path))
 }
 
-/// Syncs the names in a folder to the disk, on systems that support it.
 fn sync_folder(path: &Path) -> Result<(), IterationError> {
     if cfg!(unix) {
         let folder = File::open(path).map_err(IterationError::file(path))?;
@@ -379,7 +374,6 @@ fn sync_folder(path: &Path) -> Result<(), IterationError> {
     Ok(())
 }
 
-/// Gives the folder the usual permissions; a temporary folder is private to its owner.
 fn open_to_others(path: &Path) -> Result<(), IterationError> {
     #[cfg(unix)]
     {

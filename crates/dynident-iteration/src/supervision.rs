@@ -1,5 +1,3 @@
-//! Supervision of an iteration: stops, permissions, notification of runs.
-
 use crate::record::RunRecord;
 use crate::rehearsal::Rehearsal;
 use crate::robot::{RobotRun, RunPurpose, StopSignal};

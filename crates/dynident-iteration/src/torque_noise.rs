@@ -116,7 +116,6 @@ fn lower_quartile(count: f64) -> f64 {
     (1.0 - 1.0 / (9.0 * count) - 0.6745 / (3.0 * count.sqrt())).powi(3)
 }
 
-/// Whether a joint with these positions moves in one direction.
 fn moves_one_way(q: &[f64]) -> bool {
     let quarter = q.len() / 4;
     if quarter == 0 {

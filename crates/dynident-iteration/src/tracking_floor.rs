@@ -133,7 +133,6 @@ fn has_same_clock(reference: &Reference, record: &Record) -> bool {
     (record.rate_hz / reference.rate_hz() - 1.0).abs() < MAX_RATE_DEVIATION && record.samples > 0
 }
 
-/// The positions of a joint in the log, and in a run.
 fn positions<'a>(record: &'a Record, run: &'a Run) -> impl Iterator<Item = (&'a [f64], &'a [f64])> {
     let samples = record.samples.min(run.samples);
     (0..run.joints.len()).map(move |joint| {

@@ -1,5 +1,3 @@
-//! Typical parameters of drives without described ones.
-
 use dynident_dynamics::ParametricModel;
 use dynident_model::terms::{JointProperty, TermAction};
 

@@ -90,7 +90,6 @@ fn pass_s(legs: &[Leg], ways: &[Option<FoundWays>]) -> f64 {
     motions + ways.map(|ways| ways.approach.duration_s() + ways.back.duration_s()).sum::<f64>()
 }
 
-/// Work and path length of each joint, pass by pass.
 #[derive(Debug)]
 pub(crate) struct WarmUpWatch {
     pass_s: f64,

@@ -18,10 +18,8 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Stack size of a job's thread, as large as that of a main thread.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Panic payload of a cancelled job.
 struct Cancelled;
 
-/// State shared by a job and the thread that waits for it.
 #[derive(Default)]
 pub(crate) struct Watch {
     cancelled: AtomicBool,
@@ -63,7 +61,6 @@ impl Progress for Watch {
     }
 }
 
-/// Number of threads of a job: as requested, by default the number of processors.
 pub(crate) fn threads(asked: Option<usize>) -> usize {
     asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).max(1)
 }

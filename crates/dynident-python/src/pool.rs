@@ -1,10 +1,7 @@
-//! Thread pool for large arrays.
-
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 use std::sync::{Arc, Mutex};
 
-/// The thread pool, with the process that owns it.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 /// Returns the thread pool: as many threads as processors, or `RAYON_NUM_THREADS`. It is created again in a forked

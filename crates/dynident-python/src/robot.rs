@@ -192,7 +192,6 @@ fn of_format(found: Description, wanted: DescriptionFormat) -> PyResult<Descript
     }
 }
 
-/// Whether a text is XML rather than a path.
 fn is_xml(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim_start().starts_with('<')
 }

@@ -27,7 +27,6 @@ type Columns<'py> = (Vec<String>, Vec<Bound<'py, PyArrayDyn<f64>>>);
 pub(crate) struct Study {
     pub(crate) study: dynident::Study,
     pub(crate) path: PathBuf,
-    /// Functions that its sections name.
     pub(crate) callables: Callables,
 }
 
@@ -190,7 +189,6 @@ fn memory_log(label: &str, (names, columns): Samples<'_>) -> PyResult<MemoryLog>
     MemoryLog::columns(label, Some(names), columns).map_err(errors::log)
 }
 
-/// Label, names and columns of a table.
 fn columns<'py>(py: Python<'py>, table: &MemoryLog) -> PyResult<(String, Columns<'py>)> {
     let names = table.names().map(<[String]>::to_vec).unwrap_or_default();
     let (width, numbers): (usize, Vec<f64>) = (names.len().max(1), table.numbers().collect());

@@ -13,7 +13,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// The exception of samples and settings.
 fn raised(error: OnlineError) -> PyErr {
     Error::new_err(error.to_string())
 }

@@ -1,5 +1,3 @@
-//! `dynident benchmark`.
-
 use super::{Context, json, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
 use dynident::{OutputSet, check_writable};

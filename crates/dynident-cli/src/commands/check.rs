@@ -1,5 +1,3 @@
-//! `dynident check STUDY.toml`.
-
 use super::permission::ProgramOptions;
 use super::{Context, json, known_in};
 use crate::{Verdict, summary, terminal};

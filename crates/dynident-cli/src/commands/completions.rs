@@ -1,5 +1,3 @@
-//! `dynident completions SHELL`.
-
 use super::Context;
 use crate::{Verdict, terminal};
 use clap_complete::Shell;

@@ -1,5 +1,3 @@
-//! `dynident design STUDY.toml --out DIR`.
-
 use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, interruption, json, known_in, message_of, pretty_json, refuse_overwriting};

@@ -1,5 +1,3 @@
-//! `dynident evaluate ROBOT --states S.csv --quantity Q`.
-
 use super::permission::XacroOptions;
 use super::{Context, json, message_of};
 use crate::{Verdict, terminal};

@@ -1,5 +1,3 @@
-//! `dynident export DIR/result.json --study STUDY.toml --to FORM`.
-
 use super::permission::ProgramOptions;
 use super::{Context, json, known_in, message_of};
 use crate::{Verdict, terminal};

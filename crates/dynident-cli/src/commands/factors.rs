@@ -16,7 +16,6 @@ pub(super) fn read_all(paths: &[PathBuf]) -> Result<Factors, String> {
     Factors::merged(parts).map_err(|error| error.to_string())
 }
 
-/// Writes factors, completely or not at all, and prints their content.
 pub(super) fn write(factors: &Factors, out: &Path, context: &Context) -> Result<(), String> {
     let bytes = factors.to_bytes().map_err(|error| format!("{}: {error}", out.display()))?;
     write_whole(out, &bytes).map_err(super::message_of)?;

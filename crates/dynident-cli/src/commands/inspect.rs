@@ -1,5 +1,3 @@
-//! `dynident inspect ROBOT`.
-
 use super::permission::XacroOptions;
 use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};

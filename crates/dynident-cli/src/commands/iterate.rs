@@ -1,5 +1,3 @@
-//! `dynident iterate STUDY.toml --out DIR`.
-
 use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, interruption, json, known_in, message_of, permission, refuse_overwriting};
@@ -109,7 +107,6 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
 }
 
-/// Files and folders that an iteration may write into its folder.
 fn written_files(study: &Study) -> Vec<String> {
     let legs = study.iteration.as_ref().map_or(0, |section| section.leg.len());
     let legs = (1..=legs).map(|leg| format!("leg_{leg}/runs"));

@@ -1,5 +1,3 @@
-//! `dynident log FILE`.
-
 use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};
 use std::path::PathBuf;

@@ -1,5 +1,3 @@
-//! `dynident merge FILE.. --out FILE`.
-
 use super::{Context, factors, message_of};
 use crate::Verdict;
 use std::path::PathBuf;

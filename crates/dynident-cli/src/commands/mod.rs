@@ -40,7 +40,6 @@ pub(crate) struct Context {
 }
 
 impl Context {
-    /// Returns a progress bar for a terminal; nothing for pipes and `--quiet`.
     pub(crate) fn progress(&self) -> Box<dyn Progress> {
         if self.quiet || !terminal::watched() { Box::new(Silent) } else { Box::new(Bar::default()) }
     }
@@ -54,12 +53,10 @@ pub(crate) fn with_threads<R: Send>(threads: usize, job: impl FnOnce() -> R + Se
     }
 }
 
-/// A value as one line of JSON.
 pub(crate) fn json<T: Serialize>(value: &T) -> Result<String, String> {
     dynident_text::json::to_string(value).map_err(|error| format!("the result cannot be written as JSON: {error}"))
 }
 
-/// A value as indented JSON for a file.
 pub(crate) fn pretty_json<T: Serialize>(value: &T) -> Result<Vec<u8>, String> {
     let text = dynident_text::json::to_string_pretty(value);
     let text = text.map_err(|error| format!("the result cannot be written as JSON: {error}"))?;

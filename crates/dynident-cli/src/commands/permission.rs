@@ -1,5 +1,3 @@
-//! Questions to the user before a program starts or a robot moves.
-
 use super::{answer, interruption, known_in, message_of};
 use crate::terminal;
 use dynident::iteration::{NextMotion, RunPurpose};
@@ -73,7 +71,6 @@ impl ProgramOptions {
     }
 }
 
-/// The decisions of a command about programs: each program is shown once.
 pub(crate) struct Decisions {
     is_allowed: bool,
     made: RefCell<HashMap<Vec<String>, bool>>,
@@ -165,7 +162,6 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
     agreed(&question).unwrap_or(false)
 }
 
-/// Checks that standard input is a terminal.
 pub(crate) fn somebody() -> Result<(), String> {
     if std::io::stdin().is_terminal() {
         return Ok(());

@@ -1,5 +1,3 @@
-//! `dynident reduce STUDY.toml --out FILE`.
-
 use super::permission::ProgramOptions;
 use super::{Context, factors, known_in, message_of, refuse_overwriting};
 use crate::Verdict;

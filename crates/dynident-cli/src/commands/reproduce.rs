@@ -1,5 +1,3 @@
-//! `dynident reproduce --out DIR`.
-
 use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};
 use dynident::RunOptions;

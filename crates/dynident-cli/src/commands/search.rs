@@ -1,5 +1,3 @@
-//! Progress of a trajectory search on the terminal.
-
 use crate::commands::{Context, interruption};
 use crate::terminal;
 use core::ops::ControlFlow;

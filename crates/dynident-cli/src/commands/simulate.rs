@@ -1,5 +1,3 @@
-//! `dynident simulate STUDY.toml --out DIR`.
-
 use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, json, known_in, message_of, pretty_json, refuse_overwriting};

@@ -1,5 +1,3 @@
-//! `dynident validate DIR/result.json --study STUDY.toml`.
-
 use super::permission::ProgramOptions;
 use super::{Context, json, judged, known_in, message_of, show_problems};
 use crate::{Verdict, summary, terminal};

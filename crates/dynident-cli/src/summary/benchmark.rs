@@ -1,7 +1,6 @@
 use super::text::{table, wrapped};
 use dynident_benchmark::accuracy::BenchmarkFile;
 
-/// One line per estimator, noise level and robot.
 pub(crate) fn benchmark(file: &BenchmarkFile) -> String {
     let header =
         ["robot", "noise", "estimator", "fail", "bias", "rmse", "rmse/m", "worst", "cover %", "ms"].map(str::to_owned);

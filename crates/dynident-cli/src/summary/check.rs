@@ -3,7 +3,6 @@ use core::fmt::Write;
 use dynident::CheckFile;
 use dynident::recording::Level;
 
-/// The findings, the lines to write, and the unexplained torque of both hypotheses.
 pub(crate) fn check(file: &CheckFile) -> String {
     let check = &file.check;
     let mut text = String::new();

@@ -9,7 +9,6 @@ const MAX_SHOWN: usize = 5;
 /// Columns available for an expression.
 const EXPRESSION_COLUMNS: usize = 40;
 
-/// The motion, its limits, and the forecast for the parameters.
 pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
     let mut text = wrapped(&d.name, 2);
     let _ = writeln!(

@@ -1,7 +1,6 @@
 use super::text::{name, table, wrapped};
 use dynident::result::FactorsFile;
 
-/// Number of digits of a hash that distinguish logs.
 const DIGITS: usize = 8;
 const MAX_LISTED: usize = 40;
 

@@ -11,13 +11,11 @@ struct Group {
     quantity: String,
     joints: Vec<String>,
     logs: Vec<usize>,
-    /// The words of the message between its numbers.
     words: Vec<String>,
     /// The smallest and the largest value of each number, with their texts.
     numbers: Vec<[(f64, String); 2]>,
 }
 
-/// Problems and warnings of all logs, problems first.
 pub(super) fn findings(logs: &[LogSummary]) -> String {
     let problems = of_level(logs, Level::Problem);
     let spoilt = if problems.is_empty() { "" } else { PROBLEM_NOTE };

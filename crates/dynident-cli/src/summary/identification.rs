@@ -15,14 +15,11 @@ use std::path::Path;
 const MAX_SHOWN: usize = 6;
 /// Largest number of held-out logs for which the table shows root mean squares and priors.
 const MAX_DETAILED_LOGS: usize = 2;
-/// Smallest reported ratio of the differences between logs to their error bars.
 const MIN_REPORTED_RATIO: f64 = 1.5;
 /// Largest number of held-out logs with a column.
 const MAX_LOG_COLUMNS: usize = 5;
-/// Columns available for an expression.
 const EXPRESSION_COLUMNS: usize = 44;
 
-/// The result, its validation, and the written files.
 pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> String {
     let mut text = wrapped(&r.name, 2);
     let _ = writeln!(
@@ -205,7 +202,6 @@ fn joints(r: &ResultFile) -> String {
     text
 }
 
-/// Variation between training logs beyond their error bars.
 fn between_logs(r: &ResultFile) -> String {
     let Some(found) = r.method.between_logs else { return String::new() };
     let of = |what: &str, k: Option<f64>| {
@@ -235,7 +231,6 @@ fn lags(r: &ResultFile) -> String {
     format!("{text}\n{}", table(&header, 1..3, rows.collect()))
 }
 
-/// The choice of drive inertia by the training logs.
 fn drives(r: &ResultFile) -> String {
     let said = r.drive_inertia_choice.as_ref();
     said.map_or_else(String::new, |choice| wrapped(&format!("drive inertia: {}", choice.sentence()), 2))
@@ -267,7 +262,6 @@ fn friction(r: &ResultFile) -> String {
     text
 }
 
-/// The best determined base parameters, and the number of poorly determined ones.
 fn parameters(r: &ResultFile) -> String {
     let mut order: Vec<usize> = (0..r.base_parameters.len()).filter(|&i| r.base_parameters[i].excited).collect();
     let error = |index: usize| r.base_parameters[index].relative_half_width_percent().unwrap_or(f64::INFINITY);
@@ -352,7 +346,6 @@ fn conditional(r: &ResultFile) -> String {
     text
 }
 
-/// Whether all parameters are physically consistent.
 fn physics(r: &ResultFile) -> String {
     let bodies = r.physical.violations.len();
     wrapped(

@@ -4,10 +4,8 @@ use dynident::Inspection;
 use dynident::result::SlipEntry;
 use std::path::Path;
 
-/// Largest number of corrections shown per mistake; JSON contains all.
 const MAX_SHOWN: usize = 6;
 
-/// A robot description: joints, base parameters, and problems.
 pub(crate) fn inspection(i: &Inspection) -> String {
     let mut text = format!("{}: {} joints, {:.3} kg moving mass\n\n", i.name, i.dof, i.moving_mass_kg);
     let count = |level: &str| i.audit.iter().filter(|entry| entry.level == level).count();

@@ -5,7 +5,6 @@ use std::path::Path;
 
 const MAX_PARAMETERS: usize = 20;
 
-/// An iteration: its verdict, its runs, and the written files.
 pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     let runs = file.runs.len();
     let mut text = wrapped(&format!("{}: {} ({runs} runs of {:.1} s)", file.name, file.reason, file.duration_s), 4);

@@ -1,5 +1,3 @@
-//! Payloads and drive gains in the summary of `identify`.
-
 use super::text::{name, table, with_deviation, wrapped};
 use dynident::ResultFile;
 use dynident::identification::payload::{Measured, PayloadResult};

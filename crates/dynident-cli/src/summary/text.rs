@@ -47,7 +47,6 @@ pub(super) fn table(header: &[String], numbers: core::ops::Range<usize>, rows: V
     lines.join("\n") + "\n"
 }
 
-/// A name that fits its column.
 pub(super) fn name(name: &str) -> String {
     end_of_name(name, MAX_NAME_COLUMNS)
 }
@@ -61,7 +60,6 @@ pub(super) fn end_of_name(name: &str, columns: usize) -> String {
     format!("..{}", name.chars().skip(length - columns + 2).collect::<String>())
 }
 
-/// A percentage without its sign.
 pub(super) fn percent(value: Option<f64>) -> String {
     match value {
         Some(value) if value >= 1000.0 => format!("{value:.0}"),

@@ -1,5 +1,3 @@
-//! The summary of `validate`.
-
 use super::findings::findings;
 use super::text::{name, percent, table, wrapped};
 use dynident::estimation::ValidationReport;

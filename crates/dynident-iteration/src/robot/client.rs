@@ -15,11 +15,8 @@ use thiserror::Error;
 
 /// Largest line, bytes: about ten times a sample of a thousand joints.
 const MAX_LINE_BYTES: u64 = 1 << 20;
-/// Capacity of the queue of received lines.
 const QUEUE_LINES: usize = 1024;
-/// Size of the stored end of standard error, bytes.
 const STDERR_TAIL_BYTES: usize = 2000;
-/// Interval at which the process of a silent program is checked.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Capability of a program that runs the approach and return paths of a run.
@@ -46,7 +43,6 @@ enum Event {
 #[derive(Debug)]
 pub(super) enum Received {
     Message(ToHost),
-    /// A stop was requested, and no stop message has been sent yet.
     StopRequested,
 }
 
@@ -69,12 +65,10 @@ pub(super) struct Client {
     pub(super) places: Vec<usize>,
     /// Torque per logged unit for each of the client's joints, Nm (N) per unit.
     pub(super) torque_per_unit: Vec<f64>,
-    /// Whether it runs the approach and return paths of a run.
     pub(super) runs_ways: bool,
     run_ends: Option<(Instant, f64)>,
     stop: Option<StopSignal>,
     listening: Option<Listening>,
-    /// Whether a motion was started and has not ended yet.
     moving: bool,
     stop_sent: bool,
 }
@@ -148,7 +142,6 @@ impl Client {
         Ok(Started::Ready(Box::new(client)))
     }
 
-    /// Sets the signal that stops the client from now on.
     pub(super) fn follow(&mut self, stop: Option<&StopSignal>) {
         let (waker, id) = (self.waker.clone(), self.group.id());
         // A full queue is not empty, so the reader wakes anyway.

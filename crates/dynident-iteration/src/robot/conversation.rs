@@ -1,5 +1,3 @@
-//! Both modes of a run with a robot program: `run` and `step`.
-
 use super::client::{Client, Received};
 use super::protocol::{EndStatus, ToClient, ToHost, WayFiles};
 use super::recorder::Recorder;
@@ -133,7 +131,6 @@ fn stopped(client: &mut Client, recorder: &mut Recorder<'_>, most: usize, reason
 
 type SentSample<'a> = (Option<f64>, &'a [Option<f64>], Option<&'a [Option<f64>]>, &'a [Option<f64>]);
 
-/// Appends a sample to the record and returns its velocities, if any.
 fn keep_sample(
     (places, torque_per_unit): (&[usize], &[f64]),
     record: &mut Record,

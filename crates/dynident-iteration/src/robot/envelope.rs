@@ -1,5 +1,3 @@
-//! Limits of every sample of a run; a run that exceeds them is stopped.
-
 use super::stop_reason::{Breach, EnvelopeQuantity};
 use super::ways::RunPart;
 use super::workspace::{WorkspaceBox, WorkspaceSettings};
@@ -171,7 +169,6 @@ impl Envelope {
         of_joints.or_else(|| outside.map(|(sample, own)| own.breach(sample as f64 / reference.rate_hz())))
     }
 
-    /// Returns the first breach of the workspace in joint-major positions of a run, if any.
     pub(crate) fn outside(&self, q: &[f64], samples: usize, rate_hz: f64) -> Option<Breach> {
         let (sample, own) = self.workspace.as_ref()?.first_of(q, samples)?;
         Some(own.breach(sample as f64 / rate_hz))

@@ -114,7 +114,6 @@ impl FolderRobot {
         read_log_with_currents(path, &self.joints, rate_hz, self.forms.torque_constants.as_deref())
     }
 
-    /// Compares a log with the reference and the predicted torque.
     fn examined(&self, record: Record, reference: &Reference, model: Option<&ControllerModel>) -> ExaminedLog {
         let torque = model.or(self.prior.as_ref()).map(|model| {
             let rows: Vec<Vec<f64>> = model_torques(reference, model).collect();

@@ -1,5 +1,3 @@
-//! The input files of an external robot: the trajectory with the model torques, and the controller with its model.
-
 use super::term_description::describe;
 use super::{RobotFault, RunRequest};
 use core::fmt::Write as _;
@@ -128,7 +126,6 @@ fn files(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[
     Ok([(trajectory, trajectory_csv(request.reference, fed_forward(request))), (controller, text)])
 }
 
-/// Writes `trajectory.csv` and `controller.json` into a folder, each completely or not at all.
 pub(super) fn write(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[PathBuf; 2], RobotFault> {
     let [trajectory, controller] = files(request, joints, folder)?;
     write_whole(&trajectory.0, &trajectory.1)?;
@@ -166,7 +163,6 @@ fn of_the_run(text: &str) -> Result<Value, &str> {
 
 const MAX_FILE_BYTES: u64 = 1 << 30;
 
-/// Writes a file completely or not at all; an identical file is not touched.
 pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), RobotFault> {
     if dynident_files::read_text(path, MAX_FILE_BYTES).is_ok_and(|there| there == text) {
         return Ok(());

@@ -222,7 +222,6 @@ impl<'a> Comparison<'a> {
         (!moving.is_empty()).then_some(Self { reference, times_s, targets, moving })
     }
 
-    /// The recorded positions of a joint at the points.
     fn recorded(&self, record: &Record, joint: usize, seconds: f64, start_s: f64) -> Vec<f64> {
         let own = &record.q[record.of(joint)];
         self.times_s.iter().map(|time| interpolated(&record.times_s, own, (time + start_s) / seconds)).collect()
@@ -366,7 +365,6 @@ fn range(values: &[f64]) -> f64 {
     high - low
 }
 
-/// Linear interpolation; constant beyond the ends.
 fn interpolated(times: &[f64], values: &[f64], time: f64) -> f64 {
     let next = times.partition_point(|known| *known <= time).clamp(1, times.len() - 1);
     let (from, to) = (times[next - 1], times[next]);

@@ -24,7 +24,6 @@ pub(crate) struct RunOscillations {
     begin: (f64, usize),
     /// The newest sample: its time, s, and the tracking error of each joint, rad (m).
     newest: (f64, Vec<f64>),
-    /// `None` for all joints if no joint moves.
     joints: Vec<Option<OscillationWatch>>,
 }
 
@@ -68,7 +67,6 @@ impl RunOscillations {
         })
     }
 
-    /// The first oscillation in a complete run; `q` joint by joint.
     pub(crate) fn first(
         limits: Option<OscillationLimits>,
         reference: &Reference,

@@ -1,5 +1,3 @@
-//! A robot behind another program, which is stopped if it does not answer in time.
-
 use super::client::{Client, Started};
 use super::process_settings::{ProcessMode, ProcessSettings};
 use super::recorder::Recorder;

@@ -1,5 +1,3 @@
-//! Recording of a run in progress: one record per part, each monitored along its own path.
-
 use super::envelope::EnvelopeWatch;
 use super::oscillation_watch::RunOscillations;
 use super::stop_reason::{Breach, JointOscillation};
@@ -12,7 +10,6 @@ pub(super) fn empty_record(joints: &[String], rate_hz: f64) -> Record {
     Record { joints: joints.to_vec(), rate_hz, samples: 0, times_s: Vec::new(), q: Vec::new(), tau: Vec::new() }
 }
 
-/// Converts a record from sample-major to joint-major.
 pub(super) fn joint_major(mut record: Record) -> Record {
     let (joints, samples) = (record.joints.len(), record.samples);
     for values in [&mut record.q, &mut record.tau] {
@@ -32,7 +29,6 @@ struct Part<'a> {
     oscillations: RunOscillations,
 }
 
-/// Records of a run, part by part.
 #[derive(Debug)]
 pub(super) struct Recorder<'a> {
     parts: Vec<Part<'a>>,
@@ -60,7 +56,6 @@ impl<'a> Recorder<'a> {
         Self { parts, at: 0, zero_s: 0.0, joints: joints.to_vec() }
     }
 
-    /// The record of the current part, sample-major.
     pub(super) fn record(&mut self) -> &mut Record {
         &mut self.parts[self.at].record
     }
@@ -75,7 +70,6 @@ impl<'a> Recorder<'a> {
         self.parts[self.at..].iter().map(|part| (part.reference.duration_s() - last(part)).max(0.0)).sum()
     }
 
-    /// Whether the current part is recorded to its end.
     pub(super) fn is_at_end_of_part(&self) -> bool {
         self.require_end().is_ok()
     }
@@ -145,7 +139,6 @@ impl<'a> Recorder<'a> {
         watch.look(record, dq).map(|breach| Breach { part: *which, ..breach })
     }
 
-    /// Returns the oscillation up to the newest sample, if any.
     pub(super) fn look_for_oscillation(&mut self) -> Option<JointOscillation> {
         let Part { which, reference, record, oscillations, .. } = &mut self.parts[self.at];
         let last = record.samples.checked_sub(1)?;

@@ -1,5 +1,3 @@
-//! The envelope of an iteration as limits of motion searches.
-
 use super::envelope::EnvelopeSettings;
 use super::workspace::{WatchedPoint, WorkspaceBox};
 use dynident_excitation::limits::{BoxLimit, JointLimit, Limits, LinkPoint};

@@ -1,5 +1,3 @@
-//! Why a run was stopped by Dynident, and whether the stop was confirmed.
-
 use super::ways::RunPart;
 use serde::{Deserialize, Serialize};
 

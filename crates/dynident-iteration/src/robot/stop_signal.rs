@@ -71,7 +71,6 @@ impl StopSignal {
     }
 }
 
-/// Registration of a listener, removed when dropped.
 #[derive(Debug)]
 pub(super) struct Listening {
     signal: StopSignal,

@@ -1,5 +1,3 @@
-//! Paths of a run from the home posture to the motion and back, and their records.
-
 use dynident_excitation::Motion;
 use dynident_simulation::{Record, Reference, SimulationError, require, require_length};
 use serde::{Deserialize, Serialize};
@@ -25,7 +23,6 @@ impl RunPart {
     /// All parts, in order.
     pub const ALL: [Self; 3] = [Self::Approach, Self::Motion, Self::Return];
 
-    /// Whether it is the motion.
     #[allow(clippy::trivially_copy_pass_by_ref, reason = "required by serde")]
     pub(crate) fn is_motion(&self) -> bool {
         *self == Self::Motion

@@ -1,5 +1,3 @@
-//! Workspace of the robot: a box in the base frame that no watched point may leave.
-
 use super::stop_reason::{EnvelopeQuantity, SampleBreach};
 use dynident_dynamics::{Workspace as Arrays, body_placements};
 use dynident_model::{Model, Vec3};
@@ -123,7 +121,6 @@ impl WorkspaceBox {
         })
     }
 
-    /// The first sample of joint-major positions at which a point is outside, and its breach.
     pub(super) fn first_of(&self, q: &[f64], samples: usize) -> Option<(usize, SampleBreach)> {
         let mut arrays = self.arrays();
         let mut at = vec![0.0; self.model.dof()];

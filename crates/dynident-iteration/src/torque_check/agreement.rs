@@ -15,7 +15,6 @@ pub(super) struct Agreement {
     pub(super) left: f64,
 }
 
-/// Selects a cause for all joints, or one per joint.
 pub(super) fn agreement(explanations: &[Explanation], thresholds: &CauseSettings) -> Agreement {
     let named = for_all(explanations, thresholds).unwrap_or_else(|| each_alone(explanations, thresholds));
     let left_of = |(own, named): (&Explanation, &Option<Fitted>)| {

@@ -1,5 +1,3 @@
-//! Combines the results of single joints to statements about the log.
-
 use super::explanation::{Explanation, Fitted, TorqueCandidate};
 use super::{CheckWith, CommandSource, RowScale, TorqueCheck};
 use crate::leg::IterationTask;
@@ -211,7 +209,6 @@ impl TorqueCandidate {
 /// Smallest explained share of the squared difference of listed candidates.
 const MIN_LISTED_SHARE: f64 = 0.5;
 
-/// The causes that follow from all joints together.
 pub(super) fn causes(
     task: &IterationTask,
     check: &TorqueCheck,
@@ -271,7 +268,6 @@ pub(super) fn causes(
     found
 }
 
-/// A common scale of all joints, or one scale for each of the `scaled` joints.
 fn scale_causes(
     scaled: &[usize],
     explanations: &[Explanation],

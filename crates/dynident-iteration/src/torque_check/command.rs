@@ -48,7 +48,6 @@ impl CommandLaw<'_> {
     }
 }
 
-/// The motion of one log along one leg.
 #[derive(Debug)]
 pub(super) struct LoggedMotion<'a> {
     leg: &'a Leg,
@@ -62,12 +61,10 @@ pub(super) struct LoggedMotion<'a> {
     pub(super) ddq: Vec<f64>,
 }
 
-/// The motion of one log with the torque, filtered and decimated.
 #[derive(Debug)]
 pub(super) struct ObservedLeg<'a> {
     pub(super) motion: LoggedMotion<'a>,
     decimator: Decimator,
-    /// The logged torque of each joint, filtered and decimated.
     pub(super) torque: Vec<Vec<f64>>,
 }
 
@@ -129,12 +126,10 @@ impl<'a> ObservedLeg<'a> {
         if rows == 0 { vec![Vec::new(); count] } else { out.chunks_exact(rows).map(<[f64]>::to_vec).collect() }
     }
 
-    /// The measured positions, velocities and accelerations, filtered and decimated like the torque.
     pub(super) fn filtered_motion(&self) -> [Vec<Vec<f64>>; 3] {
         [&self.motion.q, &self.motion.dq, &self.motion.ddq].map(|values| self.decimated(values))
     }
 
-    /// The columns of each joint for some timing (the shared parameters).
     pub(super) fn columns(&self, law: CommandLaw<'_>, timing: &[f64; SHARED]) -> Vec<JointColumns> {
         let series = match law {
             CommandLaw::Known { controller, model } => {
@@ -213,7 +208,6 @@ impl LoggedMotion<'_> {
         }
     }
 
-    /// Commanded position, velocity and acceleration of each joint.
     fn reference(&self, time_s: f64, motion: [&mut [f64]; 3]) {
         let [q, dq, ddq] = motion;
         for joint in 0..self.joints {

@@ -66,7 +66,6 @@ pub(super) struct Explanation {
     pub(super) scale: Option<f64>,
     pub(super) scale_std: Option<f64>,
     pub(super) difference_percent: f64,
-    /// The commanded torque, including the constant.
     pub(super) commanded: Vec<f64>,
     pub(super) matters: bool,
     /// Squared difference as a share of the squared torque.
@@ -77,7 +76,6 @@ pub(super) struct Explanation {
     pub(super) candidates: Vec<Fitted>,
 }
 
-/// The torques and motions of all joints, row by row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointData<'a> {
     pub(super) task: &'a IterationTask,
@@ -89,7 +87,6 @@ pub(super) struct JointData<'a> {
     pub(super) ddq: &'a [Vec<f64>],
 }
 
-/// Compares one joint and fits the candidates.
 pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheckSettings) -> Explanation {
     let (y, columns) = (&data.torque[joint], &data.columns[joint]);
     let size = rms(y).max(f64::MIN_POSITIVE);
@@ -139,7 +136,6 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
 
 struct Free<'a> {
     coefficients: &'a [f64],
-    /// Whether the scale has an error bar.
     has_scale: bool,
     /// Whether the drive seems to push away from the path.
     pushes_away: bool,
@@ -194,7 +190,6 @@ fn candidates(data: &JointData<'_>, joint: usize, free: &Free<'_>, beside: &[f64
     candidates
 }
 
-/// The torques that may be missing in the log of each joint: gravity and friction.
 pub(super) fn may_be_missing(data: &JointData<'_>) -> [Vec<Vec<Vec<f64>>>; 2] {
     let joints = 0..data.torque.len();
     let gravity = joints.clone().map(|joint| gravity_columns(data, joint).unwrap_or_default()).collect();
@@ -212,7 +207,6 @@ pub(super) fn friction_columns(data: &JointData<'_>, joint: usize) -> Vec<Vec<f6
     core::iter::once(dq.clone()).chain(steps).collect()
 }
 
-/// The torque of each other joint.
 fn exchanged(data: &JointData<'_>, joint: usize, total: f64) -> Vec<Fitted> {
     let y = &data.torque[joint];
     let of = |other: usize| {
@@ -273,7 +267,6 @@ fn lacks_constant_gravity(data: &JointData<'_>, joint: usize, beside: &[f64], pe
         && (0.5..=2.0).contains(&(missing / weight))
 }
 
-/// The gravity torque of the robot description along the rows.
 fn nominal_gravity(data: &JointData<'_>, joint: usize) -> Vec<f64> {
     let model = data.task.robot.model();
     let mut workspace = Workspace::new(model);

@@ -47,7 +47,6 @@ use serde::{Deserialize, Serialize};
 
 /// Cut-off of the comparison for identification without a filter, Hz for an arm of 1.2 m.
 const USUAL_CUTOFF_HZ: f64 = 8.0;
-/// Number of stored points of each joint, for the report.
 const MAX_POINTS: usize = 150;
 /// Smallest number of cycles of the cut-off in a run.
 const MIN_CYCLES_PER_RUN: f64 = 12.0;
@@ -124,7 +123,6 @@ pub(crate) struct CheckedRun<'a> {
 pub(crate) struct CheckWith<'a> {
     pub(crate) settings: &'a TorqueCheckSettings,
     pub(crate) identification: &'a RunIdentificationSettings,
-    /// Torque scale of each joint from the estimate of all runs.
     pub(crate) row_scales: &'a [Option<RowScale>],
     /// Largest accepted delay between positions and torques of a log, s.
     pub(crate) most_lag_s: f64,
@@ -241,7 +239,6 @@ impl<'a> Observed<'a> {
         out
     }
 
-    /// The columns of each joint with this timing, over all legs.
     fn columns(&self, timing: &[f64; SHARED]) -> Vec<Vec<Vec<f64>>> {
         let mut out: Vec<Vec<Vec<f64>>> = vec![Vec::new(); self.dof];
         for (law, leg) in &self.legs {
@@ -255,7 +252,6 @@ impl<'a> Observed<'a> {
 }
 
 impl TorqueCheck {
-    /// Sets timing, scales and points from a fit.
     fn show(&mut self, fit: &SeparableFit, explanations: &[Explanation], torque: &[Vec<f64>]) {
         let [position_s, velocity_s, lag_s, clock, _] = fit.shared;
         self.feedback_delay_s = [position_s, velocity_s];

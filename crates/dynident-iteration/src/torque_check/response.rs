@@ -67,7 +67,6 @@ const MIN_ROWS_PER_UNKNOWN: usize = 3;
 const MIN_ROWS_AT_LIMIT: usize = 4;
 const MAX_SHARE_AT_LIMIT: f64 = 0.5;
 
-/// Exchanged joints and reversed signs in a run that ended early; empty if no result is clear.
 pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<TorqueCause> {
     let Some((leg, record)) = run.legs.iter().zip(run.records).rfind(|(_, record)| record.samples >= MIN_SAMPLES)
     else {
@@ -103,7 +102,6 @@ pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<To
     named(task, &moved, true)
 }
 
-/// Joints whose logged torque stays at a limit that the command exceeds.
 fn limits_in_log(task: &IterationTask, logged: &[Vec<f64>], commanded: &[Vec<f64>]) -> Vec<TorqueCause> {
     let of_joint = |joint: usize| {
         let (y, u) = (&logged[joint], &commanded[joint]);

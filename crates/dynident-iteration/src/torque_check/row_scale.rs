@@ -135,7 +135,6 @@ fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec
     }
 }
 
-/// The deviation of each joint with free deviations of the joints `chosen`.
 fn deviations(problem: &LinearProblem, values: &[f64], chosen: &[usize]) -> Vec<Option<Kappa>> {
     let of_joint = |joint: usize| -> Option<Kappa> {
         let others = chosen.iter().copied().filter(|&one| one != joint);

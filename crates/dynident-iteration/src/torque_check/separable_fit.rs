@@ -33,7 +33,6 @@ pub(super) struct SharedParameter {
 #[derive(Clone, Debug)]
 pub(super) struct SeparableFit {
     pub(super) shared: [f64; SHARED],
-    /// Their covariance for independent rows; `None` if it does not exist.
     pub(super) covariance: Option<DMatrix<f64>>,
     pub(super) columns: Vec<JointColumns>,
 }
@@ -47,7 +46,6 @@ impl SeparableFit {
     }
 }
 
-/// Fits `y[joint]` by `columns(shared)[joint]`, from the best of some start values.
 pub(super) fn separable_fit(
     y: &[Vec<f64>],
     parameters: &[SharedParameter; SHARED],
@@ -194,7 +192,6 @@ pub(super) fn square(values: &[f64]) -> f64 {
     dot(values, values)
 }
 
-/// Root mean square; zero for an empty slice.
 pub(super) fn rms(values: &[f64]) -> f64 {
     if values.is_empty() { 0.0 } else { (square(values) / values.len() as f64).sqrt() }
 }
