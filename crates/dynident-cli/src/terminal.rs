@@ -6,17 +6,11 @@ use std::io::{self, IsTerminal, Write as _};
 
 /// Prints text for people to standard output, with long lines shortened. A closed pipe (`| head`) ends the printing,
 /// not the program.
-///
-/// # Errors
-/// Other errors of the operating system (a full device).
 pub(crate) fn print(text: &str) -> Result<(), String> {
     print_document(&shortened_lines(text))
 }
 
 /// Prints text for programs (JSON, code, a study) to standard output, without shortened lines.
-///
-/// # Errors
-/// As [`print`].
 pub(crate) fn print_document(text: &str) -> Result<(), String> {
     let mut out = io::stdout().lock();
     let text = visible(text);
@@ -25,9 +19,6 @@ pub(crate) fn print_document(text: &str) -> Result<(), String> {
 }
 
 /// Prints text of the program itself without changes; a script may contain tabs.
-///
-/// # Errors
-/// As [`print`].
 pub(crate) fn print_own(text: &[u8]) -> Result<(), String> {
     let mut out = io::stdout().lock();
     written(out.write_all(text).and_then(|()| out.flush()))

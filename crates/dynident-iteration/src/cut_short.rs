@@ -15,9 +15,6 @@ pub(crate) enum CutShort {
 
 impl CutShort {
     /// Stores the recorded logs under run number `run`; `next` names the step with which a repeated command continues.
-    ///
-    /// # Errors
-    /// A folder that cannot be written.
     pub(crate) fn kept(
         self,
         store: Option<&IterationStore>,

@@ -36,9 +36,6 @@ const MIN_SAMPLES_SHARE: f64 = 0.5;
 const MIN_RESIDUAL_RATIO: f64 = 1.05;
 
 /// Estimates the base parameters from a run, without rows near rest where friction does not explain them.
-///
-/// # Errors
-/// As [`identify_run`](crate::identify_run).
 pub(crate) fn without_near_rest(
     task: &IterationTask,
     records: &[Record],

@@ -41,9 +41,6 @@ pub struct OtherLength {
 
 /// Returns the change of one length, or of all lengths by the same factor, that explains the torque of some runs best,
 /// if it does so significantly. `task` includes the selected friction; `known` is the estimate of the runs.
-///
-/// # Errors
-/// Records that do not belong to the task.
 pub(crate) fn other_length(
     task: &IterationTask,
     runs: &[RunLog<'_>],

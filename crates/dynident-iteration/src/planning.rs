@@ -8,9 +8,6 @@ use crate::run_motion::legs_along;
 
 /// Plans the run after `records`, the last of which is good; `task` includes the selected friction. If runs are not
 /// pooled, or could not be fitted together, only the last is used.
-///
-/// # Errors
-/// Errors of the planner; records of another task.
 pub(crate) fn planned_motion(
     planner: &dyn MotionPlanner,
     task: &IterationTask,

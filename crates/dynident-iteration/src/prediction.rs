@@ -21,9 +21,6 @@ pub(crate) struct Known<'a> {
 
 /// Evaluates the prediction of the torque of the recordings `indices` by `known`, joint by joint; `None` for a joint
 /// without rows.
-///
-/// # Errors
-/// As reading the recordings.
 pub(crate) fn predictions(
     logs: &Logs<'_>,
     model: &RegressorModel,

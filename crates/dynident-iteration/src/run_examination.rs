@@ -33,9 +33,6 @@ pub(crate) fn following_limits(legs: &[Leg], dof: usize, [low_rad, high_rad]: [f
 
 /// Examines the records of a run, including the prediction by `known` (the estimate before the run), without rows
 /// within the margins around rests; `task` includes the selected friction.
-///
-/// # Errors
-/// Records that do not belong to the task.
 pub(crate) fn examined(
     task: &IterationTask,
     records: &[Record],

@@ -38,9 +38,6 @@ impl RunMotion {
     }
 
     /// Reads the samples of the tables in a folder, for `joints` joints.
-    ///
-    /// # Errors
-    /// A table that is missing or invalid.
     pub(crate) fn with_tables(self, folder: &Path, joints: usize) -> Result<Self, IterationError> {
         let of_leg = |(leg, rate_hz): (usize, &f64)| read_table(&folder.join(table_name(leg)), joints, *rate_hz);
         let references = self.rates_hz.iter().enumerate().map(of_leg).collect::<Result<_, _>>()?;

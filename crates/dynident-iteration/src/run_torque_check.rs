@@ -15,9 +15,6 @@ pub(crate) type Fitted<'a> = (&'a IterationTask, &'a [RunLog<'a>], &'a RunIdenti
 impl Iteration {
     /// Compares the logged torque of a run with the torque that its controller commanded; `fitted` are the inputs of
     /// its fit, if it was fitted.
-    ///
-    /// # Errors
-    /// Records of another robot.
     pub(crate) fn torque_check(
         &self,
         record: &RunRecord,

@@ -73,9 +73,6 @@ impl RunsFolder {
     }
 
     /// Removes one run, if its folder contains only files of an iteration.
-    ///
-    /// # Errors
-    /// As [`remove_runs`](Self::remove_runs).
     pub(crate) fn remove_run(&self, folder: &Path) -> Result<(), IterationError> {
         self.may_remove_runs()?;
         if self.kept.iter().any(|kept| kept == folder) { remove(folder) } else { Ok(()) }
@@ -86,9 +83,6 @@ impl RunsFolder {
     }
 
     /// Checks that [`remove_runs`](Self::remove_runs) is possible.
-    ///
-    /// # Errors
-    /// As [`remove_runs`](Self::remove_runs).
     pub(crate) fn may_remove_runs(&self) -> Result<(), IterationError> {
         if self.removable().next().is_none() {
             return Ok(());
@@ -110,9 +104,6 @@ impl RunsFolder {
     }
 
     /// Removes the plans of all runs but `next`, which are obsolete, and the held-out runs after removed runs.
-    ///
-    /// # Errors
-    /// Errors of the operating system.
     pub(crate) fn remove_plans_but(&self, next: usize) -> Result<(), IterationError> {
         let own = |folder: &PathBuf| files(folder).is_ok_and(|files| files.iter().all(|file| is_own(file)));
         let plans = self.planned.iter().filter(|(run, _)| *run != next);
@@ -123,9 +114,6 @@ impl RunsFolder {
     }
 
     /// Removes incomplete folders of a killed iteration.
-    ///
-    /// # Errors
-    /// Errors of the operating system.
     pub(crate) fn remove_unfinished(&self) -> Result<(), IterationError> {
         let own = |folder: &&PathBuf| files(folder).is_ok_and(|files| files.iter().all(|file| is_own(file)));
         self.unfinished.iter().filter(own).try_for_each(|folder| remove(folder))
@@ -158,9 +146,6 @@ fn is_own(file: &Path) -> bool {
 }
 
 /// Removes the files in a folder, then the folder.
-///
-/// # Errors
-/// Errors of the operating system.
 pub(crate) fn remove(folder: &Path) -> Result<(), IterationError> {
     for file in files(folder)? {
         fs::remove_file(&file).map_err(IterationError::file(&file))?;

@@ -20,9 +20,6 @@ pub(crate) fn sealed_json<T: Serialize>(file: &T) -> Result<String, serde_json::
 }
 
 /// Reads the output of [`sealed_json`]. Files of earlier versions have no hash.
-///
-/// # Errors
-/// The problem, in words.
 pub(crate) fn unsealed<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     let file = serde_json::from_str(text).map_err(|error| error.to_string())?;
     let mut content: Value = serde_json::from_str(text).map_err(|error| error.to_string())?;

@@ -156,9 +156,6 @@ impl IterationStore {
     }
 
     /// Returns the log of the held-out run after a run.
-    ///
-    /// # Errors
-    /// A log that is missing or invalid.
     pub(crate) fn held_out_log(&self, run: usize, joints: &[String], rate_hz: f64) -> Result<Record, IterationError> {
         let path = self.held_out_log_path(run);
         read_log_table(&path, joints, rate_hz).map_err(|error| IterationError::State {
@@ -290,18 +287,12 @@ impl IterationStore {
     }
 
     /// Removes the newest run, whose log was corrected, and everything that followed from it.
-    ///
-    /// # Errors
-    /// A folder with foreign files, or one that cannot be removed.
     pub(crate) fn forget_run(&self, run: usize) -> Result<(), IterationError> {
         RunsFolder::read(&self.runs)?.remove_run(&self.run_folder(run))?;
         self.forget_held_out(run)
     }
 
     /// Removes the held-out run after the newest run and the plans that followed from it.
-    ///
-    /// # Errors
-    /// A folder that cannot be removed.
     pub(crate) fn forget_held_out(&self, run: usize) -> Result<(), IterationError> {
         RunsFolder::read(&self.runs)?.remove_plans_but(run)
     }

@@ -40,9 +40,6 @@ pub(super) struct FormSettings {
 
 /// Writes the formats of a run's motion and of the paths from and to home into its folder. Torque files are omitted
 /// without a model.
-///
-/// # Errors
-/// A motion that a format cannot represent, a file that cannot be written.
 pub(super) fn write_forms(
     request: &RunRequest<'_>,
     joints: &[String],

@@ -73,9 +73,6 @@ pub fn read_log_table(path: &std::path::Path, joints: &[String], rate_hz: f64) -
 
 /// Reads a log as [`read_log_table`] does. With torque constants, Nm/A (N/A), it may have currents `i1..`, A, instead
 /// of `tau1..`.
-///
-/// # Errors
-/// As [`read_log_table`].
 pub(super) fn read_log_with_currents(
     path: &std::path::Path,
     joints: &[String],

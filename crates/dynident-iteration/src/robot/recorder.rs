@@ -95,9 +95,6 @@ impl<'a> Recorder<'a> {
     }
 
     /// Checks that every part was recorded to its end.
-    ///
-    /// # Errors
-    /// The first incomplete part.
     pub(super) fn require_whole(&mut self) -> Result<(), RobotFault> {
         loop {
             self.require_end()?;

@@ -59,9 +59,6 @@ pub(crate) struct LeastDeviation {
 
 /// The relative torque scale of each joint from all `runs`; `None` if it is not determined. `task` includes the
 /// selected friction, `known` is the estimate of these runs.
-///
-/// # Errors
-/// Records that do not belong to the task.
 pub(crate) fn row_scales(
     task: &IterationTask,
     runs: &[RunLog<'_>],
