@@ -25,7 +25,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_all(&std::env::args_os().nth(1).map_or_else(default, PathBuf::from))
 }
 
-/// Writes all schemas into a folder, which is made where there is none.
 pub(crate) fn write_all(folder: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder)?;
     let files = [
@@ -49,7 +48,7 @@ pub(crate) fn write_all(folder: &Path) -> Result<(), Box<dyn Error>> {
     ];
     for (name, mut schema) in files {
         schema.insert("title".to_owned(), name.into());
-        // The key `schema` of a file names its schema.
+        // The key `schema` of a file contains the name of its schema.
         schema
             .pointer_mut("/properties/schema")
             .and_then(serde_json::Value::as_object_mut)
@@ -61,17 +60,17 @@ pub(crate) fn write_all(folder: &Path) -> Result<(), Box<dyn Error>> {
     write(folder, "study", &settings().into_generator().into_root_schema_for::<dynident::Study>())
 }
 
-/// Draft 7 is what editors of TOML read.
+/// Editors of TOML read draft 7.
 fn settings() -> SchemaSettings {
     SchemaSettings::draft07().with_transform(RecursiveTransform(plain_description))
 }
 
-/// The schema of what is written: optional keys are there, and null.
+/// The schema of written files: optional keys are present, with null.
 fn written<T: JsonSchema>() -> Schema {
     settings().for_serialize().into_generator().into_root_schema_for::<T>()
 }
 
-/// Documentation of Rust as plain text: without examples, links and breaks of lines.
+/// Documentation of Rust as plain text: without examples, links and line breaks.
 fn plain_description(schema: &mut Schema) {
     let Some(text) = schema.get("description").and_then(serde_json::Value::as_str) else { return };
     let text = text.split("```").next().unwrap_or_default().trim();
@@ -80,7 +79,7 @@ fn plain_description(schema: &mut Schema) {
     schema.insert("description".to_owned(), paragraphs.join("\n\n").into());
 }
 
-/// `[a](b)` becomes `a`, and so does a name of Rust in brackets.
+/// `[a](b)` becomes `a`, and so does an item name in brackets.
 fn without_links(text: &str) -> String {
     let mut plain = String::new();
     let mut rest = text;

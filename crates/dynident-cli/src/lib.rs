@@ -1,5 +1,5 @@
-//! **The `dynident` command**, as a library: what the binary and the Python package run. One file per subcommand under
-//! `commands/`; this file reads the command line and turns the outcome into an exit status.
+//! The `dynident` command as a library, used by the binary and the Python package. Each subcommand has a file in
+//! `commands/`; this file parses the command line and converts the outcome to an exit status.
 //!
 //! ```
 //! assert_eq!(dynident_cli::run(["dynident", "--version"].map(Into::into)), 0);
@@ -14,22 +14,22 @@ use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
 
-/// Robot dynamic identification: logs to a dynamic model that can be trusted.
+/// Robot dynamic identification: from logs to a validated dynamic model.
 #[derive(Parser)]
 #[command(
     name = "dynident",
     version,
     about = "Robot dynamic identification: from a URDF and logs to a dynamic model with error bars.",
     long_about = "Robot dynamic identification: from a URDF and logs to a dynamic model with error bars.\n\n\
-        The path:\n  \
-        1. dynident inspect arm.urdf             what the description says, and what is wrong with it\n  \
+        Steps:\n  \
+        1. dynident inspect arm.urdf             content and problems of the robot description\n  \
         2. dynident new --robot arm.urdf --log run.csv    writes study.toml: robot, logs, columns\n  \
-        3. dynident check study.toml             do study, robot and logs fit together? names mistakes and their keys\n  \
+        3. dynident check study.toml             find mistakes in study, robot and logs, and the keys to change\n  \
         4. dynident identify study.toml --out R  fit, test on held-out logs, write R/result.json and R/identified.urdf\n  \
         5. dynident validate R/result.json --study other.toml\n  \
         6. load R/identified.urdf into your controller or simulator\n\n\
-        dynident iterate runs a robot again and again, each time with the better model; simulate runs it once.\n\
-        dynident reproduce works through the paper behind this program; dynident benchmark compares estimators."
+        dynident iterate runs a robot repeatedly, each time with a better model; simulate runs it once.\n\
+        dynident reproduce reproduces the paper behind this program; dynident benchmark compares estimators."
 )]
 struct Arguments {
     #[command(flatten)]
@@ -41,13 +41,13 @@ struct Arguments {
 /// Options of every command.
 #[derive(clap::Args)]
 struct Common {
-    /// One machine-readable object on standard output; messages go to standard error.
+    /// Print one JSON object on standard output; messages go to standard error.
     #[arg(long, global = true)]
     json: bool,
-    /// Print results and errors only.
+    /// Print only results and errors.
     #[arg(long, short, global = true)]
     quiet: bool,
-    /// Threads to use; results are the same for any number. By default as many as there are processors.
+    /// Number of threads; results are the same for any number. Default: number of processors.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
@@ -56,55 +56,53 @@ struct Common {
 enum Command {
     /// Read and audit a robot description (URDF, MJCF, SDF, or D-H table in TOML).
     Inspect(commands::inspect::Options),
-    /// What a recording holds: format, channels with rates and ranges, and how a study could begin.
+    /// Show the content of a recording: format, channels with rates and ranges, and a suggested [format].
     Log(commands::log::Options),
-    /// Write a study from a robot and its recordings, every line with what speaks for it, and examine it.
+    /// Write a study from a robot and its recordings, each line with its evidence, and examine it.
     New(commands::new::Options),
-    /// Dynamics of a robot for a table of states, as CSV with 17 digits.
+    /// Compute the dynamics of a robot for a table of states, as CSV with 17 digits.
     Evaluate(commands::evaluate::Options),
-    /// Find the motion that says most about a study's robot, inside every limit.
+    /// Find the motion within all limits that excites a study's robot best.
     Design(commands::design::Options),
-    /// Examine a study against its robot and its logs before any fit is believed; names mistakes and what to write.
+    /// Examine a study with its robot and logs before the fit; reports mistakes and the lines to write.
     Check(commands::check::Options),
-    /// Fit a study's model to its logs and test it on the held-out ones.
+    /// Fit a study's model to its logs and validate it on the held-out logs.
     Identify(commands::identify::Options),
-    /// Reduce logs to their factors: small files from which a model is identified without the logs.
+    /// Reduce logs to factors: small files from which a model is identified without the logs.
     Reduce(commands::reduce::Options),
-    /// Put factors of many logs into one file, in any order.
+    /// Merge factors of several logs into one file, in any order.
     Merge(commands::merge::Options),
-    /// Test a finished model on other logs.
+    /// Validate a model on other logs.
     Validate(commands::validate::Options),
-    /// Write a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters or JSON, or a payload.
+    /// Write a model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters or JSON, or a payload.
     Export(commands::export::Options),
-    /// Let a simulated robot run a trajectory under a controller: a log, and the truth beside it.
+    /// Simulate a robot that runs a trajectory with a controller; writes a log and the truth.
     Simulate(commands::simulate::Options),
-    /// Run, identify, load the better model and run again, until all has settled.
+    /// Run, identify and load the better model, until tracking error and parameters converge.
     Iterate(commands::iterate::Options),
-    /// Reproduce the paper behind this program: every table and figure, as a page to look at.
+    /// Reproduce the paper behind this program: every table and figure, with a report.
     Reproduce(commands::reproduce::Options),
     /// Compare estimators on simulated recordings with known truth: error over the Cramér-Rao bound, coverage of error
     /// bars.
     Benchmark(commands::benchmark::Options),
-    /// Print what lets a shell complete commands, options and files.
+    /// Print a shell script that completes commands, options and files.
     Completions(commands::completions::Options),
     /// Write the manual pages: `dynident.1`, and one for each command.
     #[command(hide = true)]
     Man(commands::manual::Options),
 }
 
-/// How a command ended when it did what it was asked to.
 enum Verdict {
-    /// All is well: exit status 0.
+    /// Success: exit status 0.
     Good,
-    /// Done, but the verdict is negative: exit status 1.
+    /// Executed with a negative verdict: exit status 1.
     Negative,
-    /// Stopped by Ctrl-C, in good order: exit status 130.
+    /// Interrupted by Ctrl-C after a clean stop: exit status 130.
     Interrupted,
 }
 
-/// Runs the command line `arguments`, the name of the program first, and returns the exit status: 0 if all is well, 1
-/// for a negative verdict, 2 for what cannot be done, 130 after Ctrl-C. Results go to standard output, messages to
-/// standard error.
+/// Runs the command line `arguments`, beginning with the program name, and returns the exit status: 0 for success, 1
+/// for a negative verdict, 2 for an error, 130 after Ctrl-C. Results go to standard output, messages to standard error.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
@@ -144,18 +142,17 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     ended(outcome)
 }
 
-/// What is wrong with the command line. In colours, unless it holds an argument that would steer the terminal.
+/// Prints an error in the command line. Colours are used unless an argument contains terminal control characters.
 fn refused(error: &clap::Error) {
     let text = error.render().to_string();
     if terminal::readable(&text) == text {
-        // Nothing is left to report if the terminal has gone.
+        // A closed terminal is ignored.
         let _ = error.print();
     } else {
         terminal::complain(text.strip_prefix("error: ").unwrap_or(&text));
     }
 }
 
-/// The exit status.
 fn ended(outcome: Result<Verdict, String>) -> u8 {
     match outcome {
         Ok(Verdict::Good) => 0,

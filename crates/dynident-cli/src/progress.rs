@@ -1,21 +1,18 @@
-//! A progress bar with the time left, once a stage takes longer than a second.
-
 use crate::terminal;
 use dynident::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// How long a stage runs before its bar shows, and how often a stage that says nothing shows its time.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Delay of the bar, and update interval of a stage without progress.
+const BAR_DELAY: Duration = Duration::from_secs(1);
 
-/// The line of a stage that has not said how many rows it has, nor that any are done.
+/// Template for a stage without known progress.
 const WITHOUT_ROWS: &str = "{msg} {spinner} {elapsed}";
 
-/// The same once some are.
+/// Template for a stage with an unknown total.
 const WITH_ROWS: &str = "{msg} {spinner} {human_pos} rows  {elapsed}";
 
-/// Shows the stage that runs, on standard error.
 #[derive(Default)]
 pub(crate) struct Bar {
     stage: Mutex<Option<Stage>>,
@@ -31,7 +28,7 @@ struct Stage {
 
 impl Stage {
     fn show(&mut self) {
-        if self.bar.is_none() && self.started.elapsed() >= PATIENCE {
+        if self.bar.is_none() && self.started.elapsed() >= BAR_DELAY {
             let bar = self.total.map_or_else(ProgressBar::new_spinner, ProgressBar::new);
             let template = if self.total.is_some() { "{msg} {wide_bar} {percent} %  {eta} left" } else { WITH_ROWS };
             if let Ok(style) = ProgressStyle::with_template(template) {
@@ -50,13 +47,13 @@ impl Stage {
 impl Progress for Bar {
     fn begin(&self, stage: &str, total: Option<u64>) {
         if let Ok(mut current) = self.stage.lock() {
-            // A stage of unknown size may never say a word: its line is drawn by a clock.
+            // A stage of unknown size may report no progress, so a timer draws its line.
             let bar = total.is_none().then(|| {
                 let bar = ProgressBar::new_spinner().with_message(terminal::readable(stage));
                 if let Ok(style) = ProgressStyle::with_template(WITHOUT_ROWS) {
                     bar.set_style(style);
                 }
-                bar.enable_steady_tick(PATIENCE);
+                bar.enable_steady_tick(BAR_DELAY);
                 bar
             });
             *current = Some(Stage { name: stage.to_owned(), total, done: 0, started: Instant::now(), bar });
@@ -102,7 +99,7 @@ mod tests {
         assert!(shown());
         bar.end();
         assert!(!shown());
-        // One of known size comes after a second, if it lasts.
+        // The bar of a stage of known size appears after a second.
         bar.begin("rows", Some(1000));
         bar.advance(10);
         assert!(!shown());

@@ -1,22 +1,16 @@
-//! The only place that prints. What is printed may hold text from outside (names in files, file names, what a robot's
-//! program says): no character of it steers the terminal.
+//! All printing. Printed text may contain external text (names in files, file names, output of robot programs), so
+//! control characters are made visible.
 
 use dynident_text::{shortened_lines, visible};
 use std::io::{self, IsTerminal, Write as _};
 
-/// Prints text for people to standard output, with long lines shortened. A reader that has gone (`| head`) ends the
-/// printing, not the program.
-///
-/// # Errors
-/// What the system says if it cannot be written for another reason (a full device).
+/// Prints text for people to standard output, with long lines shortened. A closed pipe (`| head`) ends the printing,
+/// not the program.
 pub(crate) fn print(text: &str) -> Result<(), String> {
     print_document(&shortened_lines(text))
 }
 
-/// Prints what a program reads (JSON, code, a study) to standard output: as [`print`], but whole.
-///
-/// # Errors
-/// As [`print`].
+/// Prints text for programs (JSON, code, a study) to standard output, without shortened lines.
 pub(crate) fn print_document(text: &str) -> Result<(), String> {
     let mut out = io::stdout().lock();
     let text = visible(text);
@@ -24,51 +18,46 @@ pub(crate) fn print_document(text: &str) -> Result<(), String> {
     written(write!(out, "{text}{end}").and_then(|()| out.flush()))
 }
 
-/// Prints text that is the program's own, byte by byte: a script may hold tabs.
-///
-/// # Errors
-/// As [`print`].
+/// Prints text of the program itself without changes; a script may contain tabs.
 pub(crate) fn print_own(text: &[u8]) -> Result<(), String> {
     let mut out = io::stdout().lock();
     written(out.write_all(text).and_then(|()| out.flush()))
 }
 
-/// What came of writing to standard output; a reader that has gone has seen what it wanted.
+/// Converts the result of writing to standard output; a closed pipe is not an error.
 pub(crate) fn written(outcome: io::Result<()>) -> Result<(), String> {
     match outcome {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(format!("standard output: cannot be written: {error}; what was printed is not complete"))
+            Err(format!("standard output: cannot be written: {error}; the output is incomplete"))
         }
         _ => Ok(()),
     }
 }
 
-/// An error, on standard error, as clap words its own.
+/// Prints an error on standard error, in the style of clap.
 pub(crate) fn complain(message: &str) {
     let mut out = io::stderr().lock();
     let _ = writeln!(out, "error: {}", readable(&dynident::shortened_message(message)));
 }
 
-/// A remark, on standard error.
 pub(crate) fn remark(message: &str) {
     let mut out = io::stderr().lock();
     let _ = writeln!(out, "note: {}", readable(&dynident::shortened_message(message)));
 }
 
-/// A question, on standard error; the answer comes on the same line. It is not shortened: nothing of a command that a
-/// person allows is left out.
+/// Prints a question on standard error; the answer is typed on the same line. It is not shortened, so that a command is
+/// shown completely before it is permitted.
 pub(crate) fn ask(question: &str) {
     let mut out = io::stderr().lock();
     let _ = write!(out, "{}", visible(question));
     let _ = out.flush();
 }
 
-/// Whether a person watches standard error.
 pub(crate) fn watched() -> bool {
     io::stderr().is_terminal()
 }
 
-/// Text for people: no character controls the terminal, and long lines are shortened.
+/// Text for people: control characters are made visible, and long lines are shortened.
 pub(crate) fn readable(text: &str) -> String {
     shortened_lines(&visible(text)).into_owned()
 }

@@ -1,5 +1,5 @@
-//! The basin of the iteration: random planar arms, random first controllers, random torque limits; from how many starts
-//! does it find the arm? The paper's literal scheme beside ours.
+//! Basin of attraction of the iteration: random planar arms, first controllers and torque limits; from how many starts
+//! does it find the arm? Compares the paper's literal scheme with the default scheme.
 //!
 //! ```text
 //! cargo run --release -p dynident-iteration --example basin [ARMS] [FIRST_SEED]
@@ -20,26 +20,23 @@ use dynident_simulation::controllers::{FiniteTimeSettings, JointPdSettings};
 use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, Reference, RunLimits};
 use std::error::Error;
 
-/// The best stroke inside the paper's limits (18), and its window.
+/// The best stroke within the paper's limits (18), and its window.
 const STROKE: [f64; 2] = [1.991, 1.046];
 const DELTA_S: f64 = 5.74;
 const RATE_HZ: f64 = 100.0;
-/// Runs that a scheme has.
 const RUNS: usize = 10;
-/// An arm counts as found when every base parameter is right to this share of the largest.
+/// Largest error of a base parameter, as a share of the largest parameter, for which an arm is found.
 const FOUND: f64 = 0.01;
 
-/// One start.
 struct Start {
     arm: Model,
     model_free: ControllerSettings,
     controller: ControllerSettings,
     torque: Vec<f64>,
-    /// Whether the trajectory can be run inside the torque limits by a perfect controller.
+    /// Whether a perfect controller can run the trajectory within the torque limits.
     feasible: bool,
 }
 
-/// How a scheme did on a start.
 #[derive(Clone, Copy, PartialEq)]
 enum Verdict {
     Found,
@@ -50,7 +47,6 @@ enum Verdict {
 /// Windows of each joint: from, to; s.
 type Windows = Vec<Vec<[f64; 2]>>;
 
-/// A scheme's verdict on a start, and how many runs it took.
 type Scheme = fn(&Start) -> Result<(Verdict, usize), Box<dyn Error>>;
 
 fn reference(order: &[usize]) -> Result<(Reference, Windows), Box<dyn Error>> {
@@ -70,7 +66,7 @@ fn reference(order: &[usize]) -> Result<(Reference, Windows), Box<dyn Error>> {
 
 fn start(seed: u64) -> Result<Start, Box<dyn Error>> {
     let mut random = Random::new(seed);
-    // A rod-like link: mass, centre of mass along it and a little off, moments of a thick rod.
+    // A rod-like link: mass, centre of mass along it with a small offset, moments of a thick rod.
     let mut body = |length: f64| {
         let mass = random.uniform(0.3, 5.0);
         let com = Vec3([random.uniform(0.2, 0.9) * length, random.uniform(-0.1, 0.1) * length, 0.0]);
@@ -87,7 +83,7 @@ fn start(seed: u64) -> Result<Start, Box<dyn Error>> {
     };
     let controller =
         FiniteTimeSettings::with_gains(vec![wide(2.0, 20.0), wide(2.0, 20.0)], vec![wide(4.0, 20.0), wide(4.0, 20.0)]);
-    // What the trajectory asks for by the true model, and limits around it.
+    // Torque of the trajectory for the true model, and limits around it.
     let (path, _) = reference(&[1, 0])?;
     let motion = path.motion();
     let mut workspace = Workspace::new(&arm);
@@ -137,16 +133,16 @@ fn with_controllers(start: &Start, settings: IterationSettings) -> IterationSett
     IterationSettings { model_free, controller, max_runs: RUNS, ..settings }
 }
 
-/// All joints in one trajectory, physically consistent robots, rejection.
+/// All joints in one trajectory, physically consistent models, rejection.
 fn ours(start: &Start) -> Result<(Verdict, usize), Box<dyn Error>> {
-    // Nothing is known of the bodies.
+    // The bodies are unknown.
     let robot = ParametricModel::new(start.arm.clone(), Vec::new())?.with_nominal(vec![0.0; 20])?;
     let (path, windows) = reference(&[1, 0])?;
     let legs = vec![Leg::windowed(path, windows)?];
     let torque_limits = Some(start.torque.clone());
     let task = IterationTask { robot: robot.clone(), legs, known: Vec::new(), torque_limits };
     let mut settings = with_controllers(start, IterationSettings::default());
-    // Torque limits are felt as noise of the fit: what counts is that the arm is found.
+    // Torque limits act like noise in the fit; the test is whether the arm is found.
     settings.settled.parameter_tolerance = 1e-3;
     let iteration = Iteration::new(task, settings)?;
     let mut driven = simulated(start, None)?;
@@ -154,7 +150,7 @@ fn ours(start: &Start) -> Result<(Verdict, usize), Box<dyn Error>> {
     Ok((verdict(start, &outcome, &robot), outcome.runs.len()))
 }
 
-/// Joint 2 with joint 1 locked, joint 1 with joint 2 locked; the map; every estimate straight into the controller.
+/// Joint 2 with joint 1 locked, joint 1 with joint 2 locked; the map; every estimate directly in the controller.
 fn literal(start: &Start) -> Result<(Verdict, usize), Box<dyn Error>> {
     let robot = ParametricModel::new(start.arm.clone(), Vec::new())?.with_nominal(vec![0.0; 20])?;
     let mut legs = Vec::new();
@@ -164,7 +160,7 @@ fn literal(start: &Start) -> Result<(Verdict, usize), Box<dyn Error>> {
     }
     let task = IterationTask { robot: robot.clone(), legs, known: Vec::new(), torque_limits: None };
     let mut settings = with_controllers(start, IterationSettings::literal(0.5));
-    // It is given all its runs: its error bars know nothing of the map's bias.
+    // It uses all its runs, because its error bars do not include the bias of the map.
     settings.settled.parameter_sigmas = 0.0;
     let iteration = Iteration::new(task, settings)?;
     let (mut second, mut first) = (simulated(start, Some(0))?, simulated(start, Some(1))?);

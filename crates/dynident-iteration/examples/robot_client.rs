@@ -1,15 +1,15 @@
-//! A robot program behind the line protocol, `docs/src/robot-protocol.md`: the simulator, served on standard input and
-//! output. What a program for a real robot looks like, and what the tests speak to.
+//! A robot program with the line protocol, `docs/src/robot-protocol.md`: the simulator, served on standard input and
+//! output. An example for programs of real robots, and the counterpart of the tests.
 //!
 //!     robot_client ROBOT.urdf [--fault KIND] [--part PART] [--at SAMPLE] [--marker FILE] [--unwatched yes]
 //!         [--brakes MS] [--paced yes]
 //!
 //! A stop message, or the end of its input, stops the robot at the next sample; so does a sample outside of the
-//! envelope that a motion comes with, unless it is `--unwatched`. With `--fault` it misbehaves at the given sample
-//! (default 50) of the part (default motion), with a word in the marker file before: die, hang, wait (for a message),
-//! ignore (a stop), pause (a second), orphan (dies while a process that it started holds its output), garbage, nan,
-//! null, joints, backwards, flood, megabyte, stop, short, turn; or it sends all samples `afterwards`; or at its hello:
-//! deaf, protocol, names, modes, homeless (it does not know of ways). `--paced` it runs in real time.
+//! envelope of a motion, unless it is `--unwatched`. With `--fault` it fails at the given sample (default 50) of the
+//! part (default motion), after writing a word to the marker file: die, hang, wait (for a message), ignore (a stop),
+//! pause (a second), orphan (dies while a child process holds its output), garbage, nan, null, joints, backwards,
+//! flood, megabyte, stop, short, turn; or it sends all samples `afterwards`; or it fails at its hello: deaf, protocol,
+//! names, modes, homeless (without the capability `home`). With `--paced` it runs in real time.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "speaking is what this program is for")]
 
@@ -31,19 +31,19 @@ struct Client {
     joints: Vec<String>,
     fault: String,
     at: usize,
-    /// The part of the run in which it misbehaves.
+    /// The part of the run in which it fails.
     part: String,
     marker: String,
     watched: bool,
-    /// Where it misbehaves: how long it needs to stand after its stop, ms; then its marker file says so.
+    /// Time to stop after its failure, ms; its marker file is then updated.
     brakes: u64,
-    /// Whether a sample of the mode run is sent when it is due, not at once.
+    /// Whether a sample in mode `run` is sent when it is due instead of at once.
     paced: bool,
-    /// What the host writes: read aside, so that a stop is heard in the middle of a motion.
+    /// Messages of the host, read in a thread, so that a stop is received during a motion.
     messages: Receiver<Value>,
 }
 
-/// Why a motion ends before its end.
+/// Why a motion ended early.
 const INTERRUPTED: &str = "the host asked for it";
 
 fn main() -> Result<()> {
@@ -66,7 +66,7 @@ fn main() -> Result<()> {
         }
     }
     let model = load_robot(path)?.model;
-    // The other way round than the model: vectors follow the names of the hello.
+    // Opposite order to the model: vectors follow the names of the hello.
     let joints: Vec<String> = model.joints().iter().rev().map(|joint| joint.name.clone()).collect();
     let plant = Plant::new(&model, &[], &[])?;
     let (sender, messages) = channel();
@@ -84,7 +84,7 @@ fn main() -> Result<()> {
         match message["type"].as_str() {
             Some("run") => client.run(&message)?,
             Some("begin") => client.steps(&message)?,
-            // It stands already.
+            // It is at rest already.
             Some("stop") => {}
             Some("bye") => break,
             other => return Err(format!("unknown message {other:?}").into()),
@@ -103,7 +103,6 @@ fn numbers(value: &Value) -> Result<Vec<f64>> {
     Ok(serde_json::from_value(value.clone())?)
 }
 
-/// A vector in the other order.
 fn turned(values: &[f64]) -> Vec<f64> {
     values.iter().rev().copied().collect()
 }
@@ -124,7 +123,7 @@ impl Client {
         send(&hello)
     }
 
-    /// A word in the marker file, whole or not at all.
+    /// Writes a word to the marker file, completely or not at all.
     fn mark(&self, word: &str) -> Result<()> {
         if self.marker.is_empty() {
             return Ok(());
@@ -134,7 +133,6 @@ impl Client {
         Ok(std::fs::rename(unfinished, &self.marker)?)
     }
 
-    /// Whether a stop has come, or nobody is there any more.
     fn stop_asked(&self) -> bool {
         match self.messages.try_recv() {
             Ok(message) => message["type"] == "stop",
@@ -143,7 +141,7 @@ impl Client {
         }
     }
 
-    /// What leaves the envelope of the message, joints in the client's order: limits that are null do not count.
+    /// The breach of the envelope in the message, joints in the client's order; null limits are inactive.
     fn breach(&self, envelope: &Value, q: &[f64], dq: &[f64], tau: &[f64], target: &[f64]) -> Option<String> {
         if !self.watched {
             return None;
@@ -166,7 +164,7 @@ impl Client {
         })
     }
 
-    /// Misbehaves, if it is time for it. True if the run is over.
+    /// Fails, if it is time. Returns true if the run is over.
     fn misbehave(&self, (part, sample): (&str, usize), time_s: f64) -> Result<bool> {
         if sample != self.at || part != self.part {
             return Ok(false);
@@ -228,7 +226,6 @@ impl Client {
         Ok(false)
     }
 
-    /// Runs the controller by itself, from the files.
     fn run(&mut self, message: &Value) -> Result<()> {
         let file = |key: &str| std::fs::read_to_string(message[key].as_str().unwrap_or_default());
         let controller: Value = serde_json::from_str(&file("controller")?)?;
@@ -236,7 +233,7 @@ impl Client {
         let dof = self.plant.dof();
         let message_envelope = message["envelope"].clone();
         let rate_hz = message["rate_hz"].as_f64().ok_or("no rate")?;
-        // One controller runs through all parts; where one ends, the next begins.
+        // One controller runs through all parts without a pause.
         let mut parts = vec![("motion", table(&file("trajectory")?, dof, rate_hz)?)];
         if let Value::Object(home) = &message["home"] {
             let way =
@@ -255,7 +252,7 @@ impl Client {
         let mut kept = Vec::new();
         let begin = Instant::now();
         for (place, (part, reference)) in parts.iter().enumerate() {
-            // The samples that a way shares with the motion are the motion's.
+            // The samples that a path shares with the motion belong to the motion.
             let samples = match *part {
                 "approach" => 0..reference.samples() - 1,
                 "return" => 1..reference.samples(),
@@ -297,14 +294,13 @@ impl Client {
             }
         }
         if !kept.is_empty() {
-            // Longer than a message may take, shorter than that and the motion.
+            // Longer than a message may take, shorter than that plus the motion.
             std::thread::sleep(Duration::from_secs_f64(0.75 * message["duration_s"].as_f64().ok_or("no duration")?));
         }
         kept.iter().try_for_each(send)?;
         send(&json!({ "type": "end", "status": "done" }))
     }
 
-    /// Holds the torques that it is sent.
     fn steps(&mut self, begin: &Value) -> Result<()> {
         self.plant.set_state(0.0, &turned(&numbers(&begin["q"])?), &turned(&numbers(&begin["dq"])?));
         let rate_hz = begin["rate_hz"].as_f64().ok_or("no rate")?;
@@ -332,7 +328,6 @@ impl Client {
     }
 }
 
-/// The reference of a table that was handed over.
 fn table(text: &str, dof: usize, rate_hz: f64) -> Result<Reference> {
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for line in text.lines().skip(1) {
@@ -351,7 +346,6 @@ fn table(text: &str, dof: usize, rate_hz: f64) -> Result<Reference> {
     Ok(Reference::new(rate_hz, motion)?)
 }
 
-/// The first sample of each joint.
 fn first(values: &[f64], samples: usize) -> Vec<f64> {
     values.chunks(samples).map(|own| own[0]).collect()
 }

@@ -1,4 +1,4 @@
-//! What comes before a motion is commanded: its rehearsal, and slower ones.
+//! Preparation of a motion: its order among slower motions and warm-ups, and its rehearsal.
 
 use crate::home::{FoundWays, HomeError};
 use crate::leg::{IterationTask, Leg};
@@ -15,30 +15,27 @@ use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Reference, SimulationError};
 use std::borrow::Cow;
 
-/// A motion on the way to a run, or the run itself.
+/// A motion before a run (speed step, warm-up), or the run itself.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Commanded<'a> {
-    /// Place of the leg, from 0.
     pub(crate) place: usize,
     pub(crate) leg: &'a Leg,
-    /// Share of its speed.
+    /// Share of the leg's speed.
     pub(crate) speed: f64,
     pub(crate) purpose: RunPurpose,
 }
 
 impl<'a> Commanded<'a> {
-    /// What the robot is to follow: the leg's reference at its share of the speed.
+    /// Returns the commanded reference: that of the leg, slowed down to the share of its speed.
     pub(crate) fn reference(&self) -> Result<Cow<'a, Reference>, SimulationError> {
         let reference = self.leg.reference();
         if self.speed < 1.0 { reference.slowed(self.speed).map(Cow::Owned) } else { Ok(Cow::Borrowed(reference)) }
     }
 
-    /// Whether it is what the run is made for.
     pub(crate) fn is_run(&self) -> bool {
         self.speed == 1.0 && !matches!(self.purpose, RunPurpose::WarmUp { .. })
     }
 
-    /// Its begin of a sentence about what came before a run.
     pub(crate) fn words(&self) -> String {
         match self.purpose {
             RunPurpose::WarmUp { pass, of } => format!("in pass {pass} of {of} of the warm-up"),
@@ -47,8 +44,8 @@ impl<'a> Commanded<'a> {
     }
 }
 
-/// Every leg at each speed step before the first run that gets to its end, then in every pass of a warm-up, then the
-/// run itself.
+/// The order of motions: each leg at each speed step (before the first completed run), each leg in each warm-up pass,
+/// then the run itself.
 pub(crate) fn motions<'a>(
     task: &'a IterationTask,
     settings: &IterationSettings,
@@ -58,7 +55,7 @@ pub(crate) fn motions<'a>(
     let legs = |speed: f64, purpose: RunPurpose| {
         task.legs.iter().enumerate().map(move |(place, leg)| Commanded { place, leg, speed, purpose })
     };
-    // A run that was stopped early shows nothing of the rest of its motion, nor of a next controller.
+    // A run that was stopped early does not replace the speed steps.
     let is_first = !before.iter().any(|record| record.done);
     let steps = if is_first { &settings.safety.speed_steps[..] } else { &[] };
     let slow = steps.iter().filter(|&&step| step < 1.0).flat_map(|&step| legs(step, RunPurpose::Run));
@@ -66,10 +63,10 @@ pub(crate) fn motions<'a>(
     slow.chain(warm).chain(legs(1.0, RunPurpose::Run)).collect()
 }
 
-/// The ways of every leg; none where the robot has no home.
+/// Paths from and to home for each leg; `None` if no home is set.
 ///
 /// # Errors
-/// Why there is no way to one of them.
+/// No path to one of the legs.
 pub(crate) fn ways_of(
     task: &IterationTask,
     settings: &IterationSettings,
@@ -83,7 +80,7 @@ pub(crate) fn ways_of(
     task.legs.iter().map(of_leg).collect()
 }
 
-/// What the rehearsal of a plan shows, if there is one. `robot` is with the friction in force.
+/// Rehearses a plan if the settings request it. `robot` includes the selected friction.
 pub(crate) fn rehearsed<'a>(
     task: &'a IterationTask,
     settings: &IterationSettings,
@@ -93,8 +90,8 @@ pub(crate) fn rehearsed<'a>(
     before: &[RunRecord],
 ) -> Result<Result<Option<Rehearsal>, RehearsalFailure>, SimulationError> {
     let Some(rehearsal) = &settings.safety.rehearsal else { return Ok(Ok(None)) };
-    // What is believed of the whole robot: the controller's own model once runs have shown one, else what they have
-    // shown, else the description with typical drives.
+    // Parameters of the simulated robot, in order of preference: the controller's model after a good run, the newest
+    // estimate, the nominal model with typical drives.
     let shown = before.iter().rev().find_map(|record| record.knowledge()?.possible.as_deref());
     let own = match &plan.model {
         Some(ModelParameters::All(values)) => Some(&values[..]).filter(|_| shown.is_some()),
@@ -118,8 +115,7 @@ pub(crate) fn rehearsed<'a>(
         model,
         believed: own.or(shown).or(known.then_some(&typical[..])),
         light: light.as_deref().filter(|_| known && own.or(shown).is_none()),
-        // Drives close their own loop at their own rate, which nobody states: at the rate of the motion it may
-        // oscillate.
+        // The loop rate of drives is unknown; at the rate of the motion their loop may oscillate.
         oscillation: match controller {
             ControllerSettings::PositionLoop(_) => None,
             _ => settings.safety.oscillation.limits(robot.model()),
@@ -129,7 +125,6 @@ pub(crate) fn rehearsed<'a>(
     Ok(rehearsed.run(rehearsal, stop)?.map(Some))
 }
 
-/// What somebody who is asked hears of a motion.
 pub(crate) fn next_motion(
     task: &IterationTask,
     plan: &RunPlan,

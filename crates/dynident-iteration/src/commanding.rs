@@ -1,5 +1,3 @@
-//! A motion is commanded: prepared, allowed, run, and what it came to.
-
 use crate::before_motion::{Commanded, next_motion, rehearsed, ways_of};
 use crate::cut_short::CutShort;
 use crate::error::IterationError;
@@ -15,34 +13,29 @@ use crate::supervision::Supervisor;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use std::time::Instant;
 
-/// What a plan is run with, looked at beforehand.
 #[derive(Debug)]
 pub(crate) struct Prepared {
     pub(crate) controller: ControllerSettings,
     pub(crate) model: Option<ControllerModel>,
-    /// Of each leg.
     pub(crate) ways: Vec<Option<FoundWays>>,
     pub(crate) rehearsal: Option<Rehearsal>,
 }
 
-/// What a motion came to.
-pub(crate) enum Came {
-    /// A run, done or not.
+pub(crate) enum MotionOutcome {
     Run(RobotRun),
-    /// The iteration ends here.
     Stopped(IterationStatus),
-    /// It does not count: what was recorded of the motion, if it had begun, and why.
+    /// The motion was interrupted or failed: its log if it had begun, and the reason.
     CutShort(Option<RobotRun>, CutShort),
 }
 
-/// Number of a run's leg: it differs from leg to leg, since noise and folders depend on it.
+/// Number of a leg of a run, which seeds its noise and names its folder.
 pub(crate) fn folder_number(run: usize, place: usize, legs: usize) -> usize {
     (run - 1) * legs + place + 1
 }
 
 impl Iteration {
-    /// Controller, model, ways and rehearsal of a plan along the legs of `task`; or why it is not commanded. `stop`
-    /// ends it.
+    /// Prepares controller, model, paths and rehearsal of a plan along the legs of `task`; or returns why it is not
+    /// commanded.
     pub(crate) fn prepared(
         &self,
         task: &IterationTask,
@@ -67,7 +60,7 @@ impl Iteration {
             Ok(ways) => ways,
             Err(HomeError::Numbers(error)) => return Err(error.into()),
             Err(HomeError::Interrupted) => return interrupted(),
-            Err(none) => return refused(&none),
+            Err(error) => return refused(&error),
         };
         let with = (plan, &controller, model.as_ref());
         match rehearsed(task, settings, &robot, with, (&ways, &stopped), before)? {
@@ -77,7 +70,6 @@ impl Iteration {
         }
     }
 
-    /// Commands one motion of a plan, if nobody stops it and somebody who is asked allows it.
     pub(crate) fn commanded(
         &self,
         robot: &mut dyn Robot,
@@ -85,7 +77,7 @@ impl Iteration {
         motion: &Commanded<'_>,
         supervisor: &mut dyn Supervisor,
         last_motion: &mut Option<Instant>,
-    ) -> Result<Came, IterationError> {
+    ) -> Result<MotionOutcome, IterationError> {
         let Commanded { place, speed, purpose, .. } = *motion;
         let Prepared { controller, model, ways, rehearsal } = prepared;
         let run = folder_number(plan.run, place, task.legs.len());
@@ -96,18 +88,18 @@ impl Iteration {
         let stop = supervisor.stop().cloned();
         let stop_requested = || stop.as_ref().is_some_and(StopSignal::is_requested);
         if stop_requested() {
-            return Ok(Came::CutShort(None, CutShort::Interrupted("between two runs".to_owned())));
+            return Ok(MotionOutcome::CutShort(None, CutShort::Interrupted("between two runs".to_owned())));
         }
         let mut shown = next_motion(task, plan, controller, motion, reference, own.as_ref().zip(found));
         shown.rehearsal.clone_from(rehearsal);
         if !supervisor.allows(&shown) {
             if stop_requested() {
-                return Ok(Came::CutShort(None, CutShort::Interrupted("before a run".to_owned())));
+                return Ok(MotionOutcome::CutShort(None, CutShort::Interrupted("before a run".to_owned())));
             }
             let reason = format!("run {} was not allowed", plan.run);
-            return Ok(Came::Stopped(IterationStatus::Waiting { reason }));
+            return Ok(MotionOutcome::Stopped(IterationStatus::Waiting { reason }));
         }
-        let came = robot.run(&RunRequest {
+        let robot_run = robot.run(&RunRequest {
             model: model.as_ref(),
             envelope: self.settings().safety.envelope.as_ref(),
             oscillation: self.settings().safety.oscillation.limits(self.task().robot.model()),
@@ -118,21 +110,23 @@ impl Iteration {
             ..RunRequest::new(run, reference, controller)
         })?;
         *last_motion = Some(Instant::now());
-        Ok(match &came.status {
-            RobotStatus::Waiting { .. } => Came::Stopped(IterationStatus::Waiting { reason: came.status.to_string() }),
+        Ok(match &robot_run.status {
+            RobotStatus::Waiting { .. } => {
+                MotionOutcome::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() })
+            }
             RobotStatus::Failed { .. } => {
-                let how = format!("run {}: {}", plan.run, came.status);
-                Came::CutShort(Some(came), CutShort::Failed(how))
+                let how = format!("run {}: {}", plan.run, robot_run.status);
+                MotionOutcome::CutShort(Some(robot_run), CutShort::Failed(how))
             }
             RobotStatus::Interrupted { .. } => {
-                let how = came.status.to_string();
-                Came::CutShort(Some(came), CutShort::Interrupted(how))
+                let how = robot_run.status.to_string();
+                MotionOutcome::CutShort(Some(robot_run), CutShort::Interrupted(how))
             }
             RobotStatus::Done
             | RobotStatus::Simulated { .. }
             | RobotStatus::Stopped { .. }
             | RobotStatus::Oscillated { .. }
-            | RobotStatus::LeftEnvelope { .. } => Came::Run(came),
+            | RobotStatus::LeftEnvelope { .. } => MotionOutcome::Run(robot_run),
         })
     }
 }

@@ -1,5 +1,3 @@
-//! What an iteration still falls short of: converged is only what meets everything.
-
 use crate::estimate::RunEstimate;
 use crate::evidence::{Clipping, JointEvidence};
 use crate::lengths::OtherLength;
@@ -10,175 +8,163 @@ use dynident_identification::examination::{LagChoice, TorqueLag};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Samples at the drive's limit that a run may have, as a share: a limit that is touched at a reversal moves nothing.
-const MOST_CLIPPED: f64 = 2e-3;
-
-/// The share of the torque that a 95 % band has to hold, in a run that was not fitted to. Residuals that are correlated
-/// over seconds let the share vary by some percent; a prediction that is off by its own noise throughout has 83 %.
-const LEAST_INSIDE: f64 = 0.85;
-
-/// Lags of two runs differ clearly beyond so many times the 95 % interval of their difference: with six joints in some
-/// runs chance alone goes beyond once.
-const CLEARLY_OTHER: f64 = 1.5;
-
-/// What is not met after the last run, with its numbers; [`remedy`](Self::remedy) says what would help.
+/// A condition that the last run does not meet, with its numbers; [`remedy`](Self::remedy) suggests a fix.
 #[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "condition", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Shortfall {
-    /// One good run cannot be compared with another.
-    #[error("{good} good runs: nothing to compare the last one with")]
+    /// Fewer than two good runs, so no comparison is possible.
+    #[error("{good} good runs, 2 are needed for a comparison")]
     TooFewRuns {
-        /// How many there are.
+        /// Number of good runs.
         good: usize,
     },
-    /// The last run does not count as good.
-    #[error("the last run does not count: {reason}")]
+    /// The last run was rejected.
+    #[error("the last run was rejected: {reason}")]
     LastRunRejected {
         /// Why.
         reason: String,
     },
-    /// The last run was under another controller than the model-based one with the whole of the newest model.
-    #[error("the last run was not under the controller with the newest model")]
+    /// The last run did not use the model-based controller with the undamped newest model.
+    #[error("the last run did not use the controller with the newest model")]
     NoModel,
-    /// A run of an earlier version, without what the verdict rests on.
-    #[error("run {run} was made by an earlier version, which did not keep what its log shows")]
+    /// The run is from an earlier version, without the evidence for the verdict.
+    #[error("run {run} was made by an earlier version, which did not store the evidence of its log")]
     NoEvidence {
         /// The run.
         run: usize,
     },
-    /// A joint was farther from its trajectory than asked, and than can be explained.
-    #[error("joint {joint} was {error_rad:.2e} rad from its trajectory, asked is {tolerance_rad:.2e}{}", floor_words(*.floor_rad))]
+    /// The tracking error of a joint exceeds the tolerance and the explained error.
+    #[error("joint {joint} was {error_rad:.2e} rad from its trajectory, tolerance {tolerance_rad:.2e}{}", floor_words(*.floor_rad))]
     Tracking {
         /// The joint.
         joint: String,
         /// Its largest distance, rad (m).
         error_rad: f64,
-        /// What was asked for.
+        /// Tolerance, rad (m).
         tolerance_rad: f64,
-        /// What noise, friction and delay explain; none where that cannot be told.
+        /// Error that noise, friction and delay explain, rad (m); `None` if unknown.
         floor_rad: Option<f64>,
     },
-    /// A parameter that the last run moved.
-    #[error("{parameter} moved by {bars:.1} error bars with the last run, {allowed:.1} are allowed")]
+    /// The last run changed a parameter by too much.
+    #[error("{parameter} changed by {bars:.1} error bars with the last run, the limit is {allowed:.1}")]
     ParameterMoves {
         /// The base parameter.
         parameter: String,
-        /// By how many error bars.
+        /// Change in error bars.
         bars: f64,
-        /// How many count as standing still.
+        /// Largest accepted change in error bars.
         allowed: f64,
     },
-    /// A parameter that is hardly known.
+    /// The error bar of a parameter is too wide.
     #[error(
-        "the error bar of {parameter} makes {percent:.0} % of the torque of the largest parameter, {allowed_percent:.0} % are allowed"
+        "the error bar of {parameter} is {percent:.0} % of the largest parameter (by torque), the limit is {allowed_percent:.0} %"
     )]
     ParameterUncertain {
         /// The base parameter.
         parameter: String,
-        /// The torque of its error bar (one standard deviation) as a share of what the largest parameter makes.
+        /// Torque of its error bar (one standard deviation), percent of the torque of the largest parameter.
         percent: f64,
-        /// The widest that is allowed.
+        /// Largest accepted value, percent.
         allowed_percent: f64,
     },
     /// Torque at the drive's limit.
-    #[error("torque of joint {joint} stands at {torque:.3} Nm in {percent:.1} % of the samples: {}", clipping_words(*.stated))]
+    #[error("the torque of joint {joint} is {torque:.3} Nm in {percent:.1} % of the samples: {}", clipping_words(*.stated))]
     Clipping {
         /// The joint.
         joint: String,
-        /// Share of its samples.
+        /// Percentage of its samples.
         percent: f64,
         /// The torque, Nm (N).
         torque: f64,
-        /// Whether it is a stated limit.
+        /// Whether this is a stated limit.
         stated: bool,
     },
-    /// Torque and positions of the last log belong to different instants, by another lag than the one that was taken
-    /// off.
-    #[error("torque comes {:.1} +- {:.1} ms {} the motion at all joints (95 %), unexplained", 1e3 * .lag_s.abs(), 1e3 * .half_width_95_s, if *.lag_s > 0.0 { "after" } else { "before" })]
+    /// Unexplained lag between torque and positions of the last log, after compensation.
+    #[error("unexplained lag: the torque of all joints is {:.1} +- {:.1} ms (95 %) {} the motion", 1e3 * .lag_s.abs(), 1e3 * .half_width_95_s, if *.lag_s > 0.0 { "after" } else { "before" })]
     Lag {
-        /// What is left of the lag, s.
+        /// Lag after compensation, s.
         lag_s: f64,
-        /// Half the width of its 95 % interval.
+        /// Half the width of its 95 % interval, s.
         half_width_95_s: f64,
     },
-    /// A compensated lag that is longer than allowed by more than its 95 % interval: the robot is not where the log
-    /// shows it.
-    #[error("torque and motion of the log are {:.1} ms apart, {:.1} ms are allowed", 1e3 * .lag_s, 1e3 * .allowed_s)]
+    /// The compensated lag exceeds the limit by more than its 95 % interval: the true position differs from the logged
+    /// one.
+    #[error("torque and motion of the log are {:.1} ms apart, the limit is {:.1} ms", 1e3 * .lag_s, 1e3 * .allowed_s)]
     LongLag {
         /// The longest lag of a joint, s.
         lag_s: f64,
-        /// What is allowed.
+        /// Limit, s.
         allowed_s: f64,
     },
-    /// A lag was taken off, but runs differ in it: a recorder's would be the same in all of them.
-    #[error("what looks like a lag of joint {joint}'s torque is {:.1} ms in the last run and {:.1} ms in one before, +- {:.1} ms (95 %)", 1e3 * .lag_s, 1e3 * .before_s, 1e3 * .half_width_95_s)]
+    /// The compensated lag differs between runs; a recorder delay would be constant.
+    #[error("the apparent torque lag of joint {joint} is {:.1} ms in the last run and {:.1} ms in an earlier run, +- {:.1} ms (95 %)", 1e3 * .lag_s, 1e3 * .before_s, 1e3 * .half_width_95_s)]
     LagChanges {
         /// The joint.
         joint: String,
         /// The lag of the last run, s.
         lag_s: f64,
-        /// That of the good run that differs most.
+        /// Lag of the good run that differs most, s.
         before_s: f64,
-        /// Half the width of the 95 % interval of their difference.
+        /// Half the width of the 95 % interval of their difference, s.
         half_width_95_s: f64,
     },
-    /// The model of the runs before does not predict the last one.
+    /// The model of the earlier runs does not predict the last run.
     #[error(
-        "the model of the runs before holds {inside_percent:.0} % of joint {joint}'s torque in its 95 % band, off by {rms_error_nm:.3} Nm where the band is {half_width_nm:.3}"
+        "{inside_percent:.0} % of joint {joint}'s torque is inside the 95 % band of the model of the earlier runs: error {rms_error_nm:.3} Nm, band +- {half_width_nm:.3} Nm"
     )]
     Prediction {
         /// The joint.
         joint: String,
-        /// Share inside the band.
+        /// Percentage of samples inside the band.
         inside_percent: f64,
         /// Root mean square error of the prediction, Nm (N).
         rms_error_nm: f64,
-        /// Mean half width of the band.
+        /// Mean half width of the band, Nm (N).
         half_width_nm: f64,
     },
-    /// No run of the held-out motion has judged the newest model yet.
-    #[error("the newest model has not been judged by a run of the held-out motion")]
+    /// The newest model has not been validated on the held-out motion yet.
+    #[error("the newest model has not been validated on the held-out motion")]
     NotHeldOut,
-    /// The held-out motion was not run to its end, or its log tells nothing.
-    #[error("the held-out run says nothing of the newest model: {reason}")]
+    /// The held-out motion was not completed, or its log is unusable.
+    #[error("the held-out run cannot validate the newest model: {reason}")]
     HeldOutFailed {
         /// Why.
         reason: String,
     },
-    /// The newest model does not predict a motion that it was not fitted to.
+    /// The newest model does not predict the held-out motion.
     #[error(
-        "on the held-out motion the newest model holds {inside_percent:.0} % of joint {joint}'s torque in its 95 % band, off by {rms_error_nm:.3} Nm where the band is {half_width_nm:.3}"
+        "held-out motion: {inside_percent:.0} % of joint {joint}'s torque is inside the 95 % band of the newest model: error {rms_error_nm:.3} Nm, band +- {half_width_nm:.3} Nm"
     )]
     HeldOutPrediction {
         /// The joint.
         joint: String,
-        /// Share inside the band.
+        /// Percentage of samples inside the band.
         inside_percent: f64,
         /// Root mean square error of the prediction, Nm (N).
         rms_error_nm: f64,
-        /// Mean half width of the band.
+        /// Mean half width of the band, Nm (N).
         half_width_nm: f64,
     },
-    /// Torque that no parameter of the model explains.
+    /// Torque that the model does not explain.
     #[error(
-        "{percent:.1} % of joint {joint}'s torque is left unexplained beyond its noise, {allowed_percent:.1} % are allowed"
+        "{percent:.1} % of joint {joint}'s torque is unexplained beyond its noise, the limit is {allowed_percent:.1} %"
     )]
     Unexplained {
         /// The joint.
         joint: String,
-        /// Share of its torque, of root mean squares.
+        /// Unexplained torque in percent of the joint torque (root mean squares).
         percent: f64,
-        /// What is allowed.
+        /// Limit, percent.
         allowed_percent: f64,
     },
-    /// Torque that another length of a link explains clearly better than the description's: another arm.
+    /// Another link length explains the torque significantly better than that of the robot description.
     #[error(
-        "{}: {:.3} Nm of joint {}'s torque are then left in place of {:.3}", length_words(.0), .0.left_with_nm, .0.explained_joint, .0.left_nm
+        "{}: the residual of joint {} is then {:.3} Nm instead of {:.3} Nm", length_words(.0), .0.explained_joint, .0.left_with_nm, .0.left_nm
     )]
     Length(OtherLength),
-    /// The logged torque is not the torque that the controller commanded.
+    /// The logged torque differs from the commanded torque.
     #[error("{0}")]
     Torque(TorqueCause),
 }
@@ -186,108 +172,108 @@ pub enum Shortfall {
 fn length_words(other: &OtherLength) -> String {
     let OtherLength { joint, factor, .. } = other;
     match joint {
-        Some(joint) => format!("joint {joint} is {factor:.2} times as far from the one before as described"),
-        None => format!("all lengths are {factor:.2} times as described"),
+        Some(joint) => format!(
+            "the torque indicates that joint {joint} is {factor:.2} times as far from the previous joint as in the robot description"
+        ),
+        None => format!("the torque indicates that all lengths are {factor:.2} times those of the robot description"),
     }
 }
 
 fn floor_words(floor_rad: Option<f64>) -> String {
     floor_rad.map_or_else(
-        || "; what the loop could reach is not known".to_owned(),
+        || "; the error that the loop can reach is unknown".to_owned(),
         |floor| format!(", and noise, friction and delay explain {floor:.2e}"),
     )
 }
 
 fn clipping_words(stated: bool) -> &'static str {
-    if stated { "its limit" } else { "as if its drive gave no more" }
+    if stated { "its limit" } else { "probably saturation of its drive" }
 }
 
 impl Shortfall {
-    /// Whether it names why the model does not fit, rather than that it does not.
-    fn claims_a_cause(&self) -> bool {
+    fn is_cause(&self) -> bool {
         matches!(self, Self::Lag { .. } | Self::LongLag { .. } | Self::LagChanges { .. } | Self::Length(_))
     }
 
-    /// What would help.
+    /// Suggested fix.
     pub fn remedy(&self) -> &'static str {
         match self {
-            Self::TooFewRuns { .. } => "more good runs: mend what refused one, or allow more (max_runs)",
+            Self::TooFewRuns { .. } => "fix the cause of the rejected run, or allow more runs (max_runs)",
             Self::NoModel => "allow more runs (max_runs)",
             Self::LastRunRejected { .. } => {
-                "see the reason; a first controller that holds the robot is the commonest cure"
+                "see the reason; a first controller that holds the robot steadily usually fixes this"
             }
-            Self::NoEvidence { .. } => "begin anew with this version",
+            Self::NoEvidence { .. } => "restart the iteration with this version",
             Self::Tracking { .. } => {
-                "look for what the model has no term for (sticking, backlash, elasticity, a controller that is not the stated one); or give stiffer gains or a larger settled.tracking_tolerance"
+                "look for effects without a term in the model (stiction, backlash, elasticity, another controller than stated); or use stiffer gains or a larger settled.tracking_tolerance"
             }
             Self::ParameterMoves { .. } => {
-                "allow more runs (max_runs); a parameter that keeps moving changes with temperature, or hangs on a term that the model has not"
+                "allow more runs (max_runs); a parameter that keeps changing may depend on temperature or on a missing model term"
             }
-            Self::ParameterUncertain { .. } => "a motion that excites it: a longer one, or another design",
-            Self::Clipping { .. } => "a slower motion, a limit of torque in [design.limits], or the right effort limit",
+            Self::ParameterUncertain { .. } => "use a motion that excites it: a longer one, or another design",
+            Self::Clipping { .. } => {
+                "use a slower motion, add a torque limit to [design.limits], or correct the effort limit"
+            }
             Self::Lag { .. } | Self::LongLag { .. } => {
-                "take positions and torques at the same instant, or correct the delay where the log is made; a constant delay that is meant to be there may be allowed with settled.most_lag_s"
+                "record positions and torques at the same instant, or correct the delay in the recorder; increase settled.most_lag_s to accept a known constant delay"
             }
             Self::LagChanges { .. } => {
-                "look for friction that the model has no term for, or elasticity: at reversals both look like a lag (friction = \"auto\")"
+                "look for missing friction terms (friction = \"auto\") or elasticity: at reversals both look like a lag"
             }
             Self::NotHeldOut => {
-                "allow the run: it comes when all else is met, or after every so many runs (held_out.every)"
+                "allow the held-out run: it follows when all other conditions are met, or after every N runs (held_out.every)"
             }
             Self::HeldOutFailed { .. } => {
-                "see the reason: a held-out motion that the robot can follow as well as its own"
+                "see the reason; use a held-out motion that the robot can follow as well as the fitted motion"
             }
             Self::HeldOutPrediction { .. } => {
-                "what the fitted motion never showed: other friction terms (friction = \"auto\"), a motion that excites more (motion = \"redesign\"), elasticity, temperature"
+                "look for effects that the fitted motion does not excite: other friction terms (friction = \"auto\"), elasticity, temperature; or use a more exciting motion (motion = \"redesign\")"
             }
-            Self::Prediction { .. } => {
-                "look for what changed between the runs: temperature, load, sticking friction, sensor zeros"
-            }
+            Self::Prediction { .. } => "look for changes between the runs: temperature, load, stiction, sensor offsets",
             Self::Unexplained { .. } => {
-                "other friction terms (friction = \"auto\"), the right lengths and axes in the description, or a larger settled.most_unexplained_percent"
+                "add friction terms (friction = \"auto\"), correct lengths and axes in the robot description, or increase settled.most_unexplained_percent"
             }
             Self::Torque(cause) => cause.remedy(),
             Self::Length(_) => {
-                "the description of this very arm: measure the length; where it is right, what else grows with that distance (elasticity, a tool, axes that are not parallel)"
+                "measure the length and correct the robot description; if the length is right, look for other effects that grow with it (elasticity, a tool, axes that are not parallel)"
             }
         }
     }
 }
 
-/// Names that sentences take, how much parameters count, and what depends on the robot's size.
+/// Names for messages, torque shares of the parameters, and limits that depend on the size of the robot.
 pub(crate) struct Names {
     pub(crate) joints: Vec<String>,
     pub(crate) parameters: Vec<String>,
-    /// Of each parameter, the torque that one of its unit makes along the last motion, as a share of the joints' own;
-    /// empty where the last run shows no torque.
+    /// Torque share of each parameter: torque of one unit along the last motion over the joint torque; empty if the
+    /// last run shows no torque.
     pub(crate) shares: Vec<f64>,
-    /// The longest lag with which an iteration converges, seconds.
+    /// Longest accepted lag, seconds.
     pub(crate) most_lag_s: f64,
-    /// Whether runs of another motion judge the model, in place of those that are fitted next.
+    /// Whether held-out runs validate the model, instead of the next fitted runs.
     pub(crate) held_out: bool,
 }
 
-/// What is not met after the last of `records`; nothing if the iteration has converged.
+/// Returns the conditions that the last of `records` does not meet; empty if the iteration has converged.
 pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<Shortfall> {
     let Some(last) = records.last() else { return vec![Shortfall::TooFewRuns { good: 0 }] };
     let wrong_torque = last.torque_causes().iter().cloned().map(Shortfall::Torque);
-    // All else that a wrong torque log shows is a consequence.
+    // All other findings are consequences of a wrong torque log.
     if last.torque_causes().iter().any(TorqueCause::is_determined) {
         return wrong_torque.collect();
     }
     let mut found: Vec<Shortfall> = wrong_torque.collect();
-    // Beside a torque that is another one for an unknown reason, no other cause can be claimed.
+    // With torque that is wrong for an unknown reason, no other cause is reliable.
     let may_claim = found.is_empty();
-    found.extend(unmet(records, settings, names).into_iter().filter(|own| may_claim || !own.claims_a_cause()));
+    found.extend(unmet(records, settings, names).into_iter().filter(|own| may_claim || !own.is_cause()));
     found
 }
 
-/// The unmet condition of a compensated lag that is longer than allowed by more than its 95 % interval.
+/// Unmet condition of a compensated lag that exceeds the limit by more than its 95 % interval.
 fn long_lag(lag: &LagChoice, allowed_s: f64) -> Option<Shortfall> {
     (lag.certain_s() > allowed_s).then(|| Shortfall::LongLag { lag_s: lag.longest_s(), allowed_s })
 }
 
-/// What is not met besides the scale of the torque.
 fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<Shortfall> {
     let good: Vec<&RunRecord> = records.iter().filter(|record| record.accepted).collect();
     let Some(last) = records.last() else { return Vec::new() };
@@ -319,7 +305,7 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
     }
     found.extend(last.knowledge().and_then(|known| long_lag(&known.lag, names.most_lag_s)));
     for (place, shown) in evidence.joints.iter().enumerate() {
-        if let Some((now, then)) = changed_lag(&good, place) {
+        if let Some((now, then)) = changed_lag(&good, place, limits.verdict.min_lag_change_ratio) {
             let half_width_95_s = now.half_width_95_s.hypot(then.half_width_95_s);
             let (lag_s, before_s) = (now.lag_s, then.lag_s);
             found.push(Shortfall::LagChanges { joint: joint(place), lag_s, before_s, half_width_95_s });
@@ -328,7 +314,7 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
     }
     found.extend(evidence.other_length.clone().map(Shortfall::Length));
     if names.held_out {
-        held_out(&mut found, last, names);
+        held_out(&mut found, last, limits.verdict.min_inside_share, names);
     }
     found
 }
@@ -343,16 +329,18 @@ fn of_joint(
     names: &Names,
 ) {
     let joint = || names.joints[place].clone();
-    if let Some(Clipping { share, torque, stated }) = shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED) {
+    if let Some(Clipping { share, torque, stated }) =
+        shown.clipping.filter(|clipping| clipping.share > limits.verdict.max_clipped_share)
+    {
         let beyond = last.max_tracking_error_rad[place] > limits.tracking_tolerance;
-        // Without a stated limit a flat top is a matter of the drive only where the joint does not follow, and no
-        // more was commanded.
+        // Without a stated limit, constant peak torque indicates saturation only if the joint does not follow and no
+        // larger torque was commanded.
         if stated || beyond && !last.has_commanded_torque(place) {
             found.push(Shortfall::Clipping { joint: joint(), percent: 100.0 * share, torque, stated });
         }
     }
     let of_run = shown.prediction.filter(|_| !names.held_out);
-    if let Some(prediction) = of_run.filter(|prediction| prediction.inside < LEAST_INSIDE) {
+    if let Some(prediction) = of_run.filter(|prediction| prediction.inside < limits.verdict.min_inside_share) {
         found.push(Shortfall::Prediction {
             joint: joint(),
             inside_percent: 100.0 * prediction.inside,
@@ -362,7 +350,7 @@ fn of_joint(
     }
     let sigma = last.estimate.as_ref().map_or(0.0, |estimate| {
         let (sigma, near_rest) = (estimate.joint_sigma[place], estimate.near_rest.get(place));
-        // What is left near rest is the friction's that holds the joint, up to what that can be.
+        // Stiction explains the residual near rest up to its maximum.
         near_rest.and_then(|found| found.as_ref()?.unexplained_nm(sigma)).unwrap_or(sigma)
     });
     let beyond_noise = (sigma * sigma - shown.row_noise * shown.row_noise).max(0.0).sqrt();
@@ -372,8 +360,7 @@ fn of_joint(
     }
 }
 
-/// What the held-out run after the last one speaks against.
-fn held_out(found: &mut Vec<Shortfall>, last: &RunRecord, names: &Names) {
+fn held_out(found: &mut Vec<Shortfall>, last: &RunRecord, min_inside_share: f64, names: &Names) {
     let Some(run) = &last.held_out else {
         found.push(Shortfall::NotHeldOut);
         return;
@@ -385,7 +372,7 @@ fn held_out(found: &mut Vec<Shortfall>, last: &RunRecord, names: &Names) {
     };
     for (place, shown) in evidence.joints.iter().enumerate() {
         let Some(prediction) = shown.prediction else { continue };
-        if prediction.inside < LEAST_INSIDE {
+        if prediction.inside < min_inside_share {
             found.push(Shortfall::HeldOutPrediction {
                 joint: names.joints[place].clone(),
                 inside_percent: 100.0 * prediction.inside,
@@ -396,8 +383,8 @@ fn held_out(found: &mut Vec<Shortfall>, last: &RunRecord, names: &Names) {
     }
 }
 
-/// What is left of the lag that all joints share, where it is beyond its bar and moves torque. A torque that is held
-/// from sample to sample is half a sample late by itself. What joints do not share is friction's, and is judged as
+/// Lag of all joints after compensation, if it exceeds its interval and is large enough to matter. Torque that is held
+/// from sample to sample is half a sample late. Differences between joints come from friction and are reported as
 /// unexplained torque.
 fn unexplained_lag(lag: &LagChoice, log_rates_hz: &[f64]) -> Option<TorqueLag> {
     let slowest_hz = log_rates_hz.iter().copied().filter(|hz| *hz > 0.0).fold(f64::INFINITY, f64::min);
@@ -405,9 +392,9 @@ fn unexplained_lag(lag: &LagChoice, log_rates_hz: &[f64]) -> Option<TorqueLag> {
     (rest.matters && rest.lag_s.abs() > 0.5 / slowest_hz + rest.half_width_95_s).then_some(rest)
 }
 
-/// The lags of a joint in the last of some good runs and in the one that it differs most from, each by itself, where
-/// one was taken off and they differ clearly.
-fn changed_lag(good: &[&RunRecord], joint: usize) -> Option<(TorqueLag, TorqueLag)> {
+/// Lags of a joint in the last good run and in the run that differs most from it, if a lag was compensated and they
+/// differ significantly.
+fn changed_lag(good: &[&RunRecord], joint: usize, min_ratio: f64) -> Option<(TorqueLag, TorqueLag)> {
     let (last, before) = good.split_last()?;
     let taken_off = good.iter().filter_map(|record| record.estimate.as_ref()).chain(last.knowledge());
     if taken_off.into_iter().all(|estimate| estimate.lag.taken_off().is_none()) {
@@ -417,10 +404,11 @@ fn changed_lag(good: &[&RunRecord], joint: usize) -> Option<(TorqueLag, TorqueLa
     let now = lag_of(last)?;
     let bars = |then: &TorqueLag| (now.lag_s - then.lag_s).abs() / now.half_width_95_s.hypot(then.half_width_95_s);
     let then = before.iter().filter_map(|record| lag_of(record)).max_by(|a, b| bars(a).total_cmp(&bars(b)))?;
-    (bars(&then) > CLEARLY_OTHER).then_some((now, then))
+    (bars(&then) > min_ratio).then_some((now, then))
 }
 
-/// The parameter that moved most, if one moved too far, and the one that is least known, if it is hardly known.
+/// Reports the parameter that changed most, if it changed too much, and the parameter with the widest error bar, if it
+/// is too wide.
 fn parameters(
     found: &mut Vec<Shortfall>,
     old: &RunEstimate,
@@ -451,8 +439,8 @@ fn parameters(
     }
 }
 
-/// Whether a further run of the same motion would tell little: the last two good runs have one model-based controller,
-/// no parameter moved beyond its bars or is hardly known, and tracking is inside the tolerance or no longer falls.
+/// Whether a further run of the same motion would add little: the last two good runs used the undamped model-based
+/// controller, no parameter changed or is uncertain, and tracking is within the tolerance or no longer improves.
 pub(crate) fn stands_still(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> bool {
     let [.., before, last] = records else { return false };
     if !(before.accepted && last.accepted && last.controller.model.is_some() && last.controller.damping == 1.0) {
@@ -478,7 +466,7 @@ mod tests {
     }
 
     /// A correct TX40, whose log was 6.2 ms late: the estimate was 15.0 ms with a 95 % interval of 5.0 ms, and the
-    /// iteration named a lag above 10 ms.
+    /// iteration reported a lag above 10 ms.
     #[test]
     fn a_lag_is_long_only_beyond_its_interval() {
         assert_eq!(long_lag(&lag(-15.0e-3, 5.02e-3), 10.0e-3), None);

@@ -1,11 +1,9 @@
-//! The course of an iteration: corrected logs, held-out runs, planned runs and stops, in turn.
-
 use crate::convergence::Shortfall;
 use crate::drive::{CorrectedLog, NextRunMotion, PlannedRun};
 use crate::error::IterationError;
 use crate::forecast::MotionForecast;
 use crate::good_log::GoodLog;
-use crate::held_out::HeldOutCame;
+use crate::held_out::HeldOutOutcome;
 use crate::held_out_motion::HeldOutMotion;
 use crate::iteration::Iteration;
 use crate::policy::{Next, RunPlan};
@@ -26,21 +24,22 @@ pub struct IterationOutcome {
     pub shortfalls: Vec<Shortfall>,
     /// Every run.
     pub runs: Vec<RunRecord>,
-    /// The predicted gain of a further run, where all conditions are met and the gain was too small for another run.
+    /// Forecast for a further run, if all conditions are met and its gain was too small.
     pub declined: Option<MotionForecast>,
 }
 
-/// Runs, identifies and repeats until tracking and parameters have converged: the first run by a controller without a
-/// model or by the prior, then by the model-based controller with the newest estimate. A run that got worse (its
-/// tracking, a broken limit, divergence) is rejected: the step from the last good parameters to the new ones is halved,
-/// and if that does not help the controller without a model comes back, stiffer.
+/// Runs, identifies and repeats until tracking and parameters have converged. The first run uses a controller without a
+/// model, or the nominal model; later runs use the model-based controller with the newest estimate. A run that got
+/// worse (worse tracking, a broken limit, divergence) is rejected and the step from the last good parameters to the new
+/// ones is halved; if that does not help, the iteration falls back to the controller without a model, with higher
+/// gains.
 ///
-/// `robots` holds one robot for all legs, or one for each. With a `store`, runs that it holds are not made again, and
-/// each new one is kept before the next begins. `watch` hears of every new run.
+/// `robots` contains one robot for all legs, or one per leg. With a `store`, stored runs are not repeated, and each new
+/// run is stored before the next begins. `watch` is called after every new run.
 ///
 /// # Errors
-/// Settings that do not fit together, files that cannot be written. Faults of the robot are in the records and the
-/// status.
+/// Settings that do not fit together, files that cannot be written. Faults of the robot are reported in the records and
+/// the status.
 pub fn iterate(
     iteration: &Iteration,
     robots: &mut [&mut dyn Robot],
@@ -50,8 +49,8 @@ pub fn iterate(
     iterate_supervised(iteration, robots, store, &mut Watching(watch))
 }
 
-/// [`iterate()`] with a supervisor, who may stop it and is asked before every motion. A run that is stopped is not
-/// used: its record is kept in a separate folder, and the next call repeats the run.
+/// [`iterate()`] with a supervisor, who may stop it and must permit every motion. A run that is
+/// stopped is not used: its log is kept in a separate folder, and the next call repeats the run.
 ///
 /// # Errors
 /// As [`iterate()`].
@@ -71,7 +70,7 @@ pub fn iterate_supervised(
         if let Some(status) = course.waits(supervisor)? {
             return course.outcome(status);
         }
-        // What is known is judged before it is used further.
+        // Validate the newest model before it is used further.
         if let Some(held_out) = iteration.held_out_due(&course.records)? {
             if let Some(status) = course.run_held_out(held_out, &mut *robots[0], supervisor)? {
                 return course.outcome(status);
@@ -92,7 +91,7 @@ pub fn iterate_supervised(
     }
 }
 
-/// The records of earlier calls, without those whose logs were corrected since.
+/// Returns the records of earlier calls, without those whose logs were corrected since.
 fn known_records(
     iteration: &Iteration,
     robots: &[&mut dyn Robot],
@@ -116,7 +115,6 @@ fn known_records(
     Ok(records)
 }
 
-/// The step after the runs that were made.
 enum NextStep {
     Run(RunPlan, NextRunMotion),
     Finished(IterationStatus),
@@ -124,39 +122,34 @@ enum NextStep {
     Declined(IterationStatus, Option<MotionForecast>),
 }
 
-/// An iteration between two runs.
 struct Course<'a> {
     iteration: &'a Iteration,
     store: Option<&'a IterationStore>,
     records: Vec<RunRecord>,
-    /// Logs of the good runs, once they are needed.
+    /// Logs of the good runs, loaded when first needed.
     good: Option<Vec<GoodLog>>,
-    /// Why the newest run ended early, if it did.
     stopped: Option<String>,
-    /// When the robot last moved in this call; earlier motions are not known.
     last_motion: Option<Instant>,
 }
 
 impl Course<'_> {
-    /// The outcome of an iteration that ends here.
     fn outcome(self, status: IterationStatus) -> Result<IterationOutcome, IterationError> {
         let shortfalls = self.iteration.shortfalls(&self.records)?;
         Ok(IterationOutcome { status, shortfalls, runs: self.records, declined: None })
     }
 
-    /// Whether somebody has to look at the robot before the next run.
+    /// Returns the waiting status if a person has to check the robot before the next run.
     fn waits(&self, supervisor: &dyn Supervisor) -> Result<Option<IterationStatus>, IterationError> {
         let Some(why) = self.stopped.as_ref().filter(|_| self.iteration.settings.safety.outside && !supervisor.asks())
         else {
             return Ok(None);
         };
         let next = self.records.len() + 1;
-        let reason = format!("{why}. Look at the robot; the same command goes on with run {next}");
+        let reason = format!("{why}. Check the robot, then repeat the command to continue with run {next}");
         let is_finished = matches!(self.iteration.next(&self.records)?, Next::Finished(_));
         Ok((!is_finished).then_some(IterationStatus::Waiting { reason }))
     }
 
-    /// Makes a held-out run; the status of the iteration if it ends there.
     fn run_held_out(
         &mut self,
         held_out: &HeldOutMotion,
@@ -164,16 +157,17 @@ impl Course<'_> {
         supervisor: &mut dyn Supervisor,
     ) -> Result<Option<IterationStatus>, IterationError> {
         let run = self.records.len();
-        let came = self.iteration.held_out_made(held_out, robot, &self.records, supervisor, &mut self.last_motion)?;
-        match came {
-            HeldOutCame::Stopped(status) => Ok(Some(status)),
-            HeldOutCame::CutShort(runs, why) => {
+        let outcome =
+            self.iteration.held_out_made(held_out, robot, &self.records, supervisor, &mut self.last_motion)?;
+        match outcome {
+            HeldOutOutcome::Stopped(status) => Ok(Some(status)),
+            HeldOutOutcome::CutShort(runs, why) => {
                 let next = format!("the held-out run after run {run}");
                 why.kept(self.store, run, &runs, &next).map(Some)
             }
-            HeldOutCame::Run(found, came) => {
+            HeldOutOutcome::Run(found, robot_run) => {
                 if let (Some(store), Some(last)) = (self.store, self.records.last()) {
-                    store.keep_held_out(last.run, &found, &came)?;
+                    store.keep_held_out(last.run, &found, &robot_run)?;
                 }
                 self.stopped =
                     (!found.done).then(|| format!("the held-out run after run {run} ended early: {}", found.outcome));
@@ -185,7 +179,6 @@ impl Course<'_> {
         }
     }
 
-    /// The next run and its motion, or how the iteration ends.
     fn next(&self, stop: Option<&StopSignal>) -> Result<NextStep, IterationError> {
         let (iteration, records) = (self.iteration, &self.records);
         match iteration.next(records)? {
@@ -194,7 +187,7 @@ impl Course<'_> {
                 let Some(plan) = iteration.further(&status, records) else { return Ok(NextStep::Finished(status)) };
                 let next = iteration.next_motion(records, self.store, stop)?;
                 if stop.is_some_and(StopSignal::is_requested) {
-                    let reason = format!("while the motion of run {} was looked for", plan.run);
+                    let reason = format!("during the search for the motion of run {}", plan.run);
                     return Ok(NextStep::Finished(IterationStatus::Interrupted { reason }));
                 }
                 if !next.forecast.as_ref().is_some_and(|forecast| forecast.worth_a_run) {
@@ -205,7 +198,6 @@ impl Course<'_> {
         }
     }
 
-    /// Makes a planned run; the status of the iteration if it ends there.
     fn run(
         &mut self,
         robots: &mut [&mut dyn Robot],
@@ -214,7 +206,7 @@ impl Course<'_> {
         supervisor: &mut dyn Supervisor,
     ) -> Result<Option<IterationStatus>, IterationError> {
         let Self { iteration, store, records, .. } = self;
-        // Only now: an iteration that has ended needs no logs.
+        // Load the logs only now: an iteration that has ended needs none.
         let good = match &mut self.good {
             Some(good) => good,
             None => self.good.insert(iteration.good_logs(records, *store)?),

@@ -1,25 +1,20 @@
-//! A run that was cut short: it does not count, what was recorded of it is kept beside the runs, and the next call
-//! makes it anew.
+//! A run that was interrupted or failed: it is not used, its log is kept next to the runs, and the next call repeats
+//! it.
 
 use crate::error::IterationError;
 use crate::robot::RobotRun;
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
 
-/// By what a run was cut short, and how it ended, in words.
+/// Why a run was cut short, with its outcome in words.
 #[derive(Clone, Debug)]
 pub(crate) enum CutShort {
-    /// Somebody asked for a stop.
     Interrupted(String),
-    /// The exchange with the robot failed.
     Failed(String),
 }
 
 impl CutShort {
-    /// Keeps what was recorded, after run number `run` or of it; `next` is what the same command goes on with.
-    ///
-    /// # Errors
-    /// A folder that cannot be written.
+    /// Stores the recorded logs under run number `run`; `next` names the step with which a repeated command continues.
     pub(crate) fn kept(
         self,
         store: Option<&IterationStore>,
@@ -29,8 +24,8 @@ impl CutShort {
     ) -> Result<IterationStatus, IterationError> {
         let (Self::Interrupted(how) | Self::Failed(how)) = &self;
         let kept = store.map_or(Ok(None), |store| store.keep_interrupted(run, runs, how))?;
-        let kept = kept.map_or_else(String::new, |path| format!("; what was recorded of it: {}", path.display()));
-        let reason = format!("{how}{kept}. The same command goes on with {next}");
+        let kept = kept.map_or_else(String::new, |path| format!("; its recorded part: {}", path.display()));
+        let reason = format!("{how}{kept}. Repeat the command to continue with {next}");
         Ok(match self {
             Self::Interrupted(_) => IterationStatus::Interrupted { reason },
             Self::Failed(_) => IterationStatus::Refused { reason },

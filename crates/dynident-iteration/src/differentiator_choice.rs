@@ -1,8 +1,7 @@
-//! Which way from positions to velocities and accelerations the rows of a run ask for.
+//! Selection of the differentiator of a run.
 //!
-//! Every way makes the same rows of the same torques, so the way whose motion explains the torques best leaves the
-//! least of them: noise of the velocities and accelerations, what a filter takes from the motion, and a wrong map all
-//! leave more.
+//! All candidates yield rows for the same torques, so the best one has the smallest residual: noise of velocities and
+//! accelerations, motion that a filter removes, and a wrong map all increase the residual.
 
 use crate::error::IterationError;
 use crate::leg::IterationTask;
@@ -15,58 +14,56 @@ use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// A later candidate is taken where it leaves this share less of the torque than those before it: less is chance in
-/// some thousand rows.
-const CLEARLY_LESS: f64 = 0.02;
-/// A way that can be applied to less than this share of the samples of another is not taken, however well it does
-/// there.
-const LEAST_SHARE: f64 = 0.5;
-/// Longest lag that the paper's map and the time warp look for, s.
+/// Smallest relative reduction of the residual for which a later candidate is preferred; smaller differences occur by
+/// chance in some thousand rows.
+const MIN_RESIDUAL_REDUCTION: f64 = 0.02;
+/// Smallest share of the usable samples of another candidate; a candidate with fewer samples is excluded.
+const MIN_SAMPLES_SHARE: f64 = 0.5;
+/// Largest lag in the search of the paper's map and the time warp, s.
 const MAX_LAG_S: f64 = 0.5;
 
-/// The way that was taken, and the others beside it.
+/// The selected differentiator and the other candidates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DifferentiatorChoice {
-    /// The way that was taken.
+    /// The selected differentiator.
     pub taken: DifferentiatorSettings,
     /// Its name.
     pub name: String,
-    /// All that were tried, in their order.
+    /// All candidates, in order.
     pub candidates: Vec<DifferentiatorCandidate>,
 }
 
-/// A way that was tried.
+/// A candidate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DifferentiatorCandidate {
     /// Its name.
     pub name: String,
-    /// Samples that it can be applied to.
+    /// Number of usable samples.
     pub samples: usize,
-    /// What it leaves of the torque over what the one taken leaves, on the samples that all can be applied to:
-    /// geometric mean over the rows of all joints of the residuals' standard deviations. None where it was not fitted.
+    /// Ratio of its residual to that of the selected one, on the samples that are usable for all: geometric mean, over
+    /// the rows of all joints, of the standard deviations. `None` if it was not fitted.
     pub residual_ratio: Option<f64>,
     /// Why it was not fitted.
     pub problem: Option<String>,
 }
 
 impl DifferentiatorChoice {
-    /// What was taken and why, in a sentence without a full stop.
+    /// Returns the selection and its reason in a sentence without a full stop.
     pub fn sentence(&self) -> String {
         let others = self.candidates.iter().filter(|candidate| candidate.name != self.name).map(|candidate| {
             match (candidate.residual_ratio, &candidate.problem) {
-                (Some(ratio), _) => format!("{} leaves {ratio:.2} times as much", candidate.name),
+                (Some(ratio), _) => format!("{} has {ratio:.2} times the residual", candidate.name),
                 (None, Some(problem)) => format!("{} was not tried ({problem})", candidate.name),
                 (None, None) => format!("{} was not tried", candidate.name),
             }
         });
         let others: Vec<String> = others.collect();
-        format!("{} was taken by what is left of the torque: {}", self.name, others.join(", "))
+        format!("{} was selected by its torque residual: {}", self.name, others.join(", "))
     }
 }
 
-/// The ways that are tried, the usual one first.
 fn candidates() -> [(&'static str, DifferentiatorSettings); 4] {
     let reference = ReferenceSettings::default;
     let smoother = Box::default;
@@ -81,16 +78,17 @@ fn candidates() -> [(&'static str, DifferentiatorSettings); 4] {
     ]
 }
 
-/// The way that leaves the least of the torques of a run, friction chosen for each where it is left to the data.
+/// Selects the differentiator with the smallest torque residual of a run. Friction is selected for each candidate if
+/// the settings request it.
 ///
 /// # Errors
-/// A run that none of them can be applied to.
+/// A run to which no candidate can be applied.
 pub(crate) fn choose_differentiator(
     task: &IterationTask,
     records: &[Record],
     settings: &RunIdentificationSettings,
 ) -> Result<DifferentiatorChoice, IterationError> {
-    // Each way's motion of the run.
+    // The motion of the run by each candidate.
     let mut tried: Vec<(DifferentiatorCandidate, DifferentiatorSettings, Vec<Recording>)> = Vec::new();
     let mut last_error = None;
     for (name, way) in candidates() {
@@ -109,14 +107,14 @@ pub(crate) fn choose_differentiator(
     }
     let most = tried.iter().map(|(candidate, ..)| candidate.samples).max().unwrap_or(0);
     for (candidate, _, motions) in &mut tried {
-        if !motions.is_empty() && (candidate.samples as f64) < LEAST_SHARE * most as f64 {
+        if !motions.is_empty() && (candidate.samples as f64) < MIN_SAMPLES_SHARE * most as f64 {
             let percent = 100.0 * candidate.samples as f64 / most.max(1) as f64;
-            candidate.problem = Some(format!("it applies to {percent:.0} % of the samples only"));
+            candidate.problem = Some(format!("only {percent:.0} % of the samples are usable"));
             motions.clear();
         }
     }
 
-    // The same samples for all of them, then what each leaves.
+    // Residual of each candidate on the same samples.
     let masks = common_samples(tried.iter().map(|(.., motions)| &motions[..]));
     let mut best: Option<(usize, f64)> = None;
     let mut residuals = vec![None; tried.len()];
@@ -125,7 +123,7 @@ pub(crate) fn choose_differentiator(
         match residual(task, motions, &settings.with_differentiator(way)) {
             Ok(left) => {
                 residuals[place] = Some(left);
-                if best.is_none_or(|(_, least)| left < least + (1.0 - CLEARLY_LESS).ln()) {
+                if best.is_none_or(|(_, least)| left < least + (1.0 - MIN_RESIDUAL_REDUCTION).ln()) {
                     best = Some((place, left));
                 }
             }
@@ -137,7 +135,7 @@ pub(crate) fn choose_differentiator(
     }
     let none = || IterationError::Record {
         joints: task.robot.joint_names(),
-        problem: "no way from positions to velocities can be applied to it".to_owned(),
+        problem: "no differentiator can be applied to it".to_owned(),
     };
     let Some((best, least)) = best else { return Err(last_error.unwrap_or_else(none)) };
     let (name, taken) = (tried[best].0.name.clone(), tried[best].1.clone());
@@ -148,7 +146,6 @@ pub(crate) fn choose_differentiator(
     Ok(DifferentiatorChoice { taken, name, candidates })
 }
 
-/// Samples of a motion that can be used.
 fn usable(recording: &Recording) -> usize {
     match &recording.samples {
         Samples::Motion(record) if record.usable.is_empty() => record.motion.rows,
@@ -157,7 +154,7 @@ fn usable(recording: &Recording) -> usize {
     }
 }
 
-/// Of each recording the samples that every way can use, and the torques that any of them sets aside.
+/// The samples of a recording that all candidates can use, and the torques that any of them excludes.
 #[derive(Clone, Default)]
 struct CommonSamples {
     usable: Vec<bool>,
@@ -177,7 +174,7 @@ fn common_samples<'a>(ways: impl Iterator<Item = &'a [Recording]>) -> Vec<Common
     common
 }
 
-/// Marks of both; an empty list is one of `usual` marks.
+/// Combines two lists of flags; a missing flag has the value `usual`.
 fn merge(into: &mut Vec<bool>, other: &[bool], usual: bool, both: impl Fn(bool, bool) -> bool) {
     into.resize(into.len().max(other.len()), usual);
     for (into, other) in into.iter_mut().zip(other) {

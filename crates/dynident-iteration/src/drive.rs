@@ -1,7 +1,5 @@
-//! The steps of an iteration: the next motion, its run, its examination and judgement.
-
 use crate::before_motion::motions;
-use crate::commanding::{Came, Prepared, folder_number};
+use crate::commanding::{MotionOutcome, Prepared, folder_number};
 use crate::cut_short::CutShort;
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_runs};
@@ -28,22 +26,19 @@ use std::borrow::Cow;
 use std::path::Path;
 use std::time::Instant;
 
-/// The motion of a run: its own trajectories, if they are not the task's, and what they are expected to bring.
+/// The motion of a run: its own trajectories, if they differ from the task's, and the forecast of their information.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NextRunMotion {
     pub(crate) motion: Option<RunMotion>,
     pub(crate) forecast: Option<MotionForecast>,
 }
 
-/// The result of a planned run.
 pub(crate) enum PlannedRun {
     Run(Box<RunRecord>, Vec<RobotRun>),
     Stopped(IterationStatus),
-    /// The record of a run that is not used, and the reason.
     CutShort(Vec<RobotRun>, CutShort),
 }
 
-/// A log that was corrected after it had been read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CorrectedLog {
     Run,
@@ -51,7 +46,6 @@ pub(crate) enum CorrectedLog {
 }
 
 impl Iteration {
-    /// The motion of the run after `records`, as an earlier call has planned it or planned now.
     pub(crate) fn next_motion(
         &self,
         records: &[RunRecord],
@@ -60,7 +54,7 @@ impl Iteration {
     ) -> Result<NextRunMotion, IterationError> {
         let good = records.iter().rev().find(|record| record.accepted && record.estimate.is_some());
         let (Some(planner), Some(good)) = (&self.planner, good) else { return Ok(NextRunMotion::default()) };
-        // After a run that does not count, the motion that the robot is known to follow.
+        // After a rejected run, the last motion that the robot followed.
         if good.run != records.len() {
             return Ok(NextRunMotion { motion: good.motion.clone(), forecast: None });
         }
@@ -71,7 +65,7 @@ impl Iteration {
         } else {
             let (task, _) = self.in_force(records)?;
             let planned = planned_motion(&**planner, &task, records, self.settings.pool, stop)?;
-            // A search that was cut short is not this run's motion.
+            // A plan from an interrupted search is not stored.
             if let Some(store) = store.filter(|_| !stop.is_some_and(StopSignal::is_requested)) {
                 store.keep_planned(run, &planned)?;
             }
@@ -80,13 +74,12 @@ impl Iteration {
         Ok(NextRunMotion { motion: motion.or_else(|| good.motion.clone()), forecast: Some(forecast) })
     }
 
-    /// A run for its motion alone, if everything is met, motions are planned, and one is left.
+    /// Returns a run for an additional motion, if the iteration has converged, motions are planned, and a run is left.
     pub(crate) fn further(&self, status: &IterationStatus, records: &[RunRecord]) -> Option<RunPlan> {
         let open = self.planner.is_some() && status.is_converged() && records.len() < self.settings.max_runs;
-        open.then(|| policy::further(records)).flatten()
+        open.then(|| policy::further(records, &self.settings.settled.verdict)).flatten()
     }
 
-    /// Makes one run: every leg on its robot, then the identification.
     pub(crate) fn made(
         &self,
         robots: &mut [&mut dyn Robot],
@@ -109,31 +102,31 @@ impl Iteration {
         for motion in motions(task, &self.settings, before, passes) {
             let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[motion.place] };
             let with = (task, plan, &prepared);
-            let came = match self.commanded(*robot, with, &motion, supervisor, last_motion)? {
-                Came::Run(came) => came,
-                Came::Stopped(status) => return Ok(PlannedRun::Stopped(status)),
-                Came::CutShort(came, why) => {
-                    runs.extend(came);
+            let outcome = match self.commanded(*robot, with, &motion, supervisor, last_motion)? {
+                MotionOutcome::Run(run) => run,
+                MotionOutcome::Stopped(status) => return Ok(PlannedRun::Stopped(status)),
+                MotionOutcome::CutShort(run, why) => {
+                    runs.extend(run);
                     return Ok(PlannedRun::CutShort(runs, why));
                 }
             };
-            let done = came.status.is_done();
+            let done = outcome.status.is_done();
             if !motion.is_run() {
                 if !done {
                     let reason = format!(
-                        "{} run {} ended early: {}. Look at the robot; the same command begins it anew",
+                        "{} run {} ended early: {}. Check the robot, then repeat the command to restart the run",
                         motion.words(),
                         plan.run,
-                        came.ending(&*motion.reference()?, self.lowest_oscillation_hz())
+                        outcome.ending(&*motion.reference()?, self.lowest_oscillation_hz())
                     );
                     return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
                 }
                 if let RunPurpose::WarmUp { pass, .. } = motion.purpose {
-                    warm_up.add(pass, motion.leg.reference(), &came.record);
+                    warm_up.add(pass, motion.leg.reference(), &outcome.record);
                 }
                 continue;
             }
-            runs.push(came);
+            runs.push(outcome);
             if !done {
                 break;
             }
@@ -152,7 +145,8 @@ impl Iteration {
         Ok(PlannedRun::Run(Box::new(record), runs))
     }
 
-    /// What a finished run's records say: parameters, alone and with the good runs before it, and what its log shows.
+    /// Examines a finished run: the estimate from the run alone and with the earlier good runs, and the evidence in its
+    /// log.
     fn examine(
         &self,
         record: &mut RunRecord,
@@ -202,7 +196,7 @@ impl Iteration {
         let before_it = if self.settings.pool { earlier } else { &[] };
         let runs: Vec<RunLog<'_>> = before_it.iter().map(GoodLog::as_run).chain([run]).collect();
         if runs.len() > 1 {
-            // Where all together cannot be fitted the newest stands alone.
+            // If the joint fit fails, the estimate of the newest run is used.
             record.pooled = identify_runs(&task, &runs, &settings).ok().filter(|found| found.impossible.is_none());
         }
         let all: Vec<RunRecord> = before.iter().cloned().chain([record.clone()]).collect();
@@ -210,21 +204,25 @@ impl Iteration {
         let task = IterationTask { legs: legs.clone(), ..task.into_owned() };
         let after = record.pooled.as_ref().unwrap_or(&own);
         let errors = &record.max_tracking_error_rad;
-        // The first good run is not judged, whatever it was under.
+        // The first good run is not checked against its tracking floor or for other lengths.
         let is_judged = known.is_some() && record.controller.model.is_some();
         if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
             add_tracking_floors(evidence, &task, records, &self.settings, after, &in_force.friction_before, errors);
-            evidence.other_length = other_length(&task, &runs, &settings, after)?;
+            let thresholds = &self.settings.settled.verdict.lengths;
+            evidence.other_length = other_length(&task, &runs, &settings, after, thresholds)?;
         }
         let fitted = Some((&task, &runs[..], &*settings));
         record.torque_check = self.torque_check(record, records, before, earlier, prepared, fitted)?;
         Ok(())
     }
 
-    /// Whether the run counts as good.
     fn judge(&self, record: &mut RunRecord, before: &[RunRecord]) -> Result<(), IterationError> {
         let names = self.names(&*self.robot(before)?, before)?;
-        let following = following_limits(&self.legs_of(record)?, self.task.robot.dof());
+        let following = following_limits(
+            &self.legs_of(record)?,
+            self.task.robot.dof(),
+            self.settings.settled.verdict.following_error_bounds,
+        );
         match policy::verdict(record, before, &self.settings, &following, &names) {
             Ok(()) => record.accepted = true,
             Err(reason) => record.reason = Some(reason.to_string()),
@@ -272,7 +270,7 @@ impl Iteration {
         }
     }
 
-    /// Which log of the newest run a person has corrected since it was read, if any.
+    /// Returns the log of the newest run that a person has corrected since it was read, if any.
     pub(crate) fn corrected_log(
         &self,
         robots: &[&mut dyn Robot],
@@ -302,7 +300,7 @@ impl Iteration {
         }))
     }
 
-    /// The logs of the good runs among `records`, from the store: what further runs are identified together with.
+    /// Returns the logs of the good runs among `records` from the store, for the joint identification.
     pub(crate) fn good_logs(
         &self,
         records: &[RunRecord],
@@ -313,7 +311,6 @@ impl Iteration {
         self.logs_of(&records.iter().filter(good).collect::<Vec<_>>(), store)
     }
 
-    /// The logs of these runs.
     pub(crate) fn logs_of(
         &self,
         records: &[&RunRecord],

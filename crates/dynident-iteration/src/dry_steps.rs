@@ -1,12 +1,12 @@
-//! Friction of a simulated robot whose step at rest is narrower than runs can tell: it is dry friction.
+//! Friction with a step at rest that is too narrow to be identified: simulated as dry friction.
 
 use crate::rests::MOVING;
 use dynident_identification::friction::JointFriction;
 use dynident_model::terms::{CoulombShape, TorqueTerm};
 
-/// The laws of a robot that is simulated along a motion with these highest speeds: a step of friction that is narrower
-/// than the speed below which a joint rests is dry friction with stiction. Runs cannot tell it from one, it holds a
-/// joint that the controller does not move, and it needs no short steps of the integrator.
+/// Replaces narrow friction steps by dry friction with stiction, for a simulation along a motion with these highest
+/// speeds. A step is narrow if its width is below the speed at which a joint is at rest: runs do not determine the
+/// width, dry friction holds a joint at rest, and it needs no short integration steps.
 pub(crate) fn with_dry_steps(terms: &[TorqueTerm], fastest: &[f64]) -> Vec<TorqueTerm> {
     let dry = |term: &TorqueTerm| {
         let fastest = term.joints().into_iter().map(|joint| fastest[joint]).fold(0.0, f64::max);
@@ -18,10 +18,10 @@ pub(crate) fn with_dry_steps(terms: &[TorqueTerm], fastest: &[f64]) -> Vec<Torqu
     terms.iter().map(dry).collect()
 }
 
-/// The same terms with their parameters where joints stick with all of their friction: those whose narrowest step may
-/// be that of dry friction, by its width or by the 95 % interval of the width that runs `chose` for the joint of this
-/// name. One joint has one friction, and of a step that smoothing hides its terms tell widths of their own. `None`
-/// where no joint sticks with more than by [`with_dry_steps`].
+/// The terms and parameters with sticking joints: joints whose narrowest step may be dry friction, by its width or by
+/// the 95 % interval of the width that runs `chose` for the joint of this name. All friction terms of such a joint
+/// become dry, because their separate widths are not reliable when smoothing hides the step. `None` if this adds no
+/// joint to those of [`with_dry_steps`].
 pub(crate) fn with_sticking_joints(
     terms: &[TorqueTerm],
     parameters: &[f64],
@@ -87,11 +87,11 @@ mod tests {
         let fastest = [0.5, 0.5];
         let sticking = |chose: &[JointFriction]| with_sticking_joints(&terms, &parameters, &names, chose, &fastest);
 
-        // The first joint's Coulomb friction is dry by its width, and so is the rest of its friction then.
+        // The first joint's Coulomb friction is dry by its width; then all of its friction is dry.
         let of_width = (vec![coulomb(0, SIGN), stribeck(SIGN), sigmoid], parameters.to_vec());
         assert_eq!(sticking(&[]), Some(of_width));
 
-        // The second's may be by the interval of its steepness: half a step of both directions together.
+        // The second joint's may be dry by the interval of its steepness: half a step of both directions together.
         let steepness = FrictionConstant {
             term: "sigmoid".to_owned(),
             constant: "steepness".to_owned(),
@@ -106,7 +106,7 @@ mod tests {
         assert_eq!(sticking(&chosen([10.0, 250.0])), Some(of_interval));
         assert_ne!(sticking(&chosen([10.0, 150.0])), sticking(&chosen([10.0, 250.0])));
 
-        // Wide steps are no dry friction, and one that is dry in any case is nothing more.
+        // Wide steps are not dry friction; steps that are already dry change nothing.
         let plain = [coulomb(0, smooth(0.02)), coulomb(1, smooth(0.005))];
         assert_eq!(with_sticking_joints(&plain, &[1.0, 1.0], &names, &[], &fastest), None);
     }

@@ -1,5 +1,4 @@
-//! What can be wrong with an iteration. How it went is its status, not an error: see
-//! [`IterationStatus`](super::IterationStatus).
+//! Errors of an iteration. Its outcome is a status, not an error: see [`IterationStatus`](super::IterationStatus).
 
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
@@ -10,41 +9,41 @@ use dynident_simulation::SimulationError;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Why an iteration cannot be made or go on.
+/// Why an iteration cannot be created or continued.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum IterationError {
-    /// A robot, a controller or a setting.
+    /// Invalid robot, controller or setting.
     #[error(transparent)]
     Experiment(#[from] SimulationError),
-    /// A robot whose parts do not fit.
+    /// Parts of the robot that do not fit together.
     #[error(transparent)]
     Model(#[from] ParametricModelError),
-    /// Friction that an earlier run is said to have chosen and that this robot cannot have.
+    /// Stored friction of an earlier run that does not fit this robot.
     #[error(
-        "the friction that run {run} chose does not fit this robot: {source}; start afresh, or give another folder"
+        "the friction that run {run} selected does not fit this robot: {source}; start afresh, or use another folder"
     )]
     ChosenFriction {
         /// The run.
         run: usize,
-        /// What is wrong.
+        /// The mismatch.
         source: ParametricModelError,
     },
-    /// Rows that do not carry a model.
+    /// Rows that are not sufficient for a model.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
-    /// A differentiator or a filter.
+    /// Invalid differentiator or filter.
     #[error(transparent)]
     Filter(#[from] FilterError),
-    /// Rows that do not carry an estimate.
+    /// Rows that are not sufficient for an estimate.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
-    /// A record that cannot be used.
+    /// An unusable record.
     #[error("record of joints {}: {problem}", joints.join(", "))]
     Record {
         /// Its joints.
         joints: Vec<String>,
-        /// What is wrong, and the fix.
+        /// The problem and its fix.
         problem: String,
     },
     /// A run whose motion cannot be planned.
@@ -52,23 +51,23 @@ pub enum IterationError {
     Planning {
         /// The run.
         run: usize,
-        /// What is wrong, and the fix.
+        /// The problem and its fix.
         problem: String,
     },
-    /// A file of the iteration's folder that cannot be read or written. What was there before is untouched.
-    #[error("{}: {source}; nothing that was there has changed", path.display())]
+    /// A file of the iteration's folder that cannot be read or written; existing files are unchanged.
+    #[error("{}: {source}; existing files are unchanged", path.display())]
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A file of the iteration's folder that holds something else.
+    /// A file of the iteration's folder with invalid content.
     #[error("{}: {problem}", path.display())]
     State {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and the fix.
+        /// The problem and its fix.
         problem: String,
     },
 }

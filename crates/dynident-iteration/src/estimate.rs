@@ -1,5 +1,3 @@
-//! What runs say about the base parameters: the identification of several together.
-
 use crate::differentiator_choice::DifferentiatorChoice;
 use crate::error::IterationError;
 use crate::leg::IterationTask;
@@ -7,7 +5,7 @@ use crate::model_parameters::ModelParameters;
 use crate::near_rest::NearRest;
 use crate::rests::RestMargin;
 use crate::run_logs::{RunLog, identification_settings, recordings};
-use crate::run_offsets::{RunOffset, choices, deviations, seen};
+use crate::run_offsets::{RunOffset, choices, deviations, is_any_significant};
 use crate::settings::{RunIdentificationSettings, Scheme};
 use crate::step_by_step::step_by_step;
 use dynident_dynamics::ParametricModel;
@@ -22,53 +20,52 @@ use dynident_identification::{
 };
 use serde::{Deserialize, Serialize};
 
-/// What a run says about the base parameters.
+/// Estimate of the base parameters from one run, or from several.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunEstimate {
     /// Base parameters.
     pub values: Vec<f64>,
-    /// Their standard deviations; zero for what was given or is not determined by the data.
+    /// Their standard deviations; zero for parameters that were given or that the data do not determine.
     pub std: Vec<f64>,
-    /// Their covariance, row by row.
+    /// Their covariance, by rows.
     pub covariance: Vec<Vec<f64>>,
-    /// Rows that it was made from.
+    /// Number of rows in the fit.
     pub rows: usize,
     /// Standard deviation of each joint's residual, Nm (N).
     pub joint_sigma: Vec<f64>,
-    /// Base parameters that the data do not determine: they have the prior's values.
+    /// Indices of the base parameters that the data do not determine; they have the nominal values.
     pub fixed: Vec<usize>,
-    /// All parameters of the physically consistent set that fits best, ten for each body and one for each term, if it
-    /// was asked for.
+    /// All parameters of the best physically consistent model, ten per body and one per term, if requested.
     pub possible: Option<Vec<f64>>,
-    /// Why no consistent set was found; none where one was found or not requested.
+    /// Why no physically consistent model was found; `None` if one was found or not requested.
     pub impossible: Option<String>,
-    /// The friction that this run chose, for itself and the runs after it; empty where it was stated or chosen before.
+    /// The friction that this run selected for itself and later runs; empty if it was stated or selected before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub friction: Vec<JointFriction>,
-    /// By how much each joint's torque comes after the motion, with what was taken off; none where the rows do not
-    /// determine it. Empty step by step.
+    /// Lag of each joint's torque behind the motion, including the compensated part; `None` if the rows do not
+    /// determine it. Empty in the joint-by-joint scheme.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_lags: Vec<Option<TorqueLag>>,
-    /// The lag that was taken off the rows, and what all joints share.
+    /// The compensated lag and the lag that all joints share.
     #[serde(default)]
     pub lag: LagChoice,
-    /// The differentiator that the run chose; none where it was stated.
+    /// The selected differentiator; `None` if it was stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differentiator: Option<DifferentiatorChoice>,
-    /// The joints with dry friction whose torque near rest does not count, joint by joint: where rows near rest made
-    /// the fit leave more of it. Empty where they did at none, and of runs together, each of which has its own.
+    /// Joints whose dry friction rows near rest are excluded, because these rows increase the residual; one entry per
+    /// joint. Empty if no rows are excluded, and for runs that are fitted together.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub near_rest: Vec<Option<NearRest>>,
-    /// Where runs that were fitted together have constant torques of their own: by how much each deviates from the
-    /// mean, which the base parameters hold. Empty where they share one.
+    /// Deviation of each run's torque offset from the mean, if runs that are fitted together have separate offsets; the
+    /// base parameters contain the mean. Empty if they share an offset.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub run_offsets: Vec<RunOffset>,
 }
 
 impl RunEstimate {
-    /// What a controller gets: the physically consistent set if it was asked for, else the estimate as it is. None
-    /// where the physically consistent set was asked for and does not exist.
+    /// Returns the model parameters for a controller: the physically consistent model if requested, else the base
+    /// parameters. `None` if the physically consistent model was requested and not found.
     pub fn for_controller(&self) -> Option<ModelParameters> {
         match (&self.possible, &self.impossible) {
             (Some(parameters), _) => Some(ModelParameters::All(parameters.clone())),
@@ -77,14 +74,15 @@ impl RunEstimate {
         }
     }
 
-    /// How far from rest the torque of each joint has to be to count; empty where only rests are set aside.
+    /// Returns the distance from rest above which the rows of each joint are used; empty if only rows at rest are
+    /// excluded.
     pub fn rest_margins(&self) -> Vec<RestMargin> {
         let margin = |near_rest: &Option<NearRest>| near_rest.as_ref().map(|found| found.margin).unwrap_or_default();
         self.near_rest.iter().map(margin).collect()
     }
 
-    /// How many times wider its error bars are than another's: the geometric mean over the parameters that both
-    /// determine; 1 where there is none.
+    /// Geometric mean of the ratio of its error bars to another's, over the parameters that both determine; 1
+    /// without such parameters.
     pub(crate) fn wider_than(&self, other: &Self) -> f64 {
         let pairs = self.std.iter().zip(&other.std).filter(|(own, other)| **own > 0.0 && **other > 0.0);
         let (sum, count) =
@@ -93,10 +91,10 @@ impl RunEstimate {
     }
 }
 
-/// As [`identify_run`](crate::identify_run) from several runs together, each weighted by its own noise joint by joint
-/// ([`LogNoise::Own`](dynident_identification::LogNoise::Own)): bars narrow with every run, and a run that followed its
-/// trajectory badly counts for what it tells. Residuals are those of the last run. Delays are those of all runs.
-/// Where one has a constant torque that the others have not, each gets its own ([`RunOffsets`](super::RunOffsets)).
+/// Identifies several runs together, as [`identify_run`](crate::identify_run) does for one. Each run is weighted by its
+/// own noise, joint by joint ([`LogNoise::Own`](dynident_identification::LogNoise::Own)), so a run with poor tracking
+/// has less weight. Residuals are those of the last run; delays are those of all runs. If the offset of a run differs
+/// from the others, each run gets its own offset ([`RunOffsets`](super::RunOffsets)).
 ///
 /// # Errors
 /// As [`identify_run`](crate::identify_run).
@@ -108,20 +106,23 @@ pub fn identify_runs(
     match (settings.scheme, choices(&task.robot, runs, settings.run_offsets)) {
         (Scheme::AllJoints, &[shared, own]) => {
             let shared = fitted(task, runs, settings, shared)?;
-            // A fit that fails with more columns is no reason for any.
+            // A failed fit with separate offsets is not an error: the shared offset is used.
             let own = fitted(task, runs, settings, own).ok();
-            Ok(own.filter(|own| own.impossible.is_none() && seen(&own.run_offsets, runs)).unwrap_or(shared))
+            Ok(own
+                .filter(|own| own.impossible.is_none() && is_any_significant(&own.run_offsets, runs))
+                .unwrap_or(shared))
         }
         (Scheme::AllJoints, &[one]) => fitted(task, runs, settings, one),
         _ => fitted(task, runs, settings, OffsetChoice::Shared),
     }
 }
 
-/// The fit with one offset of a joint for all runs, or one for each.
+/// Fits with a shared offset per joint, or one per run.
 ///
-/// Friction that is chosen with a lag in the rows can make up for it, at each joint for another part, so that no common
-/// lag is seen beyond its bar any more. So where friction is chosen and none was taken off, that of the stated friction
-/// is, whatever its bar, and the fit counts that says most of the rows with the fewest parameters ([`schwarz`]).
+/// Friction that is selected from rows with a lag can compensate the lag, differently at each joint, so that the common
+/// lag becomes insignificant. Therefore, if friction was selected and no lag was compensated, the fit is repeated with
+/// the lag of the stated friction, whatever its error bar, and the fit with the smaller Bayesian information criterion
+/// ([`schwarz`]) is kept.
 fn fitted(
     task: &IterationTask,
     runs: &[RunLog<'_>],
@@ -145,18 +146,16 @@ fn fitted(
         return Ok(found.estimate);
     };
     let first = LagChoice { kind: LagKind::Common, lag_s: vec![lag_s; task.robot.dof()], ..LagChoice::default() };
-    // Where the rows cannot be fitted so, they are as they were.
+    // If that fit fails, the first one is kept.
     let other = fit.rounds(&identification, LagRounds::of(identification.lags).after(first));
     Ok(other.ok().filter(|other| other.schwarz < found.schwarz).unwrap_or(found).estimate)
 }
 
-/// A fit and how much it says of its rows.
 struct RunsEstimate {
     estimate: RunEstimate,
     schwarz: f64,
 }
 
-/// Runs that are fitted together.
 struct RunsFit<'a> {
     task: &'a IterationTask,
     runs: &'a [RunLog<'a>],
@@ -165,7 +164,6 @@ struct RunsFit<'a> {
 }
 
 impl RunsFit<'_> {
-    /// Fits from these rounds on, until the rows show no lag that moves parameters.
     fn rounds(
         &self,
         identification: &IdentificationSettings,
@@ -183,7 +181,7 @@ impl RunsFit<'_> {
                 training_rows(&logs, &identification, chosen.model.clone(), &all, &settings.payloads, None)?;
             training.friction_choice.clone_from(&chosen.joints);
             if training.problem.joint_rows().iter().sum::<usize>() == 0 {
-                let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
+                let problem = "no usable sample: the differentiator is valid nowhere in the windows; check its settings and the tracking error".to_owned();
                 return Err(IterationError::Record { joints: robot.joint_names(), problem });
             }
             if settings.scheme == Scheme::StepByStep {
@@ -206,7 +204,7 @@ impl RunsFit<'_> {
     }
 }
 
-/// For each recording and joint what its rows are multiplied by: the noise of the last run over that of its own.
+/// Row weights of each recording and joint: noise of the last run over noise of the recording's run.
 fn run_weights(task: &IterationTask, runs: &[RunLog<'_>]) -> Vec<Vec<f64>> {
     let sigma = |log: &RunLog<'_>, joint: usize| log.joint_sigma.get(joint).copied().filter(|sigma| *sigma > 0.0);
     let of_run = |log: &RunLog<'_>| -> Vec<f64> {
@@ -216,7 +214,6 @@ fn run_weights(task: &IterationTask, runs: &[RunLog<'_>]) -> Vec<Vec<f64>> {
     runs.iter().flat_map(|log| core::iter::repeat_n(of_run(log), log.legs.len())).collect()
 }
 
-/// All joints at once.
 fn all_joints(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -252,7 +249,7 @@ fn all_joints(
     })
 }
 
-/// The paper's order: each joint from its own rows, tip first.
+/// The paper's order: each joint from its own rows, from tip to base.
 fn joint_by_joint(
     task: &IterationTask,
     logs: &Logs<'_>,
@@ -289,7 +286,7 @@ fn joint_by_joint(
     })
 }
 
-/// All parameters of the consistent set that fits best, or why there is none.
+/// All parameters of the best physically consistent model, or why it was not found.
 fn consistent(
     robot: &ParametricModel,
     problem: &LinearProblem,

@@ -1,35 +1,34 @@
-//! What a run's log shows beside parameters: what the verdict on an iteration rests on.
+//! Evidence in a run's log in addition to the parameters, for the verdict on an iteration.
 
 use crate::lengths::OtherLength;
 use crate::oscillation::Oscillation;
 use serde::{Deserialize, Serialize};
 
-/// What the log of one run shows of one joint.
+/// Evidence of one joint in the log of one run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointEvidence {
     /// Root mean square of the logged torque, Nm (N).
     pub torque_rms: f64,
-    /// Standard deviation of the noise that one logged torque has, Nm (N), without steps of friction: the lower
-    /// quartile over short windows, octave by octave above the motion.
+    /// Standard deviation of the noise of a logged torque sample, Nm (N), without friction steps: the lower quartile
+    /// over short windows, octave by octave above the motion.
     pub torque_noise: f64,
-    /// Standard deviation of the same noise in a row of the fit, Nm (N), by its density just above the motion.
+    /// Standard deviation of the same noise in a row of the fit, Nm (N), from its density just above the motion.
     pub row_noise: f64,
-    /// Samples at the drive's limit; none where no torque stands still at its largest.
+    /// Samples at the drive's limit; `None` without saturation.
     pub clipping: Option<Clipping>,
-    /// Torque that oscillates far above the motion's frequencies; none where it does not.
+    /// Torque oscillation far above the frequencies of the motion; `None` otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub oscillation: Option<Oscillation>,
-    /// What the model of the runs before says of this run, before it was fitted to; none for the first.
+    /// Prediction of this run by the model of the earlier runs, before the run was fitted; `None` for the first.
     pub prediction: Option<Prediction>,
-    /// The distance from the trajectory that the noise of the log, the friction found, the measured lag and the
-    /// feedback's delay explain, rad (m): the largest of a run that is simulated with the robot found and the same
-    /// controller with that robot as its model. None where tracking is inside the tolerance, and where there is no
-    /// physically consistent robot.
+    /// Tracking error that the noise of the log, the friction, the lag and the feedback delay explain, rad (m): the
+    /// largest error of a simulated run with the estimated robot and the same controller with that robot as its model.
+    /// `None` if tracking is within the tolerance, or without a physically consistent model.
     pub tracking_floor_rad: Option<f64>,
 }
 
-/// Torque that stands at the drive's limit.
+/// Torque at the drive's limit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Clipping {
@@ -37,15 +36,15 @@ pub struct Clipping {
     pub share: f64,
     /// The torque, Nm (N).
     pub torque: f64,
-    /// Whether it is a stated limit; otherwise the log alone shows it: its largest torques are all the same.
+    /// Whether it is a stated limit; otherwise it follows from constant peak torque in the log.
     pub stated: bool,
 }
 
-/// How well a model predicts a run that it was not fitted to.
+/// How well a model predicts a run that was not used for its fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Prediction {
-    /// Rows that count.
+    /// Number of rows.
     pub rows: usize,
     /// Share of them inside the 95 % band `W θ ± 1.96 √(w V wᵀ + σ²)`, 0 to 1.
     pub inside: f64,
@@ -55,20 +54,20 @@ pub struct Prediction {
     pub half_width: f64,
 }
 
-/// What the log of one run shows, joint by joint.
+/// Evidence in the log of one run, joint by joint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunEvidence {
-    /// Samples a second of each leg's log, by its own clock.
+    /// Sample rate of each leg's log by its own clock, Hz.
     pub log_rates_hz: Vec<f64>,
     /// The joints.
     pub joints: Vec<JointEvidence>,
-    /// How late the controller saw positions, s: the delay that explains more than half of the tracking error. None
-    /// where no delay does, and where tracking is inside the tolerance.
+    /// Feedback delay of the controller, s, if a delay explains more than half of the tracking error; `None` otherwise,
+    /// or if tracking is within the tolerance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub feedback_delay_s: Option<f64>,
-    /// A length that is not the description's, by the torque of all good runs so far; none where no length explains
-    /// clearly more.
+    /// A link length that explains the torque of all good runs significantly better than that of the robot description;
+    /// `None` otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub other_length: Option<OtherLength>,
 }

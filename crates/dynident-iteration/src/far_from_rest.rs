@@ -1,10 +1,10 @@
-//! How far from rest the torque of a run's joints has to be to count, by what the fit leaves.
+//! Exclusion of rows near rest, joint by joint, if they increase the residual.
 //!
-//! Near rest a joint with dry friction sticks, breaks loose and jumps. Its smoothed motion does neither, and the
-//! difference comes back with the same sign in every run, so that more rows narrow the bars and not the error: drive
-//! inertias take it up, and it looks like a lag of its own at each joint. Where that is so the rows near rest have
-//! residuals that those far from it have not. So a run is fitted once with them and once without, and a joint of which
-//! they make the fit leave more goes without.
+//! Near rest a joint with dry friction sticks, breaks loose and jumps, but its smoothed motion does not. The difference
+//! has the same sign in every run, so more rows narrow the error bars but do not reduce the error: it biases drive
+//! inertias and looks like a lag of individual joints. Where this happens, rows near rest have larger residuals than
+//! the others. So a run is fitted with and without these rows, and they are excluded for the joints whose residual they
+//! increase.
 
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_runs};
@@ -18,8 +18,8 @@ use dynident_identification::friction::chosen_model;
 use dynident_identification::{Recording, RegressorModel, Samples};
 use dynident_simulation::Record;
 
-/// What may be set aside, the widest first: a joint that gathers speed slowly sticks up to a fifth of it, and what
-/// smoothing makes of breaking loose lasts a period of the smoother's cut-off.
+/// Candidate margins, widest first: a slowly accelerating joint sticks up to a fifth of its speed, and the smoothed
+/// breakaway lasts one period of the smoother's cut-off.
 const MARGINS: [RestMargin; 4] = [
     RestMargin { speed_share: 0.2, smoothing_periods: 1.0 },
     RestMargin { speed_share: 0.1, smoothing_periods: 1.0 },
@@ -27,18 +27,15 @@ const MARGINS: [RestMargin; 4] = [
     RestMargin { speed_share: 0.1, smoothing_periods: 0.5 },
 ];
 
-/// A margin leaves a joint at least this share of a run's samples: one that rests most of the time, or hardly gets away
-/// from rest, would know nothing of the friction that its controller has to overcome there.
-const LEAST_LEFT: f64 = 0.5;
+/// Smallest share of a run's samples that a margin leaves a joint; otherwise its friction near rest would not be
+/// determined.
+const MIN_SAMPLES_SHARE: f64 = 0.5;
 
-/// Residuals larger by this factor are larger. Chance moves the ratio by some percent where a third of some hundred
-/// rows is left out: then rows are lost and bars widen, no more.
-const LARGER: f64 = 1.05;
+/// Smallest ratio of the residuals with and without rows near rest for which the rows are excluded. By chance the ratio
+/// varies by some percent if a third of some hundred rows is excluded; a false exclusion only widens the error bars.
+const MIN_RESIDUAL_RATIO: f64 = 1.05;
 
-/// What a run says of the base parameters, without the torque near rest where friction does not explain it.
-///
-/// # Errors
-/// As [`identify_run`](crate::identify_run).
+/// Estimates the base parameters from a run, without rows near rest where friction does not explain them.
 pub(crate) fn without_near_rest(
     task: &IterationTask,
     records: &[Record],
@@ -52,17 +49,17 @@ pub(crate) fn without_near_rest(
         return Ok(all);
     }
     let (widest, shares) = run.widest_margins()?;
-    // Where so few rows cannot be fitted, none is left out.
+    // If the remaining rows cannot be fitted, none are excluded.
     let Some(far) = run.identified(&widest).ok().filter(|far| far.impossible.is_none()) else { return Ok(all) };
-    let asks = |joint: usize| {
+    let is_excluded = |joint: usize| {
         let (near, far) = (all.joint_sigma[joint], far.joint_sigma[joint]);
-        widest[joint] != RestMargin::REST && far > 0.0 && near > LARGER * far
+        widest[joint] != RestMargin::REST && far > 0.0 && near > MIN_RESIDUAL_RATIO * far
     };
-    let asking: Vec<bool> = (0..widest.len()).map(asks).collect();
-    if !asking.contains(&true) {
+    let excluded: Vec<bool> = (0..widest.len()).map(is_excluded).collect();
+    if !excluded.contains(&true) {
         return Ok(all);
     }
-    let margin = |joint: usize| if asking[joint] { widest[joint] } else { RestMargin::REST };
+    let margin = |joint: usize| if excluded[joint] { widest[joint] } else { RestMargin::REST };
     let margins: Vec<RestMargin> = (0..widest.len()).map(margin).collect();
     let found = if margins == widest { far } else { run.identified(&margins)? };
     let friction = run.dry_friction_nm(&found)?;
@@ -70,13 +67,12 @@ pub(crate) fn without_near_rest(
         let (share, dry_friction_nm) = (shares[joint], friction[joint]);
         let [all, far] = [&all, &found].map(|fit| fit.joint_sigma[joint] * fit.joint_sigma[joint]);
         let residual_nm = ((all - (1.0 - share) * far) / share).max(0.0).sqrt();
-        asking[joint].then_some(NearRest { margin: margins[joint], share, residual_nm, dry_friction_nm })
+        excluded[joint].then_some(NearRest { margin: margins[joint], share, residual_nm, dry_friction_nm })
     });
     let near_rest = near_rest.collect();
     Ok(RunEstimate { near_rest, ..found })
 }
 
-/// The records of one run.
 struct OneRun<'a> {
     task: &'a IterationTask,
     records: &'a [Record],
@@ -89,7 +85,7 @@ impl OneRun<'_> {
         RunLog { run: 1, legs, records, joint_sigma: &[], differentiator: None, rest_margins }
     }
 
-    /// The estimate with these margins. Friction that rows near rest alone would show is not looked for without them.
+    /// The estimate with these margins. Friction that needs rows near rest is not selected without them.
     fn identified(&self, rest_margins: &[RestMargin]) -> Result<RunEstimate, IterationError> {
         let mut settings = self.settings.clone();
         for search in &mut settings.friction {
@@ -100,8 +96,8 @@ impl OneRun<'_> {
         identify_runs(self.task, &[self.log(rest_margins)], &settings)
     }
 
-    /// The widest margin that leaves each joint enough, rests alone for one without dry friction; and the share of the
-    /// samples that it takes.
+    /// The widest margin that leaves each joint enough samples (for a joint without dry friction: samples at rest
+    /// only), and the share of the samples that it excludes.
     fn widest_margins(&self) -> Result<(Vec<RestMargin>, Vec<f64>), IterationError> {
         let dry = has_dry_friction(&self.task.robot, &self.settings.friction);
         let count = |margin: RestMargin| -> Result<Vec<f64>, IterationError> {
@@ -114,7 +110,7 @@ impl OneRun<'_> {
         for margin in MARGINS {
             let left = count(margin)?;
             for joint in (0..dry.len()).filter(|&joint| dry[joint] && moving[joint] > 0.0) {
-                let is_enough = left[joint] >= LEAST_LEFT * samples && left[joint] < moving[joint];
+                let is_enough = left[joint] >= MIN_SAMPLES_SHARE * samples && left[joint] < moving[joint];
                 if widest[joint] == RestMargin::REST && is_enough {
                     (widest[joint], shares[joint]) = (margin, 1.0 - left[joint] / moving[joint]);
                 }
@@ -123,7 +119,7 @@ impl OneRun<'_> {
         Ok((widest, shares))
     }
 
-    /// The dry friction of each joint by an estimate of the run, Nm (N).
+    /// The dry friction of each joint in an estimate of the run, Nm (N).
     fn dry_friction_nm(&self, found: &RunEstimate) -> Result<Vec<f64>, IterationError> {
         let robot = chosen_model(&self.task.robot, &found.friction)
             .map_err(|source| IterationError::ChosenFriction { run: 1, source })?;
@@ -138,7 +134,7 @@ impl OneRun<'_> {
     }
 }
 
-/// Samples of each joint whose torque counts.
+/// Number of samples of each joint that are not excluded.
 fn counted(motions: &[Recording], joints: usize) -> Vec<f64> {
     let mut counts = vec![0.0; joints];
     for recording in motions {

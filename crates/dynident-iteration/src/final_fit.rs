@@ -1,5 +1,3 @@
-//! The robot that all good runs tell: a task for the whole identification.
-
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::good_log::GoodLog;
@@ -11,12 +9,12 @@ use crate::store::IterationStore;
 use dynident_identification::{IdentificationTask, OffsetChoice, Role};
 
 impl Iteration {
-    /// What [`identify`](dynident_identification::identify()) makes the iteration's result of: the logs of all good
-    /// runs in the store (of the last where runs are not pooled), each weighted by its own noise, all joints at once
-    /// whatever the scheme, nothing held. `None` without a good run.
+    /// Returns the task with which [`identify`](dynident_identification::identify()) computes the result of the
+    /// iteration: the logs of all good runs in the store (only the last if runs are not pooled), each weighted by its
+    /// own noise, all joints at once, no parameter fixed. `None` without a good run.
     ///
     /// # Errors
-    /// Logs that are not in the store any more, records of another robot.
+    /// Logs that are missing in the store, records of another robot.
     pub fn identification_task(
         &self,
         records: &[RunRecord],
@@ -35,13 +33,11 @@ impl Iteration {
         identification.payloads.clone_from(&settings.payloads);
         identification.settings = identification_settings(&task, &settings, runs.len());
         identification.settings.estimation.held.clear();
-        // As in the last fit of all runs.
         let own_offsets =
             good.last().and_then(|last| last.pooled.as_ref()).is_some_and(|all| !all.run_offsets.is_empty());
         if own_offsets && self.settings().pool {
             identification.settings.offsets = OffsetChoice::PerLog;
         }
-        // The runs that were never fitted test it, each by the log that it left.
         if let Some(held_out) = &self.held_out {
             let joints = task.robot.joint_names();
             let settings = held_out_settings(&settings, records);

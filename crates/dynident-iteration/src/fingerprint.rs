@@ -1,7 +1,7 @@
-//! What runs depend on, as text that two calls compare: a number for all of it, then one for each table.
+//! Fingerprint of the inputs of an iteration as text: a hash of everything, then one per table.
 
-/// That runs or a trajectory with the fingerprint `there` are not those of a call with `here`, with the tables that
-/// differ where both name them, as `name:number` after the number of the whole.
+/// Describes that runs or a trajectory with the fingerprint `there` belong to other settings than `here`, and names the
+/// tables that differ. A fingerprint is the hash of everything, followed by `name:hash` for each table.
 ///
 /// ```
 /// let words = dynident_iteration::other_settings("1 design:7 robot:3", "2 design:8 robot:3");

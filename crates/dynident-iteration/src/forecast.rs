@@ -1,52 +1,49 @@
-//! What a run is expected to bring: the error bars after it, before it is made.
-
 use crate::estimate::RunEstimate;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
-/// Directions that a gain is told of: the ten worst, or all of fewer parameters.
-const WORST: usize = 10;
+const MAX_DIRECTIONS: usize = 10;
 
-/// What a motion was expected to bring by all that was known before it.
+/// Forecast for a motion from the estimate before it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MotionForecast {
-    /// Whether the motion is another than that of the good run before.
+    /// Whether the motion differs from that of the previous good run.
     pub redesigned: bool,
-    /// Why it is not, although another was looked for.
+    /// Why the motion was not changed, if a new one was searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// By how much the run is to narrow the bars of the worst directions (their root mean square), percent.
+    /// Forecast reduction of the error bars of the worst directions (root mean square), percent.
     pub gain_percent: f64,
-    /// The same of the motion of the good run before, once more.
+    /// Forecast reduction if the motion of the previous good run is repeated, percent.
     pub repeat_gain_percent: f64,
-    /// Whether that is worth a run: the gain that the settings ask for.
+    /// Whether the reduction reaches the minimum in the settings.
     pub worth_a_run: bool,
-    /// The directions that are known worst before the run, worst first.
+    /// The directions with the widest error bars before the run, widest first.
     pub directions: Vec<ForecastDirection>,
-    /// Standard deviation of every base parameter after the run; none for what it will not determine either.
+    /// Standard deviation of every base parameter after the run; `None` for parameters that remain undetermined.
     pub std: Vec<Option<f64>>,
-    /// For each joint the largest torque along the motion of any model in the uncertainty (the 95 % ellipsoid of all
+    /// Largest torque of each joint along the motion, over all models within the uncertainty (95 % ellipsoid of all
     /// parameters), Nm (N).
     pub largest_torque: Vec<f64>,
 }
 
-/// A combination `vᵀ θ` of base parameters that is known badly.
+/// A combination `vᵀ θ` of base parameters with a wide error bar.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ForecastDirection {
-    /// v, one number for each base parameter, 1 over its unit.
+    /// v, one number per base parameter, in 1 over its unit.
     pub weights: Vec<f64>,
-    /// `√(vᵀ C v)` by the covariance before the run: the torque error that it makes over all that the arm may do (root
-    /// mean square, all joints), in units of the torque's noise.
+    /// `√(vᵀ C v)` with the covariance before the run: the torque error over the workspace (root mean square, all
+    /// joints), in units of the torque noise.
     pub before: f64,
-    /// What was expected after it.
+    /// Forecast after the run.
     pub after: f64,
 }
 
 impl MotionForecast {
-    /// By how much a run has narrowed the bars of the directions (their root mean square), percent, from what is known
-    /// after it; none where there is nothing to compare.
+    /// Returns the reduction of the error bars of the directions (root mean square) that was reached, percent, from the
+    /// estimate after the run; `None` if there is nothing to compare.
     pub fn reached_gain_percent(&self, known: &RunEstimate) -> Option<f64> {
         let covariance = covariance(known);
         let bars = |direction: &ForecastDirection| {
@@ -59,25 +56,25 @@ impl MotionForecast {
     }
 }
 
-/// The information of all good runs so far, and what errors of the parameters are measured by.
+/// Information of all good runs, and the units of parameter errors.
 #[derive(Clone, Debug)]
 pub(crate) struct KnownInformation {
     /// Sum over the good runs.
     pub(crate) total: DMatrix<f64>,
-    /// T with `T Tᵀ = M⁻¹`: its columns are steps of the parameters that make as much torque as the joints' noise, over
-    /// all that the arm may do.
+    /// T with `T Tᵀ = M⁻¹`: its columns are parameter steps that cause as much torque as the joint noise, over the
+    /// workspace.
     pub(crate) units: DMatrix<f64>,
     /// `T⁻ᵀ`.
     weights: DMatrix<f64>,
 }
 
 impl KnownInformation {
-    /// `needed` is M, the mean information of a sample over all that the arm may do.
+    /// `needed` is M, the mean information of a sample over the workspace.
     pub(crate) fn new(total: DMatrix<f64>, needed: &DMatrix<f64>) -> Self {
         let count = total.nrows();
         let scale: Vec<f64> = needed.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
         let eigen = SymmetricEigen::new(DMatrix::from_fn(count, count, |i, j| needed[(i, j)] / (scale[i] * scale[j])));
-        // What makes no torque anywhere is measured by what makes the least.
+        // Directions without any torque get the smallest positive unit.
         let least = f64::EPSILON.sqrt() * eigen.eigenvalues.amax();
         let root = eigen.eigenvalues.map(|value| value.max(least).sqrt());
         let vectors = eigen.eigenvectors;
@@ -89,13 +86,13 @@ impl KnownInformation {
     /// `Tᵀ D T`.
     fn measured(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
         let measured = self.units.tr_mul(information) * &self.units;
-        // Symmetric to the last bit, as eigenvalues expect.
+        // Exactly symmetric, as required by the eigenvalue solver.
         0.5 * (&measured + measured.transpose())
     }
 
-    /// What a run adds: the worst directions with their bars before and after it, the ratio of these for each, and the
-    /// standard deviations after it. Bars before are those of the estimate, whose residuals are correlated in time and
-    /// whose covariance says so; the run multiplies them by what information alone would.
+    /// Forecast of a run: the worst directions with their error bars before and after it, and the standard deviations
+    /// after it. The error bars before the run are those of the estimate, whose covariance includes correlated
+    /// residuals; the run scales them by the ratio from information alone.
     pub(crate) fn after(&self, run: &DMatrix<f64>, known: &RunEstimate) -> Expected {
         let count = self.total.nrows();
         let (before, after) =
@@ -104,7 +101,7 @@ impl KnownInformation {
         let mut order: Vec<usize> = (0..count).collect();
         order.sort_by(|&a, &b| before.values[a].total_cmp(&before.values[b]));
         let mut expected = Expected { directions: Vec::new(), bars: Vec::new(), std: Vec::new() };
-        for &place in order.iter().take(WORST) {
+        for &place in order.iter().take(MAX_DIRECTIONS) {
             let direction = before.vectors.column(place).into_owned();
             let information_alone = (before.values[place].sqrt().recip(), after.variance(&direction).sqrt());
             let ratio = (information_alone.1 / information_alone.0).min(1.0);
@@ -125,22 +122,20 @@ impl KnownInformation {
     }
 }
 
-/// What is expected of a run.
 pub(crate) struct Expected {
     pub(crate) directions: Vec<ForecastDirection>,
-    /// Bars before and after by information alone, direction by direction.
+    /// Error bars before and after by information alone, direction by direction.
     bars: Vec<(f64, f64)>,
     pub(crate) std: Vec<Option<f64>>,
 }
 
 impl Expected {
-    /// By how much the bars of the directions narrow, percent.
     pub(crate) fn gain_percent(&self) -> f64 {
         gain_percent(&self.bars).unwrap_or(0.0)
     }
 }
 
-/// `100 (1 - √(Σ after² / Σ before²))`; none where nothing is to be narrowed.
+/// `100 (1 - √(Σ after² / Σ before²))`; `None` if there is nothing to reduce.
 fn gain_percent(bars: &[(f64, f64)]) -> Option<f64> {
     let sums = bars.iter().fold([0.0, 0.0], |[b, a], (before, after)| [b + before * before, a + after * after]);
     (sums[0] > 0.0).then(|| 100.0 * (1.0 - (sums[1] / sums[0]).sqrt()))
@@ -156,7 +151,8 @@ pub(crate) fn covariance(known: &RunEstimate) -> DMatrix<f64> {
     DMatrix::from_fn(count, count, |row, column| known.covariance[row][column])
 }
 
-/// A positive semi-definite matrix by its eigenvalues, those that are rounding alone taken as the least that is not.
+/// Inverse of a positive semi-definite matrix by its eigenvalues; eigenvalues at rounding level are replaced by the
+/// smallest significant one.
 struct Inverse {
     values: Vec<f64>,
     vectors: DMatrix<f64>,
@@ -178,7 +174,7 @@ impl Inverse {
         shares.iter().zip(&self.values).map(|(share, value)| share * share / value).sum()
     }
 
-    /// Whether a direction has no part in what is not excited at all.
+    /// Whether a direction has no component in the null space.
     fn determines(&self, direction: &DVector<f64>) -> bool {
         let most = f64::EPSILON.sqrt() * direction.norm_squared();
         let lost = self.values.iter().enumerate().filter(|(_, value)| **value <= self.least);
@@ -211,14 +207,13 @@ mod tests {
         }
     }
 
-    /// The mean information of what is to be predicted.
     fn needed() -> DMatrix<f64> {
         let root = DMatrix::from_row_slice(3, 3, &[1.0, 0.2, 0.5, 0.0, 2.0, -0.4, 0.3, 0.0, 9.0]);
         root.tr_mul(&root)
     }
 
-    /// The same run again: every bar by 1/√2, whatever the covariance that was found is; and with runs enough of it, by
-    /// the root of their number.
+    /// Repeating a run scales every error bar by 1/√2, for any covariance; enough runs scale it by the root of
+    /// their number.
     #[test]
     fn a_repeated_run_narrows_by_the_root_of_the_number() {
         let root = DMatrix::from_row_slice(3, 3, &[2.0, 0.3, 0.0, 0.0, 1.0, -0.4, 0.1, 0.0, 30.0]);
@@ -235,7 +230,7 @@ mod tests {
         }
     }
 
-    /// Directions, worst first, do not depend on units, and what is told of them comes back from the covariance.
+    /// The worst directions do not depend on units, and their error bars follow from the covariance.
     #[test]
     fn worst_directions_have_no_units() {
         let root = DMatrix::from_row_slice(3, 3, &[2.0, 0.3, 0.0, 0.0, 1.0, -0.4, 0.1, 0.0, 30.0]);
@@ -252,7 +247,7 @@ mod tests {
             assert!((a.before - b.before).abs() < 1e-9 && (a.after - b.after).abs() < 1e-9);
         }
         assert!(expected.directions.is_sorted_by(|a, b| a.before >= b.before));
-        // What came of it, where exactly the forecast comes true.
+        // The gain that is reached equals the forecast if it comes true exactly.
         let after = (&one + &run).try_inverse().unwrap();
         let forecast = MotionForecast {
             redesigned: true,
@@ -271,7 +266,7 @@ mod tests {
         }
     }
 
-    /// A parameter that nothing excites has no bar, and is where all is to be gained.
+    /// A parameter that is not excited has no error bar and the largest possible gain.
     #[test]
     fn what_nothing_excites() {
         let one = DMatrix::from_diagonal(&DVector::from_vec(vec![4.0, 0.0]));

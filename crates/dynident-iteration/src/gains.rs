@@ -1,5 +1,3 @@
-//! Gains of a first controller from the nominal model, its uncertainty, and a stated bandwidth.
-
 use crate::loop_delay::{highest_omega, highest_omega_if_light, share_of_all};
 use crate::posture::{at_sample, inertia_matrix};
 use crate::robot::{TRACKING_M, TRACKING_RAD};
@@ -14,65 +12,65 @@ use dynident_simulation::{PerJoint, Reference, SimulationError, require};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Damping of a joint whose drive may be too light for critical damping: half of the velocity gain, at the same
+/// Damping ratio of a joint whose drive may be too light for critical damping: half of the velocity gain at the same
 /// stiffness.
 const LIGHT_DAMPING: f64 = 0.5;
 
-/// Postures of each motion that are looked at.
+/// Number of postures along each motion at which the inertia is evaluated.
 const POSTURES: usize = 200;
 
-/// What gains are derived from, apart from the nominal model.
+/// Settings of the derived gains.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GainSettings {
     /// Natural frequency of each joint, Hz.
     pub bandwidth_hz: PerJoint,
-    /// How much lighter than the nominal model the robot may be, percent.
+    /// Uncertainty of the nominal inertia, percent: the robot may be lighter by this.
     pub uncertainty_percent: f64,
-    /// How late the controller may see or act, s.
+    /// Largest delay of the control loop, s.
     pub delay_s: f64,
-    /// Smallest share of the typical inertia that a drive without a described inertia may have: the loop has to be
-    /// stable with it.
+    /// Smallest possible inertia of a drive without described inertia, as a share of the typical inertia; the loop must
+    /// be stable with it.
     pub lightest_drive: f64,
-    /// How late the controller may be where the inertia of a drive is not known, s.
+    /// Largest delay of the control loop for joints with unknown drive inertia, s.
     pub light_delay_s: f64,
-    /// Largest distance from the path before a run is stopped, rad (m); `None` for the default of the envelope.
+    /// Largest deviation from the path before a run is stopped, rad (m); `None` for the default of the envelope.
     pub tracking_error: Option<PerJoint>,
 }
 
-/// Controllers whose gains come from the nominal model and a bandwidth.
+/// Controllers with gains from the nominal model and a bandwidth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DerivedControllers {
     /// Joint PD.
     pub model_free: ControllerSettings,
     /// Computed torque with the nominal model.
     pub first: ControllerSettings,
-    /// The parameters of that model where the nominal ones know nothing of the drives: with typical inertia of theirs.
+    /// Parameters of the nominal model with typical drive inertia, if the nominal parameters have no drive inertia.
     pub first_model: Option<Vec<f64>>,
     /// Computed torque with the newest model.
     pub model_based: ControllerSettings,
-    /// Natural frequency of each joint without a model, Hz: what was asked for, or as much as the delay allows.
+    /// Natural frequency of each joint without a model, Hz: the requested one, or the highest that the delay allows.
     pub model_free_hz: Vec<f64>,
-    /// The same with the nominal model.
+    /// Natural frequency of each joint with the nominal model, Hz.
     pub first_hz: Vec<f64>,
-    /// The same with the newest model.
+    /// Natural frequency of each joint with the newest model, Hz.
     pub model_based_hz: Vec<f64>,
 }
 
-/// A joint whose loop is slower than was asked for.
+/// A joint whose bandwidth is lower than requested.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LoweredBandwidth {
-    /// Its name.
+    /// Name of the joint.
     pub joint: String,
-    /// With which model: `none`, `nominal` or `newest`.
+    /// Model of the controller: `none`, `nominal` or `newest`.
     pub model: String,
-    /// What was asked for, Hz.
+    /// Requested bandwidth, Hz.
     pub asked_hz: f64,
-    /// What it has, Hz.
+    /// Achieved bandwidth, Hz.
     pub hz: f64,
 }
 
-/// The joints whose loops with a `model` have less than they were `asked_hz` for.
+/// Returns the joints whose bandwidth with a `model` is lower than `asked_hz`.
 pub fn lowered_bandwidths(
     model: &str,
     given_hz: &[f64],
@@ -85,37 +83,36 @@ pub fn lowered_bandwidths(
         asked_hz: asked_hz.of(joint),
         hz,
     };
-    // Hz to rad/s and back rounds.
+    // Tolerance for the conversion from Hz to rad/s and back.
     let is_lower = |one: &LoweredBandwidth| one.hz < one.asked_hz * (1.0 - 1e-9);
     names.iter().zip(given_hz).enumerate().map(of_joint).filter(is_lower).collect()
 }
 
-/// Controllers of a robot whose nominal bodies are known, critically damped, with the natural frequency `ω = 2π
-/// bandwidth` of each joint:
+/// Derives critically damped controllers for a robot with nominal bodies; the natural frequency of each joint is `ω =
+/// 2π bandwidth`:
 ///
-/// * joint PD: `K_p = ω² m`, `K_d = 2 ω m`, `m = (1 - uncertainty) max M_jj(q)` along the motions;
-/// * computed torque with the nominal model: `K_p = (1 - uncertainty) ω²`, `K_d = 2 √K_p`; where the model has drive
-///   inertia of which the description says nothing, with that of a typical drive (the effort limit accelerates it by
-///   300 rad/s²), which M_jj has, too;
-/// * computed torque with an identified model: `K_p = ω²`, `K_d = 2 ω`.
+/// * * joint PD: `K_p = ω² m`, `K_d = 2 ω m`, `m = (1 - uncertainty) max M_jj(q)` along the motions;
+/// * * computed torque with the nominal model: `K_p = (1 - uncertainty) ω²`, `K_d = 2 √K_p`; without described drive
+///   inertia, the model and M_jj use that of a typical drive (the effort limit accelerates it by 300 rad/s²);
+/// * * computed torque with an identified model: `K_p = ω²`, `K_d = 2 ω`.
 ///
-/// So the lightest robot that the uncertainty leaves is not faster than stated: under computed torque anywhere, under
-/// joint PD in the posture that is heaviest for the joint (in lighter ones it is faster, and more than critically
-/// damped). A heavier one is slower, and sags more: whether that is enough, the rehearsal shows.
+/// So the lightest robot within the uncertainty is not faster than requested: under computed torque in all postures,
+/// under joint PD in the posture with the largest inertia of the joint (in others it is faster, and overdamped). A
+/// heavier robot is slower and sags more; the rehearsal shows whether it follows well enough.
 ///
-/// A controller that acts late swings where it is fast: a folded arm under joint PD has a tenth of the inertia that its
-/// gains are for. So `ω` is lowered, joint by joint and then for all together, until in every posture along the motions
-/// a robot with that delay keeps a phase margin of 30 degrees. It is never raised.
+/// A delayed loop becomes unstable where it is fast: under joint PD, a folded arm has a tenth of the inertia for which
+/// the gains are designed. So `ω` is reduced, first for each joint, then for all together, until every posture along
+/// the motions has a phase margin of 30 degrees at this delay. It is never increased.
 ///
-/// A drive without a described inertia may be much lighter than a typical one: a gripper of 30 Nm had a tenth of the
-/// typical inertia, and its loop is then ten times as fast. With `lightest_drive` of the typical inertia and a delay of
-/// `light_delay_s` each joint keeps a phase margin of 15 degrees: where it would not, it gets half of the damping, and
-/// `ω` is lowered. It is not lowered so far that typical friction (5 % of the effort limit, and as much at full
-/// velocity) would hold the joint 80 % of `tracking_error` from its path.
+/// A drive without described inertia may be much lighter than a typical one: a gripper of 30 Nm had a tenth of the
+/// typical inertia, which makes the loop ten times as fast. With `lightest_drive` times the typical inertia and a delay
+/// of `light_delay_s`, each joint keeps a phase margin of 15 degrees: where necessary its damping is halved and `ω`
+/// reduced. `ω` stays high enough that typical friction (5 % of the effort limit, and as much at full velocity) holds
+/// the joint at most 80 % of `tracking_error` from its path.
 ///
 /// # Errors
-/// A bandwidth that is not positive, a bound that takes all inertia away, a nominal model without inertia, a delay that
-/// is negative.
+/// A bandwidth that is not positive, an uncertainty of 100 % or more, a nominal model without inertia, or a negative
+/// delay.
 pub fn derived_controllers(
     robot: &ParametricModel,
     references: &[&Reference],
@@ -146,7 +143,7 @@ pub fn derived_controllers(
     let first_model = with_typical_inertia(robot);
     let drives = if first_model.is_some() { TIMES_THE_LIGHTEST } else { 1.0 };
     let with_model = lowered(&|_| 1.0 / left);
-    // With drives that are as light as they may be each joint is only to be stable.
+    // With the lightest possible drives each joint only has to be stable.
     let light = with_light_drives(robot, *lightest_drive).map(|light| mass_matrices(robot, references, &light));
     let light = light.transpose()?;
     let stiff = stiff_enough(robot, &matrices, left, tracking_error.as_deref());
@@ -155,7 +152,7 @@ pub fn derived_controllers(
         None => Loops { omega, damping: vec![1.0; dof] },
     };
     let with_nominal = stable(lowered(&|_| drives), &|light| inertia_ratios(&matrices, light, dof));
-    // Joint PD in the posture where the joint is lightest, the others free.
+    // Joint PD in the posture with the lowest inertia of the joint, other joints free.
     let pd_ratios = |matrices: &[DMatrix<f64>]| -> Vec<f64> {
         largest.iter().zip(lightest_inertia(matrices, dof)).map(|(most, least)| (most / least).max(1.0)).collect()
     };
@@ -179,7 +176,6 @@ pub fn derived_controllers(
     })
 }
 
-/// The closed loops of all joints.
 struct Loops {
     /// Natural frequencies, rad/s.
     omega: Vec<f64>,
@@ -188,7 +184,7 @@ struct Loops {
 }
 
 impl Loops {
-    /// Loops that stay stable with the lightest drives, whose inertia is the modelled one divided by `ratios`; not
+    /// Loops that stay stable with the lightest drives, whose inertia is the modelled one divided by `ratios`, but not
     /// slower than `stiff`.
     fn stable(omega: Vec<f64>, ratios: &[f64], stiff: &[f64], light_delay_s: f64) -> Self {
         let of_joint = |((omega, &ratio), stiff): ((f64, &f64), &f64)| {
@@ -206,7 +202,6 @@ impl Loops {
         PerJoint::Each((0..self.omega.len()).map(of).collect())
     }
 
-    /// Joint PD with this share of the joints' inertia.
     fn joint_pd(&self, inertia: &[f64], share: f64) -> ControllerSettings {
         let Self { omega, damping } = self;
         ControllerSettings::JointPd(JointPdSettings {
@@ -215,7 +210,6 @@ impl Loops {
         })
     }
 
-    /// Computed torque with this share of the stiffness.
     fn computed_torque(&self, share: f64) -> ControllerSettings {
         let Self { omega, damping } = self;
         ControllerSettings::ComputedTorque(ComputedTorqueSettings {
@@ -230,7 +224,7 @@ impl Loops {
     }
 }
 
-/// The largest inertia about each joint, the others held.
+/// Largest inertia about each joint, other joints fixed.
 fn largest_inertia(robot: &ParametricModel, matrices: &[DMatrix<f64>]) -> Result<Vec<f64>, SimulationError> {
     let mut largest = vec![0.0_f64; robot.dof()];
     for matrix in matrices {
@@ -238,13 +232,18 @@ fn largest_inertia(robot: &ParametricModel, matrices: &[DMatrix<f64>]) -> Result
     }
     for (joint, inertia) in robot.model().joints().iter().zip(&largest) {
         let what = format!("nominal inertia about {}", joint.name);
-        require(*inertia > 0.0 && inertia.is_finite(), what, *inertia, "state the gains: the description has none")?;
+        require(
+            *inertia > 0.0 && inertia.is_finite(),
+            what,
+            *inertia,
+            "state the gains: the robot description has no inertia",
+        )?;
     }
     Ok(largest)
 }
 
 /// Natural frequency of each joint at which typical friction would hold it 80 % of the largest tracking error from its
-/// path, rad/s: `√(F / (left · M_jj · e))`; 0 of a joint whose effort is not known.
+/// path, rad/s: `√(F / (left · M_jj · e))`; 0 for a joint with unknown effort limit.
 fn stiff_enough(
     robot: &ParametricModel,
     matrices: &[DMatrix<f64>],
@@ -262,7 +261,7 @@ fn stiff_enough(
     robot.model().joints().iter().enumerate().map(of_joint).collect()
 }
 
-/// How many times as fast as commanded each joint accelerates under computed torque with `matrices` where it has
+/// Ratio of actual to commanded acceleration of each joint under computed torque with `matrices` if the true inertia is
 /// `light`: the largest `(M_light⁻¹ M)_jj`, at least 1.
 fn inertia_ratios(matrices: &[DMatrix<f64>], light: &[DMatrix<f64>], dof: usize) -> Vec<f64> {
     let mut ratios = vec![1.0_f64; dof];
@@ -274,7 +273,7 @@ fn inertia_ratios(matrices: &[DMatrix<f64>], light: &[DMatrix<f64>], dof: usize)
     ratios
 }
 
-/// The least inertia of each joint with the others free, `1 / (M⁻¹)_jj`.
+/// Lowest inertia of each joint with the other joints free, `1 / (M⁻¹)_jj`.
 fn lightest_inertia(matrices: &[DMatrix<f64>], dof: usize) -> Vec<f64> {
     let mut lightest = vec![f64::INFINITY; dof];
     for inverse in matrices.iter().filter_map(|matrix| matrix.clone().cholesky().map(|own| own.inverse())) {
@@ -283,7 +282,6 @@ fn lightest_inertia(matrices: &[DMatrix<f64>], dof: usize) -> Vec<f64> {
     lightest
 }
 
-/// Mass matrices in postures along the motions.
 fn mass_matrices(
     robot: &ParametricModel,
     references: &[&Reference],

@@ -1,5 +1,3 @@
-//! The logs of good runs, which further runs are identified together with.
-
 use crate::estimate::RunEstimate;
 use crate::leg::Leg;
 use crate::record::RunRecord;
@@ -8,7 +6,6 @@ use crate::run_logs::RunLog;
 use dynident_recording::DifferentiatorSettings;
 use dynident_simulation::Record;
 
-/// A good run's records, kept for those after it.
 #[derive(Clone, Debug)]
 pub(crate) struct GoodLog {
     run: usize,
@@ -20,7 +17,6 @@ pub(crate) struct GoodLog {
 }
 
 impl GoodLog {
-    /// Of a run along these legs.
     pub(crate) fn new(record: &RunRecord, legs: Vec<Leg>, records: Vec<Record>) -> Self {
         let joint_sigma = record.estimate.as_ref().map(|estimate| estimate.joint_sigma.clone()).unwrap_or_default();
         let way = record.estimate.as_ref().and_then(|estimate| estimate.differentiator.as_ref());
@@ -29,7 +25,6 @@ impl GoodLog {
         Self { run: record.run, legs, records, joint_sigma, differentiator, rest_margins }
     }
 
-    /// Number of the run.
     pub(crate) fn run(&self) -> usize {
         self.run
     }

@@ -1,7 +1,5 @@
-//! Runs of another motion, which are never fitted: what the newest model is judged by.
-
 use crate::before_motion::Commanded;
-use crate::commanding::Came;
+use crate::commanding::MotionOutcome;
 use crate::convergence::Shortfall;
 use crate::cut_short::CutShort;
 use crate::error::IterationError;
@@ -21,34 +19,33 @@ use dynident_simulation::{SimulationError, require};
 use std::borrow::Cow;
 use std::time::Instant;
 
-/// What came of a held-out run.
-pub(crate) enum HeldOutCame {
+pub(crate) enum HeldOutOutcome {
     Run(HeldOutRun, Box<RobotRun>),
     Stopped(IterationStatus),
     CutShort(Vec<RobotRun>, CutShort),
 }
 
 impl Iteration {
-    /// The same, judged by runs of a motion that is never fitted.
+    /// Returns the iteration with validation by runs of a held-out motion.
     ///
     /// # Errors
-    /// A task of several legs, or of one of which not everything counts; a motion of other joints; every no run.
+    /// A task with several legs or with windows, a motion with other joints, or `every` = 0.
     pub fn with_held_out(mut self, held_out: HeldOutMotion) -> Result<Self, SimulationError> {
         let legs = &self.task().legs;
         let one = legs.len() == 1 && legs[0].windows().is_none() && held_out.leg.windows().is_none();
-        require(one, "legs", legs.len() as f64, "held_out needs one motion of which everything counts")?;
+        require(one, "legs", legs.len() as f64, "held_out needs a task with one motion and without windows")?;
         dynident_simulation::require_length(
             "joints of the held-out motion",
             self.task().robot.dof(),
             held_out.leg.reference().joints(),
         )?;
-        require(held_out.every != Some(0), "held_out.every", 0.0, "give 1 or more, or leave it out")?;
+        require(held_out.every != Some(0), "held_out.every", 0.0, "give 1 or more, or omit the key")?;
         self.held_out = Some(held_out);
         Ok(self)
     }
 
-    /// Whether the newest model has to be judged before anything else comes: after every so many runs, and where
-    /// nothing else is missing.
+    /// Returns the held-out motion if the newest model has to be validated now: after every N runs, and if no other
+    /// condition is unmet.
     pub(crate) fn held_out_due(&self, records: &[RunRecord]) -> Result<Option<&HeldOutMotion>, IterationError> {
         let (Some(held_out), Some(last)) = (&self.held_out, records.last()) else { return Ok(None) };
         let has_model = last.knowledge().and_then(RunEstimate::for_controller).is_some();
@@ -60,7 +57,6 @@ impl Iteration {
         Ok(due.then_some(held_out))
     }
 
-    /// Makes a held-out run after the last of `records`.
     pub(crate) fn held_out_made(
         &self,
         held_out: &HeldOutMotion,
@@ -68,53 +64,52 @@ impl Iteration {
         records: &[RunRecord],
         supervisor: &mut dyn Supervisor,
         last_motion: &mut Option<Instant>,
-    ) -> Result<HeldOutCame, IterationError> {
+    ) -> Result<HeldOutOutcome, IterationError> {
         let last = records.last();
         let known = last.and_then(RunRecord::knowledge);
         let (Some(last), Some(known)) = (last, known) else {
-            let reason = "no model to judge".to_owned();
-            return Ok(HeldOutCame::Stopped(IterationStatus::Refused { reason }));
+            let reason = "no model to validate".to_owned();
+            return Ok(HeldOutOutcome::Stopped(IterationStatus::Refused { reason }));
         };
         let (run, model) = (last.run, known.for_controller());
         let plan = RunPlan { run, model, damping: 1.0, stiffness: 1.0 };
         let task = IterationTask { legs: vec![held_out.leg.clone()], ..self.task().clone() };
         let prepared = match self.prepared(&task, &plan, records, supervisor.stop())? {
             Ok(prepared) => prepared,
-            Err(status) => return Ok(HeldOutCame::Stopped(status)),
+            Err(status) => return Ok(HeldOutOutcome::Stopped(status)),
         };
         let motion = Commanded { place: 0, leg: &task.legs[0], speed: 1.0, purpose: RunPurpose::HeldOut };
-        let came = match self.commanded(robot, (&task, &plan, &prepared), &motion, supervisor, last_motion)? {
-            Came::Run(came) => came,
-            Came::Stopped(status) => return Ok(HeldOutCame::Stopped(status)),
-            Came::CutShort(came, why) => return Ok(HeldOutCame::CutShort(came.into_iter().collect(), why)),
+        let robot_run = match self.commanded(robot, (&task, &plan, &prepared), &motion, supervisor, last_motion)? {
+            MotionOutcome::Run(robot_run) => robot_run,
+            MotionOutcome::Stopped(status) => return Ok(HeldOutOutcome::Stopped(status)),
+            MotionOutcome::CutShort(part, why) => return Ok(HeldOutOutcome::CutShort(part.into_iter().collect(), why)),
         };
-        let (evidence, reason) = if came.status.is_done() {
-            match self.held_out_evidence(held_out, &came, records, known) {
+        let (evidence, reason) = if robot_run.status.is_done() {
+            match self.held_out_evidence(held_out, &robot_run, records, known) {
                 Ok(evidence) => (Some(evidence), None),
                 Err(error) => (None, Some(error.to_string())),
             }
         } else {
             (None, None)
         };
-        let max_tracking_error_rad = match &came.truth {
+        let max_tracking_error_rad = match &robot_run.truth {
             Some(truth) => truth.max_error.clone(),
-            None => came.max_error(held_out.leg.reference()),
+            None => robot_run.max_error(held_out.leg.reference()),
         };
         let found = HeldOutRun {
-            done: came.status.is_done(),
-            outcome: came.ending(held_out.leg.reference(), self.lowest_oscillation_hz()),
+            done: robot_run.status.is_done(),
+            outcome: robot_run.ending(held_out.leg.reference(), self.lowest_oscillation_hz()),
             max_tracking_error_rad,
             evidence,
             reason,
         };
-        Ok(HeldOutCame::Run(found, Box::new(came)))
+        Ok(HeldOutOutcome::Run(found, Box::new(robot_run)))
     }
 
-    /// What its log shows, by the same identification as of runs.
     fn held_out_evidence(
         &self,
         held_out: &HeldOutMotion,
-        came: &RobotRun,
+        robot_run: &RobotRun,
         records: &[RunRecord],
         known: &RunEstimate,
     ) -> Result<RunEvidence, IterationError> {
@@ -124,11 +119,11 @@ impl Iteration {
         let own = records.last().and_then(|record| record.estimate.as_ref());
         let rest_margins = own.map(RunEstimate::rest_margins).unwrap_or_default();
         let oscillation = &self.settings().safety.oscillation;
-        examined(&task, core::slice::from_ref(&came.record), &settings, oscillation, Some(known), &rest_margins)
+        examined(&task, core::slice::from_ref(&robot_run.record), &settings, oscillation, Some(known), &rest_margins)
     }
 }
 
-/// How a held-out log is read: as that of the last run, with the differentiator that it chose.
+/// Settings for a held-out log: those of the last run, with the differentiator that it selected.
 pub(crate) fn held_out_settings<'a>(
     settings: &'a RunIdentificationSettings,
     records: &[RunRecord],

@@ -1,4 +1,4 @@
-//! Where the robot waits between runs, and the ways from there to a motion and back.
+//! The home posture between runs, and the approach and return paths between home and a motion.
 
 use crate::robot::{Envelope, Ways};
 use dynident_excitation::Motion;
@@ -9,120 +9,121 @@ use dynident_model::sample::Random;
 use dynident_simulation::{Reference, SimulationError, require, require_length};
 use thiserror::Error;
 
-/// Postures in between that are tried where the straight way is not clear, and pairs of them.
+/// Largest numbers of random via postures, and of pairs of them, that are tried if the direct path is not clear.
 const POSTURES_TRIED: usize = 500;
 const PAIRS_TRIED: usize = 5000;
 
-/// Seed of these postures: the same ways again whenever an iteration is taken up.
+/// Seed of the via postures; a resumed iteration finds the same paths.
 const SEED: u64 = 1;
 
-/// Places of a straight piece that are looked at before it is checked as a whole.
-const PLACES: usize = 60;
+/// Samples of a straight segment in the quick check before the full check.
+const QUICK_CHECK_SAMPLES: usize = 60;
 
-/// A motion begins or ends at rest if its own highest acceleration stops every joint within so many samples: the last
-/// sample of a trajectory need not be its very end.
-const AT_REST: f64 = 2.0;
+/// Braking time at the motion's highest acceleration, in samples, below which an end of the motion is at rest: the last
+/// sample need not be the exact end of the trajectory.
+const MAX_BRAKING_SAMPLES: f64 = 2.0;
 
-/// A way is a whole number of so many samples long, so that a log at a lower rate begins with the motion.
-const WHOLE_SAMPLES: f64 = 100.0;
+/// Path lengths are multiples of this number of samples, so that a log at a lower rate has a sample where the motion
+/// begins.
+const PATH_LENGTH_MULTIPLE: f64 = 100.0;
 
-/// Where the robot waits, and how it comes to a motion from there.
+/// The home posture and how the robot moves between it and a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HomeSettings {
-    /// The posture, rad (m), joint by joint in the model's order.
+    /// Home posture, rad (m), in the joint order of the model.
     pub posture: Vec<f64>,
-    /// Share of the velocity and acceleration limits that the ways have; see [`ways`](Self::ways). By default 0.2 in
-    /// studies.
+    /// Share of the velocity and acceleration limits that the paths use; see [`ways`](Self::ways). Default in studies
+    /// 0.2.
     pub speed: f64,
-    /// What the ways keep: joints, floor, distances of links. Torque is that of the nominal model.
+    /// Limits of the paths: joints, floor, distances of links. Torques are those of the nominal model.
     pub limits: Limits,
-    /// How much larger than the nominal model's the torque may be, percent: it is kept below its limit by that.
+    /// Uncertainty of the nominal torque, percent; the torque limits are reduced by it.
     pub uncertainty_percent: f64,
 }
 
-/// Why there is no way.
+/// Why no path exists.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum HomeError {
-    /// Nothing says how fast a joint may move.
+    /// A joint without velocity limit has to move.
     #[error(
-        "joint {joint} has to be moved from home and has no velocity limit (nor does the motion move it): state one in [design.limits]"
+        "no velocity limit for joint {joint}, which has to move from home (the motion does not move it): add one to [design.limits]"
     )]
     NoSpeed {
         /// The joint.
         joint: String,
     },
-    /// A motion that is entered or left at speed.
+    /// A motion that begins or ends at nonzero velocity.
     #[error(
-        "the motion {} at {speed:.3} rad/s (m/s) of joint {joint}, and ways from and to home are from rest to rest: give a motion that begins and ends at rest",
+        "the motion {} at {speed:.3} rad/s (m/s) of joint {joint}, but paths from and to home are from rest to rest: use a motion that begins and ends at rest",
         if *.begins { "begins" } else { "ends" }
     )]
     NotAtRest {
         /// The joint.
         joint: String,
-        /// Its velocity there.
+        /// Its velocity there, rad/s (m/s).
         speed: f64,
-        /// Whether it is the begin.
+        /// Whether this is the begin of the motion.
         begins: bool,
     },
-    /// A posture itself is not clear.
+    /// A posture breaks a limit.
     #[error("{posture} itself breaks the limit of {kind} of {subject} (ratio {ratio:.3}, 1 is the limit): {fix}")]
     Posture {
-        /// Which posture.
+        /// The posture.
         posture: &'static str,
-        /// What is limited.
+        /// Kind of limit.
         kind: LimitKind,
-        /// Of which joint, point or pair of links.
+        /// Joint, point or pair of links.
         subject: String,
-        /// 1 on the limit.
+        /// Value over limit.
         ratio: f64,
-        /// What to do.
+        /// Suggested fix.
         fix: &'static str,
     },
-    /// No way was found.
+    /// No path was found.
     #[error(
-        "no clear way between home and {posture} was found: the straight one breaks the limit of {kind} of {subject} {:.0} % on its way (ratio {ratio:.3}, 1 is the limit), and so do those over one or two of {tried} random postures in between; give another home, or a start_posture of [design] that is nearer",
+        "no clear path between home and {posture}: the direct path breaks the limit of {kind} of {subject} at {:.0} % of its length (ratio {ratio:.3}, 1 is the limit), and so do all paths through one or two of {tried} random postures; use another home, or a start_posture in [design] that is nearer",
         100.0 * .share
     )]
     NotClear {
         /// The posture at the other end.
         posture: &'static str,
-        /// What is limited.
+        /// Kind of limit.
         kind: LimitKind,
-        /// Of which joint, point or pair of links.
+        /// Joint, point or pair of links.
         subject: String,
-        /// Where on the straight way from home, 0 to 1.
+        /// Position on the direct path from home, 0 to 1.
         share: f64,
-        /// 1 on the limit.
+        /// Value over limit.
         ratio: f64,
-        /// Random postures that were tried.
+        /// Number of random postures that were tried.
         tried: usize,
     },
-    /// Somebody asked for a stop.
-    #[error("the search for the ways from and to home was interrupted")]
+    /// The search was interrupted.
+    #[error("the search for the paths from and to home was interrupted")]
     Interrupted,
-    /// Limits that cannot be.
+    /// Invalid limits.
     #[error(transparent)]
     Limits(#[from] LimitError),
-    /// Numbers that do not fit.
+    /// Invalid numbers.
     #[error(transparent)]
     Numbers(#[from] SimulationError),
 }
 
-/// The ways to a motion and back, and over which postures each goes.
+/// The paths to a motion and back, with their via postures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundWays {
-    /// The ways.
+    /// The paths.
     pub ways: Ways,
-    /// Postures in between, rad (m), in order from home: none where the way is straight.
+    /// Via postures of each path, rad (m), in order from home; empty for a direct path.
     pub over: [Vec<Vec<f64>>; 2],
 }
 
 impl HomeSettings {
-    /// Checks the numbers for so many joints.
+    /// Checks the settings for `joints` joints.
     ///
     /// # Errors
-    /// A posture of other joints, a speed that is no share.
+    /// A posture with another number of joints, or a speed outside of 0 to 1.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         require_length("home", joints, self.posture.len())?;
         for &q in &self.posture {
@@ -132,21 +133,20 @@ impl HomeSettings {
         require(speed > 0.0 && speed <= 1.0, "approach_speed", speed, "give a share of the limits: above 0, at most 1")
     }
 
-    /// The ways from home to the begin of `motion`, and from its end home. Each is a quintic from rest to rest, without
-    /// acceleration at its ends, straight in the space of joints, in which every joint has at most the share
-    /// [`speed`](Self::speed) of its velocity and acceleration limits (and of the envelope's velocity); where one is
-    /// not limited, of the highest that the motion itself has. Where the straight way breaks a limit it goes over one
-    /// or two postures in between, the first of 500 random ones (with the same seed always) over which it does not, at
-    /// rest in each. All limits are looked at by [`check_limits`]. A robot that is there already has a way of one
-    /// sample.
+    /// Plans the paths from home to the begin of `motion` and from its end to home. Each path is a quintic in joint
+    /// space from rest to rest, with zero acceleration at both ends. Every joint uses at most the share
+    /// [`speed`](Self::speed) of its velocity and acceleration limits (and of the velocity limit of the envelope);
+    /// without a limit, of the maximum of the motion. If the direct path breaks a limit, the path goes through one or
+    /// two random via postures (at most 500, fixed seed), at rest in each. All limits are checked by [`check_limits`].
+    /// If the robot is already there the path has one sample.
     ///
     /// # Errors
-    /// Why there is no way; nothing has moved then.
+    /// No path exists; nothing has moved.
     pub fn ways(&self, model: &Model, motion: &Reference, envelope: Option<&Envelope>) -> Result<FoundWays, HomeError> {
         self.ways_until(model, motion, envelope, &|| false)
     }
 
-    /// The same; the search ends with [`HomeError::Interrupted`] once `stop` says so.
+    /// As [`ways`](Self::ways), but the search ends with [`HomeError::Interrupted`] once `stop` returns true.
     ///
     /// # Errors
     /// As [`ways`](Self::ways).
@@ -169,7 +169,7 @@ impl HomeSettings {
         planner.clear_posture(
             &self.posture,
             "home",
-            "give another home, or say in [design] what is in the way (limits; defaults, as floor = false)",
+            "use another home, or correct the obstacles in [design] (limits; defaults such as floor = false)",
         )?;
         let (first, last) = (posture(0), posture(samples - 1));
         let (there, over_there) = planner.way(&first, "the motion's first posture")?;
@@ -184,7 +184,6 @@ impl HomeSettings {
     }
 }
 
-/// The same path the other way.
 fn backwards(motion: &Motion) -> Motion {
     let turned = |values: &[f64], sign: f64| -> Vec<f64> {
         values
@@ -202,14 +201,13 @@ fn backwards(motion: &Motion) -> Motion {
     }
 }
 
-/// What ways are made with.
 struct Planner<'a> {
     home: &'a HomeSettings,
     model: &'a Model,
     rate_hz: f64,
-    /// Highest velocity and acceleration of each joint on a way; none where nothing says.
+    /// Highest velocity and acceleration of each joint on a path; `None` if unknown.
     fastest: Vec<Option<[f64; 2]>>,
-    /// With what the nominal model does not know taken off the torque.
+    /// Limits, with torques reduced by the uncertainty of the nominal model.
     limits: Limits,
     set: LimitSet,
     stop: &'a dyn Fn() -> bool,
@@ -238,7 +236,7 @@ impl<'a> Planner<'a> {
             let speed = stated.into_iter().chain(watched).reduce(f64::min);
             let acceleration = limit.and_then(|limit| limit.acceleration);
             let speed = speed.or_else(|| some(highest(&own.dq, place)))?;
-            // Without either the speed is reached as in a design's default: after 0.2 rad (m) from rest.
+            // Default of the design: full velocity after 0.2 rad (m) from rest.
             let acceleration = acceleration.or_else(|| some(highest(&own.ddq, place))).unwrap_or(2.5 * speed * speed);
             Some([home.speed * speed, home.speed * acceleration])
         });
@@ -247,21 +245,19 @@ impl<'a> Planner<'a> {
         Ok(Self { home, model, rate_hz: motion.rate_hz(), fastest, limits, set, stop })
     }
 
-    /// That the motion stands still at a sample.
     fn at_rest(&self, motion: &Reference, sample: usize) -> Result<(), HomeError> {
         let own = motion.motion();
         for (place, joint) in self.model.joints().iter().enumerate() {
             let hardest = own.ddq[own.of(place)].iter().fold(0.0_f64, |most, ddq| most.max(ddq.abs()));
             let speed = own.dq[own.of(place)][sample].abs();
-            if speed > AT_REST * hardest / self.rate_hz {
+            if speed > MAX_BRAKING_SAMPLES * hardest / self.rate_hz {
                 return Err(HomeError::NotAtRest { joint: joint.name.clone(), speed, begins: sample == 0 });
             }
         }
         Ok(())
     }
 
-    /// That nobody asks for a stop.
-    fn asked(&self) -> Result<(), HomeError> {
+    fn check_stop(&self) -> Result<(), HomeError> {
         if (self.stop)() { Err(HomeError::Interrupted) } else { Ok(()) }
     }
 
@@ -274,14 +270,14 @@ impl<'a> Planner<'a> {
         Ok(())
     }
 
-    /// A way from home to a posture, and over which others.
     fn way(&self, to: &[f64], posture: &'static str) -> Result<(Motion, Vec<Vec<f64>>), HomeError> {
-        let fix = "the motion breaks it, too: give another one, or say in [design] what is in the way (limits; defaults, as floor = false)";
+        let fix = "the motion breaks it, too: use another motion, or correct the obstacles in [design] (limits; defaults such as floor = false)";
         self.clear_posture(to, posture, fix)?;
         let from = &self.home.posture;
         let straight = self.piece(from, to)?;
         let Some(broken) = self.broken(&straight)? else { return Ok((straight, Vec::new())) };
-        // Postures that are seen from home, and from the other end: over one of both, or over one of each.
+        // Postures that are reachable directly from home, or from the other end; a path uses one posture of both kinds,
+        // or one of each.
         let (mut from_home, mut to_end): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
         let mut random = Random::new(SEED);
         let mut pairs = 0;
@@ -318,7 +314,6 @@ impl<'a> Planner<'a> {
         Err(HomeError::NotClear { posture, kind, subject, share, ratio, tried: POSTURES_TRIED })
     }
 
-    /// The way from one posture over others, at rest in each.
     fn over(&self, from: &[f64], over: &[Vec<f64>], to: &[f64]) -> Result<Motion, HomeError> {
         let mut way = self.piece(from, from)?;
         let mut last = from;
@@ -329,14 +324,13 @@ impl<'a> Planner<'a> {
         Ok(way)
     }
 
-    /// Whether the straight way between two postures looks clear.
     fn sees(&self, from: &[f64], to: &[f64]) -> Result<bool, HomeError> {
-        self.asked()?;
+        self.check_stop()?;
         Ok(self.looks_clear(&self.piece(from, to)?))
     }
 
-    /// A posture to go over: first about the way itself, then farther and farther from it, within the limits of
-    /// position, or a turn (1 m) to either side.
+    /// A random via posture: first near the direct path, then farther away, within the position limits or, without
+    /// limits, half a turn (1 m) beyond the path.
     fn between(&self, from: &[f64], to: &[f64], tried: usize, random: &mut Random) -> Vec<f64> {
         let reach = (tried + 1) as f64 / POSTURES_TRIED as f64;
         let joints = self.model.joints().iter().enumerate();
@@ -351,7 +345,7 @@ impl<'a> Planner<'a> {
         joints.map(one).collect()
     }
 
-    /// A quintic from rest to rest; one sample where there is nothing to move.
+    /// A quintic from rest to rest; one sample if nothing moves.
     fn piece(&self, from: &[f64], to: &[f64]) -> Result<Motion, HomeError> {
         let mut duration_s = 0.0_f64;
         for (place, joint) in self.model.joints().iter().enumerate() {
@@ -362,12 +356,14 @@ impl<'a> Planner<'a> {
             let Some([speed, acceleration]) = self.fastest[place] else {
                 return Err(HomeError::NoSpeed { joint: joint.name.clone() });
             };
-            duration_s = duration_s.max(FASTEST * way / speed).max((HARDEST * way / acceleration).sqrt());
+            duration_s = duration_s
+                .max(QUINTIC_MAX_VELOCITY * way / speed)
+                .max((QUINTIC_MAX_ACCELERATION * way / acceleration).sqrt());
             if let Some(jerk) = self.limits.of(&joint.name).and_then(|limit| limit.jerk) {
                 duration_s = duration_s.max((60.0 * way / (self.home.speed * jerk)).cbrt());
             }
         }
-        let periods = (duration_s * self.rate_hz / WHOLE_SAMPLES).ceil() * WHOLE_SAMPLES;
+        let periods = (duration_s * self.rate_hz / PATH_LENGTH_MULTIPLE).ceil() * PATH_LENGTH_MULTIPLE;
         require(periods < 1e8, "length of the way home, samples", periods, "give a larger approach_speed")?;
         let periods = periods as usize;
         let mut motion = Motion::default();
@@ -378,7 +374,7 @@ impl<'a> Planner<'a> {
                 let x = sample as f64 / periods.max(1) as f64;
                 let [share, first, second, third] = quintic(x);
                 let (way, per_s) = (to[joint] - from[joint], self.rate_hz / periods.max(1) as f64);
-                // Exactly where it is to be at both ends.
+                // Exact positions at both ends.
                 motion.q[at] = if sample == periods { to[joint] } else { from[joint] + share * way };
                 motion.dq[at] = first * way * per_s;
                 motion.ddq[at] = second * way * per_s * per_s;
@@ -388,14 +384,14 @@ impl<'a> Planner<'a> {
         Ok(motion)
     }
 
-    /// Whether no limit is broken at some places of a piece: quick, and no proof.
+    /// Checks the limits at a few samples of a segment; a necessary condition only.
     fn looks_clear(&self, piece: &Motion) -> bool {
         let mut some = Motion::default();
-        some.reset(piece.joints, PLACES);
+        some.reset(piece.joints, QUICK_CHECK_SAMPLES);
         for joint in 0..piece.joints {
-            for place in 0..PLACES {
-                let sample = place * (piece.samples - 1) / (PLACES - 1);
-                let (to, from) = (joint * PLACES + place, joint * piece.samples + sample);
+            for place in 0..QUICK_CHECK_SAMPLES {
+                let sample = place * (piece.samples - 1) / (QUICK_CHECK_SAMPLES - 1);
+                let (to, from) = (joint * QUICK_CHECK_SAMPLES + place, joint * piece.samples + sample);
                 (some.q[to], some.dq[to]) = (piece.q[from], piece.dq[from]);
                 (some.ddq[to], some.dddq[to]) = (piece.ddq[from], piece.dddq[from]);
             }
@@ -405,13 +401,13 @@ impl<'a> Planner<'a> {
         values.iter().all(|value| *value <= 0.0)
     }
 
-    /// The limit that a way breaks worst, if it breaks one. It is looked at as often as a motion is by the rate of such
-    /// checks: so much more rarely as it is slower, never more rarely than its own samples.
+    /// Returns the worst violated limit of a path, if any. The check rate is that of motions, scaled by the speed of
+    /// the path, but at least the sample rate.
     fn broken(&self, way: &Motion) -> Result<Option<LimitReport>, HomeError> {
-        self.asked()?;
+        self.check_stop()?;
         let check_hz = self.home.speed * self.model.own_scale().round_hertz(CHECK_RATE_HZ);
         let rate_hz = check_hz.max(self.rate_hz);
-        // A posture is looked at once.
+        // A posture is checked once.
         let duration_s = ((way.samples - 1) as f64 / self.rate_hz).max(1.0 / rate_hz);
         let at = |times: &[f64], out: &mut Motion| {
             out.reset(way.joints, times.len());
@@ -433,11 +429,12 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Highest velocity and acceleration of the quintic over the way and over time 1.
-const FASTEST: f64 = 1.875;
-const HARDEST: f64 = 5.773_502_691_896_258;
+/// Highest velocity and acceleration of the quintic for unit distance and unit time.
+const QUINTIC_MAX_VELOCITY: f64 = 1.875;
+const QUINTIC_MAX_ACCELERATION: f64 = 5.773_502_691_896_258;
 
-/// `10 x³ - 15 x⁴ + 6 x⁵` with its first three derivatives: from 0 to 1 without velocity and acceleration at both ends.
+/// `10 x³ - 15 x⁴ + 6 x⁵` with its first three derivatives: from 0 to 1, with zero velocity and acceleration at both
+/// ends.
 fn quintic(x: f64) -> [f64; 4] {
     let y = 1.0 - x;
     [
@@ -448,7 +445,7 @@ fn quintic(x: f64) -> [f64; 4] {
     ]
 }
 
-/// One piece after the other; the posture between them stands there once.
+/// Concatenates two segments; the common posture appears once.
 fn joined(first: &Motion, second: &Motion) -> Motion {
     let mut both = Motion::default();
     both.reset(first.joints, first.samples + second.samples - 1);
@@ -473,13 +470,14 @@ fn joined(first: &Motion, second: &Motion) -> Motion {
 mod tests {
     use super::*;
 
-    /// The highest velocity is in the middle, the highest acceleration at (3 - √3) / 6; central differences agree.
+    /// The highest velocity is in the middle, the highest acceleration at (3 - √3) / 6; compared with central
+    /// differences.
     #[test]
     fn the_quintic_and_its_peaks() {
         assert_eq!(quintic(0.0)[..3], [0.0; 3]);
         assert!(quintic(1.0).iter().zip([1.0, 0.0, 0.0]).all(|(a, b)| (a - b).abs() < 1e-15));
-        assert!((quintic(0.5)[1] - FASTEST).abs() < 1e-15);
-        assert!((quintic((3.0 - 3.0_f64.sqrt()) / 6.0)[2] - HARDEST).abs() < 1e-12);
+        assert!((quintic(0.5)[1] - QUINTIC_MAX_VELOCITY).abs() < 1e-15);
+        assert!((quintic((3.0 - 3.0_f64.sqrt()) / 6.0)[2] - QUINTIC_MAX_ACCELERATION).abs() < 1e-12);
         for k in 1..20 {
             let (x, h) = (f64::from(k) / 20.0, 1e-5);
             for order in 0..3 {

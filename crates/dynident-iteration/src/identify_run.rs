@@ -1,5 +1,3 @@
-//! The identification of one run.
-
 use crate::differentiator_choice::choose_differentiator;
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
@@ -8,14 +6,14 @@ use crate::leg::IterationTask;
 use crate::settings::RunIdentificationSettings;
 use dynident_simulation::Record;
 
-/// Base parameters from the records of one run, one record for each leg of the task: the same identification as of any
-/// log ([`dynident_identification`]), on records in memory. Rows count within the windows; joints without rows are left
-/// out; known columns are held. The differentiator is chosen where the settings leave it to the run, and rows near rest
-/// count where friction explains them ([`NearRest`](crate::NearRest)).
+/// Estimates the base parameters from the records of one run (one record per leg of the task), with the same
+/// identification as for any log ([`dynident_identification`]). Only rows inside the windows are used; joints without
+/// rows are omitted; known columns are fixed. The differentiator is selected if the settings request it, and rows near
+/// rest are used where friction explains them ([`NearRest`](crate::NearRest)).
 ///
 /// # Errors
-/// Records that do not belong to the task, a differentiator that cannot be applied, rows that do not carry an estimate.
-/// That there is no consistent set is part of the result.
+/// Records that do not belong to the task, a differentiator that cannot be applied, rows that are not sufficient for an
+/// estimate. A missing physically consistent model is part of the result, not an error.
 pub fn identify_run(
     task: &IterationTask,
     records: &[Record],

@@ -1,5 +1,3 @@
-//! What an iteration is: a task, its settings, and what follows from the records of its runs.
-
 use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
@@ -21,10 +19,10 @@ use dynident_simulation::controllers::ControllerModel;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// A torque this much above a limit is no matter of rounding or of the model's last digits.
-const BEYOND: f64 = 1.001;
+/// Ratio of torque to limit above which the limit is exceeded; allows for rounding.
+const MAX_TORQUE_LIMIT_RATIO: f64 = 1.001;
 
-/// A task with its settings: what [`iterate()`](crate::iterate()) does.
+/// A task with its settings; [`iterate()`](crate::iterate()) executes it.
 #[derive(Clone, Debug)]
 pub struct Iteration {
     pub(crate) task: IterationTask,
@@ -34,7 +32,7 @@ pub struct Iteration {
 }
 
 impl Iteration {
-    /// The iteration of a task.
+    /// Creates the iteration of a task.
     ///
     /// # Errors
     /// As [`IterationTask::validate`] and [`IterationSettings::validate`].
@@ -44,7 +42,8 @@ impl Iteration {
         Ok(Self { task, settings, planner: None, held_out: None })
     }
 
-    /// The same with motions that are planned from what is known, in place of the task's in every run.
+    /// Returns the iteration with a planner, which replaces the motion of the task in every run after the first good
+    /// one.
     #[must_use]
     pub fn with_planner(mut self, planner: Arc<dyn MotionPlanner>) -> Self {
         self.planner = Some(planner);
@@ -61,12 +60,12 @@ impl Iteration {
         &self.settings
     }
 
-    /// The slowest oscillation that is looked for, Hz.
+    /// Lowest oscillation frequency that is detected, Hz.
     pub(crate) fn lowest_oscillation_hz(&self) -> f64 {
         self.settings.safety.oscillation.lowest_hz(self.task.robot.model())
     }
 
-    /// The legs of a run: the task's, along trajectories of its own where it had some.
+    /// Returns the legs of a run: those of the task, or along the run's own trajectories if it had some.
     ///
     /// # Errors
     /// A record of another task.
@@ -74,8 +73,8 @@ impl Iteration {
         legs_along(&self.task, record.motion.as_ref())
     }
 
-    /// What comes after these records: it depends on nothing else. Where motions are planned an iteration that has
-    /// converged may still go on for a motion that is worth a run.
+    /// Returns the next step, as a pure function of these records. With a motion planner, a converged iteration may
+    /// continue with a motion that is worth a run.
     ///
     /// # Errors
     /// Records of another robot.
@@ -91,7 +90,7 @@ impl Iteration {
         Ok(next)
     }
 
-    /// What is not met after these records; nothing if the iteration has converged.
+    /// Returns the conditions that are not met after these records; empty if the iteration has converged.
     ///
     /// # Errors
     /// Records of another robot.
@@ -100,7 +99,7 @@ impl Iteration {
         Ok(shortfalls(records, &self.settings, &self.names(&robot, records)?))
     }
 
-    /// Names, and how much each parameter counts along the motion of the last run.
+    /// Names of joints and parameters, and the torque share of each parameter along the motion of the last run.
     pub(crate) fn names(&self, robot: &ParametricModel, records: &[RunRecord]) -> Result<Names, IterationError> {
         let shown = records.last().and_then(|last| Some((last, last.evidence.as_ref()?)));
         let shares = match shown {
@@ -120,7 +119,7 @@ impl Iteration {
         })
     }
 
-    /// Where the trajectories ask for more torque than the joints have, by the last good model.
+    /// Checks whether the trajectories need more torque than the joint limits, according to the last good model.
     fn beyond_torque(&self, records: &[RunRecord]) -> Result<Option<String>, IterationError> {
         let Some(limits) = &self.task.torque_limits else { return Ok(None) };
         let good = records.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
@@ -137,10 +136,10 @@ impl Iteration {
                 };
                 model.reference_torque(&at(&motion.q), &at(&motion.dq), &at(&motion.ddq), &mut tau);
                 for (joint, (tau, limit)) in tau.iter().zip(limits).enumerate() {
-                    if tau.abs() > limit * BEYOND {
+                    if tau.abs() > limit * MAX_TORQUE_LIMIT_RATIO {
                         let name = &self.task.robot.model().joints()[joint].name;
                         return Ok(Some(format!(
-                            "the trajectory asks joint {name} for {:.3} Nm at {:.2} s by the model found, its limit is {limit:.3} Nm: give another trajectory",
+                            "joint {name} needs {:.3} Nm at {:.2} s of the trajectory (estimated model), above its limit of {limit:.3} Nm: use another trajectory",
                             tau.abs(),
                             sample as f64 / rate_hz
                         )));
@@ -151,10 +150,10 @@ impl Iteration {
         Ok(None)
     }
 
-    /// The robot with the friction that a run before chose.
+    /// Returns the robot with the friction that an earlier run selected.
     ///
     /// # Errors
-    /// Friction that this robot cannot have: the run is another robot's.
+    /// Friction terms that do not fit this robot: the run belongs to another robot.
     pub fn robot(&self, records: &[RunRecord]) -> Result<Cow<'_, ParametricModel>, IterationError> {
         let choices = records.iter().filter_map(|record| Some((record.run, &record.estimate.as_ref()?.friction)));
         let Some((run, choice)) = choices.into_iter().find(|(_, choice)| !choice.is_empty()) else {
@@ -164,7 +163,7 @@ impl Iteration {
         chosen.map(Cow::Owned).map_err(|source| IterationError::ChosenFriction { run, source })
     }
 
-    /// The task and how runs are identified, with the friction that a run before chose, if one did.
+    /// Returns the task and the identification settings, with the friction that an earlier run selected.
     pub(crate) fn in_force(
         &self,
         before: &[RunRecord],
@@ -183,7 +182,7 @@ impl Iteration {
         })
     }
 
-    /// The model of a controller with these parameters, after these records.
+    /// Returns the controller model with these parameters, after these records.
     ///
     /// # Errors
     /// Parameters of another robot.

@@ -1,13 +1,11 @@
-//! What the robot is asked to follow, and which rows count.
-
 use dynident_dynamics::ParametricModel;
 use dynident_recording::{Differentiator, FilterError};
 use dynident_simulation::Reference;
 use dynident_simulation::{SimulationError, require, require_length};
 use std::sync::Arc;
 
-/// One trajectory of a run. The paper moves joint 2 and then joint 1: one leg in which the joints take turns, or
-/// two legs.
+/// One trajectory of a run. The paper moves joint 2 and then joint 1: this is one leg in which the joints move one
+/// after the other, or two legs.
 #[derive(Clone, Debug)]
 pub struct Leg {
     reference: Reference,
@@ -18,19 +16,19 @@ pub struct Leg {
 }
 
 impl Leg {
-    /// A trajectory of which all samples count, for all joints.
+    /// Creates a leg of which all samples of all joints are used.
     ///
     /// # Errors
-    /// A reference of one sample only.
+    /// A reference with a single sample.
     pub fn whole(reference: Reference) -> Result<Self, FilterError> {
         Self::new(reference, None)
     }
 
-    /// A trajectory of which joint j's torque counts at the times `windows[j]` only (from, to; s): the paper's ±δ about
-    /// mid-strokes, while the joint moves alone.
+    /// Creates a leg of which the torque of joint j is used only in the time intervals `windows[j]` (from, to; s): the
+    /// paper's ±δ around mid-strokes, while the joint moves alone.
     ///
     /// # Errors
-    /// A reference of one sample only.
+    /// A reference with a single sample.
     pub fn windowed(reference: Reference, windows: Vec<Vec<[f64; 2]>>) -> Result<Self, FilterError> {
         Self::new(reference, Some(windows))
     }
@@ -45,90 +43,88 @@ impl Leg {
         Ok(Self { reference, commanded, windows, differentiator: None, payload: None })
     }
 
-    /// The same along another trajectory: windows, payload and a differentiator of one's own stay.
+    /// Returns a copy along another trajectory, with the same windows, payload and custom differentiator.
     ///
     /// # Errors
-    /// A reference of one sample only.
+    /// A reference with a single sample.
     pub fn along(&self, reference: Reference) -> Result<Self, FilterError> {
         let other = Self::new(reference, self.windows.clone())?;
         Ok(Self { differentiator: self.differentiator.clone(), payload: self.payload.clone(), ..other })
     }
 
-    /// The same with the commanded motion as differentiators are to know it: strokes in closed form in place of
-    /// samples.
+    /// Replaces the commanded motion for differentiators: strokes in closed form instead of samples.
     #[must_use]
     pub fn with_commanded(mut self, commanded: dynident_recording::Reference) -> Self {
         self.commanded = Arc::new(commanded);
         self
     }
 
-    /// The same with a differentiator of one's own in place of the settings'.
+    /// Sets a custom differentiator, which replaces that of the settings.
     #[must_use]
     pub fn with_differentiator(mut self, differentiator: Arc<dyn Differentiator>) -> Self {
         self.differentiator = Some(differentiator);
         self
     }
 
-    /// The same with a payload that the robot carries on it, by its name among the settings' payloads.
+    /// Sets the payload of the robot, by its name among the settings' payloads.
     #[must_use]
     pub fn with_payload(mut self, payload: Option<String>) -> Self {
         self.payload = payload;
         self
     }
 
-    /// What the robot carries.
+    /// Name of the payload.
     pub fn payload(&self) -> Option<&str> {
         self.payload.as_deref()
     }
 
-    /// What is followed.
+    /// The reference trajectory.
     pub fn reference(&self) -> &Reference {
         &self.reference
     }
 
-    /// The same for differentiators that know the commanded motion.
+    /// The commanded motion for differentiators.
     pub fn commanded(&self) -> &Arc<dynident_recording::Reference> {
         &self.commanded
     }
 
-    /// The differentiator of one's own, if there is one.
+    /// The custom differentiator, if any.
     pub fn differentiator(&self) -> Option<&dyn Differentiator> {
         self.differentiator.as_deref()
     }
 
-    /// Whether the torque of `joint` at `time_s` counts.
+    /// Whether the torque of `joint` at `time_s` is used.
     pub fn counts(&self, joint: usize, time_s: f64) -> bool {
         let Some(windows) = &self.windows else { return true };
         windows[joint].iter().any(|[from, to]| (*from..=*to).contains(&time_s))
     }
 
-    /// The windows of each joint, if not everything counts.
+    /// The time windows of each joint; `None` if all samples are used.
     pub fn windows(&self) -> Option<&[Vec<[f64; 2]>]> {
         self.windows.as_deref()
     }
 }
 
-/// What an iteration is about: a robot, the trajectories of every run, and parameters that are not looked for.
+/// Task of an iteration: a robot, the trajectories of every run, and known parameters.
 #[derive(Clone, Debug)]
 pub struct IterationTask {
     /// The robot.
     pub robot: ParametricModel,
-    /// The trajectories of every run, in order; of the first run only, where the motion is
-    /// [planned](crate::MotionPlanner).
+    /// The trajectories of every run, in order; of the first run only if motions are [planned](crate::MotionPlanner).
     pub legs: Vec<Leg>,
-    /// Base columns whose values are given: (place among the base columns, value). Of the paper's joint 1: what joint 2
-    /// has shown.
+    /// Base columns with known values: (index of the base column, value). Example: for the paper's joint 1, the values
+    /// estimated from joint 2.
     pub known: Vec<(usize, f64)>,
-    /// The largest torque of each joint, Nm (N); infinite where there is none. A trajectory that asks for more by the
-    /// model found is refused in the end: tracking it is not a matter of the model.
+    /// Torque limit of each joint, Nm (N), or infinity. A trajectory that needs more torque according to the estimated
+    /// model is refused at the end of the iteration.
     pub torque_limits: Option<Vec<f64>>,
 }
 
 impl IterationTask {
-    /// All joints, one trajectory of which everything counts, nothing known.
+    /// Creates a task for all joints with one trajectory, without windows or known parameters.
     ///
     /// # Errors
-    /// A reference of one sample only.
+    /// A reference with a single sample.
     pub fn new(robot: ParametricModel, reference: Reference) -> Result<Self, FilterError> {
         Ok(Self { robot, legs: vec![Leg::whole(reference)?], known: Vec::new(), torque_limits: None })
     }
@@ -136,8 +132,7 @@ impl IterationTask {
     /// Checks that legs and known columns belong to the robot.
     ///
     /// # Errors
-    /// No legs, other numbers of joints, windows that are no intervals, columns that do not exist, values that are not
-    /// finite.
+    /// No legs, wrong numbers of joints, empty windows, unknown columns, values that are not finite.
     pub fn validate(&self) -> Result<(), SimulationError> {
         let dof = self.robot.dof();
         require(!self.legs.is_empty(), "legs", 0.0, "give one or more")?;
@@ -158,13 +153,12 @@ impl IterationTask {
         }
         for (column, value) in &self.known {
             let count = self.robot.base().count();
-            require(*column < count, "known column", *column as f64, "there is no such base parameter")?;
+            require(*column < count, "known column", *column as f64, "use the index of an existing base parameter")?;
             require(value.is_finite(), "known value", *value, "give a finite number")?;
         }
         Ok(())
     }
 
-    /// The known value of each base column, if it has one.
     pub(crate) fn known_values(&self) -> Vec<Option<f64>> {
         let mut values = vec![None; self.robot.base().count()];
         for (column, value) in &self.known {

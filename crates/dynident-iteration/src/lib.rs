@@ -1,24 +1,25 @@
-//! **Run it again, better.** Run, identify, load the better model, run again; robots outside, and a store of every run.
+//! Iterative identification: run the robot, identify, load the better model into the controller, run again. Supports
+//! robots outside of this process and stores every run.
 //!
-//! | task | take |
+//! | task | use |
 //! | --- | --- |
 //! | the loop | [`iterate()`] of an [`IterationTask`] with [`IterationSettings`] |
-//! | what is run | [`Leg`]: a trajectory and which of its rows count |
+//! | the trajectory of a run and the rows that are used | [`Leg`] |
 //! | a simulated robot | [`SimulatedRobot`] |
-//! | a program that speaks the line protocol, or a person with a folder | [`robot`] |
-//! | stops, permissions, what no sample may leave | [`iterate_supervised`] with a [`Supervisor`]; [`SafetySettings`] |
+//! | a program that uses the line protocol, or a person with a folder | [`robot`] |
+//! | stops, permissions, limits of every sample | [`iterate_supervised`] with a [`Supervisor`]; [`SafetySettings`] |
 //! | gains from a nominal model and a bandwidth | [`derived_controllers`] |
-//! | a motion rehearsed before it is commanded | [`RehearsalSettings`] in [`SafetySettings`] |
-//! | the ways from where the robot waits to the motion and back | [`HomeSettings`] in [`SafetySettings`] |
-//! | a robot of one's own | a type with [`Robot`] |
-//! | one run's identification | [`identify_run`]: all joints at once, or step by step from tip to base as in the paper |
-//! | several runs' identification together | [`identify_runs`], each weighted by its own noise |
-//! | what is not met yet | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`Shortfall`]) |
-//! | what the next run is | [`Iteration::next`], a pure function of the records so far: which controller and model it has, whether a run got worse, when all has settled |
-//! | the next motion where the runs so far say least | a [`MotionPlanner`]: [`Redesign`], with [`Iteration::with_planner`] |
-//! | kept on disk, and resumed to the same result | [`IterationStore`] |
+//! | rehearsal of a motion in simulation before it is commanded | [`RehearsalSettings`] in [`SafetySettings`] |
+//! | paths from a home posture to the motion and back | [`HomeSettings`] in [`SafetySettings`] |
+//! | a custom robot | a type that implements [`Robot`] |
+//! | identification of one run | [`identify_run`]: all joints at once, or joint by joint from tip to base as in the paper |
+//! | joint identification of several runs | [`identify_runs`], each weighted by its own noise |
+//! | unmet conditions | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`Shortfall`]) |
+//! | the next run | [`Iteration::next`], a pure function of the records: controller and model, rejection of worse runs, convergence |
+//! | a next motion that excites the least known directions | a [`MotionPlanner`]: [`Redesign`], with [`Iteration::with_planner`] |
+//! | storage, and resuming with the same result | [`IterationStore`] |
 //!
-//! The crate `dynident` wraps it as `dynident iterate`, with trajectories, robots and controllers from a study file.
+//! The crate `dynident` provides it as `dynident iterate`, with trajectories, robots and controllers from a study file.
 //!
 //! ```
 //! use dynident_dynamics::ParametricModel;
@@ -33,7 +34,7 @@
 //! let rod = dynident_model::read_urdf(text)?.model;
 //! let friction = terms_per_joint(&rod, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 //!
-//! // The true pendulum has friction that the controller does not know of.
+//! // The true pendulum has friction that is missing in the controller's model.
 //! let plant = Plant::new(&rod, &friction, &[0.5])?;
 //! let mut robot = SimulatedRobot::new(plant, LoopSettings::default())?;
 //!
@@ -127,6 +128,7 @@ mod torque_noise;
 mod torque_of_all;
 mod tracking_floor;
 mod typical_drives;
+mod verdict_settings;
 mod warm_up;
 
 pub use convergence::Shortfall;
@@ -165,6 +167,7 @@ pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
 pub use supervision::{NextMotion, NextWays, Supervisor};
 pub use torque_check::{CommandSource, JointTorqueCheck, TorqueCandidate, TorqueCause, TorqueCheck};
-pub use torque_check_settings::TorqueCheckSettings;
+pub use torque_check_settings::{CauseSettings, TorqueCheckSettings};
 pub use typical_drives::with_typical_drives;
+pub use verdict_settings::{LengthSettings, VerdictSettings};
 pub use warm_up::WarmUp;

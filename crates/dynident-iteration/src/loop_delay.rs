@@ -1,42 +1,42 @@
-//! How fast a joint's loop may be when its controller acts late.
+//! Highest bandwidth of a joint's loop with a delayed controller.
 //!
-//! A joint of inertia `m` under `K_p = ω² m̂`, `K_d = 2 ω m̂` has the open loop `L(s) = r (2 ω s + ω²) e^(-τ s) / s²`,
-//! with `r = m̂ / m` the gains' inertia over the joint's own and `τ` the delay. `|L| = 1` at `ω_c = x ω`,
-//! `x² = 2 r² + r √(4 r² + 1)`, where the phase margin is `atan 2x - ω_c τ` (Åström and Murray, *Feedback Systems*,
-//! 2008, chapter 9).
+//! A joint of inertia `m` with `K_p = ω² m̂`, `K_d = 2 ω m̂` has the open loop `L(s) = r (2 ω s + ω²) e^(-τ s) / s²`,
+//! where `r = m̂ / m` is the ratio of the inertia in the gains to the true one and `τ` the delay. `|L| = 1` at
+//! `ω_c = x ω`, `x² = 2 r² + r √(4 r² + 1)`, where the phase margin is `atan 2x - ω_c τ` (Åström and Murray, *Feedback
+//! Systems*, 2008, chapter 9).
 
 use nalgebra::{DMatrix, DVector};
 
-/// Least phase margin, rad: 30 degrees.
-const MARGIN: f64 = core::f64::consts::FRAC_PI_6;
+/// Smallest phase margin, rad: 30 degrees.
+const MIN_PHASE_MARGIN_RAD: f64 = core::f64::consts::FRAC_PI_6;
 
-/// The highest natural frequency with that margin, rad/s; infinite without a delay.
+/// Highest natural frequency with that margin, rad/s; infinite without a delay.
 pub(crate) fn highest_omega(ratio: f64, delay_s: f64) -> f64 {
-    omega_with_margin(ratio, delay_s, MARGIN, 1.0)
+    omega_with_margin(ratio, delay_s, MIN_PHASE_MARGIN_RAD, 1.0)
 }
 
-/// The natural frequency at which a joint that is lighter than expected keeps half of that margin, rad/s, with
-/// `K_d = 2 ζ ω m̂` for a damping `ζ`; infinite without a delay.
+/// Natural frequency at which a joint that is lighter than expected keeps half of that margin, rad/s, with `K_d = 2 ζ ω
+/// m̂` for a damping ratio `ζ`; infinite without a delay.
 pub(crate) fn highest_omega_if_light(ratio: f64, delay_s: f64, damping: f64) -> f64 {
-    omega_with_margin(ratio, delay_s, 0.5 * MARGIN, damping)
+    omega_with_margin(ratio, delay_s, 0.5 * MIN_PHASE_MARGIN_RAD, damping)
 }
 
-/// With a damping `ζ` the crossover is at `x² = 2 ζ² r² + r √(4 ζ⁴ r² + 1)`, and the margin `atan 2 ζ x - ω_c τ`.
+/// With damping ratio `ζ` the crossover is at `x² = 2 ζ² r² + r √(4 ζ⁴ r² + 1)`, and the margin `atan 2 ζ x - ω_c τ`.
 fn omega_with_margin(ratio: f64, delay_s: f64, margin: f64, damping: f64) -> f64 {
     let damped = damping * damping * ratio;
     let crossover = (2.0 * damped * ratio + ratio * (4.0 * damped * damped + 1.0).sqrt()).sqrt();
     ((2.0 * damping * crossover).atan() - margin) / (crossover * delay_s)
 }
 
-/// The share of their natural frequencies `omega` (rad/s) at which joints under velocity gains `kd` (Nms/rad) in a
-/// posture of mass matrix `M` keep that margin; 1 where they do. None where `M` is not positive definite.
+/// Factor (at most 1) on the natural frequencies `omega` (rad/s) at which joints with velocity gains `kd` (Nms/rad)
+/// keep that margin in a posture with mass matrix `M`. `None` if `M` is not positive definite.
 ///
-/// Joint by joint a loop may be slow enough and all of them together too fast: the fastest motion of all joints crosses
-/// over at `λ`, the largest eigenvalue of `M⁻¹ K_d`, as a single joint with `r = λ / 2ω` does.
+/// The coupled loops may be too fast although each single loop is slow enough: the fastest motion of all joints crosses
+/// over at `λ`, the largest eigenvalue of `M⁻¹ K_d`, like a single joint with `r = λ / 2ω`.
 pub(crate) fn share_of_all(matrix: &DMatrix<f64>, kd: &[f64], omega: &[f64], delay_s: f64) -> Option<f64> {
     let root = DMatrix::from_diagonal(&DVector::from_iterator(kd.len(), kd.iter().map(|kd| kd.sqrt())));
     let fastest = (&root * matrix.clone().cholesky()?.inverse() * &root).symmetric_eigenvalues().max();
-    // The least phase is that of the joint whose position gain is the largest beside its velocity gain.
+    // The joint with the largest ratio of position to velocity gain has the smallest phase.
     let highest = omega.iter().copied().fold(0.0, f64::max);
     Some((highest_omega(fastest / (2.0 * highest), delay_s) / highest).min(1.0))
 }
@@ -45,8 +45,8 @@ pub(crate) fn share_of_all(matrix: &DMatrix<f64>, kd: &[f64], omega: &[f64], del
 mod tests {
     use super::*;
 
-    /// The loop `m q̈ = -K_d q̇(t - τ) - K_p q(t - τ)` in small steps: at the highest frequency a deflection dies away,
-    /// at three times that (no margin left) it grows.
+    /// The loop `m q̈ = -K_d q̇(t - τ) - K_p q(t - τ)` in small steps: a deflection decays at the highest frequency and
+    /// grows at three times that frequency (no margin left).
     #[test]
     fn the_highest_frequency_is_stable_and_three_times_that_is_not() {
         let delay_s = 0.008;
@@ -72,7 +72,7 @@ mod tests {
         }
     }
 
-    /// Without coupling it is the rule of the single joint.
+    /// Without coupling it equals the rule for a single joint.
     #[test]
     fn all_together_is_the_single_joint_where_nothing_couples() {
         let (m, omega, delay_s) = (2.5, 40.0, 0.01);

@@ -1,5 +1,3 @@
-//! Parameters of the model that a controller gets.
-
 use serde::{Deserialize, Serialize};
 
 /// Parameters of a controller's model.
@@ -7,9 +5,9 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "of", content = "values", rename_all = "kebab-case")]
 pub enum ModelParameters {
-    /// Ten for each body, then one for each term.
+    /// All parameters: ten per body, then one per term.
     All(Vec<f64>),
-    /// One for each base parameter.
+    /// One per base parameter.
     Base(Vec<f64>),
 }
 
@@ -21,7 +19,7 @@ impl ModelParameters {
         }
     }
 
-    /// `good + share (new - good)`; `new` itself where the kinds differ.
+    /// `good + share (new - good)`; `new` if the kinds differ.
     pub(crate) fn between(good: &Self, new: &Self, share: f64) -> Self {
         let mixed = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
         match (good, new) {

@@ -1,57 +1,57 @@
-//! Oscillations of a joint: a signal that swings from one side to the other, again and again, far faster than any
-//! motion. A loop that is too fast for its delay does that, and a drive that switches between two torques.
+//! Detection of oscillations of a joint: a signal that alternates far faster than any motion, as from a control loop
+//! that is too fast for its delay or a drive that switches between two torques.
 //!
-//! The signal without its mean over one period of the slowest oscillation alternates when it passes `+h` and `-h` in
-//! turn. Oscillations alternate regularly: over [`SWINGS`] alternations the lengths of the periods differ little. Noise
-//! alternates as well, but its periods differ by as much as they are long.
+//! The signal without its moving mean over one period of the lowest frequency alternates when it passes `+h` and `-h`
+//! in turn. Oscillations are regular: over [`SWINGS`] alternations the period lengths differ little. The periods of
+//! noise vary by as much as their length.
 
 use dynident_model::Model;
 use dynident_simulation::{SimulationError, require};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// The slowest oscillation, Hz of a usual arm: motions have up to some 2 Hz, loops with some milliseconds of delay
-/// become unstable at 20 to 60 Hz.
+/// Default lowest frequency of an oscillation, Hz, for an arm of 1.2 m: motions have up to about 2 Hz, loops with some
+/// milliseconds of delay become unstable at 20 to 60 Hz.
 const LOWEST_HZ: f64 = 8.0;
-/// Alternations in a row that are an oscillation: eight periods.
+/// Number of consecutive alternations of an oscillation: eight periods.
 pub(crate) const SWINGS: usize = 16;
-/// Standard deviation of the periods over their mean, at most: noise has 0.4 to 0.7. Half a sample of rounding comes on
-/// top, for periods of at least this many samples.
-const REGULAR: f64 = 0.12;
-const ROUNDING: f64 = 0.5;
-const ROUNDED: f64 = 5.0;
-/// Standard deviation of the logarithm of one peak over the one before, at most, where a run is stopped for an
-/// oscillation. Noise has 0.4, a sine of five samples per period at most 0.2.
-const EVEN: f64 = 0.25;
-/// Threshold over the root mean square of the signal: a sine reaches 1.4, and of noise two thirds are inside.
-const THRESHOLD: f64 = 0.8;
-/// Irregular swings are an oscillation if they exceed this many standard deviations of the noise.
-const BEYOND_NOISE: f64 = 6.0;
-/// An oscillation whose last swings are smaller than this share of its first ones dies away.
-const SUSTAINED: f64 = 0.8;
+/// Largest relative standard deviation of the periods (noise has 0.4 to 0.7). Rounding adds half a sample, for periods
+/// of at least `MIN_ROUNDED_PERIOD` samples.
+const MAX_PERIOD_VARIATION: f64 = 0.12;
+const ROUNDING_SAMPLES: f64 = 0.5;
+const MIN_ROUNDED_PERIOD: f64 = 5.0;
+/// Largest standard deviation of the logarithm of the ratio of consecutive peaks for which a run is stopped. Noise has
+/// 0.4, a sine of five samples per period at most 0.2.
+const MAX_PEAK_VARIATION: f64 = 0.25;
+/// Threshold over the root mean square of the signal: a sine reaches 1.4; two thirds of noise samples are below 1.
+const THRESHOLD_RMS_RATIO: f64 = 0.8;
+/// Irregular alternations are an oscillation if they exceed this number of standard deviations of the noise.
+const MIN_NOISE_SIGMAS: f64 = 6.0;
+/// An oscillation whose last peaks are below this share of its first ones decays.
+const MIN_SUSTAINED_SHARE: f64 = 0.8;
 
-/// Alternations at the end of a run that was stopped which are an oscillation, and the share of the largest one that
-/// they reach at least; each has at least this share of the one before.
-const FEWEST_LAST_SWINGS: usize = 5;
-const LAST_SWINGS_SHARE: f64 = 0.005;
-const GROWING: f64 = 0.9;
+/// Alternations at the end of a stopped run that are an oscillation, their threshold as a share of the largest value,
+/// and the smallest ratio of consecutive peaks.
+const MIN_LAST_SWINGS: usize = 5;
+const LAST_SWINGS_THRESHOLD_SHARE: f64 = 0.005;
+const MIN_PEAK_GROWTH: f64 = 0.9;
 
-/// When a joint oscillates.
+/// Settings of the detection of oscillations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct OscillationSettings {
-    /// The slowest oscillation, Hz. By default 8 Hz of an arm of 1.2 m, of others as much in their own seconds.
+    /// Lowest frequency of an oscillation, Hz. Default 8 Hz for an arm of 1.2 m, scaled with the time constant of other
+    /// arms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lowest_hz: Option<f64>,
-    /// A run is stopped where the velocity of a joint swings about that of its trajectory by more than this percentage
-    /// of the joint's highest velocity in it, eight periods in a row that do not die away. Default 10; 0 never stops a
-    /// run.
+    /// Amplitude of the velocity error of a joint at which a run is stopped, in percent of the joint's highest velocity
+    /// in the motion, over eight consecutive periods that do not decay. Default 10; 0 disables the stop.
     pub speed_percent: f64,
-    /// Torque that swings by more than this percentage of the joint's torque (root mean square) is reported. Default
+    /// Amplitude of a torque oscillation that is reported, in percent of the joint torque (root mean square). Default
     /// 10.
     pub torque_percent: f64,
-    /// Percentage of the samples in which it has to do that to be reported. Default 2.
+    /// Smallest percentage of oscillating samples that is reported. Default 2.
     pub time_percent: f64,
 }
 
@@ -79,24 +79,24 @@ impl OscillationSettings {
         Ok(())
     }
 
-    /// Limits that stop a run of a robot; `None` if `speed_percent` is 0.
+    /// Returns the limits at which a run is stopped; `None` if `speed_percent` is 0.
     pub fn limits(&self, model: &Model) -> Option<OscillationLimits> {
         let (lowest_hz, speed_share) = (self.lowest_hz(model), 0.01 * self.speed_percent);
         (speed_share > 0.0).then_some(OscillationLimits { lowest_hz, speed_share })
     }
 
-    /// The slowest oscillation of a robot, Hz.
+    /// Returns the lowest frequency of an oscillation for this robot, Hz.
     pub fn lowest_hz(&self, model: &Model) -> f64 {
         self.lowest_hz.unwrap_or_else(|| model.own_scale().hertz(LOWEST_HZ))
     }
 }
 
-/// Limits of a run: a joint that swings beyond them stops it.
+/// Limits of a run; it is stopped if a joint oscillates beyond them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OscillationLimits {
-    /// The slowest oscillation, Hz.
+    /// Lowest frequency, Hz.
     pub lowest_hz: f64,
-    /// The smallest amplitude of the velocity, as a share of the joint's highest in the trajectory.
+    /// Smallest amplitude of the velocity error, as a share of the joint's highest velocity in the trajectory.
     pub speed_share: f64,
 }
 
@@ -104,40 +104,35 @@ pub struct OscillationLimits {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Oscillation {
-    /// Alternations per second over two: the frequency, Hz.
+    /// Frequency, Hz: half the number of alternations per second.
     pub frequency_hz: f64,
-    /// Mean of the largest values between alternations, in the unit of the signal: Nm (N) of a torque, rad/s (m/s) of a
-    /// velocity.
+    /// Mean peak value between alternations, in the unit of the signal: Nm (N) or rad/s (m/s).
     pub amplitude: f64,
-    /// Share of the samples in which it is seen, 0 to 1.
+    /// Share of oscillating samples, 0 to 1.
     pub share: f64,
 }
 
-/// Thresholds of a search for oscillations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Search {
-    /// The slowest, Hz.
     pub(crate) lowest_hz: f64,
-    /// The smallest amplitude.
+    /// Smallest amplitude, in the unit of the signal.
     pub(crate) least: f64,
-    /// The smallest share of the samples.
     pub(crate) least_share: f64,
-    /// Standard deviation of the signal's noise: 0 where it is not known, and then only regular swings are found.
+    /// Standard deviation of the signal's noise; 0 if unknown, then only regular oscillations are detected.
     pub(crate) noise: f64,
 }
 
-/// The oscillation of a uniformly sampled signal; none where it never swings as an oscillation does.
 pub(crate) fn oscillation(values: &[f64], rate_hz: f64, search: Search) -> Option<Oscillation> {
     let half_period = half_period(rate_hz, search.lowest_hz)?;
     let swinging = without_mean(values, 2 * half_period);
     let rms = (swinging.iter().map(|x| x * x).sum::<f64>() / swinging.len().max(1) as f64).sqrt();
-    let regular = swings(&swinging, search.least.max(THRESHOLD * rms), half_period, |last| is_regular(last));
+    let regular = swings(&swinging, search.least.max(THRESHOLD_RMS_RATIO * rms), half_period, |last| is_regular(last));
     let beyond = (search.noise > 0.0)
-        .then(|| swings(&swinging, search.least.max(BEYOND_NOISE * search.noise), half_period, |_| true))
+        .then(|| swings(&swinging, search.least.max(MIN_NOISE_SIGMAS * search.noise), half_period, |_| true))
         .flatten();
     let is_seen = |(samples, ..): &(usize, usize, f64)| *samples as f64 >= search.least_share * values.len() as f64;
     let found = regular.into_iter().chain(beyond).filter(is_seen);
-    // The regular one, unless far more is not.
+    // Prefer the regular oscillation, unless the irregular one has more than twice the samples.
     let (samples, alternations, peaks) = found.reduce(|one, other| if other.0 > 2 * one.0 { other } else { one })?;
     Some(Oscillation {
         frequency_hz: 0.5 * alternations as f64 * rate_hz / samples as f64,
@@ -146,15 +141,15 @@ pub(crate) fn oscillation(values: &[f64], rate_hz: f64, search: Search) -> Optio
     })
 }
 
-/// An oscillation that grows up to the signal's end, as in a run that was stopped: fewer swings show it there, for
-/// something did leave its limits. Its amplitude is that of the last period.
+/// Detects an oscillation that grows up to the end of the signal, as in a stopped run. Fewer alternations are enough,
+/// because the run did exceed a limit. Its amplitude is that of the last period.
 pub(crate) fn growing_oscillation(values: &[f64], rate_hz: f64, lowest_hz: f64) -> Option<Oscillation> {
     let half_period = half_period(rate_hz, lowest_hz)?;
     let last_values = &values[values.len().saturating_sub(SWINGS * half_period)..];
-    // Differences: against a mean over the last swings the first ones, far smaller, would not alternate.
+    // Use differences: about the mean over the last alternations, the first and far smaller ones would not alternate.
     let swinging: Vec<f64> = last_values.windows(2).map(|two| two[1] - two[0]).collect();
     let peak = swinging.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-    let mut counter = AlternationCounter::new(LAST_SWINGS_SHARE * peak, half_period);
+    let mut counter = AlternationCounter::new(LAST_SWINGS_THRESHOLD_SHARE * peak, half_period);
     let mut newest = 0;
     for (sample, &x) in swinging.iter().enumerate() {
         if counter.add(x) {
@@ -162,28 +157,28 @@ pub(crate) fn growing_oscillation(values: &[f64], rate_hz: f64, lowest_hz: f64) 
         }
     }
     let last = &counter.last;
-    let own = last.iter().skip(last.len().saturating_sub(FEWEST_LAST_SWINGS));
-    let is_growing = own.clone().zip(own.clone().skip(1)).all(|(one, next)| next.peak >= GROWING * one.peak);
-    let is_one = last.len() >= FEWEST_LAST_SWINGS
+    let own = last.iter().skip(last.len().saturating_sub(MIN_LAST_SWINGS));
+    let is_growing = own.clone().zip(own.clone().skip(1)).all(|(one, next)| next.peak >= MIN_PEAK_GROWTH * one.peak);
+    let is_one = last.len() >= MIN_LAST_SWINGS
         && swinging.len() - newest <= half_period
         && is_regular(own.clone())
         && is_even(own.clone())
         && is_growing;
     let samples: usize = own.map(|one| one.length).sum();
     is_one.then(|| Oscillation {
-        frequency_hz: 0.5 * FEWEST_LAST_SWINGS as f64 * rate_hz / samples as f64,
+        frequency_hz: 0.5 * MIN_LAST_SWINGS as f64 * rate_hz / samples as f64,
         amplitude: last_values.iter().rev().take(2 * half_period).fold(0.0_f64, |most, x| most.max(x.abs())),
         share: samples as f64 / values.len() as f64,
     })
 }
 
-/// The longest half period, in samples; none for rates at which the slowest oscillation cannot be seen.
+/// Longest half period, samples; `None` for rates that are too low for the lowest frequency.
 fn half_period(rate_hz: f64, lowest_hz: f64) -> Option<usize> {
     let samples = 0.5 * rate_hz / lowest_hz;
     (samples.is_finite() && samples >= 1.0).then_some(samples.ceil() as usize)
 }
 
-/// Samples of oscillations that `is_one` accepts, the alternations in them, and the sum of their peaks.
+/// Number of samples of oscillations that `is_one` accepts, of alternations in them, and the sum of their peaks.
 fn swings(
     swinging: &[f64],
     threshold: f64,
@@ -206,26 +201,23 @@ fn swings(
     (alternations > 0 && samples > 0).then_some((samples, alternations, peaks))
 }
 
-/// A passage from one side to the other.
 #[derive(Clone, Copy, Debug)]
 struct Alternation {
-    /// The sample at which the other side's threshold is passed.
+    /// The sample at which the threshold of the other side is passed.
     sample: usize,
-    /// Samples since the one before.
     length: usize,
-    /// The largest value in between.
     peak: f64,
 }
 
-/// Counts alternations between beyond `threshold` and beyond `-threshold`.
+/// Counts alternations between values above `threshold` and below `-threshold`.
 #[derive(Debug)]
 struct AlternationCounter {
     threshold: f64,
     longest: usize,
     sample: usize,
-    /// The side, where it was passed first, and the largest value since.
+    /// The current side (positive or not), the sample at which it was entered, and the largest magnitude since.
     side: Option<(bool, usize, f64)>,
-    /// The newest alternations that follow each other within half a period of the slowest oscillation.
+    /// The newest alternations that follow each other within half a period of the lowest frequency.
     last: VecDeque<Alternation>,
 }
 
@@ -234,7 +226,6 @@ impl AlternationCounter {
         Self { threshold, longest, sample: 0, side: None, last: VecDeque::with_capacity(SWINGS) }
     }
 
-    /// The next value; true where it completes an alternation.
     fn add(&mut self, x: f64) -> bool {
         let sample = self.sample;
         self.sample += 1;
@@ -261,26 +252,26 @@ impl AlternationCounter {
     }
 }
 
-/// Whether the periods, of two alternations each, differ little.
+/// Whether the lengths of the periods (two alternations each) differ little.
 fn is_regular<'a>(alternations: impl IntoIterator<Item = &'a Alternation>) -> bool {
     let lengths: Vec<f64> = alternations.into_iter().map(|one| one.length as f64).collect();
     let periods: Vec<f64> = lengths.windows(2).map(|two| two[0] + two[1]).collect();
     let mean = periods.iter().sum::<f64>() / periods.len().max(1) as f64;
     let square = periods.iter().map(|period| (period - mean).powi(2)).sum::<f64>() / periods.len().max(1) as f64;
-    let rounding = if mean >= ROUNDED { ROUNDING } else { 0.0 };
-    !periods.is_empty() && square.sqrt() <= rounding.hypot(REGULAR * mean)
+    let rounding = if mean >= MIN_ROUNDED_PERIOD { ROUNDING_SAMPLES } else { 0.0 };
+    !periods.is_empty() && square.sqrt() <= rounding.hypot(MAX_PERIOD_VARIATION * mean)
 }
 
-/// Whether each peak is nearly as large as the one before, or grows evenly.
+/// Whether consecutive peaks are of similar size or grow evenly.
 fn is_even<'a>(alternations: impl IntoIterator<Item = &'a Alternation>) -> bool {
     let peaks: Vec<f64> = alternations.into_iter().map(|one| one.peak.ln()).collect();
     let steps: Vec<f64> = peaks.windows(2).map(|two| two[1] - two[0]).collect();
     let mean = steps.iter().sum::<f64>() / steps.len().max(1) as f64;
     let square = steps.iter().map(|step| (step - mean).powi(2)).sum::<f64>() / steps.len().max(1) as f64;
-    square.sqrt() <= EVEN
+    square.sqrt() <= MAX_PEAK_VARIATION
 }
 
-/// The values less their mean over `window` samples about each; at the ends over those of them that there are.
+/// Subtracts the moving mean over `window` samples (fewer at the ends).
 fn without_mean(values: &[f64], window: usize) -> Vec<f64> {
     let mut sums = Vec::with_capacity(values.len() + 1);
     sums.push(0.0);
@@ -295,20 +286,17 @@ fn without_mean(values: &[f64], window: usize) -> Vec<f64> {
     values.iter().enumerate().map(|(k, value)| value - mean(k)).collect()
 }
 
-/// Watches one joint while it runs: velocities about those of its trajectory.
 #[derive(Debug)]
 pub(crate) struct OscillationWatch {
     counter: AlternationCounter,
     rate_hz: f64,
-    /// The newest deviations, for their mean.
     window: VecDeque<f64>,
     sum: f64,
-    /// Squares of what is left of them, since the oldest alternation that counts.
     squares: VecDeque<f64>,
 }
 
 impl OscillationWatch {
-    /// For samples at `rate_hz`; none where the slowest oscillation cannot be seen at that rate.
+    /// Creates a monitor for samples at `rate_hz`; `None` if the rate is too low for the lowest frequency.
     pub(crate) fn new(rate_hz: f64, lowest_hz: f64, least: f64) -> Option<Self> {
         let half_period = half_period(rate_hz, lowest_hz)?;
         let window = VecDeque::with_capacity(2 * half_period + 1);
@@ -316,7 +304,7 @@ impl OscillationWatch {
         Some(Self { counter, rate_hz, window, sum: 0.0, squares: VecDeque::new() })
     }
 
-    /// The next deviation; an oscillation where it completes one that does not die away.
+    /// Adds a deviation; returns an oscillation if it completes one that does not decay.
     pub(crate) fn add(&mut self, deviation: f64) -> Option<Oscillation> {
         let length = 2 * self.counter.longest + 1;
         self.window.push_back(deviation);
@@ -327,7 +315,7 @@ impl OscillationWatch {
         if self.window.len() < length {
             return None;
         }
-        // The sample in the middle of the window: half a period late.
+        // The sample in the middle of the window, half a period late.
         let x = self.window[length / 2] - self.sum / length as f64;
         self.squares.push_back(x * x);
         if self.squares.len() > SWINGS * self.counter.longest {
@@ -339,13 +327,13 @@ impl OscillationWatch {
         }
         let last = &self.counter.last;
         let samples: usize = last.iter().map(|one| one.length).sum();
-        // Noise passes the threshold now and then; an oscillation stays beyond it.
+        // Noise exceeds the threshold only now and then.
         let own = self.squares.iter().rev().take(samples);
         let rms = (own.sum::<f64>() / samples as f64).sqrt();
         let mean = |peaks: &mut dyn Iterator<Item = f64>| peaks.sum::<f64>() / (SWINGS / 4) as f64;
         let first = mean(&mut last.iter().take(SWINGS / 4).map(|one| one.peak));
         let newest = mean(&mut last.iter().rev().take(SWINGS / 4).map(|one| one.peak));
-        (rms >= self.counter.threshold && newest >= SUSTAINED * first).then(|| Oscillation {
+        (rms >= self.counter.threshold && newest >= MIN_SUSTAINED_SHARE * first).then(|| Oscillation {
             frequency_hz: 0.5 * SWINGS as f64 * self.rate_hz / samples as f64,
             amplitude: newest,
             share: samples as f64 / self.counter.sample as f64,
@@ -361,7 +349,7 @@ mod tests {
 
     const RATE_HZ: f64 = 500.0;
 
-    /// Twenty seconds of a smooth torque with steps of friction and noise.
+    /// Twenty seconds of a smooth torque with friction steps and noise.
     fn torque(noise: f64) -> Vec<f64> {
         let mut random = Random::new(5);
         let t = |k: usize| k as f64 / RATE_HZ;
@@ -377,8 +365,8 @@ mod tests {
         oscillation(values, RATE_HZ, Search { lowest_hz: 8.0, least: 1.4, least_share: 0.02, noise })
     }
 
-    /// Torque, friction and noise of any size that a log has are no oscillation, be it white, differentiated as a
-    /// controller does with its encoders, or held together over ten samples.
+    /// Torque with friction and noise of realistic size is not an oscillation, whether the noise is white,
+    /// differentiated as in a controller, or held over ten samples.
     #[test]
     fn an_honest_torque_does_not_oscillate() {
         for noise in [0.0, 0.05, 2.0, 20.0] {
@@ -398,8 +386,8 @@ mod tests {
         assert_eq!(found(&coloured, 4.0), None);
     }
 
-    /// A fifth of the time it swings between two torques: its frequency, its size and the share are found, whether
-    /// as a sine of 43 Hz, from sample to sample, or between two torques at random.
+    /// An oscillation in a fifth of the samples is detected with its frequency, amplitude and share: a sine of 43 Hz,
+    /// alternation from sample to sample, or random switching between two torques.
     #[test]
     fn a_joint_that_chatters_is_found() {
         let with = |swing: &mut dyn FnMut(usize) -> f64| -> Vec<f64> {
@@ -416,8 +404,8 @@ mod tests {
         assert!((at_random.share - 0.2).abs() < 0.02 && at_random.amplitude > 10.0, "{at_random:?}");
     }
 
-    /// A loop that swings with a constant amplitude is found within ten periods. A loop that rings and settles is not,
-    /// and neither is noise of any size.
+    /// A loop that oscillates at constant amplitude is detected within ten periods. A decaying oscillation and noise of
+    /// any size are not reported.
     #[test]
     fn a_running_joint_is_watched() {
         let seen = |deviation: &mut dyn FnMut(f64) -> f64| {
@@ -444,8 +432,8 @@ mod tests {
         }
     }
 
-    /// The last swings of a run that a limit of velocity ended; a joint that runs away or one that is only noisy does
-    /// not oscillate.
+    /// The last alternations of a run that a velocity limit ended; a joint that runs away or is only noisy does not
+    /// oscillate.
     #[test]
     fn a_growing_oscillation_is_named() {
         let grows = |t: f64| 1e-3 * (20.0 * t).exp() * (TAU * 43.0 * t).sin();

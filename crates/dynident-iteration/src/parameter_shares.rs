@@ -1,13 +1,10 @@
-//! How much parameters count beside each other: by the torque that they make.
-
 use crate::leg::Leg;
 use crate::run_information::{RunNoise, run_information};
 use dynident_dynamics::ParametricModel;
 
-/// For each base parameter the torque that one of its unit makes along the legs, as a share of the joints' own:
-/// `√(Σ_j mean(w_j²) / r_j²)` with the column `w_j` of the regressor and the root mean square `r_j` = `torque_rms` of
-/// joint j's torque (Nm, N). A mass and a moment of inertia have no other common measure; joints without torque do not
-/// count.
+/// Torque share of each base parameter: torque of one unit along the legs relative to the joint torques, `√(Σ_j
+/// mean(w_j²) / r_j²)` with the column `w_j` of the regressor and the root mean square `r_j` = `torque_rms` of joint
+/// j's torque (Nm, N). It makes parameters of different units comparable. Joints without torque are ignored.
 pub(crate) fn parameter_shares(robot: &ParametricModel, legs: &[Leg], torque_rms: &[f64]) -> Vec<f64> {
     let joint_sigma = torque_rms.iter().map(|rms| if *rms > 0.0 { *rms } else { f64::INFINITY }).collect();
     let noise = RunNoise { joint_sigma, rows_per_s: 1.0 };

@@ -1,5 +1,3 @@
-//! Who says what the next motion is.
-
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::forecast::MotionForecast;
@@ -8,47 +6,47 @@ use crate::robot::StopSignal;
 use crate::run_motion::RunMotion;
 use dynident_dynamics::ParametricModel;
 
-/// What is known before a run.
+/// State before a run.
 #[derive(Clone, Copy, Debug)]
 pub struct BeforeRun<'a> {
-    /// Number of the run that is to be planned, from 2.
+    /// Number of the run to be planned, from 2.
     pub run: usize,
-    /// The robot, with the friction in force.
+    /// The robot with the selected friction.
     pub robot: &'a ParametricModel,
-    /// What all good runs say together, or the last alone where they are not pooled.
+    /// Estimate of all good runs, or of the last one if they are not pooled.
     pub known: &'a RunEstimate,
-    /// The runs that this was made of, in order; not empty.
+    /// The runs of this estimate, in order; not empty.
     pub good: &'a [GoodRun<'a>],
-    /// The largest torque of each joint, Nm (N); infinite where there is none.
+    /// Torque limit of each joint, Nm (N), or infinity.
     pub torque_limits: Option<&'a [f64]>,
-    /// Where a stop may be asked for: a search then ends with what it has.
+    /// Signal on which a search ends with its best result.
     pub stop: Option<&'a StopSignal>,
 }
 
-/// A good run as planners see it.
+/// A good run as input of planners.
 #[derive(Clone, Copy, Debug)]
 pub struct GoodRun<'a> {
     /// Its legs.
     pub legs: &'a [Leg],
-    /// What it says by itself.
+    /// The estimate from this run alone.
     pub estimate: &'a RunEstimate,
 }
 
-/// A motion for a run that has not been made, with what it is expected to bring.
+/// The planned motion of a run, with its forecast.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedMotion {
-    /// The trajectories, leg by leg; none for those of the good run before, once more.
+    /// Trajectories, leg by leg; `None` repeats those of the previous good run.
     pub motion: Option<RunMotion>,
-    /// What it is expected to bring.
+    /// The forecast.
     pub forecast: MotionForecast,
 }
 
-/// Who says what the next motion is, from the second good run on. Without one every run repeats the motion of the task.
+/// Plans the next motion, from the second good run on. Without a planner every run repeats the motion of the task.
 pub trait MotionPlanner: core::fmt::Debug + Send + Sync {
-    /// The motion of a run that follows a good one. It is asked once for each run: what it says is kept with the
-    /// iteration, so that it need not say the same again.
+    /// Plans the motion of a run that follows a good one. It is called once per run: the plan is stored with the
+    /// iteration, so it need not be reproducible.
     ///
     /// # Errors
-    /// A task that motions cannot be planned for. That no better motion was found is a plan.
+    /// A task for which motions cannot be planned. If no better motion is found, the plan repeats the last one.
     fn plan(&self, before: &BeforeRun<'_>) -> Result<PlannedMotion, IterationError>;
 }

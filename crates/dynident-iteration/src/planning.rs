@@ -1,5 +1,3 @@
-//! What a planner is asked: the good runs so far, each with its motion.
-
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::leg::{IterationTask, Leg};
@@ -8,11 +6,8 @@ use crate::record::RunRecord;
 use crate::robot::StopSignal;
 use crate::run_motion::legs_along;
 
-/// What a planner says of the run after `records`, the last of which is good; `task` with the friction in force. Where
-/// runs are not pooled, or could not be fitted together, the last is all that is known.
-///
-/// # Errors
-/// The planner's; records of another task.
+/// Plans the run after `records`, the last of which is good; `task` includes the selected friction. If runs are not
+/// pooled, or could not be fitted together, only the last is used.
 pub(crate) fn planned_motion(
     planner: &dyn MotionPlanner,
     task: &IterationTask,
@@ -35,7 +30,7 @@ pub(crate) fn planned_motion(
     let good: Vec<GoodRun<'_>> =
         legs.iter().zip(&estimates).map(|(legs, estimate)| GoodRun { legs, estimate }).collect();
     let Some(known) = last.and_then(RunRecord::knowledge) else {
-        let problem = "no good run to plan the next motion from".to_owned();
+        let problem = "no good run is available to plan the next motion".to_owned();
         return Err(IterationError::Planning { run, problem });
     };
     let torque_limits = task.torque_limits.as_deref();

@@ -1,5 +1,3 @@
-//! What the next run is: a pure function of the records so far.
-
 use crate::convergence::{Names, shortfalls, stands_still};
 use crate::estimate::RunEstimate;
 use crate::evidence::Clipping;
@@ -8,39 +6,30 @@ use crate::record::RunRecord;
 use crate::settings::{IterationSettings, StartWith};
 use crate::status::IterationStatus;
 use crate::torque_check::TorqueCause;
+use crate::verdict_settings::VerdictSettings;
 use dynident_simulation::PerJoint;
 use dynident_simulation::controllers::{ControllerSettings, JointPdSettings, JointPidSettings};
 use thiserror::Error;
 
-/// A good run's estimate with error bars this many times wider than an earlier one's does not take its place.
-const FAR_WIDER: f64 = 3.0;
-
-/// A rejected run's estimate takes the place of a good one's where its error bars are this many times as wide.
-const CLEARLY_NARROWER: f64 = 0.5;
-
-/// A run that left its trajectory tells that no controller helps where so large a share of the samples of a joint
-/// stands at the drive's limit.
-const HELPLESS: f64 = 0.05;
-
-/// What comes next.
+/// The next step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Next {
     /// A run.
     Run(RunPlan),
-    /// Nothing.
+    /// The end of the iteration.
     Finished(IterationStatus),
 }
 
-/// A run to be made.
+/// A planned run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunPlan {
     /// Its number, from 1.
     pub run: usize,
-    /// The model of its controller; none for the controller without a model.
+    /// Model of its controller; `None` for the controller without a model.
     pub model: Option<ModelParameters>,
     /// Share of the step from the last good parameters to the new ones.
     pub damping: f64,
-    /// Factor of the gains of the controller without a model.
+    /// Factor on the gains of the controller without a model.
     pub stiffness: f64,
 }
 
@@ -49,7 +38,7 @@ impl RunPlan {
         Self { run, model: Some(model), damping, stiffness: 1.0 }
     }
 
-    /// The controller's settings.
+    /// Returns the settings of its controller.
     pub fn controller(&self, settings: &IterationSettings) -> ControllerSettings {
         if self.model.is_some() {
             let first = settings.first.as_ref().filter(|_| self.run == 1);
@@ -59,7 +48,7 @@ impl RunPlan {
     }
 }
 
-/// The run after `records`, or how the iteration has ended. `prior` is what the robot is believed to be before any run.
+/// Plans the run after `records`, or returns how the iteration has ended. `prior` are the nominal parameters.
 pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &[f64], names: &Names) -> Next {
     let run = records.len() + 1;
     let model_free = |stiffness| Next::Run(RunPlan { run, model: None, damping: 1.0, stiffness });
@@ -79,7 +68,7 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     if shortfalls(records, settings, names).is_empty() {
         return Next::Finished(IterationStatus::Converged);
     }
-    // Once more before it is said: the second of two runs that stand still was made with the model of the first.
+    // Two unchanged results are required: the second of two such runs used the model of the first.
     let earlier = &records[..records.len() - 1];
     if stands_still(records, settings, names) && (!settings.reject || stands_still(earlier, settings, names)) {
         return Next::Finished(IterationStatus::Settled);
@@ -98,15 +87,15 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     if run > settings.max_runs {
         return Next::Finished(IterationStatus::RunsUsedUp);
     }
-    // A model that was tried and rejected is not tried again.
+    // A rejected model is not tried again.
     let untried = |model: &ModelParameters| {
         !records.iter().any(|record| !record.accepted && record.controller.model.as_ref() == Some(model))
     };
-    let trusted = most_trusted(records).and_then(model_of);
+    let trusted = most_trusted(records, &settings.settled.verdict).and_then(model_of);
     if let Some(model) = trusted.into_iter().chain(newest.filter(|_| last.accepted)).find(untried) {
         return Next::Run(RunPlan::with_model(run, model, 1.0));
     }
-    // Rejected: back towards the last good model, as long as there is one to go back to.
+    // Rejected: go back towards the last good model, if there is one.
     let since = records.iter().rposition(|record| record.accepted).map_or(0, |place| place + 1);
     let rejected = &records[since..];
     let good = records[..since].iter().rev().find_map(|record| record.controller.model.clone());
@@ -119,32 +108,33 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
         let share = 0.5_f64.powi(halvings as i32);
         return Next::Run(RunPlan::with_model(run, ModelParameters::between(&good, &new, share), share));
     }
-    if let Some(clipped) = rejected.iter().rev().find_map(|record| helpless(record, names)) {
+    if let Some(clipped) =
+        rejected.iter().rev().find_map(|record| helpless(record, settings.settled.verdict.min_saturated_share, names))
+    {
         return Next::Finished(IterationStatus::Refused { reason: clipped });
     }
     let before = records.iter().filter(|record| record.controller.model.is_none()).count();
     model_free(settings.stiffen.powi(before as i32))
 }
 
-/// A further run after all is met, under what is known: for its motion alone. None where no run has a model to load.
-pub(crate) fn further(records: &[RunRecord]) -> Option<RunPlan> {
-    let model = most_trusted(records).and_then(model_of)?;
+/// Returns a further run for an additional motion after all conditions are met; `None` if no run has a model.
+pub(crate) fn further(records: &[RunRecord], thresholds: &VerdictSettings) -> Option<RunPlan> {
+    let model = most_trusted(records, thresholds).and_then(model_of)?;
     Some(RunPlan::with_model(records.len() + 1, model, 1.0))
 }
 
-/// What a controller gets from a run.
 fn model_of(record: &RunRecord) -> Option<ModelParameters> {
     record.knowledge().and_then(RunEstimate::for_controller)
 }
 
-/// What a run with a model that left its trajectory with its drives at their limits says of them.
-fn helpless(record: &RunRecord, names: &Names) -> Option<String> {
+/// Reports that a run with a model left its trajectory while its drives were saturated.
+fn helpless(record: &RunRecord, min_saturated_share: f64, names: &Names) -> Option<String> {
     let joints = &record.evidence.as_ref().filter(|_| record.done && record.controller.model.is_some())?.joints;
     let clipped = joints.iter().enumerate().filter_map(|(joint, shown)| Some((joint, shown.clipping?)));
     let (joint, Clipping { share, torque, .. }) = clipped.max_by(|a, b| a.1.share.total_cmp(&b.1.share))?;
-    (share >= HELPLESS).then(|| {
+    (share >= min_saturated_share).then(|| {
         format!(
-            "{}: torque of joint {} stood at {torque:.3} Nm in {:.0} % of the samples, and no controller can ask its drive for more: give a slower motion, or a limit of torque in [design.limits]",
+            "{}: the drive of joint {} was saturated at {torque:.3} Nm in {:.0} % of the samples: use a slower motion, or add a torque limit to [design.limits]",
             failed(record),
             names.joints[joint],
             100.0 * share
@@ -152,40 +142,37 @@ fn helpless(record: &RunRecord, names: &Names) -> Option<String> {
     })
 }
 
-/// The run whose estimate is worth most: the newest good one, unless its error bars are far wider than those of an
-/// earlier run; and a rejected one where its error bars are clearly narrower. Bad tracking says that the model which
-/// the run was made with is bad, not that the run determines little: a joint that is thrown about may determine more
-/// than one that hardly moves.
-fn most_trusted(records: &[RunRecord]) -> Option<&RunRecord> {
+/// The run with the best estimate: the newest good run, unless its error bars are much wider than those of an earlier
+/// run, or a rejected run with clearly narrower error bars. Bad tracking indicates a bad model in the controller, not a
+/// bad estimate: a joint with large tracking errors may be excited better than one that hardly moves.
+fn most_trusted<'r>(records: &'r [RunRecord], thresholds: &VerdictSettings) -> Option<&'r RunRecord> {
     records.iter().filter(|record| model_of(record).is_some()).reduce(|best, record| {
-        let most = if record.accepted { FAR_WIDER } else { CLEARLY_NARROWER };
+        let most = if record.accepted {
+            thresholds.max_width_ratio_of_good_run
+        } else {
+            thresholds.max_width_ratio_of_rejected_run
+        };
         let (Some(old), Some(new)) = (best.knowledge(), record.knowledge()) else { return best };
         if new.wider_than(old) <= most { record } else { best }
     })
 }
 
-/// Why a run does not count as good.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub(crate) enum Rejection {
-    /// It did not get to its end.
     #[error("{outcome}")]
     NotDone { outcome: String },
-    /// It gave no estimate.
     #[error("{reason}")]
     NoEstimate { reason: String },
-    /// No robot can have its parameters.
-    #[error("no physically consistent set fits it: {reason}")]
+    #[error("no physically consistent model fits it: {reason}")]
     Inconsistent { reason: String },
-    /// A joint left its trajectory, rad (m).
-    #[error("joint {joint} left its trajectory: {error:.3} rad away, {limit:.3} still count as following")]
+    #[error("joint {joint} left its trajectory: error {error:.3} rad, limit {limit:.3} rad")]
     LeftTrajectory { joint: String, error: f64, limit: f64 },
-    /// It followed the reference worse than the last good run did, rad (m).
     #[error("it tracks worse: {now:.3e} rad after {then:.3e} rad")]
     TracksWorse { now: f64, then: f64 },
 }
 
-/// Whether a run counts as good beside those before it, and why not. `following` is the largest tracking error of each
-/// joint that still counts as following.
+/// Accepts or rejects a run, given the runs before it. `following` is the tracking error of each joint above which it
+/// has left its trajectory.
 pub(crate) fn verdict(
     record: &RunRecord,
     before: &[RunRecord],
@@ -197,7 +184,7 @@ pub(crate) fn verdict(
         return Err(Rejection::NotDone { outcome: record.outcome.clone() });
     }
     let Some(estimate) = &record.estimate else {
-        let reason = record.reason.clone().unwrap_or_else(|| "it says nothing of the parameters".to_owned());
+        let reason = record.reason.clone().unwrap_or_else(|| "it has no estimate of the parameters".to_owned());
         return Err(Rejection::NoEstimate { reason });
     };
     if let Some(reason) = &estimate.impossible {
@@ -209,21 +196,21 @@ pub(crate) fn verdict(
     {
         return Err(Rejection::LeftTrajectory { joint: names.joints[joint].clone(), error, limit });
     }
-    // Along another motion another error is to be expected.
-    let alike = |good: &&RunRecord| good.accepted && good.motion == record.motion;
-    let Some(good) = before.iter().rev().find(alike) else { return Ok(()) };
+    // Tracking errors of different motions are not comparable.
+    let is_comparable = |good: &&RunRecord| good.accepted && good.motion == record.motion;
+    let Some(good) = before.iter().rev().find(is_comparable) else { return Ok(()) };
     let (now, then) = (record.tracking_error(), good.tracking_error());
     let worst = (settings.worse_factor * then).max(settings.settled.tracking_tolerance);
-    // A controller without a model is what a bad one falls back to: its tracking is no reason to reject it.
+    // The controller without a model is the fallback, so its tracking is not a reason to reject it.
     if settings.reject && record.controller.model.is_some() && now > worst {
         return Err(Rejection::TracksWorse { now, then });
     }
     Ok(())
 }
 
-/// A model that is identified from a wrong torque log must not be loaded into a controller.
+/// A model from a wrong torque log must not be loaded into a controller.
 fn wrong_torque(record: &RunRecord, cause: &TorqueCause) -> String {
-    format!("run {}: {cause}; {}, then begin anew (--fresh)", record.run, cause.remedy())
+    format!("run {}: {cause}; {}, then restart with --fresh", record.run, cause.remedy())
 }
 
 fn failed(record: &RunRecord) -> String {
@@ -231,7 +218,7 @@ fn failed(record: &RunRecord) -> String {
     format!("run {} under {}: {reason}", record.run, record.controller.name)
 }
 
-/// Stiffness grows as `factor`, damping as its root, so that the damping ratio stays.
+/// Stiffness grows by `factor`, damping by its root, so the damping ratio is unchanged.
 fn stiffened(settings: &ControllerSettings, factor: f64) -> ControllerSettings {
     let times = |gains: &PerJoint, by: f64| match gains {
         PerJoint::All(gain) => PerJoint::All(by * gain),

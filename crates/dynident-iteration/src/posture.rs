@@ -1,10 +1,8 @@
-//! A robot at one sample of a motion.
-
 use dynident_simulation::Reference;
 use dynident_simulation::controllers::ControllerModel;
 use nalgebra::DMatrix;
 
-/// `M(q)` with the inertia of the drives, column by column as `τ(q, 0, e_j) - τ(q, 0, 0)`, kg m² (kg).
+/// `M(q)` including the inertia of the drives, column by column as `τ(q, 0, e_j) - τ(q, 0, 0)`, kg m² (kg).
 pub(crate) fn inertia_matrix(model: &mut ControllerModel, q: &[f64]) -> DMatrix<f64> {
     let dof = q.len();
     let (zeros, mut unit) = (vec![0.0; dof], vec![0.0; dof]);
@@ -19,11 +17,10 @@ pub(crate) fn inertia_matrix(model: &mut ControllerModel, q: &[f64]) -> DMatrix<
             matrix[(row, joint)] = tau[row] - still[row];
         }
     }
-    // Both halves say the same but for rounding.
+    // Remove rounding differences between both halves.
     0.5 * (&matrix + matrix.transpose())
 }
 
-/// Positions, velocities and accelerations of all joints at a sample.
 pub(crate) fn at_sample(reference: &Reference, sample: usize) -> [Vec<f64>; 3] {
     let motion = reference.motion();
     [&motion.q, &motion.dq, &motion.ddq]

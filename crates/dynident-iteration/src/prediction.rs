@@ -1,24 +1,26 @@
-//! What a model says of a run that it was not fitted to.
-
 use crate::evidence::Prediction;
 use dynident_identification::rows::{JointRows, RowConsumer, predicted_torque};
 use dynident_identification::{LogError, Logs, RegressorModel};
 use nalgebra::DMatrix;
 
-/// Half the width of a 95 % interval in standard deviations: the runs have far more rows than parameters.
-const WIDTH: f64 = 1.96;
+/// Half width of a 95 % interval in standard deviations; runs have far more rows than parameters.
+const HALF_WIDTH_95_SIGMAS: f64 = 1.96;
 
-/// A model with its error bars.
+/// L with `Lᵀ L` the covariance of some columns, by eigenvalues, because covariances from few segments are singular.
+pub(crate) fn covariance_root(covariance: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
+    let eigen = covariance.select_rows(columns).select_columns(columns).symmetric_eigen();
+    let root = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+    DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose()
+}
+
 pub(crate) struct Known<'a> {
     pub(crate) theta: &'a [f64],
     pub(crate) covariance: &'a [Vec<f64>],
     pub(crate) joint_sigma: &'a [f64],
 }
 
-/// How well `known` predicts the torque of the recordings `indices`, joint by joint; `None` for a joint without rows.
-///
-/// # Errors
-/// What reading them can give.
+/// Evaluates the prediction of the torque of the recordings `indices` by `known`, joint by joint; `None` for a joint
+/// without rows.
 pub(crate) fn predictions(
     logs: &Logs<'_>,
     model: &RegressorModel,
@@ -29,11 +31,11 @@ pub(crate) fn predictions(
     let covariance = DMatrix::from_fn(count, count, |row, column| known.covariance[row][column]);
     let joints = (0..model.dof()).map(|joint| {
         let columns = model.layout().joint_columns(joint);
-        // V = Lᵀ L of the joint's columns; covariances from few segments are singular, so by eigenvalues.
-        let eigen = covariance.select_rows(columns).select_columns(columns).symmetric_eigen();
-        let root = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
-        let root = DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose();
-        JointSums { root, sigma: known.joint_sigma[joint], ..JointSums::default() }
+        JointSums {
+            root: covariance_root(&covariance, columns),
+            sigma: known.joint_sigma[joint],
+            ..JointSums::default()
+        }
     });
     let mut sums =
         Sums { model, theta: known.theta, joints: joints.collect(), counted: Vec::new(), buffer: Vec::new() };
@@ -86,7 +88,7 @@ impl RowConsumer for Sums<'_> {
                 (0..columns.len()).map(|place| sums.root[(direction, place)] * panel[place * rows + row]).sum()
             };
             let variance: f64 = (0..sums.root.nrows()).map(|direction| of_direction(direction).powi(2)).sum();
-            let half = WIDTH * (variance + sums.sigma * sums.sigma).sqrt();
+            let half = HALF_WIDTH_95_SIGMAS * (variance + sums.sigma * sums.sigma).sqrt();
             sums.rows += 1;
             sums.inside += usize::from(error.abs() <= half);
             sums.square += error * error;

@@ -1,5 +1,3 @@
-//! What is kept of a run.
-
 use crate::estimate::RunEstimate;
 use crate::evidence::RunEvidence;
 use crate::forecast::MotionForecast;
@@ -12,71 +10,70 @@ use crate::warm_up::WarmUp;
 use dynident_dynamics::ParametricModel;
 use serde::{Deserialize, Serialize};
 
-/// What controlled a run.
+/// Controller of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct UsedController {
-    /// The controller's name.
+    /// Name of the controller.
     pub name: String,
-    /// Its model; none for controllers without.
+    /// Its model; `None` for controllers without a model.
     pub model: Option<ModelParameters>,
-    /// Share of the step from the last good parameters to the new ones that was taken.
+    /// Share of the step from the last good parameters to the new ones.
     pub damping: f64,
-    /// Factor of the gains of a controller without a model.
+    /// Factor on the gains of a controller without a model.
     pub stiffness: f64,
 }
 
-/// A run, as it is kept.
+/// Record of a run, as it is stored.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunRecord {
-    /// Its number, from 1.
+    /// Number of the run, from 1.
     pub run: usize,
-    /// Its trajectories, where they are not those of the task.
+    /// Its trajectories, if they differ from those of the task.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<RunMotion>,
-    /// What its motion was expected to bring; none where motions are not planned, and where nothing was known before.
+    /// Forecast for its motion; `None` without planned motions or before the first estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forecast: Option<MotionForecast>,
-    /// What controlled it.
+    /// Its controller.
     pub controller: UsedController,
-    /// Whether every trajectory was run to its end.
+    /// Whether every trajectory was completed.
     pub done: bool,
     /// How it ended, in words.
     pub outcome: String,
-    /// Per joint: the largest distance from the reference, rad (m).
+    /// Largest distance of each joint from the reference, rad (m).
     pub max_tracking_error_rad: Vec<f64>,
-    /// Whether it counts as good.
+    /// Whether the run is good.
     pub accepted: bool,
-    /// Why not, or why there is no estimate.
+    /// Why the run was rejected, or why there is no estimate.
     pub reason: Option<String>,
-    /// What its rehearsal had shown; none where there was none.
+    /// Result of its rehearsal, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rehearsal: Option<Rehearsal>,
-    /// What the warm-up before it has shown; none where there was none.
+    /// Result of the warm-up before it, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub warm_up: Option<WarmUp>,
-    /// What it says about the parameters by itself; none if it determines nothing.
+    /// Estimate from this run alone, if any.
     pub estimate: Option<RunEstimate>,
-    /// What all good runs up to this one say together; none where this is the first or no good one, and where runs are
-    /// not pooled.
+    /// Estimate from all good runs up to this one; `None` for the first run, for rejected runs, and if runs are not
+    /// pooled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pooled: Option<RunEstimate>,
-    /// What its log shows beside parameters; none where it did not get to its end, and in runs of earlier versions.
+    /// Evidence in its log; `None` if it was not completed, and in runs of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
-    /// Whether its logged torque is the torque that the controller commanded; none where too little was recorded, and
-    /// in runs of earlier versions.
+    /// Comparison of its logged torque with the commanded torque; `None` if too little was recorded, and in runs of
+    /// earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque_check: Option<TorqueCheck>,
-    /// The run of the held-out motion that came after it; kept in a folder of its own.
+    /// The run of the held-out motion after it; stored in a separate folder.
     #[serde(skip)]
     pub held_out: Option<HeldOutRun>,
 }
 
 impl RunRecord {
-    /// That its numbers are those of `robot`, the robot with the friction in force: a file from outside may hold
-    /// anything.
+    /// Checks that its arrays fit `robot` (with the selected friction); a file from outside may contain anything.
     pub(crate) fn check(&self, robot: &ParametricModel) -> Result<(), String> {
         let (joints, columns) = (robot.dof(), robot.layout().columns().len());
         let all = robot.model().inertial_count() + robot.terms().len();
@@ -85,7 +82,7 @@ impl RunRecord {
                 return Ok(());
             }
             Err(format!(
-                "holds {found} numbers as {what} where this robot has {expected}: remove its folder and those of the runs after it"
+                "has {found} numbers in {what}, this robot needs {expected}: remove its folder and those of the runs after it"
             ))
         };
         length("max_tracking_error_rad", self.max_tracking_error_rad.len(), joints)?;
@@ -117,7 +114,7 @@ impl RunRecord {
             }
             if let Some(column) = estimate.fixed.iter().find(|&&column| column >= columns) {
                 return Err(format!(
-                    "names base parameter {column} as fixed where this robot has {columns}: remove its folder"
+                    "lists base parameter {column} as fixed, this robot has {columns}: remove its folder"
                 ));
             }
             if !estimate.near_rest.is_empty() {
@@ -130,18 +127,18 @@ impl RunRecord {
         Ok(())
     }
 
-    /// Why its logged torque is not the commanded one; empty if it is, or where it was not checked.
+    /// Reasons why its logged torque differs from the commanded torque; empty if it agrees or was not checked.
     pub fn torque_causes(&self) -> &[TorqueCause] {
         self.torque_check.as_ref().map_or(&[], |check| &check.causes)
     }
 
-    /// Whether a joint's logged torque is known to be the torque that was commanded.
+    /// Whether a joint's logged torque is known to be the commanded torque.
     pub(crate) fn has_commanded_torque(&self, joint: usize) -> bool {
         let Some(check) = &self.torque_check else { return false };
         check.causes.is_empty() && check.joints.get(joint).is_some_and(|own| own.difference_percent.is_some())
     }
 
-    /// What is known after it: what all good runs say together, or else what it says alone.
+    /// Returns the newest estimate: from all good runs, or else from this run alone.
     pub fn knowledge(&self) -> Option<&RunEstimate> {
         self.pooled.as_ref().or(self.estimate.as_ref())
     }

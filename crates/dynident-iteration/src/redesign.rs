@@ -1,5 +1,3 @@
-//! The next motion designed with what is known: where the good runs so far say least.
-
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::forecast::{KnownInformation, MotionForecast};
@@ -24,32 +22,31 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Order of the norm of the variances along the worst directions: 1 would be their mean, infinity the largest alone. On
+/// Order p of the Kiefer criterion on the variances of the worst directions (1 is their mean, infinity the largest). On
 /// the UR10 of the examples, after its D-optimal motion, two runs at order 1, 2 and 4 leave 65, 63 and 61 % of the ten
-/// worst bars that repeating it would leave (root mean squares).
-const ORDER: f64 = 4.0;
+/// widest error bars that repeating the motion would leave (root mean squares).
+const CRITERION_ORDER: f64 = 4.0;
 
-/// States over all that the arm may do, and the seed that they are drawn by.
+/// Number and seed of the random states over the workspace.
 const STATES: usize = 2_000;
 const STATES_SEED: u64 = 1;
 
-/// Searches, each with less torque than the one before, until every model keeps the limits.
-const SEARCHES: usize = 4;
+/// Largest number of searches; each has lower torque limits than the one before, until all models keep the limits.
+const MAX_SEARCHES: usize = 4;
 
-/// Of torque that a search was beyond its limit, what the next is given less.
-const LESS_TORQUE: f64 = 1.1;
+/// Factor on the torque excess of a search by which the limits of the next search are reduced.
+const TORQUE_REDUCTION_FACTOR: f64 = 1.1;
 
-/// How exactly a motion returns to where it began, rad (m).
-const RETURNED: f64 = 1e-6;
+/// Tolerance within which a motion returns to its begin, rad (m).
+const RETURN_TOLERANCE: f64 = 1e-6;
 
-/// How motions are redesigned.
+/// Settings of the redesign of motions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RedesignSettings {
-    /// A run is worth making for its motion alone if it is to narrow the bars of the worst directions by so many
-    /// percent; an iteration that has converged otherwise goes on while one is. Default 20: the second run of one
-    /// motion brings 29, the third 18.
+    /// Smallest forecast reduction of the error bars of the worst directions, in percent, for which an iteration that
+    /// has otherwise converged makes another run. Default 20: the second run of one motion brings 29, the third 18.
     pub least_gain_percent: f64,
 }
 
@@ -63,7 +60,7 @@ impl RedesignSettings {
     /// Checks the number.
     ///
     /// # Errors
-    /// A percentage that is none.
+    /// A percentage out of range.
     pub fn validate(&self) -> Result<(), SimulationError> {
         let percent = self.least_gain_percent;
         require(
@@ -75,44 +72,35 @@ impl RedesignSettings {
     }
 }
 
-/// Why a motion is repeated although another was looked for.
 #[derive(Clone, Debug, PartialEq, Error)]
 enum NotRedesigned {
-    /// Limits that contradict each other, or what is left of them.
-    #[error("its limits leave no motion: {0}")]
+    #[error("no motion within the limits: {0}")]
     Limits(#[from] LimitError),
-    /// No motion of the family can be judged.
-    #[error("the search found none: {0}")]
+    #[error("the search found no motion: {0}")]
     Search(#[from] OptimiserError),
-    /// No motion that keeps the limits was found.
     #[error("the best motion breaks a limit of {what} by {percent:.2} %")]
     Broken { what: String, percent: f64 },
-    /// A limit that some model in the uncertainty does not keep.
     #[error(
-        "joint {joint} may need {torque:.3} Nm along every motion found, by a model in the uncertainty; its limit is {limit:.3} Nm"
+        "joint {joint} may need {torque:.3} Nm along every motion found (models within the uncertainty), its limit is {limit:.3} Nm"
     )]
     Torque { joint: String, torque: f64, limit: f64 },
-    /// The motion ends elsewhere than it begins.
     #[error("the family does not return joint {joint} to where it began")]
     Ends { joint: String },
-    /// Somebody asked for a stop.
     #[error("the search was interrupted")]
     Interrupted,
-    /// Once more brings as much.
-    #[error("the best other motion is to bring {percent:.0} %, no more")]
+    #[error("the best other motion reduces the error bars by only {percent:.0} %")]
     NoBetter { percent: f64 },
-    /// Numbers that do not fit.
     #[error(transparent)]
     Numbers(#[from] SimulationError),
 }
 
-/// Designs the next motion with what is known. Its information adds to that of all good runs, `D = Σ Wᵀ Σ⁻¹ W` with the
-/// noise that their estimates found, and it is the best by [`WorstDirections`] of the sum. What a controller needs of a
-/// model is torque, wherever the arm may be asked to move: directions are measured by the torque error that they make
-/// over random states within the limits of position, velocity and acceleration, in units of the joints' noise. Its
-/// limits hold for every model in the uncertainty (the 95 % ellipsoid of the parameters): the search has the torque of
-/// the estimated bodies, friction and drives, what the uncertainty may add is taken off its limits, and what it finds
-/// is looked at with all of them, again with less where one is beyond. It begins where the first motion began.
+/// Designs the next motion from the current estimate. The information of the new motion adds to that of all good runs,
+/// `D = Σ Wᵀ Σ⁻¹ W` with the estimated noise, and the criterion is [`WorstDirections`] of the sum. Directions are
+/// scaled by the torque error that they cause over random states within the limits of position, velocity and
+/// acceleration, in units of the joint noise. The torque limits hold for every model in the uncertainty (95 % ellipsoid
+/// of the parameters): the search uses the estimated bodies, friction and drives with limits reduced by the effect of
+/// the uncertainty. The result is checked with all models and searched again with lower limits if one exceeds them. The
+/// motion begins where the first motion began.
 #[derive(Debug)]
 pub struct Redesign {
     family: StartingAt,
@@ -124,10 +112,11 @@ pub struct Redesign {
 }
 
 impl Redesign {
-    /// For motions of a family within limits in place of the one of `leg`, the task's only one.
+    /// Creates a planner for motions of a family within limits, which replace the motion of `leg` (the only leg of the
+    /// task).
     ///
     /// # Errors
-    /// Settings out of range, a family of other joints.
+    /// Settings out of range, or a family with other joints.
     pub fn new(
         family: Box<dyn Family>,
         limits: Limits,
@@ -139,13 +128,12 @@ impl Redesign {
         let (reference, motion) = (leg.reference(), leg.reference().motion());
         let start = |joint: usize| motion.q[joint * motion.samples];
         let end = |joint: usize| motion.q[(joint + 1) * motion.samples - 1];
-        let returns = (0..motion.joints).all(|joint| (end(joint) - start(joint)).abs() <= RETURNED);
+        let returns = (0..motion.joints).all(|joint| (end(joint) - start(joint)).abs() <= RETURN_TOLERANCE);
         let posture = (0..motion.joints).map(|joint| Some(start(joint))).collect();
         let family = StartingAt::new(family, posture).map_err(|error: FamilyError| SimulationError::Family(error))?;
         Ok(Self { family, rate_hz: reference.rate_hz(), returns, limits, search, settings })
     }
 
-    /// The best motion, and the largest torques along it.
     fn search(
         &self,
         before: &BeforeRun<'_>,
@@ -158,10 +146,10 @@ impl Redesign {
         let torque_limits = self.torque_limits(before, &names);
         let known = self.known_torque(before);
         let stopped = || before.stop.is_some_and(StopSignal::is_requested);
-        // What the uncertainty adds is about what it was along the motion before.
+        // First estimate of the effect of the uncertainty: its value along the previous motion.
         let mut taken_off = repeated.beyond_search.clone();
         let mut last = None;
-        for _ in 0..SEARCHES {
+        for _ in 0..MAX_SEARCHES {
             let limits = self.with_torque(&names, &torque_limits, &known, &taken_off);
             let set = LimitSet::new(&limits, &model)?;
             let found = self.designed(before, information, noise, &set)?;
@@ -176,7 +164,7 @@ impl Redesign {
             let worst = (0..names.len()).max_by(|&a, &b| beyond(a).total_cmp(&beyond(b)));
             let Some(worst) = worst.filter(|&joint| beyond(joint) > 0.0) else { return Ok((reference, torque)) };
             for (joint, taken_off) in taken_off.iter_mut().enumerate() {
-                *taken_off += LESS_TORQUE * beyond(joint).max(0.0);
+                *taken_off += TORQUE_REDUCTION_FACTOR * beyond(joint).max(0.0);
             }
             let (joint, torque, limit) = (names[worst].clone(), torque.of_all[worst], torque_limits[worst]);
             last = Some(NotRedesigned::Torque { joint, torque, limit });
@@ -184,7 +172,6 @@ impl Redesign {
         Err(last.unwrap_or(NotRedesigned::Search(OptimiserError::Start)))
     }
 
-    /// The limit of each joint's torque: that of the design, and what its drive gives.
     fn torque_limits(&self, before: &BeforeRun<'_>, names: &[String]) -> Vec<f64> {
         let of_design = |name: &String| {
             let limit = self.limits.of(name);
@@ -194,14 +181,13 @@ impl Redesign {
         names.iter().enumerate().map(|(joint, name)| of_design(name).min(of_drive(joint))).collect()
     }
 
-    /// The torque of friction and drives that the search has: by the estimate, or as before any run.
+    /// Torque of friction and drives in the search: estimated, or nominal before any run.
     fn known_torque(&self, before: &BeforeRun<'_>) -> KnownTorque {
         let Some(all) = &before.known.possible else { return self.limits.known_torque.clone() };
         let values = &all[before.robot.model().inertial_count()..];
         KnownTorque::new(before.robot.terms().iter().cloned().zip(values.iter().copied()))
     }
 
-    /// The limits with what is left of each joint's torque for the model that the search has.
     fn with_torque(&self, names: &[String], torque_limits: &[f64], known: &KnownTorque, taken_off: &[f64]) -> Limits {
         let mut limits = Limits { known_torque: known.clone(), ..self.limits.clone() };
         for ((name, limit), taken_off) in names.iter().zip(torque_limits).zip(taken_off) {
@@ -222,7 +208,7 @@ impl Redesign {
         noise: &RunNoise,
         set: &LimitSet,
     ) -> Result<Design, NotRedesigned> {
-        let criterion = WorstDirections::new(information.units.clone(), ORDER);
+        let criterion = WorstDirections::new(information.units.clone(), CRITERION_ORDER);
         let criteria: [&dyn Criterion; 1] = [&criterion];
         let task = DesignTask {
             family: &self.family,
@@ -232,7 +218,7 @@ impl Redesign {
             torque_std_nm: &noise.joint_sigma,
             prior: Some(&information.total),
         };
-        // Every run looks from other random starts; rows count as those of the estimates do.
+        // Each run uses other random starts and the row rate of the estimates.
         let seed = self.search.seed.wrapping_add(before.run as u64);
         let settings = DesignSettings { seed, rate_hz: noise.rows_per_s, ..self.search.clone() };
         let stopped = || before.stop.is_some_and(StopSignal::is_requested);
@@ -240,8 +226,8 @@ impl Redesign {
         Ok(design(&task, &settings, watch)?)
     }
 
-    /// Random states over all that the arm may do, joints independent of each other: a turn at most, or 1 m, within the
-    /// limits of position; velocities and accelerations within theirs, or as high as the motions so far went.
+    /// Random states over the workspace, joints independent: positions within their limits and at most half a turn (0.5
+    /// m) to either side; velocities and accelerations within their limits, or up to the maxima of the earlier motions.
     fn states(&self, before: &BeforeRun<'_>) -> Motion {
         let joints = before.robot.model().joints();
         let mut random = Random::new(STATES_SEED);
@@ -256,7 +242,7 @@ impl Redesign {
             };
             let free = if joint.turns() { core::f64::consts::PI } else { 0.5 };
             let [lower, upper] = limit.and_then(|limit| limit.position).unwrap_or([-free, free]);
-            // A range that lies beyond half a turn is taken as it is.
+            // A range without overlap with that interval is used unchanged.
             let overlaps = lower < free && upper > -free;
             let [lower, upper] = if overlaps { [lower.max(-free), upper.min(free)] } else { [lower, upper] };
             let speed = limit.and_then(|limit| limit.speed).unwrap_or_else(|| highest(|motion| &motion.dq));
@@ -270,7 +256,7 @@ impl Redesign {
         states
     }
 
-    /// Every limit again, by the check that shares nothing with the search, and where the motion ends.
+    /// Checks every limit with an implementation that is independent of the search, and the end of the motion.
     fn check(
         &self,
         limits: &Limits,
@@ -290,7 +276,7 @@ impl Redesign {
         let motion = reference.motion();
         let away = |joint: &usize| {
             let own = &motion.q[motion.of(*joint)];
-            (own[own.len() - 1] - own[0]).abs() > RETURNED
+            (own[own.len() - 1] - own[0]).abs() > RETURN_TOLERANCE
         };
         match (0..names.len()).find(away) {
             Some(joint) if self.returns => Err(NotRedesigned::Ends { joint: names[joint].clone() }),
@@ -302,16 +288,15 @@ impl Redesign {
 impl MotionPlanner for Redesign {
     fn plan(&self, before: &BeforeRun<'_>) -> Result<PlannedMotion, IterationError> {
         let Some(last) = before.good.last() else {
-            let problem = "no good run to plan the next motion from".to_owned();
+            let problem = "no good run is available to plan the next motion".to_owned();
             return Err(IterationError::Planning { run: before.run, problem });
         };
         let several =
             before.good.iter().any(|run| run.legs.len() != 1 || run.legs.iter().any(|leg| leg.windows().is_some()));
         if several {
-            let problem = "motions are redesigned where a run is one trajectory of which everything counts".to_owned();
+            let problem = "the redesign of motions needs runs with a single leg and without windows".to_owned();
             return Err(IterationError::Planning { run: before.run, problem });
         }
-        // What is known.
         let count = before.robot.layout().columns().len();
         let mut total = DMatrix::zeros(count, count);
         for run in before.good {
@@ -325,7 +310,6 @@ impl MotionPlanner for Redesign {
         let information = KnownInformation::new(total, &needed);
         let expected =
             |reference: &Reference| information.after(&run_information(before.robot, reference, &noise), before.known);
-        // The motion before once more, and the best other.
         let again = expected(repeated);
         let repeat_gain_percent = again.gain_percent();
         let model = found_bodies(before.robot, before.known)?;
@@ -363,7 +347,6 @@ fn noise_of(estimate: &RunEstimate, reference: &Reference) -> RunNoise {
     RunNoise::new(&estimate.joint_sigma, estimate.rows, reference.duration_s())
 }
 
-/// The robot with the bodies that runs have shown, or else the described one.
 fn found_bodies(robot: &ParametricModel, known: &RunEstimate) -> Result<Model, SimulationError> {
     let Some(all) = &known.possible else { return Ok(robot.model().clone()) };
     let of_body = |own: &[f64]| InertialParameters(core::array::from_fn(|k| own[k]));
@@ -371,7 +354,7 @@ fn found_bodies(robot: &ParametricModel, known: &RunEstimate) -> Result<Model, S
     Ok(robot.model().with_inertials(&bodies)?)
 }
 
-/// The largest magnitude that the model of a search has for each torque along a motion, joint-major.
+/// Largest torque magnitude along a motion in the model of the search, joint-major, Nm (N).
 fn searched_torque(model: &Model, known: &KnownTorque, motion: &Motion) -> Vec<f64> {
     let dof = motion.joints;
     let mut workspace = Workspace::new(model);

@@ -1,5 +1,5 @@
-//! A motion is rehearsed before it is commanded: its torque, the mass matrix of the controller's model, and the closed
-//! loop in simulation with robots that are not quite the model.
+//! Rehearsal of a motion before it is commanded: its torque, the mass matrix of the controller's model, and the
+//! simulated closed loop with robots that deviate from the model.
 
 use crate::dry_steps::with_dry_steps;
 use crate::oscillation::OscillationLimits;
@@ -17,40 +17,40 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use thiserror::Error;
 
-/// A smaller share of the largest eigenvalue counts as none: rounding alone makes it.
-const SINGULAR: f64 = 1e-12;
-/// Delay of a controller of which nothing is known, seconds of a usual arm.
+/// Smallest eigenvalue of the mass matrix relative to the largest; below it only rounding remains.
+const MIN_EIGENVALUE_RATIO: f64 = 1e-12;
+/// Default delay of an unknown controller, s, for an arm of 1.2 m.
 const DELAY_S: f64 = 0.008;
-/// Share of the typical inertia of a drive of which nothing is known: a gripper whose description states 30 Nm had
-/// 0.01 kg m² of 0.1.
+/// Default smallest share of the typical inertia of a drive without described inertia: a gripper with 30 Nm in its
+/// robot description had 0.01 kg m² instead of the typical 0.1.
 const LIGHTEST_DRIVE: f64 = 0.1;
-/// Longest delay that can be stated, s.
-const MOST_DELAY_S: f64 = 10.0;
+/// Largest delay in the settings, s.
+const MAX_DELAY_S: f64 = 10.0;
 
-/// How a motion is rehearsed.
+/// Settings of the rehearsal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RehearsalSettings {
-    /// How far the true robot may be from the model: every mass and every parameter of friction and drives by so many
-    /// percent up or down. Default 30.
+    /// Largest deviation of the true robot from the model: each body and each parameter of friction and drives varies
+    /// by this percentage. Default 30.
     pub uncertainty_percent: f64,
-    /// Robots within that which are simulated beside the model itself. Default 4.
+    /// Number of deviating robots that are simulated in addition to the model. Default 4.
     pub robots: usize,
-    /// How late the robot's controller may see or act, between its sensors and its drives, seconds: gains that are
-    /// derived bear it, and the robots are simulated with it. That of a loop that runs in the drives is theirs. Default
-    /// 8 ms of an arm of 1.2 m, of others as much in their own seconds: some cycles of control over a network. In a
-    /// study by default none where the gains are stated, or the robot waits for every torque.
+    /// Delay of the robot's controller between its sensors and its drives, seconds: derived gains tolerate it, and the
+    /// robots are simulated with it. Not used for a position loop in the drives. Default 8 ms for an arm of 1.2 m (some
+    /// control cycles over a network), scaled with the time constant of other arms. In a study the default is 0 if the
+    /// gains are stated or the robot waits for every torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
-    /// Least inertia of a drive without a described inertia, as a share of the typical one (which the effort limit
-    /// accelerates by 300 rad/s² of a usual arm): derived gains keep a joint stable down to it, and a robot with such
-    /// drives is simulated. Default 0.1; in a study by default 1 where the gains are stated, because the robot is
-    /// expected to have run with them.
+    /// Smallest inertia of a drive without described inertia, as a share of the typical one (which the effort limit
+    /// accelerates by 300 rad/s² for an arm of 1.2 m). Derived gains keep a joint stable down to it, and a robot with
+    /// such drives is simulated. Default 0.1; in a study 1 if the gains are stated, because the robot is expected to
+    /// have run with them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lightest_drive: Option<f64>,
-    /// Postures at which the mass matrix is looked at: so many over the workspace, and so many along the motion.
-    /// Default 200.
+    /// Number of postures at which the mass matrix is checked: as many over the workspace as along the motion. Default
+    /// 200.
     pub postures: usize,
     /// Seed of robots and postures. Default 1.
     pub seed: u64,
@@ -71,88 +71,88 @@ impl RehearsalSettings {
         let percent = self.uncertainty_percent;
         require((0.0..=90.0).contains(&percent), "rehearsal.uncertainty_percent", percent, "give 0 to 90")?;
         let delay_s = self.delay_s.unwrap_or(0.0);
-        require((0.0..=MOST_DELAY_S).contains(&delay_s), "rehearsal.delay_s", delay_s, "give 0 to 10 s")?;
+        require((0.0..=MAX_DELAY_S).contains(&delay_s), "rehearsal.delay_s", delay_s, "give 0 to 10 s")?;
         let lightest = self.lightest_drive();
         require((0.001..=1.0).contains(&lightest), "rehearsal.lightest_drive", lightest, "give 0.001 to 1")?;
         require(self.robots <= 1000, "rehearsal.robots", self.robots as f64, "give at most 1000")?;
         require(self.postures <= 1_000_000, "rehearsal.postures", self.postures as f64, "give at most 1000000")
     }
 
-    /// Least inertia of a drive of which nothing is known, as a share of the typical one.
+    /// Smallest inertia of a drive without described inertia, as a share of the typical one.
     pub fn lightest_drive(&self) -> f64 {
         self.lightest_drive.unwrap_or(LIGHTEST_DRIVE)
     }
 
-    /// How late a controller outside of such a robot may be, s.
+    /// Largest delay of the controller of this robot, s.
     pub fn delay_s(&self, model: &Model) -> f64 {
         self.delay_s.unwrap_or_else(|| model.own_scale().seconds(DELAY_S))
     }
 }
 
-/// What a rehearsal has shown.
+/// Result of a rehearsal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Rehearsal {
     /// Smallest eigenvalue of the model's mass matrix over all postures, kg m² (kg).
     pub smallest_eigenvalue: f64,
-    /// Per joint: the largest torque of the model along the motion, Nm (N).
+    /// Largest torque of the model for each joint along the motion, Nm (N).
     pub largest_torque: Vec<f64>,
-    /// Per joint: the largest distance from the path of any simulated robot, rad (m).
+    /// Largest distance of each joint from the path over all simulated robots, rad (m).
     pub largest_tracking_error_rad: Vec<f64>,
 }
 
 /// Why a motion is not commanded.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum RehearsalFailure {
-    /// The motion itself leaves the envelope.
-    #[error("the motion itself leaves the envelope: {0}; give another motion, or the limit in [iteration.envelope]")]
+    /// The motion leaves the envelope.
+    #[error("the motion leaves the envelope: {0}; use another motion, or correct the limit in [iteration.envelope]")]
     Path(Breach),
-    /// No body moves like that.
+    /// The mass matrix is not positive definite.
     #[error(
-        "the model's mass matrix is not positive definite (eigenvalue {eigenvalue:.3e} kg m^2) at the positions {q:.3?}: a controller with it may push the wrong way"
+        "the model's mass matrix is not positive definite (eigenvalue {eigenvalue:.3e} kg m^2) at the positions {q:.3?}: a controller with this model may push in the wrong direction"
     )]
     MassMatrix {
         /// The eigenvalue.
         eigenvalue: f64,
-        /// Where, rad (m).
+        /// The positions, rad (m).
         q: Vec<f64>,
     },
-    /// The motion asks for more than there is.
-    #[error("the model's torque along the motion leaves the envelope: {0}; give a slower motion")]
+    /// The motion needs more torque than the envelope allows.
+    #[error("the model's torque along the motion leaves the envelope: {0}; use a slower motion")]
     Torque(Breach),
-    /// Somebody asked for a stop.
+    /// The rehearsal was interrupted.
     #[error("the rehearsal was interrupted")]
     Interrupted,
-    /// A robot that may be the true one is not held.
+    /// A possible robot does not follow the motion.
     #[error(
-        "in simulation {robot} is not held: {verdict}; {}give other gains (kp, kd, or bandwidth_hz), compensate gravity (start = \"prior\"), or state rehearsal.uncertainty_percent and [iteration.envelope]",
+        "in simulation, {robot} does not follow the motion: {verdict}; {}use other gains (kp, kd, or bandwidth_hz), compensate gravity (start = \"prior\"), or change rehearsal.uncertainty_percent or [iteration.envelope]",
         room_words(.verdict)
     )]
     Loop {
-        /// Which robot.
+        /// The simulated robot.
         robot: String,
         /// How its run ended.
         verdict: RunStatus,
     },
-    /// A robot that may be the true one is held, but oscillates.
-    #[error("in simulation {robot} is not held: {oscillation}")]
+    /// A possible robot follows the motion but oscillates.
+    #[error("in simulation, {robot} oscillates: {oscillation}")]
     Oscillates {
-        /// Which robot.
+        /// The simulated robot.
         robot: String,
-        /// How.
+        /// The oscillation.
         oscillation: JointOscillation,
     },
-    /// A robot that may be the true one is held, but a link of it leaves the workspace.
-    #[error("in simulation {robot} leaves the envelope: {breach}; keep the motion further inside, or give other gains")]
+    /// A link of a possible robot leaves the workspace.
+    #[error("in simulation, {robot} leaves the envelope: {breach}; keep the motion further inside, or use other gains")]
     Outside {
-        /// Which robot.
+        /// The simulated robot.
         robot: String,
-        /// How.
+        /// The violated limit.
         breach: Breach,
     },
 }
 
-/// A motion that goes right up to a stop leaves no room for any tracking error: no gains mend that.
+/// If a motion reaches a limit exactly, no gains keep the tracking error within it.
 fn room_words(verdict: &RunStatus) -> &'static str {
     match verdict {
         RunStatus::LimitBroken { quantity: LimitedQuantity::Position, .. } => {
@@ -167,23 +167,21 @@ fn room_words(verdict: &RunStatus) -> &'static str {
     }
 }
 
-/// One robot of a rehearsal.
 #[derive(Clone, Copy)]
 struct Rehearsing {
-    /// 0 for the model itself, or the number of one that differs.
+    /// 0 for the model, otherwise the number of the deviating robot.
     number: usize,
-    /// How late its controller is.
     delay_s: f64,
-    /// Whether its drives are as light as they may be.
+    /// Whether its drives have the smallest inertia.
     is_light: bool,
 }
 
 impl Rehearsing {
-    /// Most samples of delay that a simulated loop has.
-    const MOST_SAMPLES: f64 = 1000.0;
+    /// Largest simulated delay in samples.
+    const MAX_DELAY_SAMPLES: f64 = 1000.0;
 
     fn delay_samples(self, rate_hz: f64) -> usize {
-        (self.delay_s * rate_hz).round().min(Self::MOST_SAMPLES) as usize
+        (self.delay_s * rate_hz).round().min(Self::MAX_DELAY_SAMPLES) as usize
     }
 
     fn words(self, settings: &RehearsalSettings) -> String {
@@ -193,38 +191,35 @@ impl Rehearsing {
                 "the model with {} of the typical inertia of drives (rehearsal.lightest_drive)",
                 settings.lightest_drive()
             ),
-            0 => "the model itself".to_owned(),
+            0 => "the model".to_owned(),
             number => format!("a robot up to {percent} % off the model ({number} of {})", settings.robots),
         };
         match self.delay_s {
             0.0 => robot,
-            late => format!("{robot}, its controller {:.3} ms late (rehearsal.delay_s),", 1e3 * late),
+            late => format!("{robot}, with {:.3} ms of controller delay (rehearsal.delay_s),", 1e3 * late),
         }
     }
 }
 
-/// What is rehearsed.
 pub(crate) struct Rehearsed<'a> {
     pub(crate) robot: &'a ParametricModel,
-    /// The whole of what is commanded, trajectory by trajectory: with the ways, where there are some.
+    /// The complete commanded trajectories, including the paths from and to home.
     pub(crate) references: &'a [Cow<'a, Reference>],
     pub(crate) controller: &'a ControllerSettings,
-    /// The controller's model.
     pub(crate) model: Option<&'a ControllerModel>,
-    /// What is believed of the robot, all parameters: what is simulated.
+    /// All parameters of the simulated robot, if known.
     pub(crate) believed: Option<&'a [f64]>,
-    /// The same with drives that are as light as they may be; none where all are known.
+    /// The same with the smallest drive inertia; `None` if all drive inertias are known.
     pub(crate) light: Option<&'a [f64]>,
-    /// Oscillation that would stop a run.
     pub(crate) oscillation: Option<OscillationLimits>,
     pub(crate) envelope: Option<&'a Envelope>,
 }
 
 impl Rehearsed<'_> {
-    /// Rehearses, until `stop` says so.
+    /// Rehearses until `stop` returns true.
     ///
     /// # Errors
-    /// Numbers that do not fit; that the rehearsal fails is inside.
+    /// Invalid numbers; a failed rehearsal is part of the result.
     pub(crate) fn run(
         &self,
         settings: &RehearsalSettings,
@@ -244,7 +239,6 @@ impl Rehearsed<'_> {
         let (model, terms) = (self.robot.model(), self.robot.terms());
         let own = self.believed.map(|all| ControllerModel::from_parameters(model, terms, all)).transpose()?;
         let Some(mut known) = self.model.cloned().or(own) else { return Ok(Ok(shown)) };
-        // The mass matrix, where the robot may come to stand and where it moves.
         let mut random = Random::new(settings.seed);
         for q in self.postures(settings.postures, &mut random) {
             if stop() {
@@ -252,12 +246,11 @@ impl Rehearsed<'_> {
             }
             let eigenvalues = inertia_matrix(&mut known, &q).symmetric_eigenvalues();
             let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
-            if smallest.is_nan() || smallest <= SINGULAR * largest.abs() {
+            if smallest.is_nan() || smallest <= MIN_EIGENVALUE_RATIO * largest.abs() {
                 return Ok(Err(RehearsalFailure::MassMatrix { eigenvalue: smallest, q }));
             }
             shown.smallest_eigenvalue = shown.smallest_eigenvalue.min(smallest);
         }
-        // The torque along the motion.
         let mut tau = vec![0.0; dof];
         for reference in self.references {
             for sample in 0..reference.samples() {
@@ -270,7 +263,6 @@ impl Rehearsed<'_> {
                 shown.largest_torque.iter_mut().zip(&tau).for_each(|(most, tau)| *most = most.max(tau.abs()));
             }
         }
-        // The closed loop, as it should be and as late as it may be.
         if let Some(believed) = self.believed.filter(|_| self.controller.can_be_simulated()) {
             let in_drives = matches!(self.controller, ControllerSettings::PositionLoop(_));
             let delay_s = if in_drives { 0.0 } else { settings.delay_s(self.robot.model()) };
@@ -284,7 +276,8 @@ impl Rehearsed<'_> {
                     return Ok(Err(failure));
                 }
             }
-            // Without a delay: the gains allow for it already, and no joint may be too fast for the controller's rate.
+            // Without a delay: the gains already allow for it. This detects joints that are too fast for the
+            // controller's rate.
             if let Some(light) = self.light {
                 let one = Rehearsing { is_light: true, ..itself };
                 if let Err(failure) = self.simulate(light, one, settings, &mut random, &mut shown)? {
@@ -295,7 +288,6 @@ impl Rehearsed<'_> {
         Ok(Ok(shown))
     }
 
-    /// One robot along all motions.
     fn simulate(
         &self,
         believed: &[f64],
@@ -347,7 +339,7 @@ impl Rehearsed<'_> {
         Ok(Ok(()))
     }
 
-    /// Postures over the workspace (within the envelope, or a turn, or 1 m, to either side) and along the motions.
+    /// Postures over the workspace (within the envelope, or half a turn (1 m) to either side) and along the motions.
     fn postures(&self, count: usize, random: &mut Random) -> Vec<Vec<f64>> {
         let joints = self.robot.model().joints();
         let mut range = |joint: usize| {

@@ -1,5 +1,4 @@
-//! Samples at which a joint rests, or is near it: its dry friction there is whatever holds it, and no model of its
-//! velocity tells it.
+//! Samples at which a joint is at rest or near rest. Its static friction there does not follow from its velocity.
 
 use core::ops::Range;
 use dynident_dynamics::ParametricModel;
@@ -8,14 +7,14 @@ use dynident_model::terms::TermAction;
 use dynident_simulation::Reference;
 use serde::{Deserialize, Serialize};
 
-/// A joint moves faster than this share of its highest speed, or it rests.
+/// Share of a joint's highest speed below which it is at rest.
 pub(crate) const MOVING: f64 = 0.02;
 
-/// How far from rest a joint has to be for its torque to count.
+/// Distance from rest above which the torque of a joint is used.
 ///
-/// A joint with dry friction sticks, breaks loose and jumps; its smoothed velocity does not. What torque and model
-/// differ by lasts as long as the smoothing reaches: samples at which the joint is slower than `speed_share` of its
-/// highest speed are set aside, and `smoothing_periods` periods of the smoother's cut-off before and after them.
+/// A joint with dry friction sticks, breaks loose and jumps, but its smoothed velocity does not. The resulting error
+/// lasts as long as the smoothing window. So samples at which the joint is slower than `speed_share` of its highest
+/// speed are excluded, and `smoothing_periods` periods of the smoother's cut-off before and after them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RestMargin {
@@ -26,11 +25,12 @@ pub struct RestMargin {
 }
 
 impl RestMargin {
-    /// Rests alone: slower than 2 % of the highest speed; half a period about those that last longer than one.
+    /// Samples at rest only: slower than 2 % of the highest speed, plus half a smoothing period around rests that last
+    /// longer than one period.
     pub const REST: Self = Self { speed_share: MOVING, smoothing_periods: 0.0 };
 
-    /// The samples at which a joint with these velocities `dq` is nearer to rest than this, where the smoother's period
-    /// is `smoothing` samples.
+    /// Ranges of samples within this margin, for a joint with velocities `dq` and a smoother with a period of
+    /// `smoothing` samples.
     pub(crate) fn samples(&self, dq: &[f64], smoothing: usize) -> Vec<Range<usize>> {
         if *self == Self::REST {
             return rests(dq, smoothing);
@@ -54,7 +54,7 @@ impl Default for RestMargin {
     }
 }
 
-/// Whether each joint has friction that is not known at rest: in the model, or among what may be chosen.
+/// Whether each joint has friction that is undetermined at rest: in the model, or among the terms that may be selected.
 pub(crate) fn has_dry_friction(robot: &ParametricModel, friction: &[FrictionSearch]) -> Vec<bool> {
     let names = robot.joint_names();
     let in_model = |joint: usize| {
@@ -66,9 +66,9 @@ pub(crate) fn has_dry_friction(robot: &ParametricModel, friction: &[FrictionSear
     names.iter().enumerate().map(|(joint, name)| in_model(joint) || may_be_chosen(name)).collect()
 }
 
-/// The samples at which a joint with these velocities `dq` rests: slower than [`MOVING`] of its highest speed. Around a
-/// rest that lasts longer than the differentiator's smoothing, `smoothing` samples, half of that does not count
-/// either: the joint breaks loose and stops at once, and the smoothed motion does not.
+/// Ranges of samples at which a joint with velocities `dq` is at rest: slower than [`MOVING`] times its highest speed.
+/// Half of the smoothing window (`smoothing` samples) around longer rests is included, because the joint breaks loose
+/// and stops suddenly, but the smoothed motion does not.
 fn rests(dq: &[f64], smoothing: usize) -> Vec<Range<usize>> {
     let mut found = slower(dq, MOVING);
     for rest in &mut found {
@@ -79,8 +79,7 @@ fn rests(dq: &[f64], smoothing: usize) -> Vec<Range<usize>> {
     found
 }
 
-/// The samples of velocities `dq` that are at most this share of the highest, and those between which one changes its
-/// sign.
+/// Ranges of samples at which `dq` is at most this share of its maximum, or changes its sign.
 fn slower(dq: &[f64], share: f64) -> Vec<Range<usize>> {
     let fastest = dq.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
     let turns = |sample: usize| share > MOVING && dq.get(sample + 1).is_some_and(|next| next * dq[sample] < 0.0);
@@ -94,7 +93,7 @@ fn slower(dq: &[f64], share: f64) -> Vec<Range<usize>> {
     found
 }
 
-/// The highest speed of each joint along some references, rad/s (m/s).
+/// Highest speed of each joint along some references, rad/s (m/s).
 pub(crate) fn highest_speeds<'a>(references: impl IntoIterator<Item = &'a Reference>) -> Vec<f64> {
     let mut fastest = Vec::new();
     for motion in references.into_iter().map(Reference::motion) {
@@ -115,24 +114,24 @@ mod tests {
         // Up, through zero, and at rest from sample 60.
         let dq: Vec<f64> = (0..100).map(|k| if k < 60 { 1.0 - f64::from(k) / 25.0 } else { 0.0 }).collect();
         let found = rests(&dq, 10);
-        // |1 - k/25| ≤ 0.02 · 1.36 at k = 25 alone.
+        // |1 - k/25| ≤ 0.02 · 1.36 only at k = 25.
         assert_eq!(found, [25..26, 55..100]);
         assert_eq!(rests(&[0.0; 4], 10).len(), 1);
     }
 
     #[test]
     fn what_is_near_rest_is_left_as_wide_as_smoothing_reaches() {
-        // From 1 to -1 rad/s in 100 steps: within 0.11 from sample 45 to 55, and half a period of ten more.
+        // From 1 to -1 rad/s in 100 steps: within 0.11 from sample 45 to 55, plus half a period of ten samples.
         let dq: Vec<f64> = (0..=100).map(|k| 1.0 - f64::from(k) / 50.0).collect();
         let margin = |speed_share, smoothing_periods| RestMargin { speed_share, smoothing_periods };
         let one = |run: Range<usize>| vec![run; 1];
         assert_eq!(margin(0.11, 0.5).samples(&dq, 10), one(40..61));
         assert_eq!(margin(0.11, 0.0).samples(&dq, 10), one(45..56));
         assert_eq!(RestMargin::REST.samples(&dq, 10), rests(&dq, 10));
-        // A joint that turns between two samples is at rest in between, however fast it is at both.
+        // A joint that turns between two samples is at rest in between, at any speed.
         let turned: Vec<f64> = (0..20).map(|k| if k < 10 { 1.0 } else { -1.0 }).collect();
         assert_eq!(margin(0.1, 0.5).samples(&turned, 4), one(7..12));
-        // Neighbours whose surroundings meet are one.
+        // Overlapping ranges are merged.
         let two = [1.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 1.0];
         assert_eq!(margin(0.1, 1.0).samples(&two, 1), one(0..6));
     }

@@ -1,5 +1,3 @@
-//! What the log of a run shows: clipping, noise, and what the model of the runs before says of it.
-
 use crate::clipping::clipping;
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
@@ -18,13 +16,9 @@ use dynident_identification::{Execution, Logs, RegressorModel};
 use dynident_recording::{cutoff, position_noise};
 use dynident_simulation::Record;
 
-/// The farthest that a joint counts as following its trajectory, rad (m): half of what it moves through, at least and
-/// at most this much. Beyond, other laws may hold than those of the motion that was asked for: stops, other contact,
-/// friction at other speeds.
-const FOLLOWING: [f64; 2] = [0.1, 1.0];
-
-/// The largest tracking error of each joint with which it still follows, rad (m).
-pub(crate) fn following_limits(legs: &[Leg], dof: usize) -> Vec<f64> {
+/// The largest tracking error of each joint with which it still follows, rad (m): half of its range of motion, within
+/// these bounds.
+pub(crate) fn following_limits(legs: &[Leg], dof: usize, [low_rad, high_rad]: [f64; 2]) -> Vec<f64> {
     let range = |joint: usize| {
         let of_leg = |leg: &Leg| {
             let motion = leg.reference().motion();
@@ -34,14 +28,11 @@ pub(crate) fn following_limits(legs: &[Leg], dof: usize) -> Vec<f64> {
         };
         legs.iter().map(of_leg).fold(0.0, f64::max)
     };
-    (0..dof).map(|joint| (0.5 * range(joint)).clamp(FOLLOWING[0], FOLLOWING[1])).collect()
+    (0..dof).map(|joint| (0.5 * range(joint)).clamp(low_rad, high_rad)).collect()
 }
 
-/// What the records of a run show, with the prediction by `known`, what was known before it, of the torque that counts
-/// with these margins about rests; `task` with the friction in force.
-///
-/// # Errors
-/// Records that do not belong to the task.
+/// Examines the records of a run, including the prediction by `known` (the estimate before the run), without rows
+/// within the margins around rests; `task` includes the selected friction.
 pub(crate) fn examined(
     task: &IterationTask,
     records: &[Record],
@@ -91,12 +82,11 @@ pub(crate) fn examined(
     })
 }
 
-/// The largest noise of the torque over the legs, joint by joint.
 fn torque_noises(records: &[Record], dof: usize) -> Vec<TorqueNoise> {
     let mut most = vec![TorqueNoise::default(); dof];
     for record in records.iter().filter(|record| record.samples > 0) {
         let q: Vec<&[f64]> = record.q.chunks_exact(record.samples).collect();
-        // Torque has faded where positions have: friction at reversals alone goes beyond.
+        // Torque ends where positions end; only friction at reversals goes beyond.
         let motion_hz = cutoff(&q, record.rate_hz).cutoff_hz;
         for (joint, most) in most.iter_mut().enumerate() {
             let tau = &record.tau[record.of(joint)];
@@ -106,14 +96,12 @@ fn torque_noises(records: &[Record], dof: usize) -> Vec<TorqueNoise> {
     most
 }
 
-/// The cut-off of the parallel filter, Hz; none without one.
 fn row_cutoff_hz(records: &[Record], settings: &RunIdentificationSettings) -> Option<f64> {
     let (filter, record) = settings.parallel_filter.as_ref().zip(records.first())?;
     let cutoff_hz = filter.cutoff_hz.unwrap_or(0.4 * record.rate_hz / filter.factor.max(1) as f64);
     Some(cutoff_hz.min(0.5 * record.rate_hz))
 }
 
-/// Predictions of the legs that carry nothing unknown.
 fn predict(
     joints: &mut [JointEvidence],
     task: &IterationTask,
@@ -125,7 +113,7 @@ fn predict(
     let log = RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None, rest_margins };
     let recordings = recordings(task, &[log], settings)?;
     let mut identification = identification_settings(task, settings, 1);
-    // The rows that the model was fitted to were without it.
+    // The lag was also removed from the rows of the fit.
     identification.motion.torque_lag_s = known.lag.taken_off();
     let all: Vec<usize> = (0..recordings.len()).collect();
     let logs =
@@ -134,7 +122,6 @@ fn predict(
     let model = model.clone().with_load_of_estimate(&model, &known.values);
     let added =
         known_payloads(&settings.payloads, &model).map_err(dynident_identification::IdentificationError::from)?;
-    // Legs with the same payload together.
     let mut groups: Vec<(Vec<f64>, Vec<usize>)> = Vec::new();
     for index in all {
         let theta = match &recordings[index].payload {
@@ -152,7 +139,6 @@ fn predict(
     for (theta, legs) in groups {
         let known = Known { theta: &theta, covariance: &known.covariance, joint_sigma: &known.joint_sigma };
         for (joint, found) in joints.iter_mut().zip(predictions(&logs, &model, &legs, &known)?) {
-            // The worst of several.
             let better = |old: &crate::evidence::Prediction| found.is_none_or(|new| old.inside <= new.inside);
             joint.prediction = joint.prediction.filter(better).or(found);
         }
@@ -160,8 +146,8 @@ fn predict(
     Ok(())
 }
 
-/// Adds what noise, friction and delay explain of each joint's tracking error, where one is beyond the tolerance.
-/// `known` is what is known after the run, `friction` what runs so far chose.
+/// Adds the tracking error of each joint that noise, friction and delay explain, if any joint exceeds the tolerance.
+/// `known` is the estimate after the run, `friction` the selected friction.
 pub(crate) fn add_tracking_floors(
     evidence: &mut RunEvidence,
     task: &IterationTask,
@@ -185,7 +171,7 @@ pub(crate) fn add_tracking_floors(
         let known = KnownLoop { robot, parameters, friction, controller, position_noise, delay_s };
         let Some(of_leg) = tracking_floor(leg.reference(), record, &known) else { return };
         floors.iter_mut().zip(of_leg.floor).for_each(|(most, floor)| *most = most.max(floor));
-        // The longest of several legs.
+        // The longest delay of several legs.
         feedback_delay_s = feedback_delay_s.into_iter().chain(of_leg.feedback_delay_s).reduce(f64::max);
     }
     evidence.feedback_delay_s = feedback_delay_s;

@@ -1,39 +1,35 @@
-//! What the motion of a run says about the parameters.
-
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::{Information, Motion};
 use dynident_simulation::Reference;
 use nalgebra::DMatrix;
 
-/// Samples of a motion that are looked at, at most: its information is an integral over time.
-const MOST_SAMPLES: usize = 4_000;
+/// Largest number of samples at which the information of a motion is evaluated; it is an integral over time.
+const MAX_SAMPLES: usize = 4_000;
 
-/// Noise of a joint that counts as none, Nm (N): simulated logs without noise leave less.
-const LEAST_NOISE: f64 = 1e-9;
+/// Smallest noise of a joint, Nm (N); simulated logs without noise have less.
+const MIN_NOISE: f64 = 1e-9;
 
-/// How a run was measured: what turns a motion into information.
 #[derive(Clone, Debug)]
 pub(crate) struct RunNoise {
     /// Standard deviation of each joint's residual in the rows of the estimate, Nm (N).
     pub(crate) joint_sigma: Vec<f64>,
-    /// Rows of each joint a second.
     pub(crate) rows_per_s: f64,
 }
 
 impl RunNoise {
-    /// Of a run of this many seconds with so many rows of all joints.
+    /// For a run of this duration (s) with this number of rows over all joints.
     pub(crate) fn new(joint_sigma: &[f64], rows: usize, duration_s: f64) -> Self {
         let joints = joint_sigma.len().max(1) as f64;
-        let joint_sigma = joint_sigma.iter().map(|sigma| sigma.max(LEAST_NOISE)).collect();
+        let joint_sigma = joint_sigma.iter().map(|sigma| sigma.max(MIN_NOISE)).collect();
         Self { joint_sigma, rows_per_s: rows as f64 / joints / duration_s.max(f64::MIN_POSITIVE) }
     }
 }
 
-/// `Σ_j W_jᵀ W_j / σ_j²` along a trajectory, in the base columns of the robot with its terms, as many rows counted as
-/// an estimate has of it. The low-pass that torque and columns share is taken as passing all of the motion.
+/// `Σ_j W_jᵀ W_j / σ_j²` along a trajectory, in the base columns of the robot with its terms, for the row rate of an
+/// estimate. The common low-pass of torque and columns is assumed to pass the whole motion.
 pub(crate) fn run_information(robot: &ParametricModel, reference: &Reference, noise: &RunNoise) -> DMatrix<f64> {
     let whole = reference.motion();
-    let step = whole.samples.div_ceil(MOST_SAMPLES).max(1);
+    let step = whole.samples.div_ceil(MAX_SAMPLES).max(1);
     let mut part = Motion::default();
     part.reset(whole.joints, whole.samples.div_ceil(step));
     for joint in 0..whole.joints {

@@ -1,5 +1,3 @@
-//! The records of runs as recordings of motions, and what they are identified with.
-
 use crate::error::IterationError;
 use crate::leg::{IterationTask, Leg};
 use crate::motion::measured_motion;
@@ -16,23 +14,23 @@ use std::sync::Arc;
 /// The records of one run with its number.
 #[derive(Clone, Copy, Debug)]
 pub struct RunLog<'a> {
-    /// The run's number, from 1.
+    /// Number of the run, from 1.
     pub run: usize,
-    /// The legs that it was made along.
+    /// Its legs.
     pub legs: &'a [Leg],
-    /// One record for each leg.
+    /// One record per leg.
     pub records: &'a [Record],
-    /// Standard deviation of each joint's residual by the run alone, Nm (N); for step-by-step identification, which
-    /// weights runs by it.
+    /// Standard deviation of each joint's residual in the run alone, Nm (N); used as weights in joint-by-joint
+    /// identification.
     pub joint_sigma: &'a [f64],
-    /// The differentiator that the run chose for itself; none for that of the settings.
+    /// The differentiator that the run selected; `None` for that of the settings.
     pub differentiator: Option<&'a DifferentiatorSettings>,
-    /// How far from rest the torque of each joint with dry friction has to be to count, as the run chose it; rests
-    /// alone are set aside of joints for which there is none.
+    /// Distance from rest above which the torque of each joint with dry friction is used, as selected by the run;
+    /// without an entry, only samples at rest are excluded.
     pub rest_margins: &'a [RestMargin],
 }
 
-/// The records as recordings of motions that are made already, leg after leg of run after run.
+/// The records as recordings with computed motions, run by run and leg by leg.
 pub(crate) fn recordings(
     task: &IterationTask,
     runs: &[RunLog<'_>],
@@ -60,7 +58,6 @@ pub(crate) fn recordings(
     Ok(recordings)
 }
 
-/// What the identification is given.
 pub(crate) fn identification_settings(
     task: &IterationTask,
     settings: &RunIdentificationSettings,
@@ -72,14 +69,14 @@ pub(crate) fn identification_settings(
     identification.estimation = settings.estimation.clone();
     identification.estimation.held.clone_from(&task.known);
     identification.consistency.clone_from(&settings.consistency);
-    // What is hardly known would keep the iteration from converging.
+    // Poorly determined friction would prevent convergence.
     let search = |own: &FrictionSearch| FrictionSearch {
         most_inflation: own.most_inflation.or(Some(FrictionSearch::MOST_INFLATION)),
         ..own.clone()
     };
     identification.friction = settings.friction.iter().map(search).collect();
     identification.friction_before.clone_from(&settings.friction_before);
-    // Of runs under one controller friction leaves another lag at each joint, and not the same in every run.
+    // With the same controller, friction causes another apparent lag at each joint and in each run.
     identification.lags = LagCandidates::Common;
     identification.log_noise = if runs > 1 { LogNoise::Own } else { LogNoise::Shared };
     identification

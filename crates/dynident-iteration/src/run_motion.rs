@@ -1,5 +1,3 @@
-//! The motion of a run where it is not that of the task, and its table on disk.
-
 use crate::error::IterationError;
 use crate::leg::{IterationTask, Leg};
 use crate::robot::trajectory_csv;
@@ -9,12 +7,12 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Trajectories of a run, leg after leg, in place of those of the task. What is written into `run.json` are their
-/// rates; the samples stand in `motion.csv` beside it (`motion_2.csv` and so on for further legs).
+/// Trajectories of a run, leg by leg, which replace those of the task. `run.json` contains their rates; the samples are
+/// in `motion.csv` next to it (`motion_2.csv` and so on for further legs).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunMotion {
-    /// Samples a second of each leg.
+    /// Sample rate of each leg, Hz.
     pub rates_hz: Vec<f64>,
     /// The trajectories.
     #[serde(skip)]
@@ -22,7 +20,8 @@ pub struct RunMotion {
 }
 
 impl RunMotion {
-    /// The motion of these trajectories, without their jerks, which no controller looks at and no table holds.
+    /// Creates the motion from trajectories. Jerks are removed, because no controller uses them and no table contains
+    /// them.
     pub fn new(references: Vec<Reference>) -> Self {
         let kept = |reference: Reference| {
             let motion = Motion { dddq: Vec::new(), ..reference.motion().clone() };
@@ -32,16 +31,13 @@ impl RunMotion {
         Self { rates_hz: references.iter().map(Reference::rate_hz).collect(), references }
     }
 
-    /// The tables, each with its name: columns `t_s`, `q1..`, `dq1..`, `ddq1..`; s, rad (m). They are read back bit for
-    /// bit.
+    /// Names and contents of the tables: columns `t_s`, `q1..`, `dq1..`, `ddq1..`; s, rad (m). They are read back bit
+    /// for bit.
     pub(crate) fn tables(&self) -> impl Iterator<Item = (String, String)> {
         self.references.iter().enumerate().map(|(leg, reference)| (table_name(leg), trajectory_csv(reference, None)))
     }
 
-    /// The same with the samples of the tables in a folder, for so many joints.
-    ///
-    /// # Errors
-    /// A table that is not there or holds something else.
+    /// Reads the samples of the tables in a folder, for `joints` joints.
     pub(crate) fn with_tables(self, folder: &Path, joints: usize) -> Result<Self, IterationError> {
         let of_leg = |(leg, rate_hz): (usize, &f64)| read_table(&folder.join(table_name(leg)), joints, *rate_hz);
         let references = self.rates_hz.iter().enumerate().map(of_leg).collect::<Result<_, _>>()?;
@@ -49,10 +45,10 @@ impl RunMotion {
     }
 }
 
-/// The legs of a run: those of the task, along trajectories of its own where it has some.
+/// The legs of a run: those of the task, or along the run's own trajectories.
 ///
 /// # Errors
-/// A motion of other legs.
+/// A motion with another number of legs.
 pub(crate) fn legs_along<'a>(
     task: &'a IterationTask,
     motion: Option<&RunMotion>,
@@ -64,18 +60,16 @@ pub(crate) fn legs_along<'a>(
     Ok(Cow::Owned(legs?))
 }
 
-/// The table of a leg, by its place from 0.
 fn table_name(leg: usize) -> String {
     if leg == 0 { "motion.csv".to_owned() } else { format!("motion_{}.csv", leg + 1) }
 }
 
-/// Largest table that is read, bytes.
-const MOST_BYTES: u64 = 1 << 30;
+const MAX_TABLE_BYTES: u64 = 1 << 30;
 
 fn read_table(path: &Path, joints: usize, rate_hz: f64) -> Result<Reference, IterationError> {
     let wrong = |problem: String| IterationError::State { path: PathBuf::from(path), problem };
-    let fix = "the run was made along it: put it back, or remove this folder and those after it";
-    let text = dynident_files::read_text(path, MOST_BYTES).map_err(|error| wrong(format!("{error}; {fix}")))?;
+    let fix = "the run used this motion: put the file back, or remove this folder and those after it";
+    let text = dynident_files::read_text(path, MAX_TABLE_BYTES).map_err(|error| wrong(format!("{error}; {fix}")))?;
     let columns = 1 + 3 * joints;
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for (line, row) in text.lines().enumerate().skip(1) {

@@ -1,5 +1,3 @@
-//! Constant torques that single runs have and others have not: zeros of sensors that drift, a cable that pulls.
-
 use crate::run_logs::RunLog;
 use crate::settings::RunOffsets;
 use dynident_dynamics::ParametricModel;
@@ -8,31 +6,30 @@ use dynident_identification::OffsetChoice;
 use dynident_model::terms::TorqueTerm;
 use serde::{Deserialize, Serialize};
 
-/// An offset of a run deviates clearly beyond so many of its standard deviations: of a hundred of them that share one
-/// offset, chance alone brings one so far in a thousand fits or more, also where few segments make the bars.
-const CLEAR_BARS: f64 = 5.0;
+/// Deviation of a run's offset in standard deviations above which it is significant: among a hundred runs with the same
+/// offset, it is exceeded by chance in less than one of a thousand fits, also if the error bars come from few segments.
+const MIN_DEVIATION_SIGMAS: f64 = 5.0;
 
-/// A smaller share of the joint's torque (root mean square) is nothing that a fit of the others would suffer from.
-const MATTERS: f64 = 0.01;
+/// Smallest relevant deviation as a share of the joint's torque (root mean square).
+const MIN_DEVIATION_SHARE: f64 = 0.01;
 
-/// By how much an offset of a run deviates from the mean of all runs.
+/// Deviation of a run's offset from the mean of all runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunOffset {
     /// The run.
     pub run: usize,
-    /// The joint's place, from 0.
+    /// Index of the joint, from 0.
     pub joint: usize,
     /// The deviation, Nm (N).
     pub deviation: f64,
-    /// Its standard deviation.
+    /// Its standard deviation, Nm (N).
     pub std: f64,
 }
 
-/// How the runs are fitted: together with one offset for each joint, with one for each run, or both ways.
 pub(crate) fn choices(robot: &ParametricModel, runs: &[RunLog<'_>], asked: RunOffsets) -> &'static [OffsetChoice] {
     let has_offset = robot.terms().iter().any(|term| matches!(term, TorqueTerm::Offset(_)));
-    // Of several legs each would have its own: joints that are held say nothing of theirs.
+    // With several legs each would need its own offset, but joints at rest do not determine it.
     let possible = has_offset && runs.len() > 1 && runs.iter().all(|run| run.legs.len() == 1);
     match asked {
         RunOffsets::WhereSeen if possible => &[OffsetChoice::Shared, OffsetChoice::PerLog],
@@ -41,8 +38,8 @@ pub(crate) fn choices(robot: &ParametricModel, runs: &[RunLog<'_>], asked: RunOf
     }
 }
 
-/// The deviations that an estimate with an offset for each run has; `columns` are (run's place, joint, column), and the
-/// last run's are what the others leave.
+/// The deviations in an estimate with an offset per run; `columns` are (index of the run, joint, column). The deviation
+/// of the last run is minus the sum of the others.
 pub(crate) fn deviations(
     columns: &[(usize, usize, usize)],
     estimate: &Estimate,
@@ -67,14 +64,14 @@ pub(crate) fn deviations(
     found
 }
 
-/// Whether one of them is clearly there and matters.
-pub(crate) fn seen(deviations: &[RunOffset], runs: &[RunLog<'_>]) -> bool {
+/// Whether a deviation is significant and large enough to be relevant.
+pub(crate) fn is_any_significant(deviations: &[RunOffset], runs: &[RunLog<'_>]) -> bool {
     deviations.iter().any(|own| {
-        own.deviation.abs() > CLEAR_BARS * own.std && own.deviation.abs() > MATTERS * torque_rms(runs, own.joint)
+        own.deviation.abs() > MIN_DEVIATION_SIGMAS * own.std
+            && own.deviation.abs() > MIN_DEVIATION_SHARE * torque_rms(runs, own.joint)
     })
 }
 
-/// Root mean square of a joint's torque over all runs, Nm (N).
 fn torque_rms(runs: &[RunLog<'_>], joint: usize) -> f64 {
     let records = || runs.iter().flat_map(|run| run.records);
     let square: f64 =

@@ -1,5 +1,3 @@
-//! The torque check of a run, with the runs before it where their logs are at hand.
-
 use crate::commanding::Prepared;
 use crate::error::IterationError;
 use crate::good_log::GoodLog;
@@ -12,15 +10,11 @@ use crate::torque_check::{CheckWith, CheckedRun, LeastDeviation, TorqueCheck, ch
 use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 
-/// What a run was fitted with: the task with the friction in force, the runs, and the settings.
 pub(crate) type Fitted<'a> = (&'a IterationTask, &'a [RunLog<'a>], &'a RunIdentificationSettings);
 
 impl Iteration {
-    /// Compares the logged torque of a run with the torque that its controller commanded; `fitted` is what it was
-    /// fitted with, if it was.
-    ///
-    /// # Errors
-    /// Records of another robot.
+    /// Compares the logged torque of a run with the torque that its controller commanded; `fitted` are the inputs of
+    /// its fit, if it was fitted.
     pub(crate) fn torque_check(
         &self,
         record: &RunRecord,
@@ -45,7 +39,7 @@ impl Iteration {
         });
         let legs: Vec<Leg> = self.legs_of(record)?.into_owned();
         let (controller, model) = (&prepared.controller, prepared.model.as_ref());
-        // A run that ended early has no more records than legs.
+        // A run that ended early may have fewer records than legs.
         let newest = CheckedRun { legs: &legs, records, controller, model };
         let runs: Vec<CheckedRun<'_>> = earlier_runs.chain([newest]).collect();
         let feeds_forward_later =
@@ -61,7 +55,6 @@ impl Iteration {
         Ok(check_torque(&self.task, &runs, &with))
     }
 
-    /// The controller of an earlier run, with its model if it had one.
     fn of_earlier(
         &self,
         log: &GoodLog,

@@ -1,49 +1,37 @@
-//! What stands in `runs/`, and what of it may be removed: only what an iteration wrote there.
+//! Content of the folder `runs/`, and safe removal: only files of an iteration are removed.
 
 use crate::error::IterationError;
 use dynident_system::names;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What a run's folder begins with until it is whole.
 pub(crate) const UNFINISHED: &str = ".unfinished-";
-/// What a run's folder begins with.
 const RUN: &str = "run_";
-/// What the folder of a run that a stop cut short begins with.
 pub(crate) const INTERRUPTED: &str = "interrupted_";
-/// What the folder of a motion that has been planned for a run begins with.
 pub(crate) const PLANNED: &str = "planned_";
-/// What the folder of a held-out run begins with.
 pub(crate) const HELD_OUT: &str = "held_out_";
-/// The file of a held-out run.
 pub(crate) const HELD_OUT_FILE: &str = "held_out.json";
-/// The file of a planned motion.
 pub(crate) const PLAN_FILE: &str = "plan.json";
-/// The file of a run.
 pub(crate) const RUN_FILE: &str = "run.json";
-/// The file of a run that a stop cut short.
 pub(crate) const INTERRUPTED_FILE: &str = "interrupted.json";
 
-/// What the names of the logs of a run's ways begin with.
+/// Prefixes of the logs of a run's approach and return paths.
 pub(crate) const WAYS: [&str; 2] = ["approach", "return"];
 
-/// The folders of an iteration that are there.
 pub(crate) struct RunsFolder {
     runs: PathBuf,
     kept: Vec<PathBuf>,
-    /// Planned motions with the numbers of their runs.
     planned: Vec<(usize, PathBuf)>,
-    /// Held-out runs with the numbers of the runs before them.
     held_out: Vec<(usize, PathBuf)>,
     unfinished: Vec<PathBuf>,
 }
 
 impl RunsFolder {
-    /// Looks, and changes nothing.
+    /// Reads the folder; changes nothing.
     ///
     /// # Errors
-    /// Something of another's in the place of a run: nothing could be kept there.
-    pub(crate) fn look(runs: &Path) -> Result<Self, IterationError> {
+    /// Foreign content at the path of a run, where no run can be stored.
+    pub(crate) fn read(runs: &Path) -> Result<Self, IterationError> {
         let (mut kept, mut planned, mut unfinished) = (Vec::new(), Vec::new(), Vec::new());
         let mut held_out = Vec::new();
         for path in files(runs)? {
@@ -54,7 +42,7 @@ impl RunsFolder {
                 && number.parse::<usize>().is_ok()
             {
                 if !is_folder(&path) || !path.join(RUN_FILE).is_file() {
-                    let problem = "stands where a run is to be kept, and no iteration wrote it: move it away";
+                    let problem = "is not from an iteration, but is at the path of a run: move it to another folder";
                     return Err(IterationError::State { path, problem: problem.to_owned() });
                 }
                 kept.push(path);
@@ -75,46 +63,39 @@ impl RunsFolder {
         Ok(Self { runs: runs.to_owned(), kept, planned, held_out, unfinished })
     }
 
-    /// Removes the runs and what was planned for them, if nothing but an iteration's files is in them.
+    /// Removes the runs and their plans, if the folders contain only files of an iteration.
     ///
     /// # Errors
-    /// A folder behind a symbolic link, files of somebody else's: then nothing is removed.
+    /// A folder behind a symbolic link, or foreign files; nothing is removed then.
     pub(crate) fn remove_runs(&self) -> Result<(), IterationError> {
         self.may_remove_runs()?;
         self.removable().try_for_each(|folder| remove(folder))
     }
 
-    /// Removes one run, if nothing but an iteration's files is in its folder.
-    ///
-    /// # Errors
-    /// As [`remove_runs`](Self::remove_runs).
+    /// Removes one run, if its folder contains only files of an iteration.
     pub(crate) fn remove_run(&self, folder: &Path) -> Result<(), IterationError> {
         self.may_remove_runs()?;
         if self.kept.iter().any(|kept| kept == folder) { remove(folder) } else { Ok(()) }
     }
 
-    /// The folders of runs, and of what was planned for them.
     fn removable(&self) -> impl Iterator<Item = &PathBuf> {
         self.kept.iter().chain(self.planned.iter().chain(&self.held_out).map(|(_, folder)| folder))
     }
 
-    /// That [`remove_runs`](Self::remove_runs) would find nothing in its way.
-    ///
-    /// # Errors
-    /// As there.
+    /// Checks that [`remove_runs`](Self::remove_runs) is possible.
     pub(crate) fn may_remove_runs(&self) -> Result<(), IterationError> {
         if self.removable().next().is_none() {
             return Ok(());
         }
         if self.runs.is_symlink() {
-            let problem =
-                "is a symbolic link, and runs are not removed through one: give another --out, or remove them";
+            let problem = "is a symbolic link, and runs are not removed through links: use another --out, or remove the runs yourself";
             return Err(IterationError::State { path: self.runs.clone(), problem: problem.to_owned() });
         }
         for folder in self.removable() {
             for file in files(folder)? {
                 if !is_own(&file) {
-                    let problem = "is no file of an iteration, so its folder is not removed: move it away";
+                    let problem =
+                        "is not a file of an iteration, so its folder is not removed: move the file to another folder";
                     return Err(IterationError::State { path: file, problem: problem.to_owned() });
                 }
             }
@@ -122,31 +103,23 @@ impl RunsFolder {
         Ok(())
     }
 
-    /// Removes what was planned for any run but `next`: other runs have been made, or those before are gone; and the
-    /// held-out runs after runs that are gone.
-    ///
-    /// # Errors
-    /// What the system says.
+    /// Removes the plans of all runs but `next`, which are obsolete, and the held-out runs after removed runs.
     pub(crate) fn remove_plans_but(&self, next: usize) -> Result<(), IterationError> {
         let own = |folder: &PathBuf| files(folder).is_ok_and(|files| files.iter().all(|file| is_own(file)));
         let plans = self.planned.iter().filter(|(run, _)| *run != next);
-        // A held-out run after a run that is gone judged another model.
+        // A held-out run after a removed run validated another model.
         let held_out = self.held_out.iter().filter(|(run, _)| *run >= next);
         let stale = plans.chain(held_out).filter(|(_, folder)| own(folder));
         stale.into_iter().try_for_each(|(_, folder)| remove(folder))
     }
 
-    /// Removes what a killed iteration left half written.
-    ///
-    /// # Errors
-    /// What the system says.
+    /// Removes incomplete folders of a killed iteration.
     pub(crate) fn remove_unfinished(&self) -> Result<(), IterationError> {
         let own = |folder: &&PathBuf| files(folder).is_ok_and(|files| files.iter().all(|file| is_own(file)));
         self.unfinished.iter().filter(own).try_for_each(|folder| remove(folder))
     }
 }
 
-/// A folder itself, not a link to one.
 fn is_folder(path: &Path) -> bool {
     path.symlink_metadata().is_ok_and(|found| found.is_dir())
 }
@@ -156,7 +129,6 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, IterationError> {
     Ok(names.into_iter().map(|name| folder.join(name)).collect())
 }
 
-/// Whether it is a file by a name that an iteration gives.
 fn is_own(file: &Path) -> bool {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let numbered = |rest: &str| rest.strip_suffix(".csv").is_some_and(|number| number.parse::<usize>().is_ok());
@@ -173,10 +145,7 @@ fn is_own(file: &Path) -> bool {
     known && file.symlink_metadata().is_ok_and(|meta| meta.is_file())
 }
 
-/// Removes the files, then the folder, which is empty now.
-///
-/// # Errors
-/// What the system says.
+/// Removes the files in a folder, then the folder.
 pub(crate) fn remove(folder: &Path) -> Result<(), IterationError> {
     for file in files(folder)? {
         fs::remove_file(&file).map_err(IterationError::file(&file))?;

@@ -1,5 +1,3 @@
-//! Files of an iteration with the hash of their content: a file that was edited or damaged is not read.
-
 use core::fmt::Write;
 use dynident_text::json;
 use serde::Serialize;
@@ -7,10 +5,8 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// The key of the hash.
 const KEY: &str = "content_sha256";
 
-/// A file with the hash of everything else in it.
 #[derive(Serialize)]
 struct Sealed<'a, T> {
     #[serde(flatten)]
@@ -18,16 +14,12 @@ struct Sealed<'a, T> {
     content_sha256: String,
 }
 
-/// `file`, which JSON writes as an object, with the hash of its content.
 pub(crate) fn sealed_json<T: Serialize>(file: &T) -> Result<String, serde_json::Error> {
     let content_sha256 = content_sha256(&serde_json::to_value(file)?);
     json::to_string_pretty(&Sealed { file, content_sha256 })
 }
 
-/// Reads what [`sealed_json`] wrote. Files of earlier versions have no hash.
-///
-/// # Errors
-/// What is wrong, in words.
+/// Reads the output of [`sealed_json`]. Files of earlier versions have no hash.
 pub(crate) fn unsealed<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     let file = serde_json::from_str(text).map_err(|error| error.to_string())?;
     let mut content: Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
@@ -57,10 +49,10 @@ mod tests {
         let read = |text: &str| unsealed::<Value>(text).map(|read| read["values"].clone());
         assert_eq!(read(&text).unwrap(), file["values"]);
         assert!(read(&text.replace("1.5e-7", "1.5e-6")).unwrap_err().contains("edited or damaged"));
-        // Another layout is no other content.
+        // Another layout is the same content.
         let lines: Value = serde_json::from_str(&text).unwrap();
         assert!(read(&lines.to_string()).is_ok());
-        // Of an earlier version.
+        // A file of an earlier version.
         assert!(read(&file.to_string()).is_ok());
     }
 }

@@ -1,7 +1,6 @@
-//! Settings of an iteration.
-
 use crate::safety::SafetySettings;
 use crate::torque_check_settings::TorqueCheckSettings;
+use crate::verdict_settings::VerdictSettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;
@@ -13,7 +12,7 @@ use dynident_simulation::controllers::{ControllerSettings, FiniteTimeSettings, J
 use dynident_simulation::{SimulationError, require};
 use serde::{Deserialize, Serialize};
 
-/// Which parameters are looked for together.
+/// Which parameters are estimated together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -21,58 +20,56 @@ pub enum Scheme {
     /// All joints at once.
     #[default]
     AllJoints,
-    /// Joint by joint from tip to base, as in the paper (Eqs. 9, 10): the rows of one joint alone, columns that are
-    /// known already subtracted.
+    /// One joint at a time, from tip to base, as in the paper (Eqs. 9, 10). Each step uses the rows of one joint and
+    /// subtracts the columns that are already known.
     StepByStep,
 }
 
-/// Whether runs that are fitted together share the constant torques of their joints.
+/// Whether runs that are fitted together share the constant torque offsets of their joints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunOffsets {
-    /// One offset for each joint.
+    /// One offset per joint.
     Shared,
-    /// One offset for each joint, unless one of some run clearly deviates from the mean and matters; then as
-    /// [`PerRun`](Self::PerRun).
+    /// One offset per joint, or one per joint and run if the offset of a run deviates significantly from the mean.
     #[default]
     WhereSeen,
-    /// Each run has its own; base parameters hold their mean.
+    /// One offset per joint and run; the base parameters contain the mean.
     PerRun,
 }
 
-/// How one run is identified: the motion as it follows from a record, then all that an identification can be
-/// determined.
+/// How one run is identified: from the recorded motion to the estimate.
 #[derive(Clone, Debug)]
 pub struct RunIdentificationSettings {
-    /// All joints at once (the default), or step by step.
+    /// All joints at once (default) or joint by joint.
     pub scheme: Scheme,
-    /// From positions to velocities and accelerations. Default `deviation`: the commanded motion's own derivatives and
-    /// those of the smoothed deviation from it.
+    /// How velocities and accelerations are computed from positions. Default `deviation`: exact derivatives of the
+    /// commanded motion plus derivatives of the smoothed deviation from it.
     pub differentiator: DifferentiatorSettings,
-    /// Whether each run chooses its differentiator among several, the paper's map among them: the one whose motion
-    /// leaves the least of the run's torques ([`DifferentiatorChoice`](super::DifferentiatorChoice)). Default false.
+    /// Whether each run selects the differentiator with the smallest torque residual among several, including the
+    /// paper's position map ([`DifferentiatorChoice`](super::DifferentiatorChoice)). Default false.
     pub choose_differentiator: bool,
-    /// Torque and every column pass the same low-pass and lose the same rows; default none.
+    /// Low-pass and decimation that are applied to the torque and to every column. Default `None`.
     pub parallel_filter: Option<DecimationSettings>,
-    /// Whether recorded torques are held from one sample to the next, as digital drives do: at a sample's instant the
-    /// mean of the values before and after is in force. Default true.
+    /// Whether the recorded torque is held constant from one sample to the next, as in digital drives. The torque at a
+    /// sample is then the mean of the values before and after it. Default true.
     pub held_torque: bool,
-    /// Whether rows near rest do not count where a joint's dry friction is not explained there
-    /// ([`NearRest`](crate::NearRest)); default true. Rests themselves never count.
+    /// Whether rows near rest are excluded where the dry friction model of a joint does not fit there
+    /// ([`NearRest`](crate::NearRest)). Default true. Rows at rest are always excluded.
     pub set_aside_near_rest: bool,
-    /// The estimator, what counts as excited, where error bars come from. Default weighted least squares. Step by step
-    /// takes ordinary or weighted least squares.
+    /// Estimator, excitation thresholds and sources of error bars. Default weighted least squares. The joint-by-joint
+    /// scheme supports ordinary and weighted least squares.
     pub estimation: EstimationSettings,
-    /// Joints whose friction the first run that is able to chooses, for itself and all runs after it. Default none.
+    /// Joints whose friction is selected by the first run that allows it; later runs use the same terms. Default empty.
     pub friction: Vec<FrictionSearch>,
-    /// Friction that a run before chose, which the robot's terms hold: what is unknown of its constants stands in the
-    /// bars. The iteration fills it in.
+    /// Friction that an earlier run selected. The error bars include the uncertainty of its constants. Set by the
+    /// iteration.
     pub friction_before: Vec<JointFriction>,
-    /// What is known of the bodies of the consistent set that controllers get; `None` gives them the estimate as it is.
+    /// Prior knowledge of the bodies for the physically consistent model of the controllers; `None` gives the
+    /// controllers the unconstrained estimate.
     pub consistency: Option<ConsistencySettings>,
-    /// What legs carry. Default nothing.
+    /// Payloads of the legs. Default empty.
     pub payloads: Vec<Payload>,
-    /// Whether runs that are fitted together share the constant torques of the joints that have one; by default unless
-    /// one run clearly has another.
+    /// Whether runs that are fitted together share the constant torque offsets of their joints.
     pub run_offsets: RunOffsets,
 }
 
@@ -100,14 +97,13 @@ impl Default for RunIdentificationSettings {
 }
 
 impl RunIdentificationSettings {
-    /// The same with this differentiator, stated.
     #[must_use]
     pub(crate) fn with_differentiator(&self, differentiator: &DifferentiatorSettings) -> Self {
         Self { differentiator: differentiator.clone(), choose_differentiator: false, ..self.clone() }
     }
 }
 
-/// What controls the first run.
+/// Controller of the first run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -115,50 +111,49 @@ pub enum StartWith {
     /// A controller without a model.
     #[default]
     ModelFree,
-    /// The controller with the prior of the robot.
+    /// The controller with the nominal model.
     Prior,
 }
 
-/// When an iteration has converged: see [`Shortfall`](super::Shortfall) for what must be met, and by what it is judged.
-/// Parameters stand still with `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance ·
-/// max|θ|` and `s ≤ most_uncertain · max|θ|`, where θ_k is what is known after run k. Sizes of different parameters are
-/// compared by the torque that they make along the motion, as a share of each joint's: a mass and a moment of inertia
-/// have no other common measure.
+/// When an iteration has converged; [`Shortfall`](super::Shortfall) lists the conditions. Parameters have converged if
+/// `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and `s ≤ most_uncertain ·
+/// max|θ|`, where θ_k is the estimate after run k and s its standard deviation. To compare parameters of different
+/// units, each is weighted by its torque along the motion as a share of the joint torque.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SettledSettings {
-    /// Error bars within which a change counts as none. Default 3.
+    /// Largest change of a parameter, in error bars. Default 3.
     pub parameter_sigmas: f64,
-    /// Share of the largest parameter (by its torque) within which a change counts as none. Default 1e-6.
+    /// Largest change of a parameter as a share of the largest parameter (both by torque). Default 1e-6.
     pub parameter_tolerance: f64,
-    /// Widest error bar (one standard deviation) as a share of the largest parameter, both by their torque: what is
-    /// known worse than that cannot be said to stand still. Default 0.1.
+    /// Widest error bar (one standard deviation) as a share of the largest parameter, both by torque. Default 0.1.
     pub most_uncertain: f64,
-    /// Tracking error that is good enough, rad (m): the largest distance of every joint from its trajectory. Default
-    /// 1e-4.
+    /// Accepted tracking error, rad (m): the largest deviation of each joint from its trajectory. Default 1e-4.
     pub tracking_tolerance: f64,
-    /// Tracking that falls by less than this factor from a run to the next no longer gets better: the iteration ends,
+    /// Smallest factor by which the tracking error of consecutive runs must fall; below it the iteration ends,
     /// converged or not. Default 1.5.
     pub tracking_ratio: f64,
-    /// A tracking error beyond the tolerance is explained up to this many times the floor that noise, friction and
-    /// delay make. Default 2.
+    /// Factor on the tracking floor (from noise, friction and delay) up to which a tracking error is accepted. Default
+    /// 2.
     pub floor_ratio: f64,
-    /// Torque of a joint that the model leaves unexplained beyond the log's own noise, as a percentage of the joint's
-    /// torque (root mean squares). Default 5.
+    /// Largest unexplained torque of a joint beyond the noise of the log, in percent of the joint torque (root mean
+    /// squares). Default 5.
     pub most_unexplained_percent: f64,
-    /// Longest lag between torque and motion that is taken off and still lets the iteration converge, seconds: with a
-    /// longer one the robot is not where its log says, whatever the tracking is. By default 10 ms, and for an arm
-    /// longer than 1.2 m a hundredth of its own second: a bus is no faster because the arm is short.
+    /// Longest compensated lag between torque and motion that is accepted, seconds. With a longer lag the logged
+    /// position differs from the true position of the robot. Default 10 ms, for an arm longer than 1.2 m scaled with
+    /// its time constant; bus delay does not shrink with the arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_lag_s: Option<f64>,
+    /// Thresholds of the verdict on a run. Not part of study files.
+    #[serde(skip)]
+    pub verdict: VerdictSettings,
 }
 
-/// Longest lag that still lets an iteration converge, seconds of a usual arm and of a shorter one.
+/// Default of the longest accepted lag, seconds, for arms of up to 1.2 m.
 const MOST_LAG_S: f64 = 0.01;
 
 impl SettledSettings {
-    /// The longest lag that still lets an iteration with such a robot converge, seconds.
     pub(crate) fn most_lag_s(&self, model: &Model) -> f64 {
         self.most_lag_s.unwrap_or_else(|| model.own_scale().seconds(MOST_LAG_S).max(MOST_LAG_S))
     }
@@ -175,6 +170,7 @@ impl Default for SettledSettings {
             floor_ratio: 2.0,
             most_unexplained_percent: 5.0,
             most_lag_s: None,
+            verdict: VerdictSettings::default(),
         }
     }
 }
@@ -184,38 +180,37 @@ impl Default for SettledSettings {
 pub struct IterationSettings {
     /// How a run is identified.
     pub identification: RunIdentificationSettings,
-    /// What controls the first run; default a controller without a model.
+    /// Controller of the first run; default a controller without a model.
     pub start: StartWith,
-    /// The controller of the first run where that has the prior as its model: a poor model asks for less trust than a
-    /// good one. Default [`controller`](Self::controller).
+    /// Controller of the first run if it uses the nominal model, which may need lower gains. Default
+    /// [`controller`](Self::controller).
     pub first: Option<ControllerSettings>,
-    /// The model of the first run's controller in place of the prior, all parameters; default the prior.
+    /// Model of the first run's controller (all parameters). Default the nominal model.
     pub first_model: Option<Vec<f64>>,
-    /// The controller without a model: joint PD (16 and 8) by default. It is also what a bad model falls back to.
+    /// Controller without a model, also used as a fallback after a bad model. Default joint PD (16 and 8).
     pub model_free: ControllerSettings,
-    /// The controller with the model so far: the paper's finite-time law with its gains of joint 2 (4 and 4) by
-    /// default.
+    /// Controller with the estimated model. Default the paper's finite-time law with its gains of joint 2 (4 and 4).
     pub controller: ControllerSettings,
-    /// Whether a run that got worse is rejected and its step halved; true by default.
+    /// Whether a run that got worse is rejected and its step halved. Default true.
     pub reject: bool,
-    /// Whether the model is fitted to all good runs together; true by default. Otherwise to the newest alone.
+    /// Whether the model is fitted to all good runs together (default), or only to the newest run.
     pub pool: bool,
-    /// A run is worse when its tracking error (mean over the joints of the largest) is above this many times that of
-    /// the last good run, and above `settled.tracking_tolerance`. Default 1.5.
+    /// A run is worse if its tracking error (mean of the joint maxima) exceeds this factor times that of the last good
+    /// run, and `settled.tracking_tolerance`. Default 1.5.
     pub worse_factor: f64,
-    /// How often a step is halved before the controller without a model comes back. Default 3.
+    /// Number of step halvings before the iteration falls back to the controller without a model. Default 3.
     pub most_halvings: usize,
-    /// By how much the gains of the controller without a model grow each time it has to come back. Default 2.
+    /// Factor on the gains of the controller without a model each time the iteration falls back to it. Default 2.
     pub stiffen: f64,
-    /// Model-free runs that may fail before the robot counts as one that cannot follow. Default 4.
+    /// Number of failed runs without a model after which the iteration stops. Default 4.
     pub most_model_free: usize,
-    /// Most runs. Default 8.
+    /// Largest number of runs. Default 8.
     pub max_runs: usize,
-    /// When all has settled.
+    /// When the iteration has converged.
     pub settled: SettledSettings,
-    /// When a difference between logged and commanded torque counts; `None` disables the check.
+    /// When a difference between logged and commanded torque is reported; `None` disables the check.
     pub torque_check: Option<TorqueCheckSettings>,
-    /// What keeps runs safe.
+    /// Safety of the runs.
     pub safety: SafetySettings,
 }
 
@@ -243,9 +238,8 @@ impl Default for IterationSettings {
 }
 
 impl IterationSettings {
-    /// The paper's scheme as it stands: velocities and accelerations by the map from position (Eqs. 15, 16) with the
-    /// lag of at most `max_lag_s` estimated, step by step, every estimate straight into the controller, nothing
-    /// rejected.
+    /// The paper's scheme: velocities and accelerations by the map from position (Eqs. 15, 16) with an estimated lag of
+    /// at most `max_lag_s` (seconds), joint by joint, each estimate directly used by the controller, no run rejected.
     pub fn literal(max_lag_s: f64) -> Self {
         Self {
             identification: RunIdentificationSettings {
@@ -264,10 +258,11 @@ impl IterationSettings {
         }
     }
 
-    /// Checks the numbers for so many joints.
+    /// Checks the settings for `joints` joints.
     ///
     /// # Errors
-    /// Numbers out of range, controllers whose gains do not fit, a controller for the first run that needs a model.
+    /// Numbers out of range, controllers with the wrong number of gains, or a `model_free` controller that needs a
+    /// model.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.safety.validate(joints)?;
         self.model_free.validate(joints)?;
@@ -285,6 +280,7 @@ impl IterationSettings {
         within("most_model_free", self.most_model_free as f64, 1.0, 50.0, "give 1 to 50")?;
         within("max_runs", self.max_runs as f64, 1.0, 1000.0, "give 1 to 1000")?;
         let settled = &self.settled;
+        settled.verdict.validate()?;
         within("settled.parameter_sigmas", settled.parameter_sigmas, 0.0, 1e3, "give 0 to 1000")?;
         within("settled.parameter_tolerance", settled.parameter_tolerance, 0.0, 1.0, "give 0 to 1")?;
         within("settled.most_uncertain", settled.most_uncertain, 0.0, 1e6, "give 0 or a positive share")?;
@@ -303,7 +299,7 @@ mod tests {
     use dynident_model::InertialParameters;
     use dynident_model::sample::planar_2r;
 
-    /// What a bus takes does not shrink with the arm: a TX40 of 0.45 m had 6 ms, and its drives log 7 to 8 ms late.
+    /// Bus delay does not scale with the arm: a TX40 of 0.45 m had 6 ms, and its drives log 7 to 8 ms late.
     #[test]
     fn a_short_arm_may_be_as_late_as_a_usual_one() {
         let rod = |length_m: f64| {

@@ -1,37 +1,35 @@
-//! How an iteration ended.
-
 use serde::{Deserialize, Serialize};
 
-/// How an iteration ended, or why it stands still.
+/// How an iteration ended, or why it is paused.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "end", rename_all = "kebab-case")]
 pub enum IterationStatus {
-    /// Nothing is left of what [`Shortfall`](super::Shortfall) names.
+    /// All conditions are met: no [`Shortfall`](super::Shortfall) is left.
     Converged,
-    /// Neither tracking nor parameters change any more, and something is not met: a further run of the same motion
-    /// would not help.
+    /// Tracking and parameters no longer change, but a condition is not met: a further run of the same motion would not
+    /// help.
     Settled,
-    /// All runs allowed were made.
+    /// The largest number of runs was reached.
     RunsUsedUp,
-    /// No run can be made under any controller that is left to try.
+    /// No run is possible with any of the controllers.
     Refused {
         /// Why.
         reason: String,
     },
-    /// Somebody asked for a stop; the next call goes on from here.
+    /// A stop was requested; the next call continues from here.
     Interrupted {
-        /// What became of the run that was under way, and how to go on.
+        /// The result of the interrupted run, and how to continue.
         reason: String,
     },
-    /// Somebody has to run the robot first; then the iteration goes on from here.
+    /// A person has to run the robot; then the iteration continues from here.
     Waiting {
-        /// For what.
+        /// The missing input.
         reason: String,
     },
 }
 
 impl IterationStatus {
-    /// Whether everything is met.
+    /// Whether all conditions are met.
     pub fn is_converged(&self) -> bool {
         *self == Self::Converged
     }
@@ -41,8 +39,8 @@ impl core::fmt::Display for IterationStatus {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Converged => write!(f, "converged"),
-            Self::Settled => write!(f, "not converged: nothing changes any more"),
-            Self::RunsUsedUp => write!(f, "not converged: all runs allowed were made"),
+            Self::Settled => write!(f, "not converged: tracking and parameters no longer change"),
+            Self::RunsUsedUp => write!(f, "not converged: the largest number of runs was reached"),
             Self::Refused { reason } => write!(f, "refused: {reason}"),
             Self::Interrupted { reason } => write!(f, "interrupted: {reason}"),
             Self::Waiting { reason } => write!(f, "waiting: {reason}"),

@@ -1,5 +1,5 @@
-//! The paper's order: the tip joint first, then each joint towards the base with what is known already taken off its
-//! torque.
+//! The paper's order: the tip joint first, then each joint towards the base, with the torque of known parameters
+//! subtracted.
 
 use crate::error::IterationError;
 use crate::leg::IterationTask;
@@ -12,19 +12,17 @@ use dynident_identification::rows::{JointRows, RowConsumer};
 use dynident_identification::{EstimationSettings, LogError, Logs, RegressorModel};
 use nalgebra::DMatrix;
 
-/// What the steps have found so far.
 pub(crate) struct Steps {
     pub(crate) values: Vec<f64>,
     pub(crate) covariance: DMatrix<f64>,
     pub(crate) joint_sigma: Vec<f64>,
-    /// Whether each column was estimated.
     pub(crate) found: Vec<bool>,
     pub(crate) rows: usize,
 }
 
-/// Step by step: θ_k by least squares on `τ_k - B θ_known = A θ_k`, the rows of joint k alone (Eqs. 9, 10). What was
-/// estimated before enters with its covariance, `∂θ_k/∂θ_known = -A⁺ B`. Rows of joint k of recording ℓ are multiplied
-/// by `weights[ℓ][k]`.
+/// Joint-by-joint identification: θ_k by least squares on `τ_k - B θ_known = A θ_k`, with only the rows of joint k
+/// (Eqs. 9, 10). Earlier estimates contribute with their covariance, `∂θ_k/∂θ_known = -A⁺ B`. Rows of joint k of
+/// recording ℓ are multiplied by `weights[ℓ][k]`.
 pub(crate) fn step_by_step(
     task: &IterationTask,
     logs: &Logs<'_>,
@@ -84,25 +82,23 @@ pub(crate) fn step_by_step(
     Ok(steps)
 }
 
-/// The columns of one joint, as places among them.
 struct Places<'a> {
     columns: &'a [usize],
-    /// With a value that is stated or was found at an outer joint.
+    /// Stated, or estimated at an outer joint.
     known: &'a [usize],
     unknown: &'a [usize],
-    /// Those of the known that were found at an outer joint.
+    /// Those of the known that were estimated at an outer joint.
     uncertain: &'a [usize],
 }
 
-/// One joint's rows, torque less what the known columns explain.
+/// One joint's rows, with the torque of the known columns subtracted.
 struct Factors {
-    /// Of the unknown columns.
+    /// For the unknown columns.
     factor: SegmentedFactor,
-    /// Of the unknown and the uncertain columns.
+    /// For the unknown and the uncertain columns.
     wide: TriangularFactor,
 }
 
-/// The rows of one joint in all logs.
 fn joint_factors(
     task: &IterationTask,
     logs: &Logs<'_>,
@@ -152,7 +148,6 @@ fn joint_factors(
     Ok(Factors { factor, wide })
 }
 
-/// Adds this step's covariance and what it inherits from earlier ones.
 fn propagate(
     steps: &mut Steps,
     globals: &[usize],
@@ -194,7 +189,6 @@ fn propagate(
     }
 }
 
-/// The least squares that the settings ask for.
 fn least_squares(problem: &LinearProblem, settings: &EstimationSettings) -> Result<Estimate, IterationError> {
     let (rank, covariance) = (settings.rank, settings.covariance);
     Ok(match settings.estimator {
@@ -203,7 +197,6 @@ fn least_squares(problem: &LinearProblem, settings: &EstimationSettings) -> Resu
     })
 }
 
-/// Hands rows to a function.
 struct Visit<F>(F);
 
 impl<F: FnMut(&JointRows<'_>) -> Result<(), LogError>> RowConsumer for Visit<F> {

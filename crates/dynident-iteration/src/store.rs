@@ -1,5 +1,3 @@
-//! An iteration on disk: every run whole or not at all.
-
 use crate::error::IterationError;
 use crate::fingerprint::other_settings;
 use crate::forecast::MotionForecast;
@@ -15,27 +13,23 @@ use crate::runs_folder::{
 use crate::sealed::{sealed_json, unsealed};
 use dynident_simulation::Record;
 use dynident_system::TemporaryFolder;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Schema of `runs/interrupted_k/interrupted.json`.
 const INTERRUPTED_SCHEMA: &str = "dynident/interrupted/1";
 
-/// Largest file of a run that is read, bytes.
-const MOST_BYTES: u64 = 1 << 30;
+const MAX_FILE_BYTES: u64 = 1 << 30;
 
 /// Schema of `runs/run_k/run.json`.
 pub const RUN_SCHEMA: &str = "dynident/run/1";
 
-/// Schema of `runs/planned_k/plan.json`.
 const PLAN_SCHEMA: &str = "dynident/planned-motion/1";
 
-/// Schema of `runs/held_out_k/held_out.json`.
 const HELD_OUT_SCHEMA: &str = "dynident/held-out-run/1";
 
-/// What `runs/held_out_k/held_out.json` holds.
 #[derive(Serialize, Deserialize)]
 struct HeldOutFile {
     schema: String,
@@ -45,7 +39,6 @@ struct HeldOutFile {
     found: HeldOutRun,
 }
 
-/// What `runs/planned_k/plan.json` holds: the motion of a run that has not been made yet.
 #[derive(Serialize, Deserialize)]
 struct PlanFile {
     schema: String,
@@ -55,24 +48,24 @@ struct PlanFile {
     forecast: MotionForecast,
 }
 
-/// The folder of an iteration: `runs/run_k/run.json` and the records beside it. A run appears in one step (rename of a
-/// finished folder, everything on the disk before), so that whoever is killed at any moment finds all runs up to one of
-/// them, and goes on with the next.
+/// Folder of an iteration: `runs/run_k/run.json` and the logs next to it. A run appears in one step (rename of a
+/// finished folder after all files are synced to disk), so an iteration that is killed at any moment can resume after
+/// its last complete run.
 #[derive(Debug)]
 pub struct IterationStore {
     runs: PathBuf,
     fingerprint: String,
 }
 
-/// What `runs/run_k/run.json` holds.
+/// Content of `runs/run_k/run.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunFile {
     /// [`RUN_SCHEMA`].
     pub schema: String,
-    /// What the runs depend on, in one number.
+    /// Fingerprint of all inputs of the runs.
     pub fingerprint: String,
-    /// SHA-256 of everything else in the file: a file that was edited or damaged is not read. None in files of earlier
+    /// SHA-256 of the rest of the file; a file that was edited or damaged is rejected. Absent in files of earlier
     /// versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub content_sha256: Option<String>,
@@ -82,53 +75,45 @@ pub struct RunFile {
 }
 
 impl IterationStore {
-    /// Opens or makes the folder. `fingerprint` stands for everything that the runs depend on; runs with another one
-    /// are another iteration's. Without `resume`, runs that are there are removed: the files that an iteration writes,
-    /// never others, and never through a symbolic link.
+    /// Opens or creates the folder. `fingerprint` identifies all inputs of the runs; runs with another fingerprint
+    /// belong to another iteration. Without `resume`, existing runs are removed: only files that an iteration writes,
+    /// and never through a symbolic link.
     ///
     /// # Errors
-    /// A folder that cannot be written; runs of another iteration; in a run's folder or in its place something that no
-    /// iteration wrote.
+    /// A folder that cannot be written, runs of another iteration, or foreign files in a run's folder.
     pub fn open(folder: &Path, fingerprint: &str, resume: bool) -> Result<Self, IterationError> {
         let runs = folder.join("runs");
         fs::create_dir_all(&runs).map_err(IterationError::file(&runs))?;
-        let found = RunsFolder::look(&runs)?;
+        let found = RunsFolder::read(&runs)?;
         if !resume {
             found.remove_runs()?;
         }
         found.remove_unfinished()?;
         let store = Self { runs, fingerprint: fingerprint.to_owned() };
         let made = store.records()?.len();
-        // Of another run it is no plan any more: runs before it have been made, or removed.
-        RunsFolder::look(&store.runs)?.remove_plans_but(made + 1)?;
+        RunsFolder::read(&store.runs)?.remove_plans_but(made + 1)?;
         Ok(store)
     }
 
-    /// That a fresh start in the folder may remove the runs that are there. Changes nothing.
+    /// Checks whether a fresh start may remove the existing runs. Changes nothing.
     ///
     /// # Errors
     /// As [`open`](Self::open) without `resume`.
     pub fn may_begin_afresh(folder: &Path) -> Result<(), IterationError> {
         let runs = folder.join("runs");
-        if runs.is_dir() { RunsFolder::look(&runs)?.may_remove_runs() } else { Ok(()) }
+        if runs.is_dir() { RunsFolder::read(&runs)?.may_remove_runs() } else { Ok(()) }
     }
 
-    /// The runs that are there, in order.
+    /// Returns the stored runs in order.
     ///
     /// # Errors
-    /// A file that cannot be read or is no run of this iteration.
+    /// A file that cannot be read or does not belong to this iteration.
     pub fn records(&self) -> Result<Vec<RunRecord>, IterationError> {
         let mut records = Vec::new();
         loop {
             let path = self.run_folder(records.len() + 1).join(RUN_FILE);
-            let text = match dynident_files::read_text(&path, MOST_BYTES) {
-                Ok(text) => text,
-                Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(records),
-                Err(error) => return Err(IterationError::file(&path)(error)),
-            };
+            let Some(file) = read_sealed::<RunFile>(&path, "a run")? else { return Ok(records) };
             let state = |problem: String| IterationError::State { path: path.clone(), problem };
-            let file: RunFile = unsealed(&text)
-                .map_err(|error| state(format!("is no run of an iteration ({error}); remove its folder")))?;
             if file.schema != RUN_SCHEMA {
                 return Err(state(format!("has the schema {}, not {RUN_SCHEMA}", file.schema)));
             }
@@ -136,7 +121,7 @@ impl IterationStore {
                 return Err(state(other_settings(&file.fingerprint, &self.fingerprint)));
             }
             if file.record.run != records.len() + 1 {
-                return Err(state(format!("holds run {}", file.record.run)));
+                return Err(state(format!("contains run {}", file.record.run)));
             }
             let mut record = file.record;
             if let Some(motion) = record.motion.take() {
@@ -148,40 +133,29 @@ impl IterationStore {
         }
     }
 
-    /// Keeps the run of the held-out motion after a run: `held_out_k/`, with `held_out.json` and the log.
+    /// Stores the run of the held-out motion after a run in `held_out_k/`: `held_out.json` and the log.
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn keep_held_out(&self, run: usize, found: &HeldOutRun, came: &RobotRun) -> Result<(), IterationError> {
+    pub fn keep_held_out(&self, run: usize, found: &HeldOutRun, robot_run: &RobotRun) -> Result<(), IterationError> {
         let folder = self.held_out_folder(run);
         let fingerprint = self.fingerprint.clone();
         let file = HeldOutFile { schema: HELD_OUT_SCHEMA.to_owned(), fingerprint, run, found: found.clone() };
         let text = sealed_json(&file)
             .map_err(|error| IterationError::State { path: folder.join(HELD_OUT_FILE), problem: error.to_string() })?;
-        self.keep_whole(&folder, (HELD_OUT_FILE, &text), core::slice::from_ref(came), None)
+        self.keep_whole(&folder, (HELD_OUT_FILE, &text), core::slice::from_ref(robot_run), None)
     }
 
-    /// The held-out run after a run, if it is there.
     fn held_out(&self, run: usize) -> Result<Option<HeldOutRun>, IterationError> {
         let path = self.held_out_folder(run).join(HELD_OUT_FILE);
-        let text = match dynident_files::read_text(&path, MOST_BYTES) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(IterationError::file(&path)(error)),
-        };
-        let wrong = |problem: String| IterationError::State { path: path.clone(), problem };
-        let file: HeldOutFile = unsealed(&text)
-            .map_err(|error| wrong(format!("is no held-out run of an iteration ({error}); remove its folder")))?;
+        let Some(file) = read_sealed::<HeldOutFile>(&path, "a held-out run")? else { return Ok(None) };
         if file.schema != HELD_OUT_SCHEMA || file.fingerprint != self.fingerprint || file.run != run {
-            return Err(wrong("belongs to another iteration, version or run: remove its folder".to_owned()));
+            return Err(IterationError::State { path, problem: OF_ANOTHER.to_owned() });
         }
         Ok(Some(file.found))
     }
 
-    /// The log of the held-out run after a run.
-    ///
-    /// # Errors
-    /// A log that is not there any more or holds something else.
+    /// Returns the log of the held-out run after a run.
     pub(crate) fn held_out_log(&self, run: usize, joints: &[String], rate_hz: f64) -> Result<Record, IterationError> {
         let path = self.held_out_log_path(run);
         read_log_table(&path, joints, rate_hz).map_err(|error| IterationError::State {
@@ -190,7 +164,7 @@ impl IterationStore {
         })
     }
 
-    /// Where the log of the held-out run after a run stands.
+    /// Path of the log of the held-out run after a run.
     pub fn held_out_log_path(&self, run: usize) -> PathBuf {
         self.held_out_folder(run).join(log_name(0))
     }
@@ -199,12 +173,12 @@ impl IterationStore {
         self.runs.join(format!("{HELD_OUT}{run}"))
     }
 
-    /// Keeps a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), `approach_log.csv` and
-    /// `return_log.csv` beside it where it had ways, and `motion.csv` of each that is not the task's. What was planned
-    /// for it is removed.
+    /// Stores a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), `approach_log.csv` and
+    /// `return_log.csv` if the run had approach and return paths, and `motion.csv` of each motion that differs from the
+    /// task. Removes the plan of the run.
     ///
     /// # Errors
-    /// A folder that cannot be written; then the run is not there.
+    /// A folder that cannot be written; the run is then not stored.
     pub fn keep(&self, record: &RunRecord, runs: &[RobotRun]) -> Result<(), IterationError> {
         let file = RunFile {
             schema: RUN_SCHEMA.to_owned(),
@@ -220,8 +194,8 @@ impl IterationStore {
         if plan.is_dir() { remove(&plan) } else { Ok(()) }
     }
 
-    /// Keeps the motion that was planned for a run, so that a further call runs the same: `planned_k/`, with
-    /// `plan.json` and `motion.csv`.
+    /// Stores the planned motion of a run in `planned_k/` (`plan.json` and `motion.csv`), so that a resumed iteration
+    /// runs the same motion.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -235,30 +209,23 @@ impl IterationStore {
         self.keep_whole(&folder, (PLAN_FILE, &text), &[], planned.motion.as_ref())
     }
 
-    /// The motion that an earlier call has planned for a run of so many joints, if one has.
+    /// Returns the motion that was planned earlier for this run, if any.
     ///
     /// # Errors
-    /// A folder that cannot be read or holds something else.
+    /// A folder that cannot be read or has other content.
     pub fn planned(&self, run: usize, joints: usize) -> Result<Option<PlannedMotion>, IterationError> {
         let folder = self.plan_folder(run);
         let path = folder.join(PLAN_FILE);
-        let text = match dynident_files::read_text(&path, MOST_BYTES) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(IterationError::file(&path)(error)),
-        };
-        let wrong = |problem: String| IterationError::State { path: path.clone(), problem };
-        let file: PlanFile = unsealed(&text)
-            .map_err(|error| wrong(format!("is no planned motion of an iteration ({error}); remove its folder")))?;
+        let Some(file) = read_sealed::<PlanFile>(&path, "a planned motion")? else { return Ok(None) };
         if file.schema != PLAN_SCHEMA || file.fingerprint != self.fingerprint || file.run != run {
-            return Err(wrong("belongs to another iteration, version or run: remove its folder".to_owned()));
+            return Err(IterationError::State { path, problem: OF_ANOTHER.to_owned() });
         }
         let motion = file.motion.map(|motion| motion.with_tables(&folder, joints)).transpose()?;
         Ok(Some(PlannedMotion { motion, forecast: file.forecast }))
     }
 
-    /// Keeps what was recorded of a run that a stop cut short, beside the runs: `interrupted_k/`, with the logs and
-    /// `interrupted.json`; where it is, or none if nothing was recorded.
+    /// Stores the logs of a run that was stopped early and `interrupted.json` in `interrupted_k/`. Returns the folder,
+    /// or `None` if nothing was recorded.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -293,7 +260,6 @@ impl IterationStore {
         Ok(Some(folder))
     }
 
-    /// A folder with a file, the logs and the motion, whole or not at all.
     fn keep_whole(
         &self,
         folder: &Path,
@@ -315,32 +281,26 @@ impl IterationStore {
         sync_folder(fresh.path())?;
         open_to_others(fresh.path())?;
         fs::rename(fresh.path(), folder).map_err(IterationError::file(folder))?;
-        // It has another name now: there is nothing left to remove.
+        // The folder was renamed, so nothing is left to remove.
         let _ = fresh.keep();
         sync_folder(&self.runs)
     }
 
-    /// Forgets the newest run, whose log was corrected, with everything that was made after it.
-    ///
-    /// # Errors
-    /// A folder that holds files of somebody else, or that cannot be removed.
+    /// Removes the newest run, whose log was corrected, and everything that followed from it.
     pub(crate) fn forget_run(&self, run: usize) -> Result<(), IterationError> {
-        RunsFolder::look(&self.runs)?.remove_run(&self.run_folder(run))?;
+        RunsFolder::read(&self.runs)?.remove_run(&self.run_folder(run))?;
         self.forget_held_out(run)
     }
 
-    /// Forgets the held-out run after the newest run, with what was planned after it.
-    ///
-    /// # Errors
-    /// A folder that cannot be removed.
+    /// Removes the held-out run after the newest run and the plans that followed from it.
     pub(crate) fn forget_held_out(&self, run: usize) -> Result<(), IterationError> {
-        RunsFolder::look(&self.runs)?.remove_plans_but(run)
+        RunsFolder::read(&self.runs)?.remove_plans_but(run)
     }
 
-    /// The records of a run, leg after leg, at these rates: bit for bit as they were when it was made.
+    /// Returns the logs of a run, one per leg, at these rates (Hz), bit for bit as recorded.
     ///
     /// # Errors
-    /// A log that is not there any more or holds something else.
+    /// A log that is missing or invalid.
     pub fn logs(&self, run: usize, joints: &[String], rates_hz: &[f64]) -> Result<Vec<Record>, IterationError> {
         let of_leg = |(leg, rate_hz): (usize, &f64)| {
             let path = self.log_path(run, leg);
@@ -354,12 +314,11 @@ impl IterationStore {
         rates_hz.iter().enumerate().map(of_leg).collect()
     }
 
-    /// That run number `run` cannot be gone on from.
     pub(crate) fn refused(&self, run: usize, problem: String) -> IterationError {
         IterationError::State { path: self.run_folder(run).join(RUN_FILE), problem }
     }
 
-    /// The log of a run's leg, by its place from 0.
+    /// Path of the log of a leg (0-based) of a run.
     pub fn log_path(&self, run: usize, leg: usize) -> PathBuf {
         self.run_folder(run).join(log_name(leg))
     }
@@ -374,7 +333,20 @@ impl IterationStore {
     }
 }
 
-/// The log of a leg, by its place from 0, in its run's folder.
+const OF_ANOTHER: &str = "belongs to another iteration, version or run: remove its folder";
+
+/// Reads a sealed file of an iteration; `None` if it does not exist.
+fn read_sealed<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<Option<T>, IterationError> {
+    let text = match dynident_files::read_text(path, MAX_FILE_BYTES) {
+        Ok(text) => text,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(IterationError::file(path)(error)),
+    };
+    let problem = |error: String| format!("is not {kind} of an iteration ({error}); remove its folder");
+    let state = |error| IterationError::State { path: path.to_owned(), problem: problem(error) };
+    unsealed(&text).map(Some).map_err(state)
+}
+
 fn log_name(leg: usize) -> String {
     if leg == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", leg + 1) }
 }
@@ -385,7 +357,6 @@ fn write_synced(path: &Path, contents: &[u8]) -> Result<(), IterationError> {
     file.sync_all().map_err(IterationError::file(path))
 }
 
-/// Names in a folder reach the disk with the folder itself, where the system knows such a thing.
 fn sync_folder(path: &Path) -> Result<(), IterationError> {
     if cfg!(unix) {
         let folder = File::open(path).map_err(IterationError::file(path))?;
@@ -394,7 +365,6 @@ fn sync_folder(path: &Path) -> Result<(), IterationError> {
     Ok(())
 }
 
-/// A temporary folder is private to its owner; a result is for everybody whom the folder lets in.
 fn open_to_others(path: &Path) -> Result<(), IterationError> {
     #[cfg(unix)]
     {

@@ -1,5 +1,3 @@
-//! Who watches over an iteration: asks for stops, allows motions, hears of runs.
-
 use crate::record::RunRecord;
 use crate::rehearsal::Rehearsal;
 use crate::robot::{RobotRun, RunPurpose, StopSignal};
@@ -9,47 +7,47 @@ use crate::robot::{RobotRun, RunPurpose, StopSignal};
 pub struct NextMotion {
     /// Number of the run, from 1.
     pub run: usize,
-    /// Place of the trajectory among those of the run, from 0, and how many there are.
+    /// Index of the trajectory in the run, from 0, and the number of trajectories.
     pub leg: (usize, usize),
-    /// The controller's name.
+    /// Name of the controller.
     pub controller: String,
-    /// Whether it has a model.
+    /// Whether the controller has a model.
     pub model_based: bool,
     /// Length, s.
     pub duration_s: f64,
-    /// Share of the trajectory's own speed; 1 but for slow runs before the first.
+    /// Share of the trajectory's speed; below 1 only in slow runs before the first run.
     pub speed: f64,
-    /// What it is made for.
+    /// Purpose of the motion.
     pub purpose: RunPurpose,
-    /// For each joint, by name, the largest velocity of the motion, rad/s (m/s).
+    /// The largest velocity of each joint, by name, rad/s (m/s).
     pub largest_speed: Vec<(String, f64)>,
-    /// What its rehearsal has shown, if there was one.
+    /// Result of its rehearsal, if any.
     pub rehearsal: Option<Rehearsal>,
-    /// The ways to it and back, where the robot waits at a home.
+    /// The paths from and to home, if a home is set.
     pub ways: Option<NextWays>,
 }
 
-/// The ways of a motion that is about to be commanded.
+/// The paths from and to home of a motion that is about to be commanded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NextWays {
-    /// Length of the way to the motion, s.
+    /// Length of the approach, s.
     pub approach_s: f64,
-    /// Length of the way back, s.
+    /// Length of the return, s.
     pub return_s: f64,
-    /// For each joint, by name, the largest velocity of both, rad/s (m/s).
+    /// The largest velocity of each joint on both paths, by name, rad/s (m/s).
     pub largest_speed: Vec<(String, f64)>,
-    /// Postures in between that each goes over, since the straight one is not clear.
+    /// Number of via postures of each path; 0 for a direct path.
     pub over_postures: [usize; 2],
 }
 
-/// Who watches over an iteration.
+/// Supervises an iteration.
 pub trait Supervisor {
-    /// Where stops are asked for.
+    /// The signal that stops the iteration.
     fn stop(&self) -> Option<&StopSignal> {
         None
     }
 
-    /// Whether somebody is asked before every motion.
+    /// Whether every motion needs the permission of a person.
     fn asks(&self) -> bool {
         false
     }
@@ -59,11 +57,10 @@ pub trait Supervisor {
         true
     }
 
-    /// Hears of every new run.
+    /// Called after every new run.
     fn made(&mut self, _record: &RunRecord, _runs: &[RobotRun]) {}
 }
 
-/// Only hears of runs.
 pub(crate) struct Watching<'a>(pub(crate) &'a mut dyn FnMut(&RunRecord, &[RobotRun]));
 
 impl Supervisor for Watching<'_> {

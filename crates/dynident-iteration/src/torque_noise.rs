@@ -1,60 +1,59 @@
-//! The noise of a logged torque, without what the model may not explain.
+//! Noise of a logged torque, without torque that the model may not explain.
 //!
-//! Friction steps where a joint reverses, and a step has a spectrum up to half the rate of the log. Noise is there all
-//! the time. So the density of the torque is taken over windows, octave by octave from where the motion has faded, each
-//! over windows as short as the octave allows, and of all windows the lower quartile is taken, of those without a
-//! reversal where there are enough. Below the motion's end the noise has the density of the first octave.
+//! Friction changes stepwise at reversals, and a step has a spectrum up to half the sample rate. Noise is always
+//! present. So the spectral density of the torque is computed over windows, octave by octave from the end of the
+//! motion's spectrum, each with windows as short as the octave allows. The lower quartile over the windows is used, of
+//! windows without a reversal if there are enough. Below the motion's end the noise has the density of the first
+//! octave.
 //!
 //! Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70; Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931)
-//! 684, for the quartile of the means of so many densities.
+//! 684, for the quartile of the means of several densities.
 
 use core::f64::consts::{PI, TAU};
 use core::ops::Range;
 
-/// Periods of an octave's lowest frequency in a window: it then has four frequencies of the octave.
-const PERIODS: usize = 4;
-/// Independent densities among the four of a window, under a Hann taper.
-const INDEPENDENT: f64 = 2.7;
-/// Fewest windows without a reversal that are used without the others.
-const FEWEST_WINDOWS: usize = 12;
-/// An octave with this many times the density of the next one shows the motion: noise of the first order falls by 4,
-/// the torque of a motion that fades by 16 and more.
-const STEEP: f64 = 8.0;
-/// A joint reverses where a quarter of a window brings it less far than this share of the others' mean.
-const STANDS: f64 = 0.1;
+/// Periods of an octave's lowest frequency in a window, which then has four frequencies of the octave.
+const PERIODS_PER_WINDOW: usize = 4;
+/// Number of independent densities among the four of a window with a Hann taper.
+const INDEPENDENT_DENSITIES: f64 = 2.7;
+/// Smallest number of windows without a reversal that are used without the others.
+const MIN_WINDOWS: usize = 12;
+/// Ratio of the densities of two octaves above which the first contains motion: first-order noise falls by 4, the
+/// torque of a motion by 16 and more.
+const MIN_MOTION_DENSITY_RATIO: f64 = 8.0;
+/// A joint reverses in a window if a quarter of it moves the joint less than this share of the mean of the quarters.
+const MIN_QUARTER_SHARE: f64 = 0.1;
 
-/// The noise of one torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TorqueNoise {
-    /// Standard deviation of one logged value, Nm (N).
+    /// Standard deviation of one sample, Nm (N).
     pub(crate) of_sample: f64,
-    /// Variance of the noise in each hertz at the lowest frequencies that show it, Nm²/Hz.
+    /// Density of the noise at the lowest resolved frequencies, Nm²/Hz.
     density: f64,
 }
 
 impl TorqueNoise {
-    /// Standard deviation of the noise that a low-pass leaves, Nm (N).
+    /// Standard deviation of the noise after a low-pass, Nm (N).
     pub(crate) fn below(self, cutoff_hz: f64) -> f64 {
         (self.density * cutoff_hz).sqrt()
     }
 
-    /// The larger of two.
     pub(crate) fn or(self, other: Self) -> Self {
         Self { of_sample: self.of_sample.max(other.of_sample), density: self.density.max(other.density) }
     }
 }
 
-/// The noise of the uniformly sampled torque `tau` of a joint at the positions `q`, whose motion has faded beyond
-/// `motion_hz`. Zero where there are too few samples, or none that differ.
+/// Estimates the noise of the uniformly sampled torque `tau` of a joint with the positions `q`, whose motion ends at
+/// `motion_hz`. Zero if there are too few samples or all are equal.
 pub(crate) fn torque_noise(tau: &[f64], q: &[f64], rate_hz: f64, motion_hz: f64) -> TorqueNoise {
     let nyquist_hz = 0.5 * rate_hz;
     if tau.len() != q.len() || !(motion_hz > 0.0 && nyquist_hz.is_finite()) || tau.iter().any(|tau| !tau.is_finite()) {
         return TorqueNoise::default();
     }
-    // Third differences: what is left of the motion's slow torque would leak through the windows' tapers.
+    // Third differences, so that the rest of the motion's slow torque does not leak through the tapers.
     let third: Vec<f64> = tau.windows(4).map(|x| x[3] - 3.0 * x[2] + 3.0 * x[1] - x[0]).collect();
     let mut octaves: Vec<([f64; 2], f64)> = Vec::new();
-    // At least one octave, the highest one at worst.
+    // At least one octave, if necessary the highest.
     let mut from_hz = motion_hz.min(0.5 * nyquist_hz);
     while from_hz < 0.9 * nyquist_hz {
         let to_hz = if 2.2 * from_hz > nyquist_hz { nyquist_hz } else { 2.0 * from_hz };
@@ -62,8 +61,9 @@ pub(crate) fn torque_noise(tau: &[f64], q: &[f64], rate_hz: f64, motion_hz: f64)
         octaves.push(([from_hz, to_hz], density));
         from_hz = to_hz;
     }
-    // Torque fades later than positions: it has the square of their frequencies, and products of several joints'.
-    let motion = octaves.windows(2).take_while(|two| two[0].1 > STEEP * two[1].1).count();
+    // The spectrum of torque is wider than that of positions, because torque contains squares and products of
+    // velocities.
+    let motion = octaves.windows(2).take_while(|two| two[0].1 > MIN_MOTION_DENSITY_RATIO * two[1].1).count();
     octaves.drain(..motion);
     let lowest = octaves.first().map(|(_, density)| *density);
     // The noise below the motion's end has the density of the first octave.
@@ -74,14 +74,15 @@ pub(crate) fn torque_noise(tau: &[f64], q: &[f64], rate_hz: f64, motion_hz: f64)
     TorqueNoise { of_sample, density: lowest.unwrap_or(0.0).max(step * step / 12.0 / nyquist_hz) }
 }
 
-/// One-sided density of the noise within an octave, Nm²/Hz, from third differences; none where no window fits.
+/// One-sided density of the noise within an octave, Nm²/Hz, from third differences; `None` if no window fits.
 fn octave_density(third: &[f64], q: &[f64], rate_hz: f64, band_hz: [f64; 2]) -> Option<f64> {
     let [from_hz, to_hz] = band_hz;
-    let length = (PERIODS as f64 * rate_hz / from_hz).round() as usize;
-    if length < 2 * PERIODS || third.len() < length {
+    let length = (PERIODS_PER_WINDOW as f64 * rate_hz / from_hz).round() as usize;
+    if length < 2 * PERIODS_PER_WINDOW || third.len() < length {
         return None;
     }
-    let bins = PERIODS..((to_hz / rate_hz * length as f64).floor() as usize + 1).min(length / 2).max(PERIODS + 1);
+    let bins = PERIODS_PER_WINDOW
+        ..((to_hz / rate_hz * length as f64).floor() as usize + 1).min(length / 2).max(PERIODS_PER_WINDOW + 1);
     let taper: Vec<f64> = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(2)).collect();
     let power: f64 = taper.iter().map(|x| x * x).sum();
     let turn: Vec<[f64; 2]> = (0..length).map(|k| (TAU * k as f64 / length as f64).sin_cos().into()).collect();
@@ -103,10 +104,10 @@ fn octave_density(third: &[f64], q: &[f64], rate_hz: f64, band_hz: [f64; 2]) -> 
         (0..=third.len() - length).step_by((length / 2).max(1)).map(|start| start..start + length).collect();
     let one_way: Vec<&Range<usize>> =
         windows.iter().filter(|window| moves_one_way(&q[window.start..window.end + 3])).collect();
-    let chosen = if one_way.len() >= FEWEST_WINDOWS { one_way } else { windows.iter().collect() };
+    let chosen = if one_way.len() >= MIN_WINDOWS { one_way } else { windows.iter().collect() };
     let mut densities: Vec<f64> = chosen.into_iter().map(of_window).collect();
     densities.sort_by(f64::total_cmp);
-    let independent = INDEPENDENT * bins.len() as f64 / PERIODS as f64;
+    let independent = INDEPENDENT_DENSITIES * bins.len() as f64 / PERIODS_PER_WINDOW as f64;
     Some(densities[densities.len() / 4] / lower_quartile(independent))
 }
 
@@ -115,7 +116,6 @@ fn lower_quartile(count: f64) -> f64 {
     (1.0 - 1.0 / (9.0 * count) - 0.6745 / (3.0 * count.sqrt())).powi(3)
 }
 
-/// Whether a joint with these positions moves in one direction.
 fn moves_one_way(q: &[f64]) -> bool {
     let quarter = q.len() / 4;
     if quarter == 0 {
@@ -124,12 +124,11 @@ fn moves_one_way(q: &[f64]) -> bool {
     let whole = q[4 * quarter - 1] - q[0];
     (0..4).all(|k| {
         let moved = q[(k + 1) * quarter - 1] - q[k * quarter];
-        moved * whole.signum() > STANDS * 0.25 * whole.abs()
+        moved * whole.signum() > MIN_QUARTER_SHARE * 0.25 * whole.abs()
     })
 }
 
-/// The step of a quantised torque: the smallest difference of neighbours that differ. Of a torque that is not quantised
-/// it is next to nothing.
+/// The step of a quantised torque: the smallest nonzero difference of neighbours; nearly zero without quantisation.
 fn quantum(tau: &[f64]) -> f64 {
     let steps = tau.windows(2).map(|two| (two[1] - two[0]).abs()).filter(|step| *step > 0.0);
     let least = steps.fold(f64::INFINITY, f64::min);
@@ -145,7 +144,7 @@ mod tests {
     /// a second.
     struct Torque {
         rate_hz: f64,
-        /// Coulomb friction, Nm, and the velocity at which it is full, rad/s.
+        /// Coulomb friction, Nm, and the velocity at which it is fully developed, rad/s.
         coulomb: [f64; 2],
         noise: f64,
     }
@@ -178,8 +177,8 @@ mod tests {
         torque_noise(tau, q, rate_hz, 6.0)
     }
 
-    /// White noise is known by construction; friction that steps within a sample, or over 0.05 rad/s, forty times as
-    /// large, adds at most half of it.
+    /// White noise is known by construction; friction that is forty times as large and steps within a sample, or over
+    /// 0.05 rad/s, adds at most half of it.
     #[test]
     fn steps_of_friction_are_not_noise() {
         for rate_hz in RATES_HZ {
@@ -195,9 +194,9 @@ mod tests {
         }
     }
 
-    /// Noise that hangs together over ten samples, as of a filtered current, is 4.4 times white noise of its size in a
-    /// slow row: the variance of the mean of a first-order process. And what a controller makes of its encoders'
-    /// noise is next to none there.
+    /// Noise that is correlated over ten samples, as of a filtered current, is 4.4 times white noise of its size in a
+    /// slow row: the variance of the mean of a first-order process. The encoder noise in a controller's torque is
+    /// nearly zero there.
     #[test]
     fn coloured_noise_is_known_in_a_filtered_row() {
         let (rate_hz, correlation) = (500.0, 0.9_f64);
@@ -209,7 +208,7 @@ mod tests {
             held
         };
         let noise: Vec<f64> = (0..smooth.len()).map(|_| 0.3 * next()).collect();
-        // The oracle: the noise alone through a moving mean, which a low-pass of that width is.
+        // Expected value: the noise through a moving mean, which is a low-pass of that width.
         let mean_of = |values: &[f64]| {
             let means: Vec<f64> = values.windows(42).map(|x| x.iter().sum::<f64>() / 42.0).collect();
             (means.iter().map(|x| x * x).sum::<f64>() / means.len() as f64).sqrt()
@@ -230,7 +229,7 @@ mod tests {
         assert!(own.below(6.0) < 0.3 * own.of_sample * (6.0 / 250.0_f64).sqrt() * 2.0, "{own:?}");
     }
 
-    /// Rounded to 0.1 Nm: a twelfth of the square of the step.
+    /// Rounded to 0.1 Nm: the variance is a twelfth of the squared step.
     #[test]
     fn rounding_is_noise() {
         for rate_hz in RATES_HZ {

@@ -1,32 +1,31 @@
-//! The torque that a motion asks for by every model in the uncertainty.
+//! The largest torque that a motion needs over all models within the uncertainty.
 
 use crate::estimate::RunEstimate;
 use crate::forecast::covariance;
+use crate::prediction::covariance_root;
 use dynident_dynamics::{BatchWorkspace, Panels, ParametricModel, regressor_panels};
 use dynident_excitation::Motion;
 use dynident_simulation::Reference;
-use nalgebra::{DMatrix, DMatrixView, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
-/// Samples whose regressor is held at once.
 const SAMPLES_AT_ONCE: usize = 2048;
 
-/// Samples a second of a usual arm that are looked at, about: torques of rigid bodies change little in between.
+/// Approximate rate of the evaluated samples, Hz for an arm of 1.2 m; rigid-body torques change little in between.
 const RATE_HZ: f64 = 500.0;
 
-/// The 95 % point of the standard normal distribution, one-sided.
+/// One-sided 95 % point of the standard normal distribution.
 const NORMAL_95: f64 = 1.644_853_6;
 
-/// Per joint the largest torque along a trajectory, Nm (N).
 #[derive(Clone, Debug)]
 pub(crate) struct LargestTorque {
-    /// Of any model in the 95 % ellipsoid of all parameters: `|wᵀθ| + √χ² √(wᵀ C w)`, which is the largest `|wᵀϑ|` over
-    /// `(ϑ - θ)ᵀ C⁻¹ (ϑ - θ) ≤ χ²`; also of `θ` in place of the estimate, the robot that controllers get.
+    /// Over all models in the 95 % ellipsoid of the parameters: `|wᵀθ| + √χ² √(wᵀ C w)`, the largest `|wᵀϑ|` with `(ϑ -
+    /// θ)ᵀ C⁻¹ (ϑ - θ) ≤ χ²`; also around the physically consistent model of the controllers.
     pub(crate) of_all: Vec<f64>,
-    /// By how much that is beyond the torque that the model of a search has, at most.
+    /// Largest excess over the torque in the model of a search.
     pub(crate) beyond_search: Vec<f64>,
 }
 
-/// The largest torques along a trajectory. `searched` gives the torque that the model of a search has, joint-major
+/// Computes the largest torques along a trajectory. `searched` returns the torque in the model of a search, joint-major
 /// along a motion.
 pub(crate) fn largest_torque(
     robot: &ParametricModel,
@@ -40,15 +39,8 @@ pub(crate) fn largest_torque(
     let width = chi_squared_95(directions).sqrt();
     let mut centres = vec![DVector::from_vec(known.values.clone())];
     centres.extend(known.possible.as_ref().map(|all| DVector::from_vec(robot.base().values(all))));
-    // V = Lᵀ L of each joint's columns; covariances from few segments are singular, so by eigenvalues.
-    let roots: Vec<DMatrix<f64>> = (0..dof)
-        .map(|joint| {
-            let columns = robot.layout().joint_columns(joint);
-            let eigen = SymmetricEigen::new(spread.select_rows(columns).select_columns(columns));
-            let root = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
-            DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose()
-        })
-        .collect();
+    let roots: Vec<DMatrix<f64>> =
+        (0..dof).map(|joint| covariance_root(&spread, robot.layout().joint_columns(joint))).collect();
     let (mut workspace, mut panels) = (BatchWorkspace::new(robot.model()), Panels::default());
     let mut largest = LargestTorque { of_all: vec![0.0; dof], beyond_search: vec![0.0; dof] };
     let whole = reference.motion();
@@ -76,7 +68,6 @@ pub(crate) fn largest_torque(
     largest
 }
 
-/// Positions, velocities and accelerations at some samples.
 fn samples_of(whole: &Motion, some: &[usize]) -> Motion {
     let mut part = Motion::default();
     part.reset(whole.joints, some.len());
@@ -89,8 +80,8 @@ fn samples_of(whole: &Motion, some: &[usize]) -> Motion {
     part
 }
 
-/// The 95 % point of χ² with so many degrees of freedom, by Wilson and Hilferty's cube (Proc. Nat. Acad. Sci. 17 (1931)
-/// 684): within 2.5 % from one on, within 0.1 % from ten.
+/// The 95 % point of χ² with this number of degrees of freedom, by the Wilson-Hilferty approximation (Proc. Nat. Acad.
+/// Sci. 17 (1931) 684): within 2.5 % from one degree on, within 0.1 % from ten.
 fn chi_squared_95(degrees_of_freedom: usize) -> f64 {
     if degrees_of_freedom == 0 {
         return 0.0;

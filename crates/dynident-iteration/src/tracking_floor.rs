@@ -1,8 +1,8 @@
-//! How well a run could follow its trajectory at best: what noise, friction and delay explain of a tracking error.
+//! The tracking floor: the tracking error that noise, friction and delay explain.
 //!
-//! A delay between the encoders and the controller stands in no log by itself: positions and torques of one instant
-//! show none. The tracking error does: a controller that sees the joint `d` seconds late takes it for being behind and
-//! pushes it ahead by about `d q̇`. So the delay is what brings the simulated errors nearest to those of the run.
+//! A delay between the encoders and the controller is not visible in the log, because its positions and torques have
+//! the same time. But it causes a tracking error: a controller that receives positions `d` seconds late pushes the
+//! joint ahead by about `d q̇`. So the delay is estimated by matching simulated tracking errors to those of the run.
 
 use crate::dry_steps::{with_dry_steps, with_sticking_joints};
 use crate::rests::highest_speeds;
@@ -13,43 +13,39 @@ use dynident_model::terms::TorqueTerm;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Integrator, LoopSettings, Plant, Record, Reference, Run, SensorSettings, closed_loop};
 
-/// Seed of the noise: a floor is the same for the same run.
+/// Seed of the noise, so that the floor of a run is reproducible.
 const SEED: u64 = 17;
-/// Longest delay of the feedback that is looked for, seconds of a usual arm.
-const LONGEST_S: f64 = 10e-3;
-/// What is left of the squared tracking errors with a delay that explains them, at most: more than half of an error is
-/// then the delay's.
-const LEFT: f64 = 0.25;
-/// The log's clock is the controller's to this share.
-const SAME_CLOCK: f64 = 1e-3;
+/// Longest feedback delay, s, for an arm of 1.2 m.
+const MAX_FEEDBACK_DELAY_S: f64 = 10e-3;
+/// Largest ratio of the squared tracking errors with and without a delay that explains them (more than half of the
+/// error).
+const MAX_SQUARED_ERROR_RATIO: f64 = 0.25;
+/// Largest relative deviation of the log's rate from the controller's.
+const MAX_RATE_DEVIATION: f64 = 1e-3;
 
-/// What is known of the loop.
 pub(crate) struct KnownLoop<'a> {
-    /// Joints and terms.
     pub(crate) robot: &'a ParametricModel,
-    /// All parameters of the robot that was found.
     pub(crate) parameters: &'a [f64],
-    /// The friction that runs chose, with what is known of its constants; empty where it was stated.
+    /// The selected friction, with the uncertainty of its constants; empty if the friction was stated.
     pub(crate) friction: &'a [JointFriction],
     pub(crate) controller: &'a ControllerSettings,
-    /// Noise of each position, rad (m).
+    /// Standard deviation of the noise of each position, rad (m).
     pub(crate) position_noise: &'a [f64],
-    /// How late positions are in the log, s.
+    /// Delay of the positions in the log, s.
     pub(crate) delay_s: f64,
 }
 
-/// What is explained of a run's tracking error.
 pub(crate) struct TrackingFloor {
-    /// Per joint the largest distance from the reference, rad (m).
+    /// Largest explained tracking error of each joint, rad (m).
     pub(crate) floor: Vec<f64>,
-    /// The delay of the feedback that explains more than half of the error, s; none where no delay does.
+    /// The feedback delay that explains more than half of the error, s; `None` otherwise.
     pub(crate) feedback_delay_s: Option<f64>,
 }
 
-/// Per joint the largest distance from the reference in a simulated run of the robot that was found, under the same
-/// controller with that very robot as its model, with the log's noise of positions, their measured delay and the
-/// feedback's, and with narrow steps of friction as dry friction; where joints may [stick](with_sticking_joints) with
-/// more of it, the larger one of both. `None` where it cannot be simulated, or does not get to its end.
+/// Largest tracking error of each joint in a simulated run of the estimated robot, with the same controller and that
+/// robot as its model. The simulation includes the position noise of the log, the measured delay, the feedback delay,
+/// and narrow friction steps as dry friction; if joints may [stick](with_sticking_joints) with more friction, the
+/// larger error of both is used. `None` if the run cannot be simulated or is not completed.
 pub(crate) fn tracking_floor(reference: &Reference, record: &Record, known: &KnownLoop<'_>) -> Option<TrackingFloor> {
     let fastest = highest_speeds([reference]);
     let terms = known.robot.terms();
@@ -68,7 +64,6 @@ pub(crate) fn tracking_floor(reference: &Reference, record: &Record, known: &Kno
     })
 }
 
-/// The floor of a robot that has these terms with their parameters.
 fn floor_with(
     friction: (&[TorqueTerm], &[f64]),
     reference: &Reference,
@@ -78,11 +73,11 @@ fn floor_with(
 ) -> Option<TrackingFloor> {
     let samples = |delay_s: f64| (delay_s * reference.rate_hz()).round() as usize;
     let explained = |run: &Run| -> Vec<f64> {
-        // What the log shows late, it shows beside the trajectory.
+        // A delay in the log appears as a tracking error.
         run.max_error.iter().zip(fastest).map(|(error, fastest)| error + known.delay_s * fastest).collect()
     };
-    // What the log shows late the controller may see late, too. Drives that close their own loop do not: where it could
-    // not bear that delay, the run that was made did not have it.
+    // The controller may have the delay of the log, too, but drives that close their own loop do not. If the loop is
+    // unstable with this delay, the executed run did not have it.
     let late_by_log = samples(known.delay_s);
     let (of_log, plain) = match simulated(reference, known, friction.0, friction.1, late_by_log) {
         Some(run) => (late_by_log, run),
@@ -94,10 +89,10 @@ fn floor_with(
         .then(one_late)
         .flatten()
         .and_then(|one_late| delay_in_samples(record, &plain, &one_late))
-        .filter(|late| *late <= samples(known.robot.model().own_scale().seconds(LONGEST_S)));
+        .filter(|late| *late <= samples(known.robot.model().own_scale().seconds(MAX_FEEDBACK_DELAY_S)));
     if let Some(late) = late
         && let Some(run) = simulated(reference, known, friction.0, friction.1, of_log + late)
-        && left(record, &run) <= LEFT * left(record, &plain)
+        && squared_error(record, &run) <= MAX_SQUARED_ERROR_RATIO * squared_error(record, &plain)
     {
         let feedback_delay_s = Some(late as f64 / reference.rate_hz());
         return Some(TrackingFloor { floor: explained(&run), feedback_delay_s });
@@ -105,7 +100,7 @@ fn floor_with(
     Some(TrackingFloor { floor: explained(&plain), feedback_delay_s: None })
 }
 
-/// A run of the robot that was found with a feedback that is so many samples late.
+/// A run of the estimated robot with a feedback delay of `late` samples.
 fn simulated(
     reference: &Reference,
     known: &KnownLoop<'_>,
@@ -133,12 +128,11 @@ fn simulated(
     run.status.is_done().then_some(run)
 }
 
-/// Whether samples of the log stand where those of a simulated run do.
+/// Whether the samples of the log have the times of a simulated run.
 fn has_same_clock(reference: &Reference, record: &Record) -> bool {
-    (record.rate_hz / reference.rate_hz() - 1.0).abs() < SAME_CLOCK && record.samples > 0
+    (record.rate_hz / reference.rate_hz() - 1.0).abs() < MAX_RATE_DEVIATION && record.samples > 0
 }
 
-/// The positions of a joint in the log, and in a run.
 fn positions<'a>(record: &'a Record, run: &'a Run) -> impl Iterator<Item = (&'a [f64], &'a [f64])> {
     let samples = record.samples.min(run.samples);
     (0..run.joints.len()).map(move |joint| {
@@ -147,8 +141,8 @@ fn positions<'a>(record: &'a Record, run: &'a Run) -> impl Iterator<Item = (&'a 
     })
 }
 
-/// The delay by which the log's positions are nearest to simulated ones, in samples: least squares with what one
-/// sample's delay changes, `Σ (q - q₀)(q₁ - q₀) / Σ (q₁ - q₀)²`.
+/// The delay, in samples, that minimises the squared difference of the log's positions to simulated ones: least squares
+/// with the effect of one sample of delay, `Σ (q - q₀)(q₁ - q₀) / Σ (q₁ - q₀)²`.
 fn delay_in_samples(record: &Record, plain: &Run, one_late: &Run) -> Option<usize> {
     let (mut across, mut square) = (0.0, 0.0);
     for ((logged, without), (_, with)) in positions(record, plain).zip(positions(record, one_late)) {
@@ -161,8 +155,8 @@ fn delay_in_samples(record: &Record, plain: &Run, one_late: &Run) -> Option<usiz
     (late.is_finite() && late >= 1.0).then_some(late as usize)
 }
 
-/// The sum of squares of what the log's positions are away from simulated ones.
-fn left(record: &Record, run: &Run) -> f64 {
+/// Sum of the squared differences between the log's positions and simulated ones.
+fn squared_error(record: &Record, run: &Run) -> f64 {
     let pairs = positions(record, run).flat_map(|(logged, simulated)| logged.iter().zip(simulated));
     pairs.map(|(logged, simulated)| (logged - simulated) * (logged - simulated)).sum()
 }

@@ -1,33 +1,30 @@
-//! What drives usually have, where nobody has said anything yet.
-
 use dynident_dynamics::ParametricModel;
 use dynident_model::terms::{JointProperty, TermAction};
 
-/// Acceleration that a drive gives its own inertia at full effort, rad/s² (m/s²) of a usual arm.
+/// Acceleration of a drive's own inertia at full effort, rad/s² (m/s²) for an arm of 1.2 m.
 const DRIVE_ACCELERATION: f64 = 300.0;
-/// How much lighter than typical a drive may be: geared arms have up to 500 rad/s².
+/// Ratio of the typical to the smallest inertia of a drive: geared arms have up to 500 rad/s².
 pub(crate) const TIMES_THE_LIGHTEST: f64 = 500.0 / DRIVE_ACCELERATION;
-/// Dry friction, and viscous friction at full velocity, as shares of the effort.
+/// Dry friction, and viscous friction at full velocity, as shares of the effort limit.
 pub(crate) const FRICTION: f64 = 0.05;
-/// Velocity of a joint whose description has no limit, rad/s (m/s) of a usual arm.
+/// Velocity of a joint without velocity limit, rad/s (m/s) for an arm of 1.2 m.
 const SPEED: f64 = 2.0;
 
-/// The nominal parameters with typical ones of drives where the model has such terms and the description says nothing
-/// of them: inertia that the joint's effort limit accelerates by 300 rad/s² (geared arms have 100 to 500: that of a
-/// UR10's wrist is 0.2 kg m² at 56 Nm; of other machines it is as much in their own seconds), dry friction of 5 % of
-/// it, and as much viscous friction at the velocity limit.
-/// None if nothing was to be filled in.
+/// Returns the nominal parameters with typical values for drive terms that the robot description leaves at zero:
+/// inertia that the effort limit accelerates by 300 rad/s² (geared arms have 100 to 500; a UR10's wrist has 0.2 kg m²
+/// at 56 Nm; scaled with the time constant of other robots), dry friction of 5 % of the effort limit, and as much
+/// viscous friction at the velocity limit. `None` if no value was filled in.
 pub fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
     filled_in(robot, |_| true, 1.0)
 }
 
-/// The same with this share of the typical inertia at drives without a described one.
+/// The same with this share of the typical inertia at drives without described inertia.
 pub(crate) fn with_light_drives(robot: &ParametricModel, share: f64) -> Option<Vec<f64>> {
     with_typical_inertia(robot).and_then(|_| filled_in(robot, |_| true, share))
 }
 
-/// The same with inertia alone: what a controller may take for true until runs have shown better, for friction that is
-/// not there would be pushed against.
+/// The same with inertia only, for the model of a controller before the first estimate: a controller would
+/// overcompensate friction that does not exist.
 pub(crate) fn with_typical_inertia(robot: &ParametricModel) -> Option<Vec<f64>> {
     filled_in(robot, |property| property == JointProperty::DriveInertia, 1.0)
 }
@@ -56,7 +53,7 @@ fn filled_in(
             (Some(JointProperty::Damping), _) => {
                 FRICTION * effort / limits.velocity.unwrap_or(own.velocity(turns, SPEED))
             }
-            // A spring has the value of the description.
+            // A spring keeps the value of the robot description.
             (
                 Some(JointProperty::Stiffness) | None,
                 TermAction::Inertia { .. }

@@ -1,5 +1,4 @@
-//! The motion made over and over before a run, so that friction is what it is when the robot works, and what changed
-//! meanwhile.
+//! Warm-up: repeats the motion before a run, so that friction reaches its working temperature, and records the change.
 
 use crate::home::FoundWays;
 use crate::leg::Leg;
@@ -9,44 +8,46 @@ use dynident_simulation::{Record, Reference};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// What a warm-up has shown: passes along the run's own motion, of which nothing is fitted.
+/// Result of a warm-up: passes along the run's motion, which are not fitted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WarmUp {
-    /// How often the motion was made.
+    /// Number of passes.
     pub passes: usize,
-    /// Length of all passes together, with the ways from home and back, s.
+    /// Length of all passes, including the paths from and to home, s.
     pub duration_s: f64,
-    /// For each pass the mean power that all joints lost, W: `Σ ∫τ q̇ dt` over the time. Of a motion that returns to
-    /// where it began this is what friction takes, whatever the bodies are.
+    /// Mean power loss of all joints in each pass, W: `Σ ∫τ q̇ dt` over the time. For a motion that returns to its
+    /// begin this is the power of friction, for any bodies.
     pub lost_power_w: Vec<f64>,
-    /// For each pass and joint the mean torque in the direction of motion, Nm (N): `∫τ q̇ dt / ∫|q̇| dt`. What joints
-    /// give each other is in it, in every pass the same: its change is that of friction. Zero for a joint that rests.
+    /// Mean torque in the direction of motion for each pass and joint, Nm (N): `∫τ q̇ dt / ∫|q̇| dt`. It contains the
+    /// coupling between joints, which is the same in every pass, so its change is that of friction. Zero for a joint at
+    /// rest.
     pub friction_torque: Vec<Vec<f64>>,
 }
 
 impl WarmUp {
-    /// By how much the last pass lost more power than the first, percent of the first; none of a single pass.
+    /// Returns the increase of the power loss from the first to the last pass, percent of the first; `None` for a
+    /// single pass.
     pub fn change_percent(&self) -> Option<f64> {
         let [first, .., last] = self.lost_power_w[..] else { return None };
         (first != 0.0).then(|| 100.0 * (last - first) / first.abs())
     }
 
-    /// The same of the last pass and the one before: what is still going on.
+    /// Returns the increase from the second-last to the last pass, percent.
     pub fn last_change_percent(&self) -> Option<f64> {
         let [.., before, last] = self.lost_power_w[..] else { return None };
         (before != 0.0).then(|| 100.0 * (last - before) / before.abs())
     }
 
-    /// The joint whose mean friction torque changed most from the first pass to the last, by its place, and by how
-    /// much, Nm (N).
+    /// Returns the index of the joint whose mean friction torque changed most from the first to the last pass, and the
+    /// change, Nm (N).
     pub fn largest_change(&self) -> Option<(usize, f64)> {
         let [first, .., last] = &self.friction_torque[..] else { return None };
         let changes = first.iter().zip(last).map(|(first, last)| last - first).enumerate();
         changes.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
-    /// In words, with the joints' names.
+    /// Returns a summary, with the names of the joints.
     pub fn sentence(&self, joints: &[String]) -> String {
         let Self { passes, duration_s, lost_power_w, .. } = self;
         let times = if *passes == 1 { "once".to_owned() } else { format!("{passes} times") };
@@ -54,10 +55,10 @@ impl WarmUp {
         if let (Some(change), Some(last_change)) = (self.change_percent(), self.last_change_percent())
             && let [first, .., last] = lost_power_w[..]
         {
-            // Writing to a string cannot fail, here and below.
+            // Writing to a string cannot fail.
             let _ = write!(
                 text,
-                ": friction took {first:.3} W in the first pass and {last:.3} W in the last ({change:+.1} %; {last_change:+.1} % with the last alone)"
+                ": friction took {first:.3} W in the first pass and {last:.3} W in the last ({change:+.1} %; {last_change:+.1} % in the last pass)"
             );
         }
         if let Some((joint, change)) = self.largest_change() {
@@ -68,8 +69,8 @@ impl WarmUp {
     }
 }
 
-/// How often the motion is made before the next run: not at all where the robot has moved within the time that a
-/// warm-up takes, and as often as fills that time otherwise.
+/// Number of passes before the next run: none if the robot has moved within the warm-up time, otherwise enough to fill
+/// that time.
 pub(crate) fn passes(
     safety: &SafetySettings,
     legs: &[Leg],
@@ -83,14 +84,12 @@ pub(crate) fn passes(
     (wanted_s / pass_s(legs, ways).max(f64::MIN_POSITIVE)).ceil().max(1.0) as usize
 }
 
-/// Length of one pass, s.
 fn pass_s(legs: &[Leg], ways: &[Option<FoundWays>]) -> f64 {
     let motions: f64 = legs.iter().map(|leg| leg.reference().duration_s()).sum();
     let ways = ways.iter().flatten().map(|found| &found.ways);
     motions + ways.map(|ways| ways.approach.duration_s() + ways.back.duration_s()).sum::<f64>()
 }
 
-/// Work and way of each joint, pass by pass.
 #[derive(Debug)]
 pub(crate) struct WarmUpWatch {
     pass_s: f64,
@@ -100,7 +99,7 @@ pub(crate) struct WarmUpWatch {
 #[derive(Debug)]
 struct Pass {
     work: Vec<f64>,
-    way: Vec<f64>,
+    path: Vec<f64>,
     duration_s: f64,
 }
 
@@ -109,12 +108,12 @@ impl WarmUpWatch {
         Self { pass_s: pass_s(legs, ways), passes: Vec::new() }
     }
 
-    /// Takes the record of a leg in a pass, counted from 1. A torque that is held from sample to sample does the work
-    /// `τ Δq`, whatever the joint does in between; the way is that of the motion itself, which has no noise.
+    /// Adds the record of a leg in a pass (counted from 1). A torque that is held from sample to sample does the work
+    /// `τ Δq`, whatever the joint does in between; the path length is that of the reference, which has no noise.
     pub(crate) fn add(&mut self, pass: usize, reference: &Reference, record: &Record) {
         let joints = record.joints.len();
         while self.passes.len() < pass {
-            self.passes.push(Pass { work: vec![0.0; joints], way: vec![0.0; joints], duration_s: 0.0 });
+            self.passes.push(Pass { work: vec![0.0; joints], path: vec![0.0; joints], duration_s: 0.0 });
         }
         let Some(own) = self.passes.last_mut() else { return };
         let last = reference.samples() - 1;
@@ -125,16 +124,15 @@ impl WarmUpWatch {
                 let dq = reference.motion().dq[joint * reference.samples() + place];
                 let at = joint * record.samples + sample;
                 own.work[joint] += record.tau[at] * (record.q[at + 1] - record.q[at]);
-                own.way[joint] += dq.abs() * step_s;
+                own.path[joint] += dq.abs() * step_s;
             }
             own.duration_s += step_s;
         }
     }
 
-    /// What it has shown; none where the motion was not made.
     pub(crate) fn shown(&self) -> Option<WarmUp> {
         let torque = |pass: &Pass| -> Vec<f64> {
-            pass.work.iter().zip(&pass.way).map(|(work, way)| if *way > 0.0 { work / way } else { 0.0 }).collect()
+            pass.work.iter().zip(&pass.path).map(|(work, path)| if *path > 0.0 { work / path } else { 0.0 }).collect()
         };
         let power = |pass: &Pass| pass.work.iter().sum::<f64>() / pass.duration_s.max(f64::MIN_POSITIVE);
         (!self.passes.is_empty()).then(|| WarmUp {

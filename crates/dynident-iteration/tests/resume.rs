@@ -1,4 +1,4 @@
-//! Killed at any moment, an iteration goes on to the same result, bit for bit.
+//! An iteration that is killed at any moment resumes with the same result, bit for bit.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 #![cfg(unix)]
@@ -46,7 +46,7 @@ fn outcome(folder: &Path) -> Result<IterationOutcome, IterationError> {
     iterate(&iteration, &mut [&mut robot], Some(&store), &mut |_, _| {})
 }
 
-/// The process that is killed: this very program with this test alone.
+/// The process that is killed: this program with only this test.
 #[test]
 #[ignore = "the child of the tests below"]
 fn child() {
@@ -67,7 +67,7 @@ fn killed_at(moments: usize) {
             .spawn()
             .unwrap()
     };
-    // How long an undisturbed child takes: kills fall anywhere in it. What is checked does not depend on it.
+    // Duration of an undisturbed child, so that kills occur at any time of it. The check does not depend on it.
     let timed = tempfile::tempdir().unwrap();
     let begun = Instant::now();
     assert!(child(timed.path()).wait().unwrap().success());
@@ -80,14 +80,14 @@ fn killed_at(moments: usize) {
             let mut running = child(folder.path());
             if kills < moments {
                 std::thread::sleep(Duration::from_secs_f64(random.uniform(0.0, lasts.as_secs_f64())));
-                // Already over is as good a moment as any.
+                // Killing a finished child is valid, too.
                 running.kill().unwrap();
             }
             let killed = !running.wait().unwrap().success();
             kills += usize::from(killed);
             let store = IterationStore::open(folder.path(), FINGERPRINT, true).unwrap();
             let records = store.records().unwrap();
-            // Whatever is there is the beginning of the expected result.
+            // The stored runs are the begin of the expected result.
             assert_eq!(records[..], expected.runs[..records.len()]);
             found[records.len()] += 1;
             if !killed {
@@ -111,7 +111,8 @@ fn killed_at_some_moments_it_goes_on_to_the_same_result() {
     killed_at(dynident_testing::count(4, 50));
 }
 
-/// Runs are fitted together, also after a kill: a good run's log that is gone is named, and no fit is made without it.
+/// Runs are fitted together, also after a kill: the missing log of a good run is reported, and nothing is fitted
+/// without it.
 #[test]
 fn a_log_that_is_gone_is_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -127,8 +128,8 @@ fn a_log_that_is_gone_is_named() {
     assert_eq!(outcome(folder.path()).unwrap(), whole);
 }
 
-/// A file from outside may hold anything: what does not fit the robot is refused with the file's name, and nothing is
-/// overwritten.
+/// A file from outside may contain anything: values that do not fit the robot are rejected with the file's name, and
+/// nothing is overwritten.
 #[test]
 fn runs_whose_numbers_do_not_fit_the_robot_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -140,7 +141,7 @@ fn runs_whose_numbers_do_not_fit_the_robot_are_refused() {
     std::fs::write(&path, file.to_string()).unwrap();
     let error = outcome(folder.path()).unwrap_err().to_string();
     assert!(error.contains("run_2") && error.contains("edited or damaged"), "{error}");
-    // As an earlier version wrote it, without a hash.
+    // As in an earlier version, without a hash.
     file = serde_json::from_str(&good).unwrap();
     file.as_object_mut().unwrap().remove("content_sha256").unwrap();
     let numbers = [
@@ -162,7 +163,7 @@ fn runs_whose_numbers_do_not_fit_the_robot_are_refused() {
         std::fs::write(&path, &text).unwrap();
         let error = outcome(folder.path()).unwrap_err();
         assert!(matches!(error, IterationError::State { .. }), "{key}: {error}");
-        assert!(error.to_string().contains("run_2") && error.to_string().contains("numbers as"), "{key}: {error}");
+        assert!(error.to_string().contains("run_2") && error.to_string().contains("numbers in"), "{key}: {error}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
     }
     let mut beyond = file;
@@ -179,10 +180,8 @@ fn runs_of_another_iteration_are_refused() {
     outcome(folder.path()).unwrap();
     let error = IterationStore::open(folder.path(), "other", true).unwrap_err();
     assert!(matches!(error, IterationError::State { .. }), "{error}");
-    // Afresh, they are gone.
     let store = IterationStore::open(folder.path(), "other", false).unwrap();
     assert!(store.records().unwrap().is_empty());
-    // A run that is cut short is not read as a run.
     std::fs::create_dir(store.run_folder(1)).unwrap();
     std::fs::write(store.run_folder(1).join("run.json"), "{\"schema\":").unwrap();
     assert!(matches!(store.records(), Err(IterationError::State { .. })));

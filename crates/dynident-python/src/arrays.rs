@@ -1,7 +1,7 @@
-//! Arrays of Python as numbers, and back.
+//! Conversion between NumPy arrays and slices.
 //!
-//! Vectors over joints stand in the last axis; whatever axes come before it count samples. What comes back has the same
-//! axes before its own, so that one posture gives a vector and a thousand give a table.
+//! Vectors over joints are in the last axis; all axes before it are samples. Results have the same leading axes: one
+//! posture gives a vector, a thousand postures give a table.
 
 use crate::pool::pool;
 use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -10,17 +10,17 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::borrow::Cow;
 
-/// Numbers of a result from which on more than one thread is worth waking.
-const WORTH_THREADS: usize = 50_000;
+/// Smallest number of result values for which several threads are used.
+const MIN_PARALLEL_VALUES: usize = 50_000;
 
-/// Numbers of an array, row-major, and its axes before the last.
+/// Values of an array, row-major, and its leading axes.
 pub(crate) struct Samples<'py> {
     array: PyReadonlyArrayDyn<'py, f64>,
     lead: Vec<usize>,
 }
 
 impl<'py> Samples<'py> {
-    /// Anything that NumPy makes an array of, with `joints` entries in the last axis.
+    /// Converts any array-like object with `joints` entries in the last axis.
     pub(crate) fn of(object: &Bound<'py, PyAny>, name: &str, joints: usize) -> PyResult<Self> {
         let array = if let Ok(array) = object.cast::<PyArrayDyn<f64>>() {
             array.clone()
@@ -44,7 +44,7 @@ impl<'py> Samples<'py> {
         }
     }
 
-    /// The same axes as another array's.
+    /// Checks that the leading axes equal those of another array.
     pub(crate) fn like(self, other: &Self, name: &str) -> PyResult<Self> {
         if self.lead == other.lead {
             return Ok(self);
@@ -53,27 +53,25 @@ impl<'py> Samples<'py> {
         Err(PyValueError::new_err(format!("{name} has samples in {found:?}, where the first array has {expected:?}")))
     }
 
-    /// The axes before the last.
     pub(crate) fn lead(&self) -> &[usize] {
         &self.lead
     }
 
-    /// Number of samples.
     pub(crate) fn count(&self) -> usize {
         self.lead.iter().product()
     }
 
-    /// All numbers, row-major; copied only where the array is not.
+    /// All values, row-major; copied only if the array is not.
     pub(crate) fn numbers(&self) -> Cow<'_, [f64]> {
         match self.array.as_slice() {
-            // A slice is also what lies column by column without a gap.
+            // `as_slice` also accepts contiguous column-major arrays.
             Ok(numbers) if self.array.is_c_contiguous() => Cow::Borrowed(numbers),
             _ => Cow::Owned(self.array.as_array().iter().copied().collect()),
         }
     }
 }
 
-/// An array with the samples' axes and its own.
+/// An array with the leading axes of the samples and its own axes.
 pub(crate) fn array<'py>(
     py: Python<'py>,
     lead: &[usize],
@@ -84,7 +82,7 @@ pub(crate) fn array<'py>(
     numbers.into_pyarray(py).reshape(shape)
 }
 
-/// A motion of `(..., n)` arrays, of which velocity and acceleration may be left out: at rest.
+/// A motion of `(..., n)` arrays; missing velocity and acceleration are zero.
 pub(crate) struct Motion<'py> {
     q: Samples<'py>,
     dq: Option<Samples<'py>>,
@@ -106,18 +104,17 @@ impl<'py> Motion<'py> {
         Ok(Self { q, dq, ddq })
     }
 
-    /// The axes before the last.
     pub(crate) fn lead(&self) -> &[usize] {
         self.q.lead()
     }
 
-    /// Number of samples.
     pub(crate) fn count(&self) -> usize {
         self.q.count()
     }
 
-    /// An array with the samples' axes and `own` ones, which `work` fills row by row, without the interpreter's lock;
-    /// on several threads where that is worth it. The memory is NumPy's own: it knows how to ask for large pages.
+    /// Creates an array with the leading axes of the samples and the axes `own`. `work` fills it row by row, without
+    /// the interpreter lock, on several threads if it is large. NumPy allocates the memory, because it requests large
+    /// pages.
     pub(crate) fn fill(
         &self,
         py: Python<'py>,
@@ -129,12 +126,12 @@ impl<'py> Motion<'py> {
         Ok(array)
     }
 
-    /// Shape of an array with the samples' axes and `own` ones.
+    /// Shape of an array with the leading axes of the samples and the axes `own`.
     pub(crate) fn shape(&self, own: &[usize]) -> Vec<usize> {
         self.lead().iter().chain(own).copied().collect()
     }
 
-    /// As [`fill`](Self::fill), into an array that is there and holds whatever it holds.
+    /// As [`fill`](Self::fill), into an existing array with any content.
     pub(crate) fn fill_into(
         &self,
         py: Python<'py>,
@@ -148,7 +145,7 @@ impl<'py> Motion<'py> {
         Ok(())
     }
 
-    /// The array that a caller wants filled: of doubles, of this shape, row by row.
+    /// Checks an output array of the caller: float64, of this shape, row-major.
     pub(crate) fn given(&self, out: &Bound<'py, PyAny>, own: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let shape = self.shape(own);
         match out.cast::<PyArrayDyn<f64>>() {
@@ -157,8 +154,8 @@ impl<'py> Motion<'py> {
         }
     }
 
-    /// Runs `work`, which makes so many numbers, on the numbers, without the interpreter's lock; on several threads
-    /// where that is worth it.
+    /// Runs `work`, which computes `results` values, without the interpreter lock, on several threads if there are many
+    /// values.
     pub(crate) fn compute<R: Send>(
         &self,
         py: Python<'py>,
@@ -170,7 +167,7 @@ impl<'py> Motion<'py> {
         let dq = self.dq.as_ref().map(Samples::numbers);
         let ddq = self.ddq.as_ref().map(Samples::numbers);
         let (q, dq, ddq) = (&*q, dq.as_deref().unwrap_or(&rest), ddq.as_deref().unwrap_or(&rest));
-        let pool = if results < WORTH_THREADS { None } else { pool(py) };
+        let pool = if results < MIN_PARALLEL_VALUES { None } else { pool(py) };
         py.detach(move || match pool {
             Some(pool) => pool.install(|| work([q, dq, ddq])),
             None => work([q, dq, ddq]),
@@ -178,7 +175,6 @@ impl<'py> Motion<'py> {
     }
 }
 
-/// Rows of samples as rows of joints.
 pub(crate) fn joint_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f64> {
     let mut out = vec![0.0; rows.len()];
     for (sample, row) in rows.chunks_exact(joints.max(1)).enumerate() {
@@ -189,7 +185,6 @@ pub(crate) fn joint_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f6
     out
 }
 
-/// Rows of joints as rows of samples.
 pub(crate) fn sample_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f64> {
     joint_major(rows, joints, samples)
 }

@@ -1,4 +1,4 @@
-//! Studies of sections and of what lies in memory.
+//! Studies from sections and objects in memory.
 
 use crate::callables::Callables;
 use crate::errors;
@@ -9,8 +9,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
 
-/// The study of sections in JSON, of a robot, of samples in memory (one entry for each log, None for one in a file) and
-/// of code.
+/// Creates a study from sections in JSON, a robot, samples in memory (one entry per log, None for a log in a file) and
+/// Python functions.
 pub(crate) fn assembled(
     py: Python<'_>,
     sections: &str,
@@ -28,7 +28,6 @@ pub(crate) fn assembled(
     Ok(study)
 }
 
-/// A dictionary of keyword arguments as JSON.
 pub(crate) fn json_of(py: Python<'_>, settings: &Bound<'_, PyDict>) -> PyResult<String> {
     py.import("json")?.call_method1("dumps", (settings,))?.extract()
 }

@@ -1,7 +1,7 @@
-//! Code of Python in a study: a torque, a differentiator, an estimator, a family of motions.
+//! Python functions in a study: a torque, a differentiator, an estimator, a family of motions.
 //!
-//! What such code raises ends the job: it unwinds to [`guarded`], where the job was begun, and is raised there as it
-//! was, with its own traceback. So does an answer of another shape, or one that is no number.
+//! An exception in such a function ends the job: it unwinds to [`guarded`] at the begin of the job, and is raised there
+//! with its traceback. So does a result with a wrong shape, or one that is not finite.
 
 use crate::arrays::{array, sample_major};
 use crate::errors;
@@ -21,24 +21,24 @@ use std::sync::Arc;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// What code of Python unwinds with.
-pub(crate) struct Thrown(pub(crate) PyErr);
+/// Panic payload of a Python exception.
+pub(crate) struct RaisedError(pub(crate) PyErr);
 
-/// Runs what may call code of Python; what that raises comes back.
+/// Runs code that may call Python functions; returns their exception.
 pub(crate) fn guarded<R>(work: impl FnOnce() -> R) -> PyResult<R> {
-    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| match panic.downcast::<Thrown>() {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| match panic.downcast::<RaisedError>() {
         Ok(thrown) => thrown.0,
         Err(panic) => resume_unwind(panic),
     })
 }
 
-/// Runs code of Python, with the interpreter's lock; what it raises is thrown.
+/// Runs Python code with the interpreter lock; unwinds with its exception.
 fn call<R>(work: impl FnOnce(Python<'_>) -> PyResult<R>) -> R {
-    Python::attach(work).unwrap_or_else(|error| resume_unwind(Box::new(Thrown(error))))
+    Python::attach(work).unwrap_or_else(|error| resume_unwind(Box::new(RaisedError(error))))
 }
 
-/// The functions of a study by the names that its sections give them: for each a dictionary with the key `function` and
-/// what else the section has beside its own keys.
+/// The functions of a study by the names in its sections: for each a dictionary with the key `function` and additional
+/// keys of the section.
 #[derive(Clone, Default)]
 pub(crate) struct Callables(Option<Arc<Py<PyDict>>>);
 
@@ -47,12 +47,12 @@ impl Callables {
         Self(functions.filter(|functions| !functions.is_empty()).map(|functions| Arc::new(functions.unbind())))
     }
 
-    /// The dictionary, None where the study has no such code.
+    /// The dictionary; `None` if the study has no functions.
     pub(crate) fn dictionary(&self, py: Python<'_>) -> Option<Py<PyDict>> {
         self.0.as_ref().map(|functions| functions.clone_ref(py))
     }
 
-    /// Puts the code into the sections that name it.
+    /// Attaches the functions to the sections that name them.
     pub(crate) fn attach(&self, py: Python<'_>, study: &mut dynident::Study) -> PyResult<()> {
         let Some(functions) = &self.0 else { return Ok(()) };
         let named = |name: &str| -> PyResult<Option<Bound<'_, PyDict>>> {
@@ -100,7 +100,7 @@ fn function_of(own: &Bound<'_, PyDict>) -> PyResult<Py<PyAny>> {
     Ok(function.unbind())
 }
 
-/// An answer as numbers in the order of its rows: `what` gave it, and it has to have this shape and be finite.
+/// Converts a result of `what` to values in row-major order; it must have this shape and be finite.
 fn numbers(answer: &Bound<'_, PyAny>, what: &str, shape: &[usize]) -> PyResult<Vec<f64>> {
     let py = answer.py();
     let settings = PyDict::new(py);
@@ -127,7 +127,7 @@ fn numbers(answer: &Bound<'_, PyAny>, what: &str, shape: &[usize]) -> PyResult<V
     Ok(values)
 }
 
-/// As Python shows it: `(3,)`, `(3, 2)`.
+/// A shape in Python's notation: `(3,)`, `(3, 2)`.
 fn shown(shape: &[usize]) -> String {
     match shape {
         [one] => format!("({one},)"),
@@ -135,14 +135,14 @@ fn shown(shape: &[usize]) -> String {
     }
 }
 
-/// The parts of an answer that has several.
+/// The parts of a result with several arrays.
 fn parts<'py, const N: usize>(answer: &Bound<'py, PyAny>, what: &str, names: &str) -> PyResult<[Bound<'py, PyAny>; N]> {
     let found: Option<Vec<Bound<'py, PyAny>>> = answer.try_iter().and_then(Iterator::collect).ok();
     let found = found.and_then(|parts| <[Bound<'py, PyAny>; N]>::try_from(parts).ok());
-    found.ok_or_else(|| errors::StudyError::new_err(format!("{what} has to give {names}")))
+    found.ok_or_else(|| errors::StudyError::new_err(format!("{what} must return {names}")))
 }
 
-/// `function(q, dq)`: torque by unit of its coefficient.
+/// `function(q, dq)`: torque per unit of its coefficient.
 #[derive(Debug)]
 struct Torque {
     what: String,
@@ -175,8 +175,8 @@ struct PyDifferentiator {
 }
 
 impl PyDifferentiator {
-    /// Samples that any differentiator needs, if its section says nothing of it.
-    const MINIMUM: usize = 5;
+    /// Default of the smallest number of samples.
+    const DEFAULT_MINIMUM_SAMPLES: usize = 5;
 
     fn of(own: &Bound<'_, PyDict>) -> PyResult<Self> {
         let count = |key: &str| -> PyResult<Option<usize>> {
@@ -189,7 +189,7 @@ impl PyDifferentiator {
             function: function_of(own)?,
             smooth: own.get_item("smooth")?.map(Bound::unbind),
             context: count("context_samples")?,
-            minimum: count("minimum_samples")?.unwrap_or(Self::MINIMUM).max(1),
+            minimum: count("minimum_samples")?.unwrap_or(Self::DEFAULT_MINIMUM_SAMPLES).max(1),
         })
     }
 }
@@ -282,11 +282,11 @@ impl MotionFunction for Trajectory {
     }
 }
 
-/// The rows that an estimator of one's own makes values of: ``W @ theta`` against ``tau``.
+/// Rows for a custom estimator: ``W @ theta`` and ``tau``.
 ///
-/// They are the triangular factors of all rows of the logs, one block for each joint: for every ``theta`` the sum of
-/// squares ``‖tau - W theta‖²`` and the gradient ``Wᵀ (tau - W theta)`` over the rows of a joint are those over all its
-/// samples. Columns that the logs do not excite are not among them.
+/// They are the triangular factors of all rows of the logs, one block per joint: for every ``theta`` the sum of squares
+/// ``‖tau - W theta‖²`` and the gradient ``Wᵀ (tau - W theta)`` of a joint's block equal those of all its samples.
+/// Columns that the logs do not excite are omitted.
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct EstimatorRows(Rows);
 
@@ -306,7 +306,7 @@ impl EstimatorRows {
         array(py, &[self.0.torque.len()], &[], self.0.torque.as_slice().to_vec())
     }
 
-    /// Of each row the number of its joint, from 0.
+    /// Index of the joint of each row, from 0.
     #[getter]
     fn joint(&self) -> Vec<usize> {
         self.0.joint_of_row.clone()
@@ -324,13 +324,13 @@ impl EstimatorRows {
         self.0.joints.clone()
     }
 
-    /// Samples of each joint that its rows stand for.
+    /// Number of samples of each joint.
     #[getter]
     fn samples(&self) -> Vec<usize> {
         self.0.samples.clone()
     }
 
-    /// Noise of each joint by weighted least squares, Nm (N), shape ``(n,)``: rows divided by it are white.
+    /// Noise of each joint from weighted least squares, Nm (N), shape ``(n,)``; rows divided by it are white.
     #[getter]
     fn sigma<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         array(py, &[self.0.joint_sigma.len()], &[], self.0.joint_sigma.clone())

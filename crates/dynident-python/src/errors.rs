@@ -1,4 +1,4 @@
-//! Exceptions: what the Rust side says, with file, place and what to do in the message.
+//! Exceptions with the messages of the Rust errors: file, place and fix.
 
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
@@ -9,36 +9,28 @@ create_exception!(
     dynident,
     Error,
     PyException,
-    "What went wrong, with the file, the place and what to do.\n\n`path`, `line` and `column` say where, None where there is no such place."
+    "An error, with the file, the place and the fix in its message.\n\n`path`, `line` and `column` are the place of the error, or None."
 );
-create_exception!(
-    dynident,
-    RobotError,
-    Error,
-    "A robot's description that cannot be read, or a name it does not have."
-);
-create_exception!(dynident, StudyError, Error, "A study that cannot be done as it is written.");
+create_exception!(dynident, RobotError, Error, "A robot description that cannot be read, or an unknown name in it.");
+create_exception!(dynident, StudyError, Error, "An invalid study.");
 create_exception!(dynident, LogError, Error, "A recording that cannot be read or used.");
 create_exception!(dynident, ResultError, Error, "A result that does not belong to its study, or cannot be exported.");
 
-create_exception!(dynident, StopRun, Error, "The robot has to be stopped: a run gives no further torque.");
+create_exception!(dynident, StopRun, Error, "The robot has to be stopped: the run is over.");
 
-/// The exception of a description or of what is asked of it.
 pub(crate) fn robot(error: impl core::fmt::Display) -> PyErr {
     RobotError::new_err(error.to_string())
 }
 
-/// The exception of recordings.
 pub(crate) fn log(error: impl core::fmt::Display) -> PyErr {
     LogError::new_err(error.to_string())
 }
 
-/// The exception of factors.
 pub(crate) fn factors(error: impl core::fmt::Display) -> PyErr {
     ResultError::new_err(error.to_string())
 }
 
-/// The exception that a job's error is, with its place.
+/// The exception of a job's error, with its place.
 pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
     use dynident::Error as Job;
     let message = dynident::shortened_message(&error.to_string());
@@ -63,7 +55,7 @@ pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
         _ => (Error::new_err(message), None, None, None),
     };
     let value = exception.value(py);
-    // An exception takes any attribute.
+    // An exception accepts any attribute.
     let _ = value.setattr("path", path);
     let _ = value.setattr("line", line);
     let _ = value.setattr("column", column);

@@ -1,4 +1,4 @@
-//! `Factors`: logs reduced to what a fit needs of them, and what a fleet of robots says.
+//! `Factors`: logs reduced to factors, and statistics of a fleet of robots.
 
 use crate::callables::Callables;
 use crate::errors;
@@ -13,25 +13,25 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 use std::path::Path;
 
-/// Logs as factors: what a fit needs of them, small, and put together in any order.
+/// Logs as factors: small files that contain all information for a fit, and can be merged in any order.
 ///
-/// Made by ``dynident.fleet.reduce``, put together by ``merged``, a model by ``dynident.fleet.identify``. Bytes are the
-/// file: versioned, with a hash at the end.
+/// Created by ``dynident.fleet.reduce``, combined by ``merged``, identified by ``dynident.fleet.identify``. The bytes
+/// are those of the file: versioned, with a hash at the end.
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct Factors(dynident::Factors);
 
-/// Name, robot, time, hash, rows of each joint at most.
+/// Name, robot, time, hash, and number of rows of a log.
 type Entry = (String, Option<String>, Option<f64>, String, u64);
 
 #[pymethods]
 impl Factors {
-    /// Reads what ``to_bytes`` gave; raises ``ResultError`` for anything else.
+    /// Reads the output of ``to_bytes``; raises ``ResultError`` for other content.
     #[staticmethod]
     fn from_bytes(py: Python<'_>, bytes: Vec<u8>) -> PyResult<Self> {
         py.detach(|| dynident::Factors::from_bytes(&bytes)).map(Self).map_err(errors::factors)
     }
 
-    /// The file of these factors.
+    /// The bytes of a factor file.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = py.detach(|| self.0.to_bytes()).map_err(errors::factors)?;
         Ok(PyBytes::new(py, &bytes))
@@ -42,14 +42,14 @@ impl Factors {
         Ok((slf.get_type().getattr("from_bytes")?, (bytes,).into_pyobject(slf.py())?))
     }
 
-    /// All logs of several, in an order that does not depend on theirs; the same log twice is one.
+    /// Merges logs, in an order that does not depend on the order of the parts; duplicate logs are removed.
     #[staticmethod]
     fn merged(py: Python<'_>, parts: Vec<Bound<'_, Self>>) -> PyResult<Self> {
         let parts: Vec<dynident::Factors> = parts.iter().map(|part| part.get().0.clone()).collect();
         py.detach(|| dynident::Factors::merged(parts)).map(Self).map_err(errors::factors)
     }
 
-    /// Those logs alone that stand at these places of ``_logs``.
+    /// Selects logs by their indices in ``_logs``.
     fn _at(&self, places: Vec<usize>) -> PyResult<Self> {
         let chosen = places.iter().map(|&place| self.0.logs().get(place).map(|log| log.sha256.clone()));
         let chosen: Option<Vec<String>> = chosen.collect();
@@ -67,7 +67,7 @@ impl Factors {
         self.0.logs().iter().map(entry).collect()
     }
 
-    /// Robot, drives, filters and estimator; a study without a log.
+    /// Robot, drives, filters and estimator; a study without logs.
     #[getter]
     fn study(&self) -> Study {
         let (study, path) = (self.0.study().clone(), self.0.study_path().to_owned());
@@ -79,7 +79,6 @@ impl Factors {
     }
 }
 
-/// Reduces the training logs of a study.
 #[pyfunction]
 #[pyo3(signature = (study, like=None, arm=None, recorded_at_s=None, segments=16, threads=None, progress=None))]
 pub(crate) fn _reduce(
@@ -98,7 +97,6 @@ pub(crate) fn _reduce(
     })
 }
 
-/// The model that explains all logs of factors.
 #[pyfunction]
 #[pyo3(signature = (factors, threads=None, progress=None))]
 pub(crate) fn _identify_factors(
@@ -113,7 +111,7 @@ pub(crate) fn _identify_factors(
     })
 }
 
-/// The part of the torque of every log that a model leaves unexplained, percent.
+/// Unexplained torque of a model for every log, percent.
 #[pyfunction]
 pub(crate) fn _factors_errors(
     factors: &Bound<'_, Factors>,
@@ -146,7 +144,7 @@ fn json(value: &impl serde::Serialize) -> PyResult<String> {
     serde_json::to_string(value).map_err(|error| errors::Error::new_err(error.to_string()))
 }
 
-/// How the estimates of several robots differ: JSON.
+/// Variation between the estimates of several robots: JSON.
 #[pyfunction]
 pub(crate) fn _spread(
     names: Vec<String>,
@@ -158,7 +156,7 @@ pub(crate) fn _spread(
     json(&found.map_err(|error| errors::Error::new_err(error.to_string()))?)
 }
 
-/// How the estimates of one robot change over time: JSON.
+/// Changes of the estimates of one robot over time: JSON.
 #[pyfunction]
 pub(crate) fn _drift(
     names: Vec<String>,

@@ -1,4 +1,4 @@
-//! A robot that is a function of Python.
+//! A robot that is a Python function.
 
 use crate::arrays::{array, sample_major};
 use crate::errors::StopRun;
@@ -10,31 +10,29 @@ use std::sync::{Arc, Mutex};
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// The first exception of code that was called on the way.
+/// The first exception of the called Python code.
 #[derive(Clone, Default)]
 pub(crate) struct Raised(Arc<Mutex<Option<PyErr>>>);
 
 impl Raised {
-    /// Keeps an exception, the first of all.
     pub(crate) fn keep(&self, outcome: PyResult<()>) {
         if let (Err(error), Ok(mut kept)) = (outcome, self.0.lock()) {
             kept.get_or_insert(error);
         }
     }
 
-    /// The exception, if there was one.
     pub(crate) fn taken(&self) -> Option<PyErr> {
         self.0.lock().ok().and_then(|mut kept| kept.take())
     }
 }
 
-/// One run of a robot: what it has to follow, and the controller that it asks for torque.
+/// One run of a robot: the motion to follow, and the controller that computes the torque.
 ///
-/// The function brings its robot to ``q[0]`` and at every sample asks ``torque`` with the measured state, applies what
-/// it gets, and returns after the last sample. It runs at ``rate_hz``.
+/// The function moves its robot to ``q[0]``. At every sample it calls ``torque`` with the measured state and applies
+/// the result; it returns after the last sample. It runs at ``rate_hz``.
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct Run {
-    /// Lent for as long as the function runs.
+    /// Borrowed while the function runs.
     controlled: Mutex<Option<ControlledRun>>,
     number: usize,
     joints: Vec<String>,
@@ -64,39 +62,38 @@ impl Run {
         self.joints.clone()
     }
 
-    /// Samples a second.
+    /// Sample rate, Hz.
     #[getter]
     fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// Samples of the run.
+    /// Number of samples of the run.
     #[getter]
     fn samples(&self) -> usize {
         self.samples
     }
 
-    /// Positions to follow, rad (m), shape ``(samples, n)``.
+    /// Reference positions, rad (m), shape ``(samples, n)``.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         self.rows(py, 0)
     }
 
-    /// Velocities to follow, rad/s (m/s), shape ``(samples, n)``.
+    /// Reference velocities, rad/s (m/s), shape ``(samples, n)``.
     #[getter]
     fn dq<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         self.rows(py, 1)
     }
 
-    /// Accelerations to follow, rad/s² (m/s²), shape ``(samples, n)``.
+    /// Reference accelerations, rad/s² (m/s²), shape ``(samples, n)``.
     #[getter]
     fn ddq<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         self.rows(py, 2)
     }
 
-    /// The drives' torques for the next sample, Nm (N), shape ``(n,)``, by the measured state at ``time_s`` of the
-    /// robot's own clock. Raises ``StopRun`` where the robot has to be stopped at once: let it pass, or stop and
-    /// return.
+    /// Drive torques for the next sample, Nm (N), shape ``(n,)``, given the measured state at ``time_s`` by the robot's
+    /// clock. Raises ``StopRun`` if the robot has to be stopped at once: do not catch it, or stop and return.
     fn torque<'py>(
         &self,
         py: Python<'py>,
@@ -117,7 +114,7 @@ impl Run {
     }
 }
 
-/// The robot that `function(run)` is; what it raises is kept.
+/// A robot that calls `function(run)`; exceptions are stored in `raised`.
 pub(crate) fn robot_of(function: &Arc<Py<PyAny>>, joints: &[String], raised: &Raised) -> Box<dyn Robot> {
     let (function, raised, names) = (Arc::clone(function), raised.clone(), joints.to_vec());
     let call = move |run: ControlledRun| {
@@ -133,13 +130,13 @@ pub(crate) fn robot_of(function: &Arc<Py<PyAny>>, joints: &[String], raised: &Ra
             };
             let shown = match Py::new(py, shown) {
                 Ok(shown) => shown,
-                // Memory for one object that is not there.
+                // Out of memory.
                 Err(error) => panic!("{error}"),
             };
             let outcome = function.call1(py, (&shown,));
             let run = shown.get().controlled.lock().ok().and_then(|mut run| run.take());
-            let run = run.unwrap_or_else(|| panic!("a run that is lent comes back"));
-            let said = match outcome {
+            let run = run.unwrap_or_else(|| panic!("the borrowed run is returned"));
+            let result = match outcome {
                 Ok(_) => Ok(()),
                 Err(error) if error.is_instance_of::<StopRun>(py) => Ok(()),
                 Err(error) => {
@@ -148,7 +145,7 @@ pub(crate) fn robot_of(function: &Arc<Py<PyAny>>, joints: &[String], raised: &Ra
                     Err(message)
                 }
             };
-            (run, said)
+            (run, result)
         })
     };
     Box::new(FunctionRobot::new(joints.to_vec(), call))

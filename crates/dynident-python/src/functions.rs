@@ -1,4 +1,4 @@
-//! The jobs of the command as functions: a study in, JSON and models out.
+//! The jobs of the command as functions: studies as input, JSON and models as output.
 
 use crate::arrays::{array, sample_major};
 use crate::errors;
@@ -26,13 +26,12 @@ use std::sync::Arc;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// A value as JSON.
 fn json(value: &impl serde::Serialize) -> Result<String, Error> {
     dynident::text::json::to_string(value)
         .map_err(|error| Error::Result { path: PathBuf::from("<result>"), message: error.to_string() })
 }
 
-/// Runs `job` of a study beside the interpreter.
+/// Runs the job of a study in a separate thread.
 pub(crate) fn of_study<T: Send + 'static>(
     study: &Bound<'_, Study>,
     threads: Option<usize>,
@@ -46,12 +45,11 @@ pub(crate) fn of_study<T: Send + 'static>(
     })
 }
 
-/// Whether a search goes on.
 fn unless(is_over: bool) -> ControlFlow<()> {
     if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
-/// Fits a study's model to its logs and tests it on the held-out ones.
+/// Fits a study's model to its logs and validates it on the held-out logs.
 #[pyfunction]
 #[pyo3(signature = (study, threads=None, progress=None))]
 pub(crate) fn _identify(
@@ -66,7 +64,6 @@ pub(crate) fn _identify(
     })
 }
 
-/// Examines a study against its robot and its logs: JSON.
 #[pyfunction]
 #[pyo3(signature = (study, threads=None, progress=None))]
 pub(crate) fn _check(
@@ -77,7 +74,6 @@ pub(crate) fn _check(
     of_study(study, threads, progress, |study, path, options, _| json(&check(&study, &path, options)?))
 }
 
-/// Tests a model on the logs of a study: JSON.
 #[pyfunction]
 #[pyo3(signature = (model, study, threads=None, progress=None))]
 pub(crate) fn _validate(
@@ -92,11 +88,10 @@ pub(crate) fn _validate(
     })
 }
 
-/// A designed motion: JSON, the trajectory as CSV, its picture as SVG, the times, and position, velocity and
+/// A designed motion: JSON, the trajectory as CSV, its figure as SVG, the times, and position, velocity and
 /// acceleration.
 type Designed<'py> = (String, String, String, Array<'py>, [Array<'py>; 3]);
 
-/// Designs the motion that a study asks for, sampled at `rate_hz`.
 #[pyfunction]
 #[pyo3(signature = (study, rate_hz=None, threads=None))]
 pub(crate) fn _design<'py>(
@@ -118,7 +113,7 @@ pub(crate) fn _design<'py>(
     Ok((file, csv, svg, array(py, &[samples], &[], times_s)?, parts))
 }
 
-/// Runs a study's trajectory on its simulated robot: the truth as JSON, the log as CSV.
+/// Simulates a study's trajectory: the truth as JSON, the log as CSV.
 #[pyfunction]
 #[pyo3(signature = (study, threads=None))]
 pub(crate) fn _simulate(study: &Bound<'_, Study>, threads: Option<usize>) -> PyResult<(String, String)> {
@@ -128,8 +123,8 @@ pub(crate) fn _simulate(study: &Bound<'_, Study>, threads: Option<usize>) -> PyR
     })
 }
 
-/// Iterates a study's robot, or a function in its place, into the folder `out`: JSON. `heard` is called after every run
-/// with its number and its largest tracking error, rad (m).
+/// Iterates with a study's robot, or with a function instead of it, into the folder `out`: JSON. `heard` is called
+/// after every run with its number and its largest tracking error, rad (m).
 #[pyfunction]
 #[pyo3(signature = (study, out, robot=None, resume=false, allow_command=false, threads=None, heard=None))]
 #[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
@@ -172,14 +167,13 @@ pub(crate) fn _iterate(
         json(&file?)
     });
     match raised.taken() {
-        // What the robot's own code raised says more than what became of the iteration.
+        // An exception of the robot's code explains more than the status of the iteration.
         Some(error) => Err(error),
         None => found,
     }
 }
 
-/// Reads and audits a robot's description as it was read: JSON, and the text with its slips corrected where it has some
-/// whose numbers can be known.
+/// Audits a robot description: JSON, and the text with corrected mistakes, if their correct numbers are known.
 #[pyfunction]
 #[pyo3(signature = (robot, total_mass_kg=None))]
 pub(crate) fn _inspect(
@@ -198,8 +192,8 @@ pub(crate) fn _inspect(
     found.map_err(|error: Error| errors::job(py, &error))
 }
 
-/// Writes the text of a study from a robot's file and recordings, as seen from `out`: JSON. `stated` are lines that a
-/// person states: JSON.
+/// Creates the text of a study from a robot file and recordings, with paths relative to `out`: JSON. `stated` are lines
+/// stated by a person: JSON.
 #[pyfunction]
 #[pyo3(signature = (robot, logs, out, rate_hz=None, stated=None, xacro=None, allow_command=false, threads=None, progress=None))]
 #[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
@@ -216,7 +210,7 @@ pub(crate) fn _new(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<String> {
     let stated: Option<Vec<StudyChange>> = stated.map(serde_json::from_str).transpose().map_err(|error| {
-        errors::StudyError::new_err(format!("stated: {error}; give lines as `proposed` of `unsure` has them"))
+        errors::StudyError::new_err(format!("stated: {error}; use the format of `proposed` in `unsure`"))
     })?;
     let xacro = XacroSettings { arguments: xacro.unwrap_or_default(), ..XacroSettings::default() };
     let description = Some(Box::new(described(py, &robot, xacro.clone(), allow_command)?));
@@ -227,14 +221,14 @@ pub(crate) fn _new(
     })
 }
 
-/// What a recording holds: JSON.
+/// Content of a recording: JSON.
 #[pyfunction]
 pub(crate) fn _log_contents(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     let contents = py.detach(|| log_contents(&path).and_then(|contents| json(&contents)));
     contents.map_err(|error| errors::job(py, &error))
 }
 
-/// Writes texts into a folder, all or none; files of None are taken away.
+/// Writes texts into a folder, all or none; files with None are removed.
 #[pyfunction]
 pub(crate) fn _write_files(py: Python<'_>, folder: PathBuf, texts: BTreeMap<String, Option<String>>) -> PyResult<()> {
     let set = texts.into_iter().fold(OutputSet::new(&folder), |set, (name, text)| match text {
@@ -244,7 +238,7 @@ pub(crate) fn _write_files(py: Python<'_>, folder: PathBuf, texts: BTreeMap<Stri
     set.write().map_err(|error| errors::job(py, &error))
 }
 
-/// Runs the command line, the name of the program first, and returns its exit status.
+/// Runs the command line, beginning with the program name, and returns its exit status.
 #[pyfunction]
 pub(crate) fn _command(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| dynident_cli::run(arguments))

@@ -1,6 +1,6 @@
-//! A job beside the interpreter: other threads of Python run on, Ctrl-C ends it, progress is heard.
+//! Jobs in a separate thread: other Python threads continue, Ctrl-C ends the job, progress is reported.
 
-use crate::callables::Thrown;
+use crate::callables::RaisedError;
 use crate::errors;
 use dynident::iteration::StopSignal;
 use dynident::{Error, Progress};
@@ -13,15 +13,13 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// How often Ctrl-C is looked for and progress is told.
-const PAUSE: Duration = Duration::from_millis(50);
-/// Stack of a job's thread, as large as that of a program's own.
+/// Interval of the check for Ctrl-C and of progress reports.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Stack size of a job's thread, as large as that of a main thread.
 const STACK_BYTES: usize = 8 << 20;
 
-/// What a job that nobody wants any more unwinds with.
 struct Cancelled;
 
-/// What a job and whoever waits for it share.
 #[derive(Default)]
 pub(crate) struct Watch {
     cancelled: AtomicBool,
@@ -30,13 +28,11 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Whether nobody wants the job any more.
     pub(crate) fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }
 
-    /// Leaves a job that nobody wants, past everything: no result of it is looked at.
-    fn leave(&self) {
+    fn unwind_if_cancelled(&self) {
         if self.is_cancelled() {
             resume_unwind(Box::new(Cancelled));
         }
@@ -45,7 +41,7 @@ impl Watch {
 
 impl Progress for Watch {
     fn begin(&self, stage: &str, total: Option<u64>) {
-        self.leave();
+        self.unwind_if_cancelled();
         self.done.store(0, Ordering::Relaxed);
         if let Ok(mut current) = self.stage.lock() {
             *current = Some((stage.to_owned(), total));
@@ -53,24 +49,24 @@ impl Progress for Watch {
     }
 
     fn advance(&self, rows: u64) {
-        self.leave();
+        self.unwind_if_cancelled();
         self.done.fetch_add(rows, Ordering::Relaxed);
     }
 
     fn end(&self) {
-        self.leave();
+        self.unwind_if_cancelled();
         if let Ok(mut current) = self.stage.lock() {
             *current = None;
         }
     }
 }
 
-/// Threads that a job may take: as many as asked for, else as there are processors.
 pub(crate) fn threads(asked: Option<usize>) -> usize {
     asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).max(1)
 }
 
-/// Calls `job` on this thread. Ctrl-C makes the function that it is given return true, and is raised afterwards.
+/// Calls `job` on this thread. After Ctrl-C the function that it receives returns true, and the interruption is raised
+/// afterwards.
 pub(crate) fn interruptible<T>(py: Python<'_>, job: impl FnOnce(&dyn Fn() -> bool) -> Result<T, Error>) -> PyResult<T> {
     let interrupted = RefCell::new(None);
     let outcome = job(&|| {
@@ -85,8 +81,8 @@ pub(crate) fn interruptible<T>(py: Python<'_>, job: impl FnOnce(&dyn Fn() -> boo
     }
 }
 
-/// As [`run`], where Ctrl-C asks `stop` first and the job is waited for: a robot is not left moving. A second one
-/// leaves it to itself.
+/// As [`run`], but Ctrl-C first requests `stop` and waits for the job, so that the robot is not left moving. A second
+/// Ctrl-C abandons the job.
 pub(crate) fn run_to_its_stop<T: Send + 'static>(
     py: Python<'_>,
     threads: usize,
@@ -96,8 +92,8 @@ pub(crate) fn run_to_its_stop<T: Send + 'static>(
     waited_for(py, threads, None, Some(stop), work)
 }
 
-/// Runs `work` on a thread of its own, with a pool of `threads` threads, while this one looks for Ctrl-C and tells
-/// `progress(stage, done, total)` where it is.
+/// Runs `work` on a separate thread, with a pool of `threads` threads, while this one checks for Ctrl-C and calls
+/// `progress(stage, done, total)`.
 pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,
     threads: usize,
@@ -117,23 +113,23 @@ fn waited_for<T: Send + 'static>(
     let mut interrupted = None;
     let watch = Arc::new(Watch::default());
     let (send, receive) = channel();
-    // One thread waits at a time, which a lock proves.
+    // The lock makes the receiver shareable; only one thread waits at a time.
     let receive = Mutex::new(receive);
     let own = Arc::clone(&watch);
     let job = move || {
         let outcome =
             catch_unwind(AssertUnwindSafe(|| match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
                 Ok(pool) => pool.install(|| work(&own)),
-                // A system that refuses threads still gets its result.
+                // Without threads the job runs here.
                 Err(_) => work(&own),
             }));
-        // Nobody may be waiting any more.
+        // The receiver may have been dropped.
         let _ = send.send(outcome);
     };
     std::thread::Builder::new().name("dynident".to_owned()).stack_size(STACK_BYTES).spawn(job)?;
     loop {
         let heard = py.detach(|| match receive.lock() {
-            Ok(receive) => receive.recv_timeout(PAUSE),
+            Ok(receive) => receive.recv_timeout(POLL_INTERVAL),
             Err(_) => Err(RecvTimeoutError::Disconnected),
         });
         match heard {
@@ -141,19 +137,19 @@ fn waited_for<T: Send + 'static>(
                 return interrupted.map_or_else(|| outcome.map_err(|error| errors::job(py, &error)), Err);
             }
             Ok(Err(panic)) if panic.is::<Cancelled>() => return Err(PyKeyboardInterrupt::new_err(())),
-            // What code of Python raised; Ctrl-C before it counts more.
-            Ok(Err(panic)) => match panic.downcast::<Thrown>() {
+            // An exception of Python code; an earlier Ctrl-C has priority.
+            Ok(Err(panic)) => match panic.downcast::<RaisedError>() {
                 Ok(thrown) => return Err(interrupted.unwrap_or(thrown.0)),
                 Err(panic) => resume_unwind(panic),
             },
-            // It ended without a word, which a thread does not do.
+            // The thread ended without a result, which should not occur.
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(errors::Error::new_err("the job ended without a result"));
             }
             Err(RecvTimeoutError::Timeout) => {}
         }
-        let told = py.check_signals().and_then(|()| tell(&watch, progress));
-        if let Err(interruption) = told {
+        let outcome = py.check_signals().and_then(|()| report(&watch, progress));
+        if let Err(interruption) = outcome {
             if let (Some(stop), None) = (stop, &interrupted) {
                 stop.request();
                 interrupted = Some(interruption);
@@ -165,7 +161,7 @@ fn waited_for<T: Send + 'static>(
     }
 }
 
-fn tell(watch: &Watch, progress: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+fn report(watch: &Watch, progress: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
     let Some(progress) = progress else { return Ok(()) };
     let stage = watch.stage.lock().ok().and_then(|stage| stage.clone());
     if let Some((name, total)) = stage {

@@ -1,5 +1,5 @@
-//! **Dynident from Python**: the part of the package `dynident` that is Rust. Its other part, in `python/dynident`,
-//! holds what needs no speed: logs, tables, pictures.
+//! The Rust part of the Python package `dynident`. The other part, in `python/dynident`, contains code that needs no
+//! speed: logs, tables, figures.
 
 #![allow(clippy::needless_pass_by_value, reason = "arguments come from Python by value")]
 
@@ -46,7 +46,7 @@ mod _native {
 
     #[pymodule_init]
     fn with_version(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        // Also of those that are raised without a place.
+        // Default for exceptions without a place.
         for place in ["path", "line", "column"] {
             module.py().get_type::<crate::errors::Error>().setattr(place, module.py().None())?;
         }

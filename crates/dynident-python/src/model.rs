@@ -1,4 +1,4 @@
-//! `FittedModel`: what an identification found, with its study.
+//! `FittedModel`: the result of an identification, with its study.
 
 use crate::arrays::{Motion, array, joint_major, sample_major};
 use crate::callables::{Callables, guarded};
@@ -19,19 +19,17 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// What messages call a result in memory.
 pub(crate) const RESULT: &str = "<model>";
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// The description with the new values: URDF, D-H table, MJCF, SDF, as far as the result has them.
+/// The robot description with the new values: URDF, D-H table, MJCF, SDF, if available.
 type Descriptions = [Option<String>; 4];
 
-/// What rebuilds a pickled model.
 type Reduced<'py> = (Bound<'py, PyAny>, (String, Study, Descriptions, String));
 
-/// A result with its study: what ``dynident.Model`` stands on. What takes time and may never be asked for is made when
-/// it is: the page, and what predicts.
+/// A result with its study: the basis of ``dynident.Model``. The report and the predictor are created when first
+/// needed.
 #[pyclass(frozen, module = "dynident._native")]
 pub(crate) struct FittedModel {
     study: dynident::Study,
@@ -43,16 +41,14 @@ pub(crate) struct FittedModel {
     predictor: OnceLock<TorquePredictor>,
 }
 
-/// The page of a result.
 enum Page {
-    /// To be made of the torques over time, which no result holds.
+    /// To be generated from the torques over time, which the result does not contain.
     Of(Vec<LogTrace>),
-    /// As it was written.
     Written(String),
 }
 
 impl FittedModel {
-    /// What an identification of this study has found.
+    /// Creates the model from the outcome of an identification.
     pub(crate) fn found(
         study: dynident::Study,
         path: PathBuf,
@@ -70,21 +66,21 @@ impl FittedModel {
 
     fn predictor(&self, py: Python<'_>) -> PyResult<&TorquePredictor> {
         if self.predictor.get().is_none() {
-            // Code of Python is called on the way: nobody waits for it with the interpreter's lock.
+            // Python functions may be called, so the interpreter lock is released.
             let made = py.detach(|| {
                 guarded(|| TorquePredictor::new(&self.result, Path::new(RESULT), &self.study, &self.path, None))
             })?;
-            // Another thread may have been faster with the same.
+            // Another thread may have stored the same already.
             let _ = self.predictor.set(made.map_err(|error| errors::job(py, &error))?);
         }
-        self.predictor.get().ok_or_else(|| errors::Error::new_err("the model predicts nothing"))
+        self.predictor.get().ok_or_else(|| errors::Error::new_err("the model has no predictor"))
     }
 }
 
 #[pymethods]
 impl FittedModel {
-    /// A result of `identify` with the study that it was made with, the description with the new values (URDF, D-H
-    /// table, MJCF, SDF) and the page.
+    /// Creates the model from a result of `identify` with its study, the robot description with the new values (URDF,
+    /// D-H table, MJCF, SDF) and the report.
     #[staticmethod]
     fn of(
         py: Python<'_>,
@@ -99,12 +95,12 @@ impl FittedModel {
         let result = result.map_err(|error| errors::job(py, &error))?;
         let page = Page::Written(report);
         let made = Self { study, path, callables, result, descriptions, page, predictor: OnceLock::new() };
-        // That study and result belong together.
+        // Checks that study and result belong together.
         made.predictor(py)?;
         Ok(made)
     }
 
-    /// Without the samples that it was fitted to.
+    /// Pickles the model without the samples of its logs.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
         let (py, own) = (slf.py(), slf.get());
         let mut study = own.study();
@@ -119,7 +115,7 @@ impl FittedModel {
         dynident::text::json::to_string(&self.result).map_err(|error| errors::Error::new_err(error.to_string()))
     }
 
-    /// The page with all figures, HTML.
+    /// The report, HTML.
     #[getter]
     fn report(&self, py: Python<'_>) -> PyResult<Cow<'_, str>> {
         match &self.page {
@@ -131,14 +127,14 @@ impl FittedModel {
         }
     }
 
-    /// The study that it was made with.
+    /// The study of the result.
     #[getter]
     fn study(&self) -> Study {
         let (study, path, callables) = (self.study.clone(), self.path.clone(), self.callables.clone());
         Study { study, path, callables }
     }
 
-    /// The description with the new values, URDF, D-H table, MJCF and SDF; None for what the result does not have.
+    /// The robot description with the new values, URDF, D-H table, MJCF and SDF; None if not available.
     #[getter]
     fn descriptions(&self) -> Descriptions {
         self.descriptions.clone()
@@ -171,7 +167,7 @@ impl FittedModel {
         Ok((rows(&found.tau)?, rows(&found.half_width_95)?))
     }
 
-    /// A watch over the robot; what is not given is the default.
+    /// Creates an online monitor of the robot; missing settings have their defaults.
     #[pyo3(signature = (rate_hz, forgetting_s=None, correlation_s=None, collision_s=None, payload_s=None, contact_alarms_per_hour=None, drift_alarms_per_hour=None, half_window=None))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn online(
@@ -200,7 +196,7 @@ impl FittedModel {
         Ok(OnlineWatch::new(watch, self.joint_names(), &settings))
     }
 
-    /// The model in the form `target`: its text, and what has to be known of it.
+    /// Exports the model in the format `target`: its text, and notes.
     fn export(&self, py: Python<'_>, target: &str) -> PyResult<(String, Vec<String>)> {
         let wanted = Target::ALL.into_iter().find(|form| form.name() == target).ok_or_else(|| {
             let known: Vec<&str> = Target::ALL.iter().map(|form| form.name()).collect();
@@ -212,7 +208,7 @@ impl FittedModel {
         Ok((exported.text, exported.notes))
     }
 
-    /// Drives as simulators mean them: JSON and a table of Markdown.
+    /// Drive parameters in the conventions of simulators: JSON and a Markdown table.
     fn simulator(&self, py: Python<'_>) -> PyResult<(String, String)> {
         let of = (&self.study, &*self.path);
         let made = py.detach(|| guarded(|| export_simulator_of(&self.result, Path::new(RESULT), of.0, of.1, None)))?;
@@ -221,7 +217,7 @@ impl FittedModel {
         Ok((json.text, made.table().text))
     }
 
-    /// A payload as the controller `reader` takes it: its text, and what has to be known of it.
+    /// A payload in the format of the controller `reader`: its text, and notes.
     #[pyo3(signature = (reader, name=None))]
     fn payload(&self, py: Python<'_>, reader: &str, name: Option<&str>) -> PyResult<(String, Vec<String>)> {
         const KNOWN: [(&str, PayloadReader); 4] = [

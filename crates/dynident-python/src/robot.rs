@@ -1,4 +1,4 @@
-//! `Robot`: a description, and its dynamics over arrays.
+//! `Robot`: a robot description, and its dynamics over arrays.
 
 use crate::arrays::{Motion, array, joint_major};
 use crate::assembled::{assembled, json_of};
@@ -20,10 +20,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
 
-/// Samples of one block of a batch: enough for full lanes, little enough for the cache.
-const BLOCK: usize = 128;
+/// Samples per block of a batch: enough for full SIMD lanes, few enough for the cache.
+const BLOCK_SAMPLES: usize = 128;
 
-/// Rows of a regressor that are written at once: their pages fit into the first level of the address cache.
+/// Regressor rows that are written together, so that their pages fit into the first level of the TLB.
 const ROWS_AT_ONCE: usize = 16;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
@@ -31,26 +31,24 @@ type Matrices<'py> = (Array<'py>, Array<'py>, Array<'py>);
 
 /// A robot on a fixed base: links, joints, gravity.
 ///
-/// Made by ``Robot.load(path)``, or ``from_urdf``, ``from_mjcf``, ``from_sdf``, ``from_dh`` of a path or a text.
-/// Keyword arguments are the keys of ``[robot]`` of a study: which joints move, what they follow, where gravity points.
+/// Created by ``Robot.load(path)``, or by ``from_urdf``, ``from_mjcf``, ``from_sdf``, ``from_dh`` from a path or a
+/// text. Keyword arguments are the keys of ``[robot]`` of a study: moving joints, mimic joints, direction of gravity.
 ///
 /// Vectors over joints follow ``joint_names``; SI units, rad. All methods take one posture, shape ``(n,)``, or any
-/// number of them, shape ``(..., n)``, and give the axes before the last back.
+/// number of them, shape ``(..., n)``, and return the same leading axes.
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct Robot {
-    /// As read.
     description: Description,
-    /// Keys of ``[robot]`` beside the file, as JSON.
+    /// Keys of ``[robot]`` in addition to the file, as JSON.
     settings: String,
-    /// With these in force.
     model: Model,
-    /// Of the bodies, once somebody has asked.
+    /// Base parameters of the bodies, computed when first needed.
     base: OnceLock<BaseParameters>,
-    /// Scratch memory of threads that have called.
+    /// Scratch memory of the calling threads.
     singles: Mutex<Vec<Workspace>>,
     batches: Mutex<Vec<BatchWorkspace>>,
     panels: Mutex<Vec<Panels>>,
-    /// Of the regressor with all columns, and with those of the base parameters.
+    /// Layouts of the regressor with all columns, and with those of the base parameters.
     layouts: [OnceLock<PanelLayout>; 2],
 }
 
@@ -59,8 +57,7 @@ impl Robot {
         self.base.get_or_init(|| BaseParameters::new(&self.model, &[], &BaseParameterSettings::default()))
     }
 
-    /// A description of one format with the keys of ``[robot]`` in force: `source` is its text if it holds one, else
-    /// the file's path.
+    /// A robot description of one format with the keys of ``[robot]``: `source` is its text, or the path of its file.
     fn new(
         py: Python<'_>,
         source: &Path,
@@ -97,13 +94,12 @@ impl Robot {
         Ok(Self { description, settings, model, base, singles, batches, panels, layouts })
     }
 
-    /// What was read, before any key is in force.
     pub(crate) fn description(&self) -> &Description {
         &self.description
     }
 
-    /// Lends scratch memory to `work`. Nobody waits for it: a process that was forked while another thread held the
-    /// lock would wait for ever.
+    /// Lends scratch memory to `work`, without waiting for a lock: a process that was forked while another thread held
+    /// the lock would wait forever.
     fn with_single<R>(&self, work: impl FnOnce(&mut Workspace) -> R) -> R {
         lend(&self.singles, || Workspace::new(&self.model), work)
     }
@@ -112,18 +108,18 @@ impl Robot {
         lend(&self.batches, || BatchWorkspace::new(&self.model), work)
     }
 
-    /// `each(row, numbers)` for every sample, where `numbers` are the `size` ones of its result in `out`.
+    /// Calls `each(row, values)` for every sample, where `values` are the `size` values of its result in `out`.
     fn for_each(&self, out: &mut [f64], size: usize, each: impl Fn(&mut Workspace, usize, &mut [f64]) + Sync) {
         in_blocks(out, size, |(number, block): (usize, &mut [f64])| {
             self.with_single(|workspace| {
                 for (row, numbers) in block.chunks_exact_mut(size.max(1)).enumerate() {
-                    each(workspace, number * BLOCK + row, numbers);
+                    each(workspace, number * BLOCK_SAMPLES + row, numbers);
                 }
             });
         });
     }
 
-    /// `each(motion, numbers)` for blocks of samples, whose motion stands joint by joint.
+    /// Calls `each(motion, values)` for blocks of samples with joint-major motion.
     fn for_blocks(
         &self,
         motion: [&[f64]; 3],
@@ -135,7 +131,7 @@ impl Robot {
         let dof = self.model.dof();
         in_blocks(out, size, |(number, block): (usize, &mut [f64])| {
             let samples = block.len() / size.max(1);
-            let first = number * BLOCK * dof;
+            let first = number * BLOCK_SAMPLES * dof;
             let of = |rows: &[f64]| joint_major(&rows[first..first + samples * dof], samples, dof);
             let (q, dq, ddq) = (of(q), of(dq), of(ddq));
             let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
@@ -154,7 +150,7 @@ fn lend<W, R>(kept: &Mutex<Vec<W>>, make: impl FnOnce() -> W, work: impl FnOnce(
     result
 }
 
-/// The sections of a study of nothing but a robot.
+/// The sections of a study with only a robot.
 fn study_of(path: &Path, settings: &str) -> PyResult<String> {
     let wrong = |error: serde_json::Error| errors::RobotError::new_err(error.to_string());
     let mut section: serde_json::Map<String, serde_json::Value> = serde_json::from_str(settings).map_err(wrong)?;
@@ -162,7 +158,7 @@ fn study_of(path: &Path, settings: &str) -> PyResult<String> {
     serde_json::to_string(&serde_json::json!({ "robot": section })).map_err(wrong)
 }
 
-/// Reads a robot file; the program `xacro` expands one with macros if that is allowed. Ctrl-C stops it.
+/// Reads a robot file; the program `xacro` expands one with macros if permitted. Ctrl-C stops it.
 pub(crate) fn described(
     py: Python<'_>,
     path: &Path,
@@ -183,7 +179,7 @@ fn xacro_settings(path: &Path, settings: &str) -> PyResult<XacroSettings> {
     Ok(study.map_err(|error| errors::StudyError::new_err(error.to_string()))?.robot.xacro_settings())
 }
 
-/// The text of a description of the format `wanted`.
+/// Reads the text of a robot description of the format `wanted`.
 fn of_text(text: &str, wanted: DescriptionFormat, name: &str) -> PyResult<Description> {
     of_format(read_robot(text.to_owned(), Path::new(name)).map_err(errors::robot)?, wanted)
 }
@@ -196,14 +192,13 @@ fn of_format(found: Description, wanted: DescriptionFormat) -> PyResult<Descript
     }
 }
 
-/// Whether a text is XML and no path.
 fn is_xml(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim_start().starts_with('<')
 }
 
-/// Hands out blocks of samples, to all threads of the pool that this runs in, if any.
+/// Processes blocks of samples, with all threads of the current pool, if any.
 fn in_blocks(out: &mut [f64], size: usize, each: impl Fn((usize, &mut [f64])) + Sync) {
-    let chunk = (BLOCK * size).max(1);
+    let chunk = (BLOCK_SAMPLES * size).max(1);
     if rayon::current_thread_index().is_none() {
         out.chunks_mut(chunk).enumerate().for_each(each);
     } else {
@@ -213,9 +208,9 @@ fn in_blocks(out: &mut [f64], size: usize, each: impl Fn((usize, &mut [f64])) + 
 
 #[pymethods]
 impl Robot {
-    /// Reads a description: URDF, MJCF, SDF or a D-H table in TOML, recognised by its content. The program ``xacro``
-    /// expands a file with macros only with ``allow_command=True``: it runs Python code of the file. Its arguments are
-    /// ``xacro={"ur_type": "ur5e"}``.
+    /// Reads a robot description: URDF, MJCF, SDF or a D-H table in TOML, recognised by its content. The program
+    /// ``xacro`` expands a file with macros only with ``allow_command=True``, because it runs Python code of the file.
+    /// Its arguments are given as ``xacro={"ur_type": "ur5e"}``.
     #[staticmethod]
     #[pyo3(signature = (path, *, allow_command=false, **settings))]
     fn load(
@@ -229,28 +224,28 @@ impl Robot {
         Self::with_settings(py, description, settings)
     }
 
-    /// A robot of a URDF: a path, or the text itself.
+    /// Creates a robot from a URDF: a path, or the text.
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_urdf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         Self::new(py, &source, DescriptionFormat::Urdf, "robot.urdf", is_xml, settings)
     }
 
-    /// A robot of MuJoCo's MJCF: a path, or the text itself.
+    /// Creates a robot from an MJCF (MuJoCo): a path, or the text.
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_mjcf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         Self::new(py, &source, DescriptionFormat::Mjcf, "robot.xml", is_xml, settings)
     }
 
-    /// A robot of Gazebo's SDF: a path, or the text itself.
+    /// Creates a robot from an SDF (Gazebo): a path, or the text.
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_sdf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         Self::new(py, &source, DescriptionFormat::Sdf, "robot.sdf", is_xml, settings)
     }
 
-    /// A robot of a Denavit-Hartenberg table in TOML: a path, or the text itself, which has more than one line.
+    /// Creates a robot from a Denavit-Hartenberg table in TOML: a path, or the text (more than one line).
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_dh(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
@@ -270,7 +265,7 @@ impl Robot {
         Ok((slf.get_type().getattr("_restore")?, state))
     }
 
-    /// The keys of ``[robot]`` that are in force beside the file, as JSON.
+    /// The keys of ``[robot]`` in addition to the file, as JSON.
     #[getter]
     fn _settings(&self) -> &str {
         &self.settings
@@ -282,19 +277,19 @@ impl Robot {
         self.model.name()
     }
 
-    /// The file that it was read from; of a text a name only.
+    /// The file that it was read from; for a text only a name.
     #[getter]
     fn path(&self) -> &Path {
         &self.description.path
     }
 
-    /// The text of the description.
+    /// The text of the robot description.
     #[getter]
     fn text(&self) -> &str {
         &self.description.text
     }
 
-    /// Names of the degrees of freedom, base to tip: the order of all vectors.
+    /// Names of the degrees of freedom, from base to tip: the order of all vectors.
     #[getter]
     fn joint_names(&self) -> Vec<String> {
         self.model.joints().iter().map(|joint| joint.name.clone()).collect()
@@ -313,13 +308,13 @@ impl Robot {
     }
 
     /// Ten inertial parameters of each body in its frame, shape ``(bodies, 10)``: ``m, mx, my, mz, Ixx, Ixy, Ixz, Iyy,
-    /// Iyz, Izz`` about the frame's origin, kg, kg m, kg m². Zeros where the description has none.
+    /// Iyz, Izz`` about the frame's origin, kg, kg m, kg m². Zeros if the robot description has none.
     #[getter]
     fn inertial_parameters<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         array(py, &[self.model.body_count()], &[10], self.model.parameter_vector())
     }
 
-    /// The same robot with the named joints held, ``{name: position}`` in rad or m.
+    /// The same robot with the named joints locked, ``{name: position}`` in rad or m.
     fn locked(&self, py: Python<'_>, positions: BTreeMap<String, f64>) -> PyResult<Self> {
         let wrong = |error: serde_json::Error| errors::RobotError::new_err(error.to_string());
         let mut settings: serde_json::Map<String, serde_json::Value> =
@@ -333,7 +328,7 @@ impl Robot {
     }
 
     /// Joint torques of a motion, Nm (N): ``M(q) ddq + C(q, dq) dq + g(q)`` of the rigid bodies. Shapes ``(..., n)``;
-    /// without ``dq`` or ``ddq`` these are zero.
+    /// ``dq`` and ``ddq`` are zero by default.
     #[pyo3(signature = (q, dq=None, ddq=None))]
     fn inverse_dynamics<'py>(
         &self,
@@ -357,12 +352,12 @@ impl Robot {
         })
     }
 
-    /// Torques that hold the robot at rest, Nm (N), shape ``(..., n)``.
+    /// Gravity torques, Nm (N), shape ``(..., n)``.
     fn gravity<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
         self.inverse_dynamics(py, q, None, None)
     }
 
-    /// Accelerations under torques, rad/s² (m/s²), shape ``(..., n)``.
+    /// Accelerations for given torques, rad/s² (m/s²), shape ``(..., n)``.
     fn forward_dynamics<'py>(
         &self,
         py: Python<'py>,
@@ -371,7 +366,7 @@ impl Robot {
         tau: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
         let dof = self.model.dof();
-        // The torque takes the place of the acceleration.
+        // The torque is passed in the place of the acceleration.
         let motion = Motion::of(dof, q, Some(dq), Some(tau))?;
         motion.fill(py, &[dof], |[q, dq, tau], out| {
             self.for_each(out, dof, |workspace, row, out| {
@@ -393,8 +388,8 @@ impl Robot {
         })
     }
 
-    /// Derivatives of the torques by position, velocity and acceleration: three arrays of shape ``(..., n, n)``, row =
-    /// torque, column = what it is derived by.
+    /// Derivatives of the torques with respect to position, velocity and acceleration: three arrays of shape ``(..., n,
+    /// n)``, row = torque, column = variable.
     #[pyo3(signature = (q, dq=None, ddq=None))]
     fn derivatives<'py>(
         &self,
@@ -426,10 +421,10 @@ impl Robot {
         Ok((part(0)?, part(1)?, part(2)?))
     }
 
-    /// The regressor ``Y(q, dq, ddq)`` with ``Y @ inertial_parameters.ravel() == tau``, shape ``(..., n, 10 bodies)``;
-    /// with ``base`` its columns that stand for the base parameters alone, shape ``(..., n, base parameters)``, for
-    /// which ``Y @ (base_projection @ inertial_parameters.ravel()) == tau``. ``out`` is an array of this shape to write
-    /// into, as of an earlier call: it saves the system making memory, which takes longer than the numbers.
+    /// The regressor ``Y(q, dq, ddq)`` with ``Y @ inertial_parameters.ravel() == tau``, shape ``(..., n, 10 bodies)``.
+    /// With ``base`` only the columns of the base parameters, shape ``(..., n, base parameters)``, for which ``Y @
+    /// (base_projection @ inertial_parameters.ravel()) == tau``. ``out`` is an array of this shape for the result, for
+    /// example from an earlier call; this saves the allocation, which takes longer than the computation.
     #[pyo3(signature = (q, dq=None, ddq=None, *, base=false, out=None))]
     fn regressor<'py>(
         &self,
@@ -448,7 +443,7 @@ impl Robot {
         let columns = layout.columns().len();
         let size = (dof * columns).max(1);
         let motion = Motion::of(dof, q, dq, ddq)?;
-        // Memory that nobody has written to is zero, and nothing but zeros stands in the other columns.
+        // New memory is zero, and the other columns contain only zeros.
         let is_zero = out.is_none();
         let array = match out {
             Some(out) => motion.given(out, &[dof, columns])?,
@@ -463,7 +458,7 @@ impl Robot {
                     }
                     for joint in 0..dof {
                         let panel = panels.joint(joint);
-                        // A few rows at a time, or every number written is a page of its own.
+                        // A few rows at a time, otherwise every value is written to another page.
                         for (part, rows) in out.chunks_mut(ROWS_AT_ONCE * size).enumerate() {
                             let from = part * ROWS_AT_ONCE;
                             for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
@@ -480,13 +475,13 @@ impl Robot {
         Ok(array)
     }
 
-    /// The base parameters of the bodies: what torque can tell, as sums of inertial parameters.
+    /// The base parameters of the bodies: the combinations of inertial parameters that torque determines.
     #[getter]
     fn base_parameters(&self) -> Vec<String> {
         self.base().expressions()
     }
 
-    /// The matrix of shape ``(base parameters, 10 bodies)`` with ``base_projection @ inertial_parameters.ravel()`` the
+    /// The matrix of shape ``(base parameters, 10 bodies)``; ``base_projection @ inertial_parameters.ravel()`` are the
     /// values of ``base_parameters``.
     #[getter]
     fn base_projection<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
@@ -503,8 +498,8 @@ impl Robot {
         array(py, &[rows], &[columns], numbers)
     }
 
-    /// Places of the regressor's columns that stand for the base parameters:
-    /// ``regressor(...)[..., base_columns] @ values == tau``.
+    /// Indices of the regressor's columns of the base parameters: ``regressor(...)[..., base_columns] @ values ==
+    /// tau``.
     #[getter]
     fn base_columns(&self) -> Vec<usize> {
         self.base().independent().to_vec()

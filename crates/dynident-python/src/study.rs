@@ -17,24 +17,22 @@ use std::path::{Path, PathBuf};
 /// Samples of one log: names of the columns, and the columns.
 type Samples<'py> = (Vec<String>, Vec<PyReadonlyArray1<'py, f64>>);
 
-/// The same on the way back.
 type Columns<'py> = (Vec<String>, Vec<Bound<'py, PyArrayDyn<f64>>>);
 
 /// A study: robot, drives, logs and settings, as ``[robot]``, ``[drive]``, ``[[log]]`` and so on of a study file.
 ///
-/// Read with ``Study.load(path)`` or ``Study.parse(text)``; put together from objects with ``dynident.study(...)``.
+/// Read with ``Study.load(path)`` or ``Study.parse(text)``, or created from objects with ``dynident.study(...)``.
 #[pyclass(frozen, module = "dynident")]
-#[allow(clippy::struct_field_names, reason = "the study that it is")]
+#[allow(clippy::struct_field_names, reason = "the wrapped study")]
 pub(crate) struct Study {
     pub(crate) study: dynident::Study,
     pub(crate) path: PathBuf,
-    /// Code that its sections name.
     pub(crate) callables: Callables,
 }
 
 impl Study {
-    /// A study as read. Its robot file is expanded if it has macros and that is allowed; where it is not, the job that
-    /// needs the robot reports it.
+    /// A study as read. Its robot file is expanded if it has macros and that is permitted; otherwise the job that needs
+    /// the robot reports it.
     fn read(py: Python<'_>, mut study: dynident::Study, path: PathBuf, allow_command: bool) -> PyResult<Self> {
         if allow_command {
             interruptible(py, |is_stopped| {
@@ -44,7 +42,7 @@ impl Study {
         Ok(Self { study, path, callables: Callables::default() })
     }
 
-    /// The study and where it stands, as jobs take it on another thread.
+    /// Copies of the study and its path, for jobs on another thread.
     pub(crate) fn owned(&self) -> (dynident::Study, PathBuf) {
         (self.study.clone(), self.path.clone())
     }
@@ -52,8 +50,8 @@ impl Study {
 
 #[pymethods]
 impl Study {
-    /// Reads a study file. With ``allow_command=True`` the program ``xacro`` expands its robot file if that has macros:
-    /// xacro runs Python code of the file.
+    /// Reads a study file. With ``allow_command=True`` the program ``xacro`` expands a robot file with macros; xacro
+    /// runs Python code of the file.
     #[staticmethod]
     #[pyo3(signature = (path, *, allow_command=false))]
     fn load(py: Python<'_>, path: PathBuf, allow_command: bool) -> PyResult<Self> {
@@ -61,8 +59,8 @@ impl Study {
         Self::read(py, study, path, allow_command)
     }
 
-    /// Reads the text of a study; files that it names are looked for beside ``path``, which need not exist.
-    /// ``allow_command`` as of ``load``.
+    /// Reads the text of a study. Its files are relative to the folder of ``path``, which need not exist.
+    /// ``allow_command`` as for ``load``.
     #[staticmethod]
     #[pyo3(signature = (text, path=PathBuf::from("<study>"), *, allow_command=false))]
     fn parse(py: Python<'_>, text: &str, path: PathBuf, allow_command: bool) -> PyResult<Self> {
@@ -70,7 +68,8 @@ impl Study {
         Self::read(py, study, path, allow_command)
     }
 
-    /// Sections as JSON, with a robot and with samples in memory: one entry for each log, None for one in a file.
+    /// Creates a study from sections in JSON, a robot, and samples in memory: one entry per log, None for a log in a
+    /// file.
     #[staticmethod]
     #[pyo3(signature = (sections, path, robot, samples, functions=None))]
     fn _assemble(
@@ -110,18 +109,19 @@ impl Study {
         for log in &own.study.log {
             samples.push(log.samples.as_ref().map(|table| columns(py, table)).transpose()?);
         }
-        // Functions are pickled as Python pickles them: by where they stand.
+        // Python pickles functions by their module and name.
         let state = (own.to_json()?, own.path.clone(), description, samples, own.callables.dictionary(py));
         Ok((slf.get_type().getattr("_restore")?, state.into_pyobject(py)?))
     }
 
-    /// The file that it was read from; ``<study>`` for one in memory. Files that it names are looked for beside it.
+    /// The file that it was read from; ``<study>`` for one in memory. Its files are relative to the folder of this
+    /// path.
     #[getter]
     fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What reports call it, None for the file's name.
+    /// Name in reports; None for the file's name.
     #[getter]
     fn name(&self) -> Option<&str> {
         self.study.name.as_deref()
@@ -150,18 +150,19 @@ impl Study {
         serde_json::to_string(&self.study).map_err(|error| errors::Error::new_err(error.to_string()))
     }
 
-    /// The parts that are code of Python, each with the name of its function: ``estimator: ridge``.
+    /// The Python functions of the study, each with its section: ``estimator: ridge``.
     #[getter]
     fn functions(&self) -> Vec<String> {
         self.study.functions()
     }
 
-    /// The study as TOML. Samples and descriptions in memory are only named in it; a study with functions is no text,
-    /// and raises ``StudyError``.
+    /// The study as TOML. Samples and robot descriptions in memory are only named in it; a study with functions raises
+    /// ``StudyError``.
     fn to_toml(&self) -> PyResult<String> {
         if let [first, ..] = &self.study.functions()[..] {
-            let message =
-                format!("{first} is a function of Python, which no file holds: pickle the study, or leave it out");
+            let message = format!(
+                "{first} is a function of Python, which cannot be written to a file: pickle the study, or remove the function"
+            );
             return Err(errors::StudyError::new_err(message));
         }
         self.study.to_toml().map_err(|error| errors::StudyError::new_err(error.to_string()))
@@ -172,12 +173,11 @@ impl Study {
     }
 }
 
-/// The tables of logs.
 fn tables(samples: Vec<Option<(String, Samples<'_>)>>) -> PyResult<Vec<Option<MemoryLog>>> {
     samples.into_iter().map(|table| table.map(|(label, table)| memory_log(&label, table)).transpose()).collect()
 }
 
-/// A table of columns. Each is copied once: a job runs on beside whoever owns the arrays.
+/// A table of columns. Each is copied once, because a job runs in parallel to the owner of the arrays.
 fn memory_log(label: &str, (names, columns): Samples<'_>) -> PyResult<MemoryLog> {
     let columns = columns
         .iter()
@@ -189,7 +189,6 @@ fn memory_log(label: &str, (names, columns): Samples<'_>) -> PyResult<MemoryLog>
     MemoryLog::columns(label, Some(names), columns).map_err(errors::log)
 }
 
-/// Label, names and columns of a table.
 fn columns<'py>(py: Python<'py>, table: &MemoryLog) -> PyResult<(String, Columns<'py>)> {
     let names = table.names().map(<[String]>::to_vec).unwrap_or_default();
     let (width, numbers): (usize, Vec<f64>) = (names.len().max(1), table.numbers().collect());

@@ -1,4 +1,4 @@
-//! `Watch`: a robot under watch, sample by sample or array by array.
+//! `Watch`: online monitoring of a robot, sample by sample or array by array.
 
 use crate::arrays::{Samples, array};
 use crate::callables::guarded;
@@ -13,15 +13,14 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// The exception of samples and settings.
 fn raised(error: OnlineError) -> PyErr {
     Error::new_err(error.to_string())
 }
 
-/// A robot under watch: what ``Model.online`` gives.
+/// Online monitor of a robot, created by ``Model.online``.
 ///
-/// ``update`` takes samples as they come, one or an array of them; what it finds is in ``alarms``. Velocities and
-/// accelerations are taken from positions where they are not given, and answers are then ``delay_s`` old.
+/// ``update`` takes one sample or an array of samples; detected events are in ``alarms``. Without velocities and
+/// accelerations these are computed from the positions, and results are delayed by ``delay_s``.
 #[pyclass(frozen, module = "dynident", name = "Watch")]
 pub(crate) struct OnlineWatch {
     own: Mutex<Watched>,
@@ -32,7 +31,7 @@ pub(crate) struct OnlineWatch {
 
 struct Watched {
     watch: Watch,
-    /// Whether derivatives come with the samples; none before the first.
+    /// Whether the samples include derivatives; `None` before the first sample.
     with_derivatives: Option<bool>,
     samples: u64,
     now: Option<Contact>,
@@ -40,7 +39,6 @@ struct Watched {
     alarms: Vec<Alarm>,
 }
 
-/// Something that began.
 #[derive(Clone, Copy)]
 struct Alarm {
     time_s: f64,
@@ -54,7 +52,7 @@ enum What {
 }
 
 impl OnlineWatch {
-    /// A watch with the names that its alarms give.
+    /// Creates a monitor with the names for its alarms.
     pub(crate) fn new(watch: Watch, joints: Vec<String>, settings: &WatchSettings) -> Self {
         let parameters = watch.estimator().model().base().expressions();
         let rate_hz = settings.contact.rate_hz;
@@ -66,7 +64,7 @@ impl OnlineWatch {
         self.own.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs all samples through the watch; gives `look`'s answer after each.
+    /// Processes all samples and calls `look` after each.
     fn run(
         &self,
         py: Python<'_>,
@@ -106,7 +104,7 @@ impl OnlineWatch {
         };
         py.detach(|| guarded(work))?.map_err(|error| match error {
             Mixed::Derivatives => Error::new_err(
-                "velocities and accelerations came with earlier samples and not with these, or the other way: give \
+                "inconsistent samples: only some have velocities and accelerations; give \
                  them always or never",
             ),
             Mixed::Online(error) => raised(error),
@@ -155,7 +153,7 @@ impl From<OnlineError> for Mixed {
 
 #[pymethods]
 impl OnlineWatch {
-    /// Takes a sample, ``(n,)``, or samples in the order of time, ``(..., n)``; gives the alarms that began in them.
+    /// Adds a sample, ``(n,)``, or samples in the order of time, ``(..., n)``; returns the alarms that began in them.
     #[pyo3(signature = (q, tau, dq=None, ddq=None))]
     fn update<'py>(
         &self,
@@ -194,8 +192,8 @@ impl OnlineWatch {
         self.own().alarms[before..].iter().map(|alarm| self.described(py, alarm)).collect()
     }
 
-    /// Thresholds of contact by motion that nothing touched, ten times the longest time constant at least: shapes
-    /// ``(samples, n)``. The samples count for the estimate as well.
+    /// Determines the contact thresholds from motion without contact, at least ten times as long as the longest time
+    /// constant: shapes ``(samples, n)``. The samples are also used for the estimate.
     #[pyo3(signature = (q, tau, dq=None, ddq=None))]
     fn calibrate(
         &self,
@@ -212,7 +210,7 @@ impl OnlineWatch {
         };
         let mut residuals = Residuals { joints: vec![Vec::new(); self.joints.len()] };
         self.run(py, [q, tau], derivatives, |own, _| {
-            // Before the first window is full there is none.
+            // There are no residuals before the first window is full.
             if own.watch.estimator().samples() > 0 {
                 for (all, residual) in residuals.joints.iter_mut().zip(own.watch.residuals_nm()) {
                     all.push(*residual);
@@ -226,21 +224,21 @@ impl OnlineWatch {
         Ok(())
     }
 
-    /// The next sample begins a motion.
+    /// Begins a new motion with the next sample.
     fn restart(&self) {
         let mut own = self.own();
         own.watch.restart();
         own.now = None;
     }
 
-    /// All alarms so far, each when it began: dictionaries with ``time_s`` and ``kind``.
+    /// All alarms, with the begin of each: dictionaries with ``time_s`` and ``kind``.
     #[getter]
     fn alarms<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let alarms = self.own().alarms.clone();
         alarms.iter().map(|alarm| self.described(py, alarm)).collect()
     }
 
-    /// What touches the robot now, or None.
+    /// The current contact, or None.
     #[getter]
     fn contact<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(contact) = self.own().now else { return Ok(None) };
@@ -249,7 +247,7 @@ impl OnlineWatch {
         Ok(Some(found))
     }
 
-    /// The last check of drift, or None before the first.
+    /// The last drift check, or None before the first.
     #[getter]
     fn drift<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(drift) = self.own().drift else { return Ok(None) };
@@ -264,7 +262,7 @@ impl OnlineWatch {
         self.parameters.clone()
     }
 
-    /// The base parameters now; None while the samples do not determine them.
+    /// The current base parameters; None while the samples do not determine them.
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py>>> {
         let mut values = vec![0.0; self.parameters.len()];
@@ -276,13 +274,13 @@ impl OnlineWatch {
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py>>> {
         let found = self.own().watch.estimator().covariance();
-        // Symmetric: by columns as by rows.
+        // Symmetric, so columns and rows are equal.
         found.map(|matrix| array(py, &[matrix.nrows(), matrix.ncols()], &[], matrix.as_slice().to_vec())).transpose()
     }
 
-    /// Parameters of all bodies and friction now that can be real: bodies ``(bodies, 10)``, and friction by symbol.
+    /// Physically consistent parameters of all bodies and friction: bodies ``(bodies, 10)``, and friction by symbol.
     fn consistent<'py>(&self, py: Python<'py>) -> PyResult<(Array<'py>, Bound<'py, PyDict>)> {
-        // Whoever has the lock does not wait for the interpreter.
+        // Release the interpreter lock, so that the holder of the monitor's lock never waits for it.
         let found = py.detach(|| {
             let own = self.own();
             let estimator = own.watch.estimator();
@@ -313,13 +311,13 @@ impl OnlineWatch {
         array(py, &[residuals.len()], &[], residuals)
     }
 
-    /// Samples so far.
+    /// Number of samples.
     #[getter]
     fn samples(&self) -> u64 {
         self.own().samples
     }
 
-    /// By how much answers are behind where derivatives are taken from positions, s.
+    /// Delay of the results if derivatives are computed from positions, s.
     #[getter]
     fn delay_s(&self) -> f64 {
         self.own().watch.delay_samples() as f64 / self.rate_hz

@@ -1,12 +1,12 @@
-//! The answer to a question on the terminal: typed after the question was there, and not awaited past Ctrl-C.
+//! Reads the answer to a question on the terminal. Input typed before the question is ignored, and Ctrl-C ends the
+//! wait.
 
 use crate::terminal;
 
-/// What is said where Ctrl-C ends the wait for an answer.
 #[cfg(unix)]
-const GIVEN_UP: &str = "a stop was asked for: the question counts as answered with no";
+const GIVEN_UP: &str = "a stop was requested: the question is treated as answered with no";
 
-/// The line that answers a question; none at the end of the input, and once Ctrl-C was pressed.
+/// Returns the line that answers a question; `None` at the end of the input, or after Ctrl-C.
 #[cfg(unix)]
 pub(super) fn to(question: &str) -> Option<String> {
     use super::interruption;
@@ -14,11 +14,12 @@ pub(super) fn to(question: &str) -> Option<String> {
     use rustix::io::{Errno, read};
     use rustix::termios::{QueueSelector, tcflush};
 
-    // Ctrl-C wakes another thread, which does not reach this one.
-    const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
-    // Read without the standard library's buffer: lines typed ahead would wait there, out of the terminal's reach.
+    // Ctrl-C wakes another thread, so this thread polls.
+    const POLL_INTERVAL: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
+    // Read without the buffer of the standard library, because lines typed ahead would remain there after a flush of
+    // the terminal.
     let terminal = std::io::stdin();
-    // What was typed before is no answer to this question: a doubled Enter moves no arm.
+    // Discard earlier input: a doubled Enter must not move the robot.
     let _ = tcflush(&terminal, QueueSelector::IFlush);
     terminal::ask(question);
     let mut line = Vec::new();
@@ -28,7 +29,7 @@ pub(super) fn to(question: &str) -> Option<String> {
             terminal::remark(GIVEN_UP);
             return None;
         }
-        match poll(&mut [PollFd::new(&terminal, PollFlags::IN)], Some(&LOOK)) {
+        match poll(&mut [PollFd::new(&terminal, PollFlags::IN)], Some(&POLL_INTERVAL)) {
             Ok(0) | Err(Errno::INTR) => continue,
             Ok(_) => {}
             Err(_) => return None,
@@ -45,7 +46,7 @@ pub(super) fn to(question: &str) -> Option<String> {
     Some(String::from_utf8_lossy(&line).into_owned())
 }
 
-/// The line that answers a question; none once Ctrl-C was pressed.
+/// Returns the line that answers a question; `None` after Ctrl-C.
 #[cfg(not(unix))]
 pub(super) fn to(question: &str) -> Option<String> {
     terminal::ask(question);

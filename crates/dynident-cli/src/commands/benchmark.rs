@@ -1,12 +1,9 @@
-//! `dynident benchmark`.
-
 use super::{Context, json, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
 use dynident::{OutputSet, check_writable};
 use dynident_benchmark::accuracy::{BenchmarkSettings, benchmark, cells_csv};
 use std::path::PathBuf;
 
-/// Options of `benchmark`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// Robots, comma-separated; all by default.

@@ -1,5 +1,3 @@
-//! `dynident check STUDY.toml`.
-
 use super::permission::ProgramOptions;
 use super::{Context, json, known_in};
 use crate::{Verdict, summary, terminal};
@@ -7,12 +5,11 @@ use dynident::recording::Level;
 use dynident::{RunOptions, check};
 use std::path::PathBuf;
 
-/// Options of `check`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder of the recordings, in place of the study's own.
+    /// Folder of the recordings, if it differs from the study's.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     #[command(flatten)]

@@ -1,10 +1,7 @@
-//! `dynident completions SHELL`.
-
 use super::Context;
 use crate::{Verdict, terminal};
 use clap_complete::Shell;
 
-/// Options of `completions`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The shell.
@@ -13,7 +10,7 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options, mut command: clap::Command, context: &Context) -> Result<Verdict, String> {
     if context.json {
-        return Err("completions prints a script for a shell, which is no JSON: leave --json out".to_owned());
+        return Err("completions prints a shell script, which is not JSON: omit --json".to_owned());
     }
     let mut script = Vec::new();
     clap_complete::generate(options.shell, &mut command, "dynident", &mut script);

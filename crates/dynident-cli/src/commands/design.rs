@@ -1,5 +1,3 @@
-//! `dynident design STUDY.toml --out DIR`.
-
 use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, interruption, json, known_in, message_of, pretty_json, refuse_overwriting};
@@ -16,9 +14,8 @@ use dynident::{
 };
 use std::path::PathBuf;
 
-/// The motion; not written where it was given.
+/// The motion; not written if it was given.
 const TRAJECTORY: &str = "trajectory.csv";
-/// Every file that may be written.
 const FILES: [&str; 9] = [
     "design.json",
     TRAJECTORY,
@@ -30,30 +27,28 @@ const FILES: [&str; 9] = [
     "waypoints.csv",
     "trajectory.script",
 ];
-/// Those of them that not every design has.
-const FURTHER: [&str; 6] =
+/// Files that not every design has.
+const OPTIONAL_FILES: [&str; 6] =
     [TRAJECTORY, "fitness.csv", "fitness.svg", "trajectory.ros2.yaml", "waypoints.csv", "trajectory.script"];
 
-/// Options of `design`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The study file; its [design] says what is looked for.
+    /// The study file; its [design] states the objective.
     study: PathBuf,
     /// Folder for design.json, trajectory.csv, preview.svg and path.svg.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Do not search: judge this trajectory (t_s, q1.., dq1.., ddq1.. or positions alone) against the study's limits,
+    /// Do not search: check this trajectory (t_s, q1.., dq1.., ddq1.. or only positions) against the study's limits,
     /// with a forecast.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["check_log", "seed"])]
     check: Option<PathBuf>,
-    /// Do not search: judge a log of the study, by its name or file: what the finished run says about each
-    /// parameter.
+    /// Do not search: check a log of the study, by its name or file, with a forecast for each parameter.
     #[arg(long, value_name = "NAME", conflicts_with = "seed")]
     check_log: Option<String>,
     /// Seed of the random starts, in place of the study's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Also write what a robot takes; may be given several times.
+    /// Also write files for the robot; may be given several times.
     #[arg(long, value_enum, value_name = "FORMAT")]
     to: Vec<Format>,
     /// Rate of trajectory.csv and of the robot's files, Hz; by default the study's search.rate_hz, and 125 for
@@ -112,22 +107,22 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let outcome = outcome.map_err(known_in(&options.study))?;
     search.end();
     if interruption::pressed() {
-        terminal::remark("stopped: this is the best motion so far");
+        terminal::remark("search stopped: this is the best motion found");
     }
     let files = files(&outcome, options)?;
     let mut set = OutputSet::new(&options.out).file("design.json", pretty_json(&outcome.file)?);
     for (name, contents) in &files {
         set = set.file(name, contents.as_slice());
     }
-    // What an earlier design left is not of this motion.
+    // Remove files of an earlier design.
     let is_checked = outcome.file.given.is_some();
-    let others = FURTHER.iter().filter(|name| !files.iter().any(|(written, _)| written == *name));
+    let others = OPTIONAL_FILES.iter().filter(|name| !files.iter().any(|(written, _)| written == *name));
     for name in others.filter(|name| !(is_checked && **name == TRAJECTORY)) {
         set = set.absent(name);
     }
     set.write().map_err(message_of)?;
     if !outcome.file.feasible && !options.to.is_empty() {
-        terminal::remark("no file for the robot was written: the motion breaks its limits");
+        terminal::remark("no robot file was written: the motion breaks its limits");
     }
     if context.json {
         terminal::print_document(&json(&outcome.file)?)?;
@@ -138,7 +133,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(if outcome.file.feasible { Verdict::Good } else { Verdict::Negative })
 }
 
-/// That every format asked for can be written, before anything is searched.
+/// Checks before the search that every requested format can be written.
 fn writable_formats(options: &Options, study: &Study) -> Result<(), String> {
     if !options.to.contains(&Format::Urscript) {
         return Ok(());
@@ -152,10 +147,9 @@ fn writable_formats(options: &Options, study: &Study) -> Result<(), String> {
     if joints == UR_JOINTS { Ok(()) } else { Err(format!("--to urscript: {}", ExportError::SixJoints { joints })) }
 }
 
-/// Joints that a URScript program moves.
 const UR_JOINTS: usize = 6;
 
-/// The files beside design.json, all made before the first is written.
+/// The files next to design.json, all generated before the first is written.
 fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str, Vec<u8>)>, String> {
     let file = &outcome.file;
     let at = |rate_hz: f64, write: &dyn Fn(&Sampled<'_>) -> Result<String, String>| {
@@ -177,7 +171,7 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
         files.push(("fitness.csv", fitness_csv(&outcome.history).into_bytes()));
         files.push(("fitness.svg", picture.into_bytes()));
     }
-    // A motion that breaks limits is for the eye, not for the robot.
+    // A motion that breaks limits must not be sent to the robot.
     for format in options.to.iter().filter(|_| file.feasible) {
         files.push(match format {
             Format::Ros2 => ("trajectory.ros2.yaml", plain(ros2_joint_trajectory)?),

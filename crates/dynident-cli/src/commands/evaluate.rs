@@ -1,5 +1,3 @@
-//! `dynident evaluate ROBOT --states S.csv --quantity Q`.
-
 use super::permission::XacroOptions;
 use super::{Context, json, message_of};
 use crate::{Verdict, terminal};
@@ -9,7 +7,6 @@ use dynident::result::{EVALUATION_SCHEMA, EvaluationFile};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Options of `evaluate`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// URDF, MJCF, SDF, or D-H table in TOML.
@@ -72,13 +69,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         out.flush().map_err(|source| dynident::Error::Output { path: PathBuf::from("standard output"), source })
     });
     match flushed {
-        // A reader that has gone (`| head`) has seen what it wanted.
+        // A reader that has closed the pipe (`| head`) has what it needs.
         Err(dynident::Error::Output { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe => Ok(Verdict::Good),
         done => done.map(|()| Verdict::Good).map_err(message_of),
     }
 }
 
-/// The table as a JSON object; without its numbers if they went to a file.
+/// The table as a JSON object; without its numbers if they were written to a file.
 fn object(quantity: String, dof: usize, rows: u64, out: Option<&Path>, table: &str) -> Result<String, String> {
     let mut lines = table.lines();
     let columns = lines.next().unwrap_or("").split(',').map(str::to_owned).collect();

@@ -1,5 +1,3 @@
-//! `dynident export DIR/result.json --study STUDY.toml --to FORM`.
-
 use super::permission::ProgramOptions;
 use super::{Context, json, known_in, message_of};
 use crate::{Verdict, terminal};
@@ -9,27 +7,26 @@ use dynident::result::{EXPORT_SCHEMA, ExportFile};
 use dynident::{ResultFile, export_payload_of, export_result, export_simulator_of, export_stored, study_inputs};
 use std::path::PathBuf;
 
-/// Options of `export`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The result.json of an identification, or its folder.
     result: PathBuf,
-    /// The study that it was made with: needed for results of older versions and for the simulator's drives.
+    /// The study of the result: needed for results of older versions and for the simulator's drives.
     #[arg(long, value_name = "STUDY.toml")]
     study: Option<PathBuf>,
-    /// Use the result although it was edited after it was written. Its numbers are checked all the same.
+    /// Use the result although it was edited after it was written. Its numbers are still checked.
     #[arg(long)]
     accept_edited: bool,
-    /// The form.
+    /// The format.
     #[arg(long, value_enum, value_name = "FORM")]
     to: Form,
-    /// Which payload, where the result has several.
+    /// Which payload, if the result has several.
     #[arg(long, value_name = "NAME")]
     payload: Option<String>,
     /// Write to this file instead of standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// A further folder in which the study's files are looked for.
+    /// An additional folder for the study's files.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     #[command(flatten)]
@@ -54,13 +51,13 @@ enum Form {
     Urdf,
     /// SDF of Gazebo.
     Sdf,
-    /// Parameters of a ROS 2 node.
+    /// ROS 2 node parameters.
     Ros2Yaml,
     /// All numbers of the model.
     Json,
     /// Armature, damping, friction, delay and gain of every joint with error bars, for a simulator: JSON.
     Simulator,
-    /// The same as a table of Markdown.
+    /// The same as a Markdown table.
     SimulatorTable,
     /// A payload for Universal Robots: a line of URScript.
     PayloadUr,
@@ -72,7 +69,6 @@ enum Form {
     PayloadAbb,
 }
 
-/// What is written.
 enum Kind {
     Model(Target),
     SimulatorJson,
@@ -116,7 +112,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     let with_study = || {
         let study = study.as_ref().map(|(study, path)| (study, *path));
-        study.ok_or_else(|| "--study STUDY.toml is missing: name the study that the result was made with".to_owned())
+        study.ok_or_else(|| "--study STUDY.toml is missing: state the study of the result".to_owned())
     };
     let read = if options.accept_edited { ResultFile::read_edited } else { ResultFile::read };
     let stored = read(&result).map_err(message_of)?;
@@ -140,7 +136,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     write(options, context, exported)
 }
 
-/// The text to its file or to standard output, the notes to the screen.
+/// Writes the text to its file or to standard output, and the notes to standard error.
 fn write(options: &Options, context: &Context, exported: Exported) -> Result<Verdict, String> {
     let Exported { text, notes } = exported;
     if let Some(path) = &options.out {
@@ -154,7 +150,7 @@ fn write(options: &Options, context: &Context, exported: Exported) -> Result<Ver
         terminal::print_document(&json(&ExportFile { schema, target, notes, file, text })?)?;
         return Ok(Verdict::Good);
     }
-    // A problem of the result is said to whoever asks for quiet as well.
+    // A problem of the result is shown even with --quiet.
     let said = notes.iter().filter(|note| !context.quiet || note.contains("PROBLEM"));
     said.for_each(|note| terminal::remark(note));
     if options.out.is_none() {

@@ -1,23 +1,21 @@
-//! Files of factors: what `reduce`, `merge` and `identify --factors` share.
+//! Reading and writing of factor files for `reduce`, `merge` and `identify --factors`.
 
 use super::{Context, json};
 use crate::{summary, terminal};
 use dynident::{Factors, write_whole};
 use std::path::{Path, PathBuf};
 
-/// Reads factors; the message of what is wrong names the file.
+/// Reads factors; error messages contain the file name.
 pub(super) fn read(path: &Path) -> Result<Factors, String> {
     let bytes = dynident::read_result(path).map_err(super::message_of)?;
     Factors::from_bytes(&bytes).map_err(|error| format!("{}: {error}", path.display()))
 }
 
-/// All logs of several files.
 pub(super) fn read_all(paths: &[PathBuf]) -> Result<Factors, String> {
     let parts: Vec<Factors> = paths.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     Factors::merged(parts).map_err(|error| error.to_string())
 }
 
-/// Writes factors, whole or not at all, and says what they hold.
 pub(super) fn write(factors: &Factors, out: &Path, context: &Context) -> Result<(), String> {
     let bytes = factors.to_bytes().map_err(|error| format!("{}: {error}", out.display()))?;
     write_whole(out, &bytes).map_err(super::message_of)?;

@@ -1,4 +1,4 @@
-//! `dynident identify STUDY.toml --out DIR`, or of factors in place of a study and its logs.
+//! `dynident identify STUDY.toml --out DIR`, or with factors instead of a study and its logs.
 
 use super::permission::ProgramOptions;
 use super::{Context, factors, json, judged, known_in, message_of, pretty_json, refuse_overwriting, show_problems};
@@ -6,42 +6,41 @@ use crate::{Verdict, summary, terminal};
 use dynident::{Factors, IdentificationOutcome, OutputSet, RunOptions, check_writable, identify, identify_factors};
 use std::path::{Path, PathBuf};
 
-/// The user's description with the new values.
+/// The user's URDF with the new values.
 const URDF: &str = "identified.urdf";
-/// The same as a D-H table, where the user's is one.
+/// The same as a D-H table, if the user's robot file is one.
 const TABLE: &str = "identified.toml";
-/// The same as an MJCF, where the user's is one.
+/// The same as an MJCF, if the user's robot file is one.
 const MJCF: &str = "identified.xml";
-/// The same as an SDF, where the user's is one.
+/// The same as an SDF, if the user's robot file is one.
 const SDF: &str = "identified.sdf";
 
-/// Options of `identify`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file.
     #[arg(required_unless_present = "factors")]
     study: Option<PathBuf>,
-    /// Files of factors that `reduce` or `merge` wrote, in place of a study and its logs.
+    /// Factor files from `reduce` or `merge`, instead of a study and its logs.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["study", "data"])]
     factors: Vec<PathBuf>,
-    /// Of factors, the logs of this robot alone.
+    /// Use only the logs of this robot in the factors.
     #[arg(long, value_name = "NAME", requires = "factors")]
     arm: Option<String>,
-    /// Folder for result.json, report.html and identified.urdf (of a D-H table identified.toml as well, of an MJCF
-    /// identified.xml, of an SDF identified.sdf).
+    /// Folder for result.json, report.html and identified.urdf (for a D-H table also identified.toml, for an MJCF
+    /// identified.xml, for an SDF identified.sdf).
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Folder of the recordings, in place of the study's own.
+    /// Folder of the recordings, if it differs from the study's.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Exit with status 1 if the relative error on any held-out log is larger, or if none is held out.
+    /// Exit with status 1 if the relative error on any held-out log is larger, or if no log is held out.
     #[arg(long, value_name = "PERCENT", value_parser = super::percentage)]
     max_validation_error: Option<f64>,
     #[command(flatten)]
     programs: ProgramOptions,
 }
 
-/// What is written.
+/// All files that may be written.
 const FILES: [&str; 6] = [URDF, TABLE, MJCF, SDF, "report.html", "result.json"];
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
@@ -83,7 +82,6 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(if result.problems.is_empty() { within } else { Verdict::Negative })
 }
 
-/// The model of a study and its logs.
 fn of_study(path: &Path, options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
     let study = options.programs.load_study(path, options.data.as_deref())?;
     let named = (&study, path, options.data.as_deref());
@@ -93,7 +91,6 @@ fn of_study(path: &Path, options: &Options, run: &RunOptions<'_>) -> Result<Iden
     identify(&study, path, run).map_err(known_in(path))
 }
 
-/// The model of factors.
 fn of_factors(options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
     let outputs = FILES.map(|name| options.out.join(name));
     dynident::refuse_overwriting(&outputs, &options.factors).map_err(message_of)?;
@@ -105,18 +102,17 @@ fn of_factors(options: &Options, run: &RunOptions<'_>) -> Result<IdentificationO
     identify_factors(&all, run).map_err(message_of)
 }
 
-/// The logs of one robot.
 fn of_arm(all: &Factors, arm: &str) -> Result<Factors, String> {
     let own = all.only(|log| log.arm.as_deref() == Some(arm));
     if own.logs().is_empty() {
         let known: Vec<&str> = all.arms().into_iter().flatten().collect();
-        return Err(format!("--arm {arm}: no log of it; the factors have logs of {}", known.join(", ")));
+        return Err(format!("--arm {arm}: no log of this robot; the factors have logs of {}", known.join(", ")));
     }
     Ok(own)
 }
 
-/// What was asked for, without what does not change the result. Folders are left to the list of files: their names say
-/// more of a computer than of a result.
+/// The command line without options that do not change the result. Folders are omitted, because their names depend on
+/// the computer and not on the result.
 fn command(options: &Options) -> String {
     let name = |path: &Path| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let limit = options.max_validation_error.map(|limit| format!(" --max-validation-error {limit}"));

@@ -1,5 +1,3 @@
-//! `dynident inspect ROBOT`.
-
 use super::permission::XacroOptions;
 use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};
@@ -8,15 +6,14 @@ use dynident::{
 };
 use std::path::PathBuf;
 
-/// Options of `inspect`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// URDF, MJCF, SDF, or D-H table in TOML.
     robot: PathBuf,
-    /// Write a copy of the URDF in which the slips that were found are corrected, and nothing else is changed.
+    /// Write a copy of the URDF in which the detected mistakes are corrected, and nothing else is changed.
     #[arg(long, value_name = "OUT.urdf")]
     fix: Option<PathBuf>,
-    /// What all masses, the base's with them, should add up to, kg; by default what a comment of the file says.
+    /// Expected total mass including the base, kg; by default the value in a comment of the file.
     #[arg(long, value_name = "KG", value_parser = kilograms)]
     total_mass: Option<f64>,
     #[command(flatten)]
@@ -53,18 +50,16 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         }
         MendedDescription::NothingToMend => {
             terminal::remark(&format!(
-                "{} was not written: no slip was found whose numbers can be known",
+                "{} was not written: no mistake with known correct numbers was found",
                 out.display()
             ));
             Ok(verdict(&inspection))
         }
-        MendedDescription::NoUrdf => {
-            Err(format!("{}: --fix looks for slips in URDFs, and this is none", options.robot.display()))
-        }
+        MendedDescription::NoUrdf => Err(format!("{}: --fix supports only URDF files", options.robot.display())),
     }
 }
 
-/// A description with problems is read all the same; the status says that a person should look.
+/// A robot description with problems is still read; the exit status is then negative.
 fn verdict(inspection: &Inspection) -> Verdict {
     let problem = inspection.audit.iter().any(|entry| entry.level == "problem");
     if problem || !inspection.slips.is_empty() { Verdict::Negative } else { Verdict::Good }

@@ -1,4 +1,4 @@
-//! Ctrl-C (and what else asks a program to end: SIGTERM, a terminal that goes away).
+//! Ctrl-C, and other requests to end the program (SIGTERM, closing of the terminal).
 
 use crate::terminal;
 use dynident::Error;
@@ -7,20 +7,18 @@ use std::cell::Cell;
 use std::sync::{Mutex, Once, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Exit status of a program that was interrupted.
 pub(crate) const STATUS: u8 = 130;
 
-/// A Ctrl-C this soon after the first one is the same press: keyboards repeat a key that is held down, and a robot
-/// needs some time to brake.
-const SAME_PRESS: Duration = Duration::from_millis(500);
+/// A second Ctrl-C within this time is ignored: held keys repeat, and a robot needs some time to brake.
+const REPEAT_INTERVAL: Duration = Duration::from_millis(500);
 
-/// When Ctrl-C was pressed first.
 static FIRST_PRESS: OnceLock<Instant> = OnceLock::new();
-/// Who hears of Ctrl-C.
+/// The signal that Ctrl-C sets.
 static STOP: Mutex<Option<StopSignal>> = Mutex::new(None);
 
-/// From now on the first Ctrl-C asks for a stop: searches end with the best, robots stop. A further one, at least 0.5 s
-/// after the first, kills every program that serves a robot, with all its processes, and ends this one.
+/// Handles Ctrl-C from now on: the first one requests a stop (searches end with their best result, robots stop). A
+/// further one, at least 0.5 s after the first, kills every robot program with all its processes, and ends this
+/// program.
 pub(crate) fn listen(stop: &StopSignal) {
     static HANDLER: Once = Once::new();
     *STOP.lock().unwrap_or_else(PoisonError::into_inner) = Some(stop.clone());
@@ -29,7 +27,7 @@ pub(crate) fn listen(stop: &StopSignal) {
 }
 
 fn on_ctrl_c() {
-    // Nobody listens any more.
+    // No stop signal is registered any more.
     let Some(stop) = STOP.lock().unwrap_or_else(PoisonError::into_inner).clone() else {
         std::process::exit(i32::from(STATUS));
     };
@@ -39,24 +37,23 @@ fn on_ctrl_c() {
         stop.request();
         return;
     }
-    if now.duration_since(first) < SAME_PRESS {
+    if now.duration_since(first) < REPEAT_INTERVAL {
         return;
     }
     if stop.kill_robots() {
         terminal::remark(
-            "the robot's program was killed before it said that the robot stands: nobody knows whether it \
-             does, look at it before anything else",
+            "the robot's program was killed before it confirmed the stop: the robot may still be moving, \
+             check it first",
         );
     }
     std::process::exit(i32::from(STATUS));
 }
 
-/// Calls `job`, which may run a program to its end. Ctrl-C stops that program with all its processes, and then ends the
-/// command.
+/// Calls `job`, which may run a program. Ctrl-C stops that program with all its processes, and then ends the command.
 pub(crate) fn while_program_runs<R>(job: impl FnOnce(&dyn Fn() -> bool) -> Result<R, Error>) -> Result<R, Error> {
     let begun = Cell::new(false);
     let is_stopped = || {
-        // A file that needs no program leaves Ctrl-C as it is.
+        // Without a program Ctrl-C works as usual.
         if !begun.replace(true) {
             listen(&StopSignal::default());
         }
@@ -72,7 +69,6 @@ pub(crate) fn while_program_runs<R>(job: impl FnOnce(&dyn Fn() -> bool) -> Resul
     outcome
 }
 
-/// Whether Ctrl-C was pressed.
 pub(crate) fn pressed() -> bool {
     FIRST_PRESS.get().is_some()
 }

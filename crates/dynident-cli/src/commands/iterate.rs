@@ -1,5 +1,3 @@
-//! `dynident iterate STUDY.toml --out DIR`.
-
 use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, interruption, json, known_in, message_of, permission, refuse_overwriting};
@@ -14,7 +12,6 @@ use dynident::{
 };
 use std::path::{Path, PathBuf};
 
-/// Files and folders of every iteration.
 const WRITTEN: [&str; 11] = [
     "iterations.json",
     "report.html",
@@ -29,22 +26,21 @@ const WRITTEN: [&str; 11] = [
     "controller.json",
 ];
 
-/// Options of `iterate`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder for iterations.json, report.html, trajectory.json, runs/, and the robot that was found: result.json,
+    /// Folder for iterations.json, report.html, trajectory.json, runs/, and the identified robot: result.json,
     /// identified.urdf (and .toml or .xml), identification.html, controller.json.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Make every run anew: by default runs that are in the folder already are not made again.
+    /// Repeat every run; by default existing runs in the folder are kept.
     #[arg(long)]
     fresh: bool,
-    /// Say in one line how the iteration in the folder stands, and run nothing.
+    /// Print the status of the iteration in the folder in one line, and run nothing.
     #[arg(long, conflicts_with = "fresh")]
     status: bool,
-    /// Seed of the simulated sensors' noise, in place of the study's.
+    /// Seed of the simulated sensor noise, if it differs from the study's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     #[command(flatten)]
@@ -52,12 +48,11 @@ pub(crate) struct Options {
     /// Ask on the terminal before each run.
     #[arg(long)]
     confirm: bool,
-    /// Folder of the robot description, in place of the study's own.
+    /// Folder of the robot description, if it differs from the study's.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
 }
 
-/// Runs the command.
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     if options.status {
         return status(&options.out, context);
@@ -79,7 +74,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     let stop = StopSignal::default();
     interruption::listen(&stop);
-    // A bar would be drawn over the questions.
+    // A progress bar would overwrite the questions.
     let progress: Box<dyn Progress> = if options.confirm { Box::new(Silent) } else { context.progress() };
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context, OnInterrupt::EndsCommand);
@@ -112,21 +107,18 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
 }
 
-/// Files and folders that an iteration may write into its folder.
 fn written_files(study: &Study) -> Vec<String> {
     let legs = study.iteration.as_ref().map_or(0, |section| section.leg.len());
     let legs = (1..=legs).map(|leg| format!("leg_{leg}/runs"));
     WRITTEN.into_iter().map(str::to_owned).chain(legs).collect()
 }
 
-/// The largest number of runs of a study.
 fn most_runs(study: &Study) -> u64 {
     let section = study.iteration.clone().unwrap_or_default();
     let iterations = if section.order == LegOrder::OneAfterAnother { section.leg.len().max(1) } else { 1 };
     (section.max_runs * iterations) as u64
 }
 
-/// Prints the result of an iteration that has ended.
 fn ended(file: &IterationsFile, options: &Options, context: &Context) -> Result<Verdict, String> {
     if context.json {
         terminal::print_document(&json(file)?)?;
@@ -139,11 +131,10 @@ fn ended(file: &IterationsFile, options: &Options, context: &Context) -> Result<
     Ok(if file.converged { Verdict::Good } else { Verdict::Negative })
 }
 
-/// How the iteration in a folder stands.
 fn status(out: &Path, context: &Context) -> Result<Verdict, String> {
     let path = out.join("iterations.json");
     if !path.is_file() {
-        return Err(format!("{}: no iteration has been here yet", path.display()));
+        return Err(format!("{}: this folder contains no iteration", path.display()));
     }
     let file = IterationsFile::read(&path).map_err(message_of)?;
     if context.json {

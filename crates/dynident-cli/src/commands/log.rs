@@ -1,13 +1,10 @@
-//! `dynident log FILE`.
-
 use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};
 use std::path::PathBuf;
 
-/// Options of `log`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// A recording of any format that is read, or the folder of a rosbag2 recording.
+    /// A recording in any supported format, or the folder of a rosbag2 recording.
     file: PathBuf,
 }
 

@@ -1,13 +1,12 @@
-//! `dynident man DIR`: for those who pack the program, so no help lists it.
+//! `dynident man DIR`: for packagers, so it is not listed in the help.
 
 use super::{Context, message_of};
 use crate::Verdict;
 use std::path::PathBuf;
 
-/// Options of `man`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The folder, which is made if it is not there.
+    /// The folder, which is created if necessary.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }

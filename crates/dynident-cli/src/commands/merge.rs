@@ -1,16 +1,13 @@
-//! `dynident merge FILE.. --out FILE`.
-
 use super::{Context, factors, message_of};
 use crate::Verdict;
 use std::path::PathBuf;
 
-/// Options of `merge`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// Files of factors that `reduce` or `merge` wrote, of one robot and one study.
+    /// Factor files from `reduce` or `merge`, of one robot and one study.
     #[arg(required = true, num_args = 1.., value_name = "FILE")]
     factors: Vec<PathBuf>,
-    /// The file of factors to write.
+    /// The factor file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }

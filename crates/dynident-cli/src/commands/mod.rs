@@ -30,10 +30,9 @@ use dynident::{Progress, Silent, Study, study_inputs};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Problems that standard error shows.
-const PROBLEMS_SHOWN: usize = 8;
+/// Largest number of problems on standard error.
+const MAX_PROBLEMS_SHOWN: usize = 8;
 
-/// What every command knows of how it was called.
 pub(crate) struct Context {
     pub(crate) json: bool,
     pub(crate) quiet: bool,
@@ -41,35 +40,30 @@ pub(crate) struct Context {
 }
 
 impl Context {
-    /// A bar for people who watch; silence for pipes and `--quiet`.
     pub(crate) fn progress(&self) -> Box<dyn Progress> {
         if self.quiet || !terminal::watched() { Box::new(Silent) } else { Box::new(Bar::default()) }
     }
 }
 
-/// Runs `job` in a pool of `threads` threads.
 pub(crate) fn with_threads<R: Send>(threads: usize, job: impl FnOnce() -> R + Send) -> R {
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(job),
-        // A system that refuses threads still gets its result.
+        // Without threads the job runs here.
         Err(_) => job(),
     }
 }
 
-/// A value as one line of JSON.
 pub(crate) fn json<T: Serialize>(value: &T) -> Result<String, String> {
     dynident_text::json::to_string(value).map_err(|error| format!("the result cannot be written as JSON: {error}"))
 }
 
-/// A value as JSON for a file: a person may want to read it.
 pub(crate) fn pretty_json<T: Serialize>(value: &T) -> Result<Vec<u8>, String> {
     let text = dynident_text::json::to_string_pretty(value);
     let text = text.map_err(|error| format!("the result cannot be written as JSON: {error}"))?;
     Ok((text + "\n").into_bytes())
 }
 
-/// An error's message.
-#[allow(clippy::needless_pass_by_value, reason = "the shape that map_err wants")]
+#[allow(clippy::needless_pass_by_value, reason = "required by map_err")]
 pub(crate) fn message_of(error: dynident::Error) -> String {
     error.to_string()
 }
@@ -81,22 +75,23 @@ pub(crate) fn percentage(text: &str) -> Result<f64, String> {
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("give 0 or more percent".to_owned()) }
 }
 
-/// The first problems of a result on standard error, and how many there are more, `listed` where.
+/// Prints the first problems of a result on standard error, and the number of further ones; `listed` states where these
+/// are.
 pub(crate) fn show_problems(problems: &[String], listed: &str) {
-    for problem in problems.iter().take(PROBLEMS_SHOWN) {
+    for problem in problems.iter().take(MAX_PROBLEMS_SHOWN) {
         terminal::remark(&format!("PROBLEM: {problem}"));
     }
-    if problems.len() > PROBLEMS_SHOWN {
-        terminal::remark(&format!("and {} more problems{listed}", problems.len() - PROBLEMS_SHOWN));
+    if problems.len() > MAX_PROBLEMS_SHOWN {
+        terminal::remark(&format!("and {} more problems{listed}", problems.len() - MAX_PROBLEMS_SHOWN));
     }
 }
 
-/// Whether every log stays below the error that was asked for, if one was: of the model that is written, which is the
-/// consistent set where there is one.
+/// Whether the error on every log is at most the limit, if there is one. The error is that of the written model: the
+/// physically consistent model if there is one.
 pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
     let Some(limit) = limit else { return Verdict::Good };
     if logs.is_empty() {
-        terminal::remark("no log was held out, so no error could be tested");
+        terminal::remark("no log was held out, so the error cannot be tested");
         return Verdict::Negative;
     }
     let mut verdict = Verdict::Good;
@@ -106,11 +101,14 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
         match written.unwrap_or(&log.model).relative_error_percent {
             Some(error) if error <= limit => continue,
             Some(error) => terminal::remark(&format!(
-                "{}: the {whose}'s error of {error:.2} % is above the {limit} % asked for",
+                "{}: the {whose}'s error of {error:.2} % is above the limit of {limit} %",
                 log.log
             )),
             None => {
-                terminal::remark(&format!("{}: the torque is zero throughout, so it has no relative error", log.log));
+                terminal::remark(&format!(
+                    "{}: the torque is always zero, so the relative error is undefined",
+                    log.log
+                ));
             }
         }
         verdict = Verdict::Negative;
@@ -118,8 +116,8 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
     verdict
 }
 
-/// That none of the files (or folders) `names` in the folder `out` is one that the study names in `sections`, or one of
-/// `further`.
+/// Checks that none of the files (or folders) `names` in the folder `out` is an input of the study in `sections`, or
+/// one of `further`.
 pub(crate) fn refuse_overwriting(
     (out, names): (&Path, &[&str]),
     (study, path, data): (&Study, &Path, Option<&Path>),
@@ -131,8 +129,8 @@ pub(crate) fn refuse_overwriting(
     dynident::refuse_overwriting(&outputs, &inputs).map_err(message_of)
 }
 
-/// The message of an error that a study led to. Where it speaks of another file, the study that names that file is
-/// named as well.
+/// Returns the message of an error in a study. If the error is in another file, the message also contains the study's
+/// name.
 pub(crate) fn known_in(study: &Path) -> impl Fn(dynident::Error) -> String {
     use dynident::Error::{Missing, Recording, Robot, Xacro};
     move |error| match error {

@@ -7,22 +7,21 @@ use dynident::result::{StudyChange, Unsure};
 use dynident::{NewStudy, RunOptions, new_study};
 use std::path::PathBuf;
 
-/// Options of `new`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The robot: URDF, MJCF, SDF, or D-H table in TOML.
     #[arg(long, value_name = "FILE")]
     robot: PathBuf,
-    /// The recordings, of any format that is read; the last of several tests the model.
+    /// The recordings, in any supported format; the last of several is held out.
     #[arg(long = "log", required = true, num_args = 1.., value_name = "FILE")]
     logs: Vec<PathBuf>,
     /// The study to write.
     #[arg(long, value_name = "STUDY.toml", default_value = "study.toml")]
     out: PathBuf,
-    /// Samples a second, for recordings without time stamps.
+    /// Sample rate for recordings without time stamps, Hz.
     #[arg(long, value_name = "HZ")]
     rate_hz: Option<f64>,
-    /// Write over a study that is there.
+    /// Overwrite an existing study.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -32,7 +31,7 @@ pub(crate) struct Options {
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     if options.out.exists() && !options.force {
         return Err(format!(
-            "{} is there already, and may hold what somebody wrote: give another --out, or --force",
+            "{} already exists and may contain your changes: use another --out, or --force",
             options.out.display()
         ));
     }
@@ -40,7 +39,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     inputs.push(options.robot.clone());
     dynident::refuse_overwriting(core::slice::from_ref(&options.out), &inputs).map_err(message_of)?;
     if options.rate_hz.is_some_and(|rate_hz| !(rate_hz > 0.0 && rate_hz.is_finite())) {
-        return Err("--rate-hz: give samples a second, more than 0".to_owned());
+        return Err("--rate-hz: give a positive sample rate, Hz".to_owned());
     }
 
     let description = options.xacro.load_robot(&options.robot)?;
@@ -68,7 +67,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         terminal::print_document(found.text.trim_end())?;
     }
     for unsure in &found.unsure {
-        terminal::remark(&format!("look at {}", unsure.sentence()));
+        terminal::remark(&format!("check {}", unsure.sentence()));
     }
     if !context.json && !context.quiet {
         terminal::remark(&format!("written: {0}; next: dynident identify {0} --out result", options.out.display()));
@@ -76,8 +75,8 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(if found.unsure.is_empty() { Verdict::Good } else { Verdict::Negative })
 }
 
-/// What a person on the terminal states: a line in place of one that is not sure, or what the examination proposes;
-/// empty where it is left.
+/// Changes that a person states on the terminal: a line instead of an uncertain one, or the proposal of the
+/// examination; empty without an answer.
 fn stated(unsure: &Unsure) -> Vec<StudyChange> {
     if !unsure.proposed.is_empty() {
         let is_agreed = agreed(&format!("{}\nWrite it?", unsure.reason)).unwrap_or(false);
@@ -87,7 +86,7 @@ fn stated(unsure: &Unsure) -> Vec<StudyChange> {
     unsure.line.as_ref().and_then(shown).into_iter().collect()
 }
 
-/// The line that stands in place of `change`, once it is one.
+/// Asks for a replacement of the line `change` until it is valid TOML.
 fn line_stated(change: &StudyChange, reason: &str) -> Option<StudyChange> {
     let (key, value) = change.line.split_once(" = ")?;
     let mut question = format!("{}: {reason}\n  {key} [{value}]:", change.place());
@@ -96,6 +95,6 @@ fn line_stated(change: &StudyChange, reason: &str) -> Option<StudyChange> {
         if answer.is_well_formed() {
             return Some(answer);
         }
-        question = format!("  that is no value of TOML, such as {value}; {key}:");
+        question = format!("  invalid TOML value (valid is for example {value}); {key}:");
     }
 }

@@ -1,5 +1,3 @@
-//! Questions to the user before a program starts or a robot moves.
-
 use super::{answer, interruption, known_in, message_of};
 use crate::terminal;
 use dynident::iteration::{NextMotion, RunPurpose};
@@ -15,8 +13,8 @@ use std::path::Path;
 /// Options of every command that may start a program.
 #[derive(clap::Args)]
 pub(crate) struct ProgramOptions {
-    /// Start the programs that the files need without asking: xacro for a robot file with macros, and the robot's
-    /// program of a study. Give it only for files that you trust.
+    /// Start the programs that the files need without asking: xacro for a robot file with macros, and the robot program
+    /// of a study. Use it only for files that you trust.
     #[arg(long)]
     allow_command: bool,
 }
@@ -40,12 +38,12 @@ fn argument(text: &str) -> Result<(String, String), String> {
 }
 
 impl XacroOptions {
-    /// How xacro is called.
+    /// The settings of the xacro call.
     pub(crate) fn settings(&self) -> XacroSettings {
         XacroSettings { arguments: self.arguments.iter().cloned().collect(), limit_s: self.xacro_limit_s }
     }
 
-    /// Reads a robot file. xacro is started if that is permitted.
+    /// Reads a robot file. xacro is started if permitted.
     pub(crate) fn load_robot(&self, path: &Path) -> Result<Robot, String> {
         let decisions = self.programs.decisions();
         let loaded = decisions.with(|programs| {
@@ -58,12 +56,11 @@ impl XacroOptions {
 }
 
 impl ProgramOptions {
-    /// What is decided in the course of a command.
     pub(crate) fn decisions(&self) -> Decisions {
         Decisions { is_allowed: self.allow_command, made: RefCell::default() }
     }
 
-    /// Reads a study. xacro is started for its robot file if the file needs it and that is permitted.
+    /// Reads a study. xacro is started for its robot file if needed and permitted.
     pub(crate) fn load_study(&self, path: &Path, data: Option<&Path>) -> Result<Study, String> {
         let mut study = Study::load(path).map_err(message_of)?;
         let expanded = self.decisions().with(|programs| {
@@ -74,7 +71,6 @@ impl ProgramOptions {
     }
 }
 
-/// The decisions of a command about programs: each program is shown once.
 pub(crate) struct Decisions {
     is_allowed: bool,
     made: RefCell<HashMap<Vec<String>, bool>>,
@@ -86,7 +82,7 @@ impl Decisions {
         job(ProgramPermission::Ask(&|request| self.decide(request)))
     }
 
-    /// Decides on the program of a study's robot, before a job that needs it begins.
+    /// Decides on the robot program of a study before the job begins.
     pub(crate) fn decide_on_robot(&self, study: &Study, path: &Path) -> Result<(), String> {
         let robot = study.iteration.as_ref().map(|section| &section.robot);
         let Some(RobotChoice::Process(process)) = robot else { return Ok(()) };
@@ -95,7 +91,7 @@ impl Decisions {
         permitted.map(drop).map_err(refused)
     }
 
-    /// Decides on a program: shown once, started without a question or after a yes.
+    /// Decides on a program: it is shown once, and started if allowed by an option or after a yes.
     pub(crate) fn decide(&self, request: &ProgramRequest) -> bool {
         if let Some(&decision) = self.made.borrow().get(&request.command) {
             return decision;
@@ -111,17 +107,17 @@ impl Decisions {
     }
 }
 
-/// Length from which a command may fill a screen, so that its beginning is out of sight, characters.
-const LONG_COMMAND: usize = 500;
+/// Length of a command above which its begin may scroll off the screen, characters.
+const LONG_COMMAND_CHARACTERS: usize = 500;
 
-/// The question whether a program may be started. The command is on one line, and the last line names a long one's
-/// program and length: a hostile command cannot scroll its beginning away and end with a question of its own.
+/// The question whether a program may be started. The command is on one line, and for a long one the last line contains
+/// its program and length, so that a hostile command cannot scroll its begin away and end with a fake question.
 fn permission_question(request: &ProgramRequest) -> String {
     let command = request.command_line();
     let command = one_line(&command);
     let length = command.chars().count();
     let program = request.command.first().map_or("", String::as_str);
-    let which = if length > LONG_COMMAND {
+    let which = if length > LONG_COMMAND_CHARACTERS {
         format!("The command has {length} characters; its program is {}. ", one_line(program))
     } else {
         String::new()
@@ -129,14 +125,13 @@ fn permission_question(request: &ProgramRequest) -> String {
     format!("{}:\n  {command}\n{which}Start it?", request.purpose)
 }
 
-/// Asks before a motion.
 pub(crate) fn for_motion(motion: &NextMotion) -> bool {
     let (leg, legs) = motion.leg;
     let of = if legs > 1 { format!(", trajectory {} of {legs}", leg + 1) } else { String::new() };
-    let model = if motion.model_based { "with the model so far" } else { "without a model" };
+    let model = if motion.model_based { "with the newest model" } else { "without a model" };
     let share = if motion.speed < 1.0 { format!(" at {} of its speed", motion.speed) } else { String::new() };
     let what = match motion.purpose {
-        RunPurpose::WarmUp { pass, of } => format!("pass {pass} of {of} that warm up for run {}", motion.run),
+        RunPurpose::WarmUp { pass, of } => format!("warm-up pass {pass} of {of} before run {}", motion.run),
         RunPurpose::HeldOut => format!("the held-out motion after run {}", motion.run),
         RunPurpose::Run => format!("run {}", motion.run),
     };
@@ -146,11 +141,11 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
     let ways = motion.ways.as_ref().map_or_else(String::new, |ways| {
         let over = |way: usize| match ways.over_postures[way] {
             0 => String::new(),
-            1 => " over a posture in between".to_owned(),
-            several => format!(" over {several} postures in between"),
+            1 => " through one via posture".to_owned(),
+            several => format!(" through {several} via postures"),
         };
         format!(
-            "\n  from home {:.1} s{}, back {:.1} s{}; largest velocities on these ways: {}",
+            "\n  from home {:.1} s{}, back {:.1} s{}; largest velocities on these paths: {}",
             ways.approach_s,
             over(0),
             ways.return_s,
@@ -159,7 +154,7 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
         )
     });
     let question = format!(
-        "{what}{of}: {:.1} s{share} under {} {model}; largest velocities, rad/s (m/s): {}{ways}\nIs the robot clear?",
+        "{what}{of}: {:.1} s{share} with controller {} {model}; largest velocities, rad/s (m/s): {}{ways}\nIs the robot clear?",
         motion.duration_s,
         motion.controller,
         speeds(&motion.largest_speed)
@@ -167,16 +162,14 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
     agreed(&question).unwrap_or(false)
 }
 
-/// That there is somebody who can be asked.
 pub(crate) fn somebody() -> Result<(), String> {
     if std::io::stdin().is_terminal() {
         return Ok(());
     }
-    Err("--confirm asks on the terminal before each run, and standard input is none: call it from a terminal"
-        .to_owned())
+    Err("--confirm needs a terminal, but standard input is not a terminal: run the command in a terminal".to_owned())
 }
 
-/// A line of text; none if nobody is there, or nothing is said.
+/// Asks for a line of text; `None` without a terminal, or for an empty answer.
 pub(crate) fn text_asked(question: &str) -> Option<String> {
     if !(std::io::stdin().is_terminal() && terminal::watched()) {
         return None;
@@ -185,7 +178,7 @@ pub(crate) fn text_asked(question: &str) -> Option<String> {
     Some(answer.trim().to_owned()).filter(|answer| !answer.is_empty())
 }
 
-/// Yes or no; none if nobody is there.
+/// Asks a yes-no question; `None` without a terminal.
 pub(crate) fn agreed(question: &str) -> Option<bool> {
     if !(std::io::stdin().is_terminal() && terminal::watched()) {
         return None;

@@ -1,33 +1,31 @@
-//! `dynident reduce STUDY.toml --out FILE`.
-
 use super::permission::ProgramOptions;
 use super::{Context, factors, known_in, message_of, refuse_overwriting};
 use crate::Verdict;
 use dynident::{ReduceSettings, ResultFile, Role, RunOptions, Study, reduce, seconds_of};
 use std::path::{Path, PathBuf};
 
-/// Options of `reduce`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The study file; cut-off and friction are stated in it, or taken from --like.
+    /// The study file; it must state cut-off and friction, or use --like.
     study: PathBuf,
-    /// The file of factors to write.
+    /// The factor file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Reduce this log of the study alone, whatever its role; may be given several times. By default all that are
-    /// fitted to.
+    /// Reduce only this log of the study, in any role; may be given several times. Default: all logs with the
+    /// role "identify".
     #[arg(long = "log", value_name = "NAME")]
     logs: Vec<String>,
-    /// Read logs as this model was identified: with the cut-off, friction and lag of its result.json.
+    /// Process the logs like this model: with the cut-off, friction and lag of its result.json.
     #[arg(long, value_name = "RESULT.json")]
     like: Option<PathBuf>,
-    /// The robot that the logs were recorded on, where there are several of one kind.
+    /// The robot of the logs, if there are several robots of one kind.
     #[arg(long, value_name = "NAME")]
     arm: Option<String>,
-    /// When they were recorded: 2026-01-05T08:00:00Z, 2026-01-05 (UTC), or seconds since 1970.
+    /// Time of the recording: 2026-01-05T08:00:00Z, 2026-01-05 (UTC), or seconds since 1970.
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     recorded_at: Option<f64>,
-    /// Time segments kept of each log: error bars of few logs need many, of hundreds one will do.
+    /// Number of time segments per log: a few logs need many segments for their error bars, for hundreds of logs one is
+    /// enough.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=4096))]
     segments: u16,
     /// Folder of the recordings, in place of the study's own.
@@ -63,14 +61,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(Verdict::Good)
 }
 
-/// Folder and name of a file.
 fn place(out: &Path) -> Result<(&Path, &str), String> {
     let name = out.file_name().and_then(|name| name.to_str());
     let name = name.ok_or_else(|| format!("{}: give the name of a file", out.display()))?;
     Ok((out.parent().unwrap_or_else(|| Path::new("")), name))
 }
 
-/// The named logs alone, to be fitted to.
+/// Keeps only the named logs, with the role "identify".
 fn choose(study: &mut Study, wanted: &[String]) -> Result<(), String> {
     let names: Vec<String> = (0..study.log.len()).map(|index| study.log_name(index)).collect();
     if let Some(unknown) = wanted.iter().find(|name| !names.contains(name)) {

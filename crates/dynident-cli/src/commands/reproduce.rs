@@ -1,15 +1,12 @@
-//! `dynident reproduce --out DIR`.
-
 use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};
 use dynident::RunOptions;
 use dynident_paper::reproduce;
 use std::path::PathBuf;
 
-/// Options of `reproduce`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// Folder for paper.json, report.html, the pictures and the studies behind them.
+    /// Folder for paper.json, report.html, the figures and their studies.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Seed of the genetic algorithm and of random starts.

@@ -1,5 +1,3 @@
-//! What a person sees of a search for a trajectory.
-
 use crate::commands::{Context, interruption};
 use crate::terminal;
 use core::ops::ControlFlow;
@@ -9,9 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Effect of Ctrl-C on a search.
 #[derive(Clone, Copy)]
 pub(crate) enum OnInterrupt {
-    /// The best motion so far is the result.
     KeepsBest,
-    /// The command ends, and nothing of the search is kept.
     EndsCommand,
 }
 
@@ -19,24 +15,23 @@ impl OnInterrupt {
     fn words(self) -> &'static str {
         match self {
             Self::KeepsBest => "Ctrl-C keeps the best",
-            Self::EndsCommand => "Ctrl-C ends the command, without this motion",
+            Self::EndsCommand => "Ctrl-C ends the command without this motion",
         }
     }
 }
 
-/// A line that shows how far a search is.
 pub(crate) struct Search {
     line: Option<ProgressBar>,
     on_interrupt: OnInterrupt,
 }
 
 impl Search {
-    /// Shows a line to people who watch. Once Ctrl-C was pressed the search ends.
+    /// Shows the line on a terminal. The search ends after Ctrl-C.
     pub(crate) fn new(context: &Context, on_interrupt: OnInterrupt) -> Self {
         Self { line: (!context.quiet && terminal::watched()).then(line), on_interrupt }
     }
 
-    /// Hears of the search, and ends it if that was asked for.
+    /// Updates the line, and ends the search if requested.
     pub(crate) fn hear(&self, at: &DesignProgress) -> ControlFlow<()> {
         if let Some(line) = &self.line {
             line.set_message(state(at, self.on_interrupt));
@@ -45,7 +40,6 @@ impl Search {
         if interruption::pressed() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// Clears the line.
     pub(crate) fn end(self) {
         if let Some(line) = self.line {
             line.finish_and_clear();
@@ -53,7 +47,6 @@ impl Search {
     }
 }
 
-/// The line that a person watches.
 fn line() -> ProgressBar {
     let line = ProgressBar::new_spinner();
     if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}") {
@@ -85,6 +78,6 @@ mod tests {
         let line = state(&at, OnInterrupt::KeepsBest);
         assert_eq!(line, "search: criterion 1.5000, 2.00 % over a limit; Ctrl-C keeps the best");
         let first = DesignProgress { round: "starts", value: f64::INFINITY, ..at };
-        assert_eq!(state(&first, OnInterrupt::EndsCommand), "starts; Ctrl-C ends the command, without this motion");
+        assert_eq!(state(&first, OnInterrupt::EndsCommand), "starts; Ctrl-C ends the command without this motion");
     }
 }

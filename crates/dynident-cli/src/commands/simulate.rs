@@ -1,5 +1,3 @@
-//! `dynident simulate STUDY.toml --out DIR`.
-
 use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, json, known_in, message_of, pretty_json, refuse_overwriting};
@@ -7,7 +5,6 @@ use crate::{Verdict, summary, terminal};
 use dynident::{OutputSet, RunOptions, check_writable, simulate_study};
 use std::path::PathBuf;
 
-/// Options of `simulate`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file.
@@ -15,10 +12,10 @@ pub(crate) struct Options {
     /// Folder for log.csv and truth.json.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Seed of the sensors' noise, in place of the study's.
+    /// Seed of the sensor noise, if it differs from the study's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Folder of the robot description, in place of the study's own.
+    /// Folder of the robot description, if it differs from the study's.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     #[command(flatten)]

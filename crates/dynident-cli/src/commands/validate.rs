@@ -1,23 +1,20 @@
-//! `dynident validate DIR/result.json --study STUDY.toml`.
-
 use super::permission::ProgramOptions;
 use super::{Context, json, judged, known_in, message_of, show_problems};
 use crate::{Verdict, summary, terminal};
 use dynident::{ResultFile, RunOptions, validate_result};
 use std::path::PathBuf;
 
-/// Options of `validate`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The result.json of an identification.
     result: PathBuf,
-    /// Use the result although it was edited after it was written. Its numbers are checked all the same.
+    /// Use the result although it was edited after it was written. Its numbers are still checked.
     #[arg(long)]
     accept_edited: bool,
-    /// A study with the same robot; its logs with the role "validate" are used, or all of them if none has it.
+    /// A study with the same robot; its logs with the role "validate" are used, or all logs if none has this role.
     #[arg(long, value_name = "STUDY.toml")]
     study: PathBuf,
-    /// Folder of the recordings, in place of the study's own.
+    /// Folder of the recordings, if it differs from the study's.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Exit with status 1 if the relative error on any log is larger.

@@ -1,9 +1,6 @@
-//! The summary of `benchmark`.
-
 use super::text::{table, wrapped};
 use dynident_benchmark::accuracy::BenchmarkFile;
 
-/// One line for every estimator at every noise level of every robot.
 pub(crate) fn benchmark(file: &BenchmarkFile) -> String {
     let header =
         ["robot", "noise", "estimator", "fail", "bias", "rmse", "rmse/m", "worst", "cover %", "ms"].map(str::to_owned);
@@ -29,7 +26,7 @@ pub(crate) fn benchmark(file: &BenchmarkFile) -> String {
         })
         .collect();
     let words = format!(
-        "{} runs of {} s at {} Hz, seed {}. bias, rmse, worst: in units of the Cramér-Rao bound, root mean square over parameters and the worst one, of the motion known; rmse/m: the bound with the motion unknown as well. cover: true values inside their 95 % intervals.",
+        "{} runs of {} s at {} Hz, seed {}. bias, rmse, worst: in units of the Cramér-Rao bound for known motion (root mean square over the parameters, and the worst one); rmse/m: in units of the bound for unknown motion. cover: true values inside their 95 % intervals.",
         file.settings.runs, file.duration_s, file.rate_hz, file.settings.seed,
     );
     format!("{}{}", table(&header, 3..10, rows), wrapped(&words, 0))

@@ -1,21 +1,15 @@
-//! The summary of `check`.
-
 use super::text::{name, table, wrapped};
 use core::fmt::Write;
 use dynident::CheckFile;
 use dynident::recording::Level;
 
-/// What was found, what to write, and the readings side by side.
 pub(crate) fn check(file: &CheckFile) -> String {
     let check = &file.check;
     let mut text = String::new();
     let problems = check.findings.iter().filter(|finding| finding.level == Level::Problem).count();
     if problems == 0 {
-        let _ = writeln!(
-            text,
-            "study, robot and logs fit together: {} other readings of the logs are no better",
-            check.tried
-        );
+        let _ =
+            writeln!(text, "study, robot and logs fit together: none of {} tested mistakes fits better", check.tried);
     }
     for finding in &check.findings {
         let level = if finding.level == Level::Problem { "PROBLEM" } else { "warning" };
@@ -25,12 +19,12 @@ pub(crate) fn check(file: &CheckFile) -> String {
             text += &wrapped(&format!("  under {} write: {}", change.place(), change.line), 4);
         }
         for other in &finding.or {
-            text += &wrapped(&format!("  these logs cannot tell it from: {other}"), 4);
+            text += &wrapped(&format!("  not distinguishable with these logs: {other}"), 4);
         }
     }
     if let Some(written) = &check.as_written {
         let best = check.best.as_ref();
-        text.push_str("\nTorque that no robot that can exist explains:\n");
+        text.push_str("\nTorque not explained by any physically consistent model:\n");
         let rows = check.joints.iter().enumerate().map(|(joint, joint_name)| {
             let percent = |reading: &dynident::result::ReadingResult| format!("{:.1}", reading.left_percent[joint]);
             vec![name(joint_name), percent(written), best.map_or_else(|| "-".to_owned(), percent)]

@@ -1,17 +1,14 @@
-//! The summary of `design`.
-
 use super::text::{name, percent, shortened, table, wrapped};
 use core::fmt::Write;
 use dynident::DesignFile;
 use dynident::result::WindowedFile;
 use std::path::Path;
 
-/// Limits and parameters shown; the rest stand in the file.
-const SHOWN: usize = 5;
-/// Columns that are left for an expression.
-const EXPRESSION: usize = 40;
+/// Number of limits and parameters shown; the file contains all.
+const MAX_SHOWN: usize = 5;
+/// Columns available for an expression.
+const EXPRESSION_COLUMNS: usize = 40;
 
-/// What was found, and how well each parameter will come out.
 pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
     let mut text = wrapped(&d.name, 2);
     let _ = writeln!(
@@ -24,7 +21,7 @@ pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
         d.criterion
     );
     if let Some(given) = &d.given {
-        text += &wrapped(&format!("looked at: {given}"), 2);
+        text += &wrapped(&format!("checked: {given}"), 2);
         text += &wrapped(&format!("limits on {}", d.check_of), 2);
         text.push('\n');
     }
@@ -70,7 +67,7 @@ pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
     text
 }
 
-/// A heading with one line for each item; nothing without items.
+/// A heading with one line for each item; empty without items.
 fn items(heading: &str, items: &[String]) -> String {
     if items.is_empty() {
         return String::new();
@@ -79,7 +76,7 @@ fn items(heading: &str, items: &[String]) -> String {
     core::iter::once(format!("{heading}\n")).chain(lines).collect()
 }
 
-/// The strokes of a windowed design and how far they are from the best ones.
+/// The strokes of a windowed design, compared with the optimum.
 fn strokes(w: &WindowedFile) -> String {
     let rows = w.strokes.iter().map(|stroke| {
         let numbers = [
@@ -104,22 +101,21 @@ fn strokes(w: &WindowedFile) -> String {
     text
 }
 
-/// The limits that the motion uses most.
 fn limits(d: &DesignFile) -> String {
     let mut used: Vec<_> = d.limits.iter().collect();
     used.sort_by(|a, b| b.worst_ratio.total_cmp(&a.worst_ratio));
-    let rows = used.iter().take(SHOWN).map(|limit| {
+    let rows = used.iter().take(MAX_SHOWN).map(|limit| {
         let part = format!("{:.2}", 100.0 * limit.worst_ratio);
         vec![limit.kind.to_string(), name(&limit.joint), part, format!("{:.3}", limit.at_s)]
     });
     table(&["limit", "of", "used %", "at s"].map(str::to_owned), 2..4, rows.collect())
 }
 
-/// The parameters that will be known best and worst, by relative error where there is a prior.
+/// The parameters with the smallest and largest error bars, relative if there is a prior.
 fn forecast(d: &DesignFile) -> String {
     let dark: Vec<&str> = d.forecast.iter().filter(|p| p.std.is_none()).map(|p| p.symbol.as_str()).collect();
     let mut known: Vec<_> = d.forecast.iter().filter(|p| p.std.is_some()).collect();
-    // Where priors are known, those that are zero have no place in a ranking by relative error.
+    // Parameters with a prior of zero have no relative error.
     if known.iter().any(|p| p.relative_std_percent.is_some()) {
         known.retain(|p| p.relative_std_percent.is_some());
     }
@@ -132,22 +128,22 @@ fn forecast(d: &DesignFile) -> String {
         let short = |std: Option<f64>| std.map_or("-".to_owned(), |std| format!("{std:.2e}"));
         let std = short(p.std);
         let prior = p.prior.map_or("-".to_owned(), |prior| format!("{prior:.4}"));
-        let mut row = vec![shortened(&p.expression, EXPRESSION), prior, std, percent(p.relative_std_percent)];
+        let mut row = vec![shortened(&p.expression, EXPRESSION_COLUMNS), prior, std, percent(p.relative_std_percent)];
         if with_prior {
-            row[0] = shortened(&p.expression, EXPRESSION - 12);
+            row[0] = shortened(&p.expression, EXPRESSION_COLUMNS - 12);
             row.push(short(p.std_with_prior));
         }
         row
     };
-    let ends = known.len().min(SHOWN / 2);
+    let ends = known.len().min(MAX_SHOWN / 2);
     let rows: Vec<_> =
-        known[..ends].iter().chain(&known[ends.max(known.len().saturating_sub(SHOWN - ends))..]).map(row).collect();
+        known[..ends].iter().chain(&known[ends.max(known.len().saturating_sub(MAX_SHOWN - ends))..]).map(row).collect();
     let mut text = String::from("forecast, best and worst known:\n");
     let heads = ["parameter", "prior", "std", "std %", "with prior"].map(str::to_owned);
     let columns = if with_prior { 5 } else { 4 };
     text += &table(&heads[..columns], 1..columns, rows);
     if !dark.is_empty() {
-        text += &wrapped(&format!("  not excited at all: {}", dark.join(", ")), 4);
+        text += &wrapped(&format!("  not excited: {}", dark.join(", ")), 4);
     }
     text
 }

@@ -1,14 +1,9 @@
-//! The summary of `reduce` and `merge`.
-
 use super::text::{name, table, wrapped};
 use dynident::result::FactorsFile;
 
-/// Digits of a hash that tell logs apart.
 const DIGITS: usize = 8;
-/// Logs that are listed; the others are counted.
-const LISTED: usize = 40;
+const MAX_LISTED: usize = 40;
 
-/// What a file of factors holds.
 pub(crate) fn factors(file: &FactorsFile) -> String {
     let rows: u64 = file.logs.iter().map(|log| log.rows).sum();
     let count = file.logs.len();
@@ -21,9 +16,9 @@ pub(crate) fn factors(file: &FactorsFile) -> String {
         vec![name(&log.name), name(&or_none(&log.arm)), or_none(&log.recorded_at), digits, log.rows.to_string()]
     };
     let header = ["log", "arm", "recorded", "hash", "rows"].map(str::to_owned);
-    text += &table(&header, 4..5, file.logs.iter().take(LISTED).map(row).collect());
-    if count > LISTED {
-        text += &wrapped(&format!("  and {} more", count - LISTED), 2);
+    text += &table(&header, 4..5, file.logs.iter().take(MAX_LISTED).map(row).collect());
+    if count > MAX_LISTED {
+        text += &wrapped(&format!("  and {} more", count - MAX_LISTED), 2);
     }
     text
 }

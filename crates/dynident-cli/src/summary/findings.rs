@@ -1,47 +1,43 @@
-//! What the importer found, said once however many joints and logs it concerns.
+//! Findings of the importer; equal findings of several joints and logs are combined.
 
 use super::text::wrapped;
 use dynident::ResultFile;
 use dynident::recording::Level;
 use dynident::result::LogSummary;
 
-/// Findings that differ in joint, log and numbers only.
+/// Findings that differ only in joint, log and numbers.
 struct Group {
     level: Level,
     quantity: String,
     joints: Vec<String>,
     logs: Vec<usize>,
-    /// The message's words between its numbers.
     words: Vec<String>,
-    /// The texts of smallest and largest of each number.
+    /// The smallest and the largest value of each number, with their texts.
     numbers: Vec<[(f64, String); 2]>,
 }
 
-/// Problems and warnings of all logs, problems first.
 pub(super) fn findings(logs: &[LogSummary]) -> String {
     let problems = of_level(logs, Level::Problem);
-    let spoilt = if problems.is_empty() { "" } else { SPOILT };
+    let spoilt = if problems.is_empty() { "" } else { PROBLEM_NOTE };
     problems + spoilt + &warnings(logs)
 }
 
-/// What stands below problems.
-const SPOILT: &str = "  A PROBLEM spoils the result: fix it before trusting any figure here.\n";
+const PROBLEM_NOTE: &str = "  A PROBLEM invalidates the result: fix it before you use any value shown here.\n";
 
-/// Everything that speaks against a result's model, alike findings of several joints and logs as one.
+/// All problems of a result's model; equal findings of several joints and logs are combined.
 pub(super) fn problems(r: &ResultFile) -> String {
     let mut text = of_level(&r.logs, Level::Problem);
     for problem in r.problems_of_the_model() {
         text += &wrapped(&format!("  PROBLEM {problem}"), 4);
     }
-    if text.is_empty() { text } else { text + SPOILT }
+    if text.is_empty() { text } else { text + PROBLEM_NOTE }
 }
 
-/// Warnings of all logs.
 pub(super) fn warnings(logs: &[LogSummary]) -> String {
     of_level(logs, Level::Warning)
 }
 
-/// Findings of one level, alike ones as one.
+/// Findings of one level, with equal ones combined.
 fn of_level(logs: &[LogSummary], level: Level) -> String {
     let mut groups: Vec<Group> = Vec::new();
     for (log, summary) in logs.iter().enumerate() {
@@ -111,14 +107,14 @@ fn sentence(group: &Group, logs: &[LogSummary]) -> String {
         message += words;
     }
     let unused = if matches!(&group.quantity[..], "velocity" | "acceleration") {
-        "; it is only compared, the fit derives its own"
+        "; it is only compared, the fit computes its own"
     } else {
         ""
     };
     format!("  {level} {}{joints}{places}: {message}{unused}", group.quantity)
 }
 
-/// A message as the words between its numbers, and the numbers; there is one more of the former.
+/// Splits a message into its numbers and the words between them; there is one more entry of words.
 fn parted(message: &str) -> (Vec<String>, Vec<(f64, String)>) {
     let (mut words, mut numbers, mut rest) = (vec![String::new()], Vec::new(), message);
     while let Some(first) = rest.chars().next() {

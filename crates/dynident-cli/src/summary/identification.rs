@@ -1,5 +1,3 @@
-//! The summary of `identify`.
-
 use super::findings::{problems, warnings};
 use super::noise::noise;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
@@ -13,18 +11,15 @@ use dynident::identification::friction::FrictionCandidate;
 use dynident::result::{BaseParameterResult, LogSummary};
 use std::path::Path;
 
-/// Base parameters shown with their error bars; the rest stand in the file.
-const SHOWN: usize = 6;
-/// Held-out logs up to which the table shows their root mean squares and priors.
-const WITH_DETAILS: usize = 2;
-/// Times their bars that logs differ from which on it is said.
-const DIFFERING: f64 = 1.5;
-/// Held-out logs that have a column.
-const COLUMNS: usize = 5;
-/// Columns that are left for an expression.
-const EXPRESSION: usize = 44;
+/// Number of base parameters shown; the file contains all.
+const MAX_SHOWN: usize = 6;
+/// Largest number of held-out logs for which the table shows root mean squares and priors.
+const MAX_DETAILED_LOGS: usize = 2;
+const MIN_REPORTED_RATIO: f64 = 1.5;
+/// Largest number of held-out logs with a column.
+const MAX_LOG_COLUMNS: usize = 5;
+const EXPRESSION_COLUMNS: usize = 44;
 
-/// What was found, proved and written, the files of the model among it.
 pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> String {
     let mut text = wrapped(&r.name, 2);
     let _ = writeln!(
@@ -82,7 +77,6 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
     text
 }
 
-/// The estimator in words.
 fn estimator(name: &str) -> String {
     match name {
         "instrumental" => "instrumental variables".to_owned(),
@@ -93,15 +87,14 @@ fn estimator(name: &str) -> String {
     }
 }
 
-/// The figures that count, first.
 fn headline(r: &ResultFile) -> String {
     let fitted = r.training.physical.as_ref();
     let fit = percent(fitted.map_or(r.training.relative_error_percent, |fitted| fitted.relative_error_percent));
     if r.validation.is_empty() {
         return wrapped(
             &format!(
-                "No log was held out: the fit's own error of {fit}\u{a0}% says how well the model fits, not how well it predicts. \
-                 Give a log (or a part of one) the role \"validate\"."
+                "No log was held out: the error of {fit}\u{a0}% is that of the fit, not of a prediction. \
+                 Set the role of a log (or a part of one) to \"validate\"."
             ),
             0,
         ) + &beside(r);
@@ -109,7 +102,7 @@ fn headline(r: &ResultFile) -> String {
     let mut text = String::new();
     for (number, log) in r.validation.iter().enumerate() {
         let prior =
-            prior_of(log, None).map_or(String::new(), |p| format!("; description's own {}\u{a0}%", percent(Some(p))));
+            prior_of(log, None).map_or(String::new(), |p| format!("; robot description {}\u{a0}%", percent(Some(p))));
         let error = percent(written(log).relative_error_percent);
         text += &wrapped(
             &format!("held-out torque error {error}\u{a0}% on [{}] {} (fit {fit}\u{a0}%{prior})", number + 1, log.log),
@@ -121,7 +114,7 @@ fn headline(r: &ResultFile) -> String {
     text + &beside(r)
 }
 
-/// Which torque the figures are for, where the fit has another band than the motion.
+/// The frequency bands of fit and validation, if they differ.
 fn bands(r: &ResultFile) -> String {
     let in_force = r.method.motion.differentiator.cutoff_hz();
     let (Some(motion_hz), Some(cutoff_hz)) = (r.method.motion_hz, in_force) else { return String::new() };
@@ -129,37 +122,37 @@ fn bands(r: &ResultFile) -> String {
     let error = |candidate: &CutoffCandidate| format!("{:.2}\u{a0}%", candidate.predicted_error_percent);
     let of = |hz: f64| candidates.iter().find(|candidate| candidate.cutoff_hz == hz).map(error);
     let predicted = of(cutoff_hz).zip(of(motion_hz)).map_or(String::new(), |(chosen, other)| {
-        format!(" (predicted error of the model {chosen}, at the motion's own {motion_hz:.1}\u{a0}Hz {other})")
+        format!(" (predicted error of the model {chosen}, at the motion's cut-off of {motion_hz:.1}\u{a0}Hz {other})")
     });
     wrapped(
         &format!(
-            "positions filtered at {cutoff_hz:.1}\u{a0}Hz{predicted}; held-out figures: torque below {:.1}\u{a0}Hz, where the motion is",
+            "positions filtered at {cutoff_hz:.1}\u{a0}Hz{predicted}; held-out errors: torque below {:.1}\u{a0}Hz, the band of the motion",
             0.7 * motion_hz
         ),
         2,
     )
 }
 
-/// The free fit beside the model that is written, and whether the logs tell the two apart.
+/// The unconstrained fit compared with the written model, and whether they differ significantly.
 fn beside(r: &ResultFile) -> String {
     let Some(fit) = &r.physical.fit else { return String::new() };
     let free = |log: &LogValidation| format!("{}\u{a0}%", percent(log.model.relative_error_percent));
-    let mut errors: Vec<String> = r.validation.iter().take(COLUMNS).map(free).collect();
+    let mut errors: Vec<String> = r.validation.iter().take(MAX_LOG_COLUMNS).map(free).collect();
     if errors.is_empty() {
         errors.push(format!("{}\u{a0}%", percent(r.training.relative_error_percent)));
     }
     let verdict = match fit.difference {
         Some(test) if test.is_significant => format!(
-            ", which the logs tell apart from it (p\u{a0}=\u{a0}{:.1e}): what is consistent does not explain all that \
-             the logs show",
+            ", significantly better (p\u{a0}=\u{a0}{:.1e}): no physically consistent model explains these logs \
+             completely",
             test.p_value
         ),
-        Some(test) => format!(", no more than chance away (p\u{a0}=\u{a0}{:.2})", test.p_value),
+        Some(test) => format!(", not significantly better (p\u{a0}=\u{a0}{:.2})", test.p_value),
         None => String::new(),
     };
     wrapped(
         &format!(
-            "  that is the physically consistent model, the one that is written; the free fit has {}{verdict}",
+            "  these errors are those of the written, physically consistent model; the unconstrained fit has {}{verdict}",
             errors.join(", ")
         ),
         4,
@@ -171,10 +164,9 @@ fn prior_of(log: &LogValidation, joint: Option<usize>) -> Option<f64> {
     joint.map_or(prior.relative_error_percent, |j| prior.joints[j].relative_error_percent)
 }
 
-/// Errors joint by joint.
 fn joints(r: &ResultFile) -> String {
-    let logs = &r.validation[..r.validation.len().min(COLUMNS)];
-    let detailed = logs.len() <= WITH_DETAILS;
+    let logs = &r.validation[..r.validation.len().min(MAX_LOG_COLUMNS)];
+    let detailed = logs.len() <= MAX_DETAILED_LOGS;
     let mut header = vec!["torque error".to_owned(), "fit %".to_owned()];
     for number in 1..=logs.len() {
         header.push(format!("[{number}] %"));
@@ -205,28 +197,27 @@ fn joints(r: &ResultFile) -> String {
     };
     let rows = (0..r.training.joints.len()).map(|joint| row(Some(joint))).chain([row(None)]).collect();
     let mut text = table(&header, 1..header.len(), rows);
-    if r.validation.len() > COLUMNS {
-        let _ = writeln!(text, "  {} more held-out logs in result.json", r.validation.len() - COLUMNS);
+    if r.validation.len() > MAX_LOG_COLUMNS {
+        let _ = writeln!(text, "  {} more held-out logs in result.json", r.validation.len() - MAX_LOG_COLUMNS);
     }
     text
 }
 
-/// Where training logs differ beyond their own bars.
 fn between_logs(r: &ResultFile) -> String {
     let Some(found) = r.method.between_logs else { return String::new() };
     let of = |what: &str, k: Option<f64>| {
-        k.filter(|k| *k >= DIFFERING)
-            .map(|k| format!("{what} differ {k:.1} times as much as their own error bars allow"))
+        k.filter(|k| *k >= MIN_REPORTED_RATIO)
+            .map(|k| format!("{what} vary between logs ({k:.1} times their error bars)"))
     };
     let said: Vec<String> =
         [of("bodies", found.bodies), of("friction parameters", found.friction)].into_iter().flatten().collect();
     if said.is_empty() {
         return String::new();
     }
-    wrapped(&format!("from log to log {}; theirs hold it", said.join(", ")), 2)
+    wrapped(&format!("{}; the error bars include this", said.join(", ")), 2)
 }
 
-/// How late the torque comes, where it matters at any joint; else that it does not.
+/// The torque lag of the joints if it is relevant, otherwise its summary.
 fn lags(r: &ResultFile) -> String {
     let known = || r.joints.iter().filter_map(|joint| joint.torque_lag.map(|lag| (&joint.name, lag)));
     let text = r.method.torque_lag.sentence().map_or_else(String::new, |what| format!("\n  torque lag: {what}\n"));
@@ -241,13 +232,13 @@ fn lags(r: &ResultFile) -> String {
     format!("{text}\n{}", table(&header, 1..3, rows.collect()))
 }
 
-/// Whether the training logs show the inertia of the drives.
 fn drives(r: &ResultFile) -> String {
     let said = r.drive_inertia_choice.as_ref();
     said.map_or_else(String::new, |choice| wrapped(&format!("drive inertia: {}", choice.sentence()), 2))
 }
 
-/// What friction the training logs chose, against the plain one; and whose they did not, with the reason.
+/// The friction selected by the training logs compared with the default; and the joints without selection, with the
+/// reason.
 fn friction(r: &ResultFile) -> String {
     let header = ["friction by cross-validation", "chosen Nm", "plain Nm", ""].map(str::to_owned);
     let (chosen, stated): (Vec<_>, Vec<_>) = r.friction_choice.iter().partition(|joint| joint.drive.is_some());
@@ -256,10 +247,15 @@ fn friction(r: &ResultFile) -> String {
             candidate.map_or_else(String::new, |candidate| format!("{:.3}", candidate.cv_error_nm))
         };
         let chosen = joint.candidates.iter().find(|candidate| candidate.chosen);
-        vec![name(&joint.joint), error(chosen), error(joint.candidates.first()), shortened(&joint.chosen, EXPRESSION)]
+        vec![
+            name(&joint.joint),
+            error(chosen),
+            error(joint.candidates.first()),
+            shortened(&joint.chosen, EXPRESSION_COLUMNS),
+        ]
     });
     let mut text = if chosen.is_empty() { String::new() } else { table(&header, 1..3, rows.collect()) };
-    // Joints with one reason in one line.
+    // Combine joints with the same reason.
     for same in stated.chunk_by(|a, b| a.chosen == b.chosen) {
         let names: Vec<String> = same.iter().map(|joint| name(&joint.joint)).collect();
         text += &wrapped(&format!("friction of {}: {}", names.join(", "), same[0].chosen), 2);
@@ -267,7 +263,6 @@ fn friction(r: &ResultFile) -> String {
     text
 }
 
-/// The best known base parameters, and how many are hardly known.
 fn parameters(r: &ResultFile) -> String {
     let mut order: Vec<usize> = (0..r.base_parameters.len()).filter(|&i| r.base_parameters[i].excited).collect();
     let error = |index: usize| r.base_parameters[index].relative_half_width_percent().unwrap_or(f64::INFINITY);
@@ -282,10 +277,10 @@ fn parameters(r: &ResultFile) -> String {
         ),
         2,
     );
-    let rows = order.iter().take(SHOWN).map(|&index| {
+    let rows = order.iter().take(MAX_SHOWN).map(|&index| {
         let p = &r.base_parameters[index];
         let [value, half_width] = with_deviation(p.value, p.bar_95());
-        vec![value, half_width, p.unit.clone(), shortened(&p.expression, EXPRESSION)]
+        vec![value, half_width, p.unit.clone(), shortened(&p.expression, EXPRESSION_COLUMNS)]
     });
     let header = ["value", "+- (95 %)", "unit", "base parameter"].map(str::to_owned);
     text += &table(&header, 0..2, rows.collect());
@@ -298,9 +293,9 @@ fn parameters(r: &ResultFile) -> String {
     if !vague.is_empty() {
         text += &wrapped(
             &format!(
-                "hardly known (error bar above the value): {} of them, worst first {}; other motion would determine more",
+                "{} parameters are poorly determined (error bar larger than the value), worst first: {}; use a more exciting motion (`dynident design`)",
                 vague.len(),
-                listed(&vague, SHOWN)
+                listed(&vague, MAX_SHOWN)
             ),
             2,
         );
@@ -310,49 +305,48 @@ fn parameters(r: &ResultFile) -> String {
     }
     if !r.method.not_excited.is_empty() {
         let names: Vec<&str> = r.method.not_excited.iter().map(String::as_str).collect();
-        let held = format!("not excited by these logs, held at the prior: {}", listed(&names, 2 * SHOWN));
+        let held = format!("not excited by these logs, fixed at the prior: {}", listed(&names, 2 * MAX_SHOWN));
         text += &wrapped(&held, 2);
         text += &conditional(r);
     }
     text
 }
 
-/// What the estimates hang on that stayed at the prior, and what would tell it.
+/// Estimates that depend on parameters fixed at the prior, and how to determine these.
 fn conditional(r: &ResultFile) -> String {
-    let hanging: Vec<_> = r.base_parameters.iter().filter(|p| !p.conditional_on.is_empty()).collect();
+    let dependent: Vec<_> = r.base_parameters.iter().filter(|p| !p.conditional_on.is_empty()).collect();
     let mut text = String::new();
-    if !hanging.is_empty() {
+    if !dependent.is_empty() {
         let one = |p: &&BaseParameterResult| {
             let on: Vec<&str> = p.conditional_on.iter().map(|condition| condition.on.as_str()).collect();
             format!("{} on {}", p.symbol, listed(&on, 2))
         };
-        let all: Vec<String> = hanging.iter().map(one).collect();
+        let all: Vec<String> = dependent.iter().map(one).collect();
         let all: Vec<&str> = all.iter().map(String::as_str).collect();
-        let bars = if hanging.iter().any(|p| p.half_width_95_with_nominal.is_some()) {
-            "their bars hold what a description may be wrong by (masses by 30\u{a0}%)"
+        let bars = if dependent.iter().any(|p| p.half_width_95_with_nominal.is_some()) {
+            "the error bars include 30\u{a0}% uncertainty of the nominal masses"
         } else {
-            "their bars hold only if those are right, and nothing is known of them"
+            "the error bars are valid only if these values are right, and their uncertainty is unknown"
         };
         let words = format!(
-            "{} estimates hang on parameters held at the prior: {}; {bars}",
-            hanging.len(),
-            listed(&all, SHOWN)
+            "{} estimates depend on parameters fixed at the prior: {}; {bars}",
+            dependent.len(),
+            listed(&all, MAX_SHOWN)
         );
         text += &wrapped(&words, 2);
     }
     if !r.method.resting_joints.is_empty() {
         let joints: Vec<&str> = r.method.resting_joints.iter().map(String::as_str).collect();
         let words = format!(
-            "no log moves {} above the noise of the encoder: record a motion of all joints (`dynident design` makes \
-             one; with `prior.result = \"result.json\"` in its [design] it looks for what these logs do not tell)",
-            listed(&joints, SHOWN)
+            "no log moves {} more than the encoder noise: record a motion of all joints (use `dynident design`; \
+             with `prior.result = \"result.json\"` in [design] it excites the parameters that these logs do not determine)",
+            listed(&joints, MAX_SHOWN)
         );
         text += &wrapped(&words, 2);
     }
     text
 }
 
-/// Whether the full set is physically consistent, in two lines.
 fn physics(r: &ResultFile) -> String {
     let bodies = r.physical.violations.len();
     wrapped(
@@ -360,15 +354,15 @@ fn physics(r: &ResultFile) -> String {
             "physics: bodies and friction are physically consistent".to_owned()
         } else {
             format!(
-                "physics: NOT consistent as it stands ({bodies} violations, listed in result.json under `physical`). Torques are predicted as \
-                 well as shown above; masses and inertias of single bodies are not measured values, and a simulator may refuse them."
+                "physics: NOT consistent ({bodies} violations, listed in result.json under `physical`). Torques are predicted as \
+                 well as shown above, but masses and inertias of single bodies are not reliable, and a simulator may reject them."
             )
         },
         2,
     )
 }
 
-/// The bodies' masses as far as data and physics hold them.
+/// Intervals of the bodies' masses from data and physical consistency.
 fn masses(intervals: &[ParameterInterval]) -> String {
     let end = |end: Option<f64>, open: &str| end.map_or_else(|| open.to_owned(), |end| format!("{end:.3}"));
     let rows = intervals.iter().filter(|interval| interval.unit == "kg").map(|interval| {
@@ -379,11 +373,10 @@ fn masses(intervals: &[ParameterInterval]) -> String {
             end(interval.upper, "open"),
         ]
     });
-    let header = ["mass, 95 % of what is physically consistent", "kg", "from", "to"].map(str::to_owned);
+    let header = ["mass, 95 % interval, physically consistent", "kg", "from", "to"].map(str::to_owned);
     table(&header, 1..4, rows.collect())
 }
 
-/// How a log was used.
 fn data(log: &LogSummary) -> String {
     let motion = log.motion_cutoff_hz.map_or(String::new(), |cutoff| format!(", motion below {cutoff:.1}\u{a0}Hz"));
     format!(
@@ -396,4 +389,4 @@ fn data(log: &LogSummary) -> String {
     )
 }
 
-const _: () = assert!(EXPRESSION + 34 <= WIDTH, "value, deviation, unit and their gaps take 34 columns");
+const _: () = assert!(EXPRESSION_COLUMNS + 34 <= WIDTH, "value, deviation, unit and their gaps take 34 columns");

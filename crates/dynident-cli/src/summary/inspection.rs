@@ -1,17 +1,13 @@
-//! The summary of `inspect`.
-
 use super::text::{name, rounded, table, wrapped};
 use core::fmt::Write;
 use dynident::Inspection;
 use dynident::result::SlipEntry;
 use std::path::Path;
 
-/// Corrections of one slip that are shown; JSON has all.
-const SHOWN: usize = 6;
+const MAX_SHOWN: usize = 6;
 
-/// A robot description: joints, base parameters, and what is wrong with it.
 pub(crate) fn inspection(i: &Inspection) -> String {
-    let mut text = format!("{}: {} joints, {:.3} kg that move\n\n", i.name, i.dof, i.moving_mass_kg);
+    let mut text = format!("{}: {} joints, {:.3} kg moving mass\n\n", i.name, i.dof, i.moving_mass_kg);
     let count = |level: &str| i.audit.iter().filter(|entry| entry.level == level).count();
     let _ = writeln!(text, "audit: {} problems, {} warnings", count("problem"), count("warning"));
     for level in ["problem", "warning", "info"] {
@@ -39,27 +35,29 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     let header = ["joint", "type", "lower", "upper", "speed", "torque", "mass kg"].map(str::to_owned);
     text += &table(&header, 2..7, rows.collect());
     let base = &i.base_parameters;
-    let _ = writeln!(text, "\n{} base parameters (what motion and torque can determine):", base.count);
+    let _ = writeln!(text, "\n{} base parameters (combinations that motion and torque determine):", base.count);
     for expression in &base.expressions {
         text += &wrapped(&format!("  {}", rounded(expression)), 6);
     }
     if base.numerical_rank != base.count {
-        let doubt = format!("  regressors at random states have rank {}: the split is not clear", base.numerical_rank);
+        let doubt = format!(
+            "  the regressor at random states has rank {}: the base parameters are not reliable",
+            base.numerical_rank
+        );
         text += &wrapped(&doubt, 4);
     }
     text
 }
 
-/// A slip, its evidence and its corrections.
 fn of_slip(slip: &SlipEntry) -> String {
     let mut text = wrapped(&format!("  SLIP ({}): {}", slip.slip, slip.what), 4);
     text += &wrapped(&format!("    evidence: {}", slip.evidence), 6);
-    for one in slip.corrections.iter().take(SHOWN) {
+    for one in slip.corrections.iter().take(MAX_SHOWN) {
         text += &wrapped(&format!("    {} {}: {} -> {}", name(&one.link), one.number, one.from, one.to), 6);
     }
     let count = slip.corrections.len();
-    if count > SHOWN {
-        let _ = writeln!(text, "    and {} more numbers", count - SHOWN);
+    if count > MAX_SHOWN {
+        let _ = writeln!(text, "    and {} more numbers", count - MAX_SHOWN);
     }
     if count > 0 {
         text += "    --fix OUT.urdf writes a copy with these numbers\n";
@@ -67,12 +65,11 @@ fn of_slip(slip: &SlipEntry) -> String {
     text
 }
 
-/// What a mended copy has become.
 pub(crate) fn mended(before: &Inspection, after: &Inspection, out: &Path) -> String {
     let numbers: usize = before.slips.iter().map(|slip| slip.corrections.len()).sum();
     let problems = |i: &Inspection| i.audit.iter().filter(|entry| entry.level == "problem").count();
     format!(
-        "{}: {numbers} numbers changed, every other byte as it was; problems before {} and now {}, slips before {} and now {}",
+        "{}: {numbers} numbers changed, all other bytes unchanged; problems before {} and now {}, slips before {} and now {}",
         out.display(),
         problems(before),
         problems(after),

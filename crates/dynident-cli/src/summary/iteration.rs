@@ -1,14 +1,10 @@
-//! The summaries of `iterate` and `simulate`.
-
 use super::text::{table, wrapped};
 use dynident::result::IterationRun;
 use dynident::{IterationsFile, SimulationFile};
 use std::path::Path;
 
-/// Parameters that the screen shows.
-const MOST_PARAMETERS: usize = 20;
+const MAX_PARAMETERS: usize = 20;
 
-/// An iteration: its verdict, run by run, and where the files are.
 pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     let runs = file.runs.len();
     let mut text = wrapped(&format!("{}: {} ({runs} runs of {:.1} s)", file.name, file.reason, file.duration_s), 4);
@@ -16,7 +12,7 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     let header = ["run", "controller", "tracking", "change", "error", "verdict"].map(str::to_owned);
     let rows = file.runs.iter().enumerate().map(|(place, run)| row(run, place.checked_sub(1).map(|k| &file.runs[k])));
     text += &table(&header, 2..5, rows.collect());
-    text += "  tracking: largest distance from the trajectory, rad (m); change: of the\n  parameters, in error bars; error: largest, where the truth is known; both of\n  all good runs so far together\n\n";
+    text += "  tracking: largest tracking error, rad (m); change: largest change of a\n  parameter, in error bars; error: largest, if the truth is known; both for the\n  joint fit of all good runs up to this one\n\n";
     text += &run_remarks(file);
     text += &verdict_remarks(file);
     text += &parameters(file);
@@ -26,7 +22,7 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     let robot = if file.base_parameters.is_empty() {
         ""
     } else {
-        ", and the robot found: result.json, identification.html, controller.json and its description"
+        ", and the identified robot: result.json, identification.html, controller.json and its robot description"
     };
     text += &wrapped(
         &format!("Written: {}, {}{robot}", out.join("iterations.json").display(), out.join("report.html").display()),
@@ -40,7 +36,7 @@ fn run_remarks(file: &IterationsFile) -> String {
     let mut text = String::new();
     for run in file.runs.iter().filter(|run| !run.accepted) {
         if let Some(reason) = &run.reason {
-            text += &wrapped(&format!("run {} does not count: {reason}", run.run), 4);
+            text += &wrapped(&format!("run {} was rejected: {reason}", run.run), 4);
         }
     }
     if let Some(sentence) = file.lowered_bandwidths_sentence() {
@@ -71,15 +67,18 @@ fn run_remarks(file: &IterationsFile) -> String {
 fn verdict_remarks(file: &IterationsFile) -> String {
     let mut text = String::new();
     if let Some(forecast) = &file.declined {
-        text += &wrapped(&format!("A further run was not worth it: {}.", forecast.sentence()), 4);
+        text += &wrapped(&format!("A further run would add too little: {}.", forecast.sentence()), 4);
     }
     if let Some(improvement) = file.tracking_improvement {
-        text += &wrapped(&format!("Tracking error down by a factor of {improvement:.1}."), 4);
+        text += &wrapped(&format!("Tracking error reduced by a factor of {improvement:.1}."), 4);
     }
     let last_evidence = file.runs.iter().rev().find_map(|run| run.evidence.as_ref());
     if let Some(delay_s) = last_evidence.and_then(|evidence| evidence.feedback_delay_s) {
         text += &wrapped(
-            &format!("Its controller sees positions {:.1} ms late: most of the tracking error is that.", 1e3 * delay_s),
+            &format!(
+                "A feedback delay of {:.1} ms in the controller causes most of the tracking error.",
+                1e3 * delay_s
+            ),
             4,
         );
     }
@@ -98,25 +97,24 @@ fn verdict_remarks(file: &IterationsFile) -> String {
         text += &wrapped(&format!("NOT checked: {what}."), 4);
     }
     for unmet in &file.unmet {
-        text += &wrapped(&format!("UNMET: {}. What would help: {}.", unmet.message, unmet.remedy), 4);
+        text += &wrapped(&format!("UNMET: {}. Suggested fix: {}.", unmet.message, unmet.remedy), 4);
     }
     text
 }
 
-/// The base parameters that were found, by all good runs together.
 fn parameters(file: &IterationsFile) -> String {
     if file.base_parameters.is_empty() {
         return String::new();
     }
-    let mut text = "\nFound by all good runs together (+- 95 %):\n".to_owned();
-    let rows = file.base_parameters.iter().take(MOST_PARAMETERS).map(|one| {
+    let mut text = "\nEstimate from all good runs (+- 95 %):\n".to_owned();
+    let rows = file.base_parameters.iter().take(MAX_PARAMETERS).map(|one| {
         let bar = if one.excited { format!("{:.2e}", one.bar_95()) } else { "not excited".to_owned() };
         vec![super::text::name(&one.symbol), format!("{:.5}", one.value), bar, one.unit.clone()]
     });
     text += &table(&["parameter", "value", "+-", "unit"].map(str::to_owned), 1..3, rows.collect());
-    if file.base_parameters.len() > MOST_PARAMETERS {
+    if file.base_parameters.len() > MAX_PARAMETERS {
         text += &wrapped(
-            &format!("and {} more, in result.json and report.html", file.base_parameters.len() - MOST_PARAMETERS),
+            &format!("and {} more, in result.json and report.html", file.base_parameters.len() - MAX_PARAMETERS),
             4,
         );
     }
@@ -149,7 +147,6 @@ fn row(run: &IterationRun, before: Option<&IterationRun>) -> Vec<String> {
     ]
 }
 
-/// A simulated run.
 pub(crate) fn simulation(file: &SimulationFile, out: &Path) -> String {
     let mut text = wrapped(
         &format!(

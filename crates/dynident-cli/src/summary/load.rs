@@ -1,10 +1,7 @@
-//! Payloads and drive gains in the summary of `identify`.
-
 use super::text::{name, table, with_deviation, wrapped};
 use dynident::ResultFile;
 use dynident::identification::payload::{Measured, PayloadResult};
 
-/// What was found of payloads and gains; nothing where there are none.
 pub(super) fn loads(r: &ResultFile) -> String {
     let mut text = String::new();
     for payload in &r.payloads {
@@ -12,8 +9,8 @@ pub(super) fn loads(r: &ResultFile) -> String {
         text += &of_payload(payload);
     }
     if !r.payloads.is_empty() && r.drive_gains.is_none() && r.method.gain_std_percent.is_none() {
-        let words = "the payload's bars take the gains of torque as exact; drive.gain_std_percent says how well \
-                     they are known, drive.gains = \"unknown\" measures them with a known weight";
+        let words = "the payload's error bars assume exact torque gains; set drive.gain_std_percent to their \
+                     uncertainty, or drive.gains = \"unknown\" to estimate them with a known weight";
         text += &wrapped(words, 2);
     }
     if let Some(gains) = &r.drive_gains {
@@ -58,7 +55,7 @@ fn of_payload(payload: &PayloadResult) -> String {
     let mut text = if rows.is_empty() {
         wrapped(
             &format!(
-                "{title}: neither mass nor centre of mass are determined alone; result.json has the sums that are"
+                "{title}: mass and centre of mass are not determined separately; result.json contains their determined combinations"
             ),
             2,
         )
@@ -69,7 +66,7 @@ fn of_payload(payload: &PayloadResult) -> String {
         text += &wrapped(&format!("not identified: {}", payload.not_identified.join("; ")), 2);
     }
     if let Some(reason) = &payload.failure {
-        text += &wrapped(&format!("no consistent body: {reason}"), 2);
+        text += &wrapped(&format!("no physically consistent body: {reason}"), 2);
     }
     text
 }

@@ -1,17 +1,14 @@
-//! The summary of `log`.
-
-use super::text::{table, wrapped};
+use super::text::{end_of_name, table, wrapped};
 use core::fmt::Write;
 use dynident::result::{LogChannel, LogContents};
 
-/// Channels of a group that are shown; JSON has all.
-const SHOWN: usize = 64;
-/// Widest name in the table.
-const NAME: usize = 34;
-/// Signs of a channel's course.
-const SIGNS: usize = 16;
+/// Largest number of channels shown per group; JSON contains all.
+const MAX_SHOWN: usize = 64;
+const MAX_NAME_COLUMNS: usize = 34;
+/// Number of characters for the course of a channel.
+const COURSE_COLUMNS: usize = 16;
 
-/// A recording: its groups, their channels with range and course, and a beginning of a study's `[format]`.
+/// A recording: its groups, their channels with range and course, and a suggested `[format]` for a study.
 pub(crate) fn log(found: &LogContents) -> String {
     let mut text = wrapped(
         &format!("{}: {}, {} bytes, {} channels", found.file, found.format, found.bytes, found.channels.len()),
@@ -28,13 +25,13 @@ pub(crate) fn log(found: &LogContents) -> String {
         text.push('\n');
         text += &wrapped(&line, 2);
         let channels: Vec<&LogChannel> = found.channels.iter().filter(|channel| channel.group == index).collect();
-        // The topic stands above.
+        // The topic is in the line above.
         let topic = group.name.as_ref().map_or_else(String::new, |name| format!("{name}."));
-        let rows = channels.iter().take(SHOWN).map(|channel| {
+        let rows = channels.iter().take(MAX_SHOWN).map(|channel| {
             let name = channel.name.strip_prefix(&topic).unwrap_or(&channel.name);
             let [low, high] = channel.range.map_or(["-".to_owned(), "-".to_owned()], |range| range.map(shown));
             vec![
-                shortened(name),
+                end_of_name(name, MAX_NAME_COLUMNS),
                 channel.unit.clone().unwrap_or_default(),
                 low,
                 high,
@@ -44,28 +41,19 @@ pub(crate) fn log(found: &LogContents) -> String {
         });
         let header = ["channel", "unit", "lowest", "highest", "missing", "course"].map(str::to_owned);
         text += &table(&header, 2..5, rows.collect());
-        if channels.len() > SHOWN {
-            let _ = writeln!(text, "  and {} more", channels.len() - SHOWN);
+        if channels.len() > MAX_SHOWN {
+            let _ = writeln!(text, "  and {} more", channels.len() - MAX_SHOWN);
         }
     }
     if let Some(place) = &found.truncated {
-        text += &wrapped(&format!("\nthe file is cut off behind {place}"), 2);
+        text += &wrapped(&format!("\nthe file is truncated after {place}"), 2);
     }
     for note in &found.notes {
         text += &wrapped(&format!("  not read: {note}"), 4);
     }
-    text += "\na study could begin with\n\n";
+    text += "\nsuggested begin of a study:\n\n";
     text += &found.study_format;
     text
-}
-
-/// The end of a long name is kept, as it distinguishes joints.
-fn shortened(name: &str) -> String {
-    let length = name.chars().count();
-    if length <= NAME {
-        return name.to_owned();
-    }
-    format!("..{}", name.chars().skip(length - NAME + 2).collect::<String>())
 }
 
 fn shown(value: f64) -> String {
@@ -75,21 +63,21 @@ fn shown(value: f64) -> String {
     format!("{value:.2e}")
 }
 
-/// The course of a channel between its lowest and highest mean, as a line of bars; a blank where it has no value.
+/// The course of a channel between its lowest and highest mean, as a line of bars; blank for missing values.
 fn course(channel: &LogChannel) -> String {
     const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let values = channel.course.iter().flatten();
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
     let count = channel.course.len();
     let bar = |sign: usize| {
-        // Every sign stands for some parts: the one in the middle speaks for them.
-        let part = channel.course[(2 * sign + 1) * count / (2 * count.min(SIGNS))];
+        // Each character shows the middle one of several parts.
+        let part = channel.course[(2 * sign + 1) * count / (2 * count.min(COURSE_COLUMNS))];
         part.map_or(' ', |value| {
             let share = if high > low { (value - low) / (high - low) } else { 0.0 };
             BARS[((share * 8.0) as usize).min(7)]
         })
     };
-    (0..count.min(SIGNS)).map(bar).collect()
+    (0..count.min(COURSE_COLUMNS)).map(bar).collect()
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
-//! What the summary says of noise in the regressor and of rows that were set aside.
+//! Noise in the regressor, gross errors, and results of special estimators.
 
 use super::text::{percent, wrapped};
 use dynident::ResultFile;
 use dynident::identification::estimators::{NoiseInRegressor, NoiseVerdict};
 
-/// Whether noise in the regressor shows, how many rows a robust estimator gave little weight, and what the study's
-/// estimator alone can determine; empty when that is nothing.
+/// The verdict on noise in the regressor, the rows with low weight in a robust estimator, and results of special
+/// estimators; otherwise empty.
 pub(crate) fn noise(r: &ResultFile) -> String {
     let mut text = String::new();
     if let Some(noise) = &r.noise_in_regressor {
@@ -28,7 +28,7 @@ pub(crate) fn noise(r: &ResultFile) -> String {
     text
 }
 
-/// What the estimators that repeat or simulate the motion found, and whether the estimator settled at all.
+/// Results of the estimators that repeat or simulate the motion, and whether the estimator converged.
 fn loops(r: &ResultFile) -> String {
     let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
     let mut text = String::new();
@@ -42,25 +42,25 @@ fn loops(r: &ResultFile) -> String {
             (largest(&mut fit.motion_std.iter().map(|std| std[0])), largest(&mut fit.torque_std.iter().copied()));
         let ratio = fit.cost / (fit.degrees_of_freedom as f64).max(1.0);
         let line = format!(
-            "{periods} periods of {} s: noise of positions at most {motion:.1e} rad, of torques {torque:.2e} Nm; residuals of the mean period are {ratio:.2} times what that explains (1 for a right model)",
+            "{periods} periods of {} s: noise of positions at most {motion:.1e} rad, of torques {torque:.2e} Nm; the residuals of the mean period are {ratio:.2} times this noise (1 for a correct model)",
             fit.period_s
         );
         text += &wrapped(&line, 2);
     }
     if let Some(fit) = &r.simulated {
         let line = format!(
-            "{} steps from the {} with {} simulations under {} at {} Hz",
+            "{} steps from the {} with {} simulations with controller {} at {} Hz",
             fit.iterations, fit.start, fit.simulations, fit.controller, fit.rate_hz
         );
         text += &wrapped(&line, 2);
     }
     if !r.method.is_settled() {
-        text += &wrapped("NOT settled: the estimator stopped before its values did; take them for what they are", 2);
+        text += &wrapped("NOT converged: the estimator stopped early, so its values are not reliable", 2);
     }
     text
 }
 
-/// What noise in the regressor does, in a sentence; nothing where it does nothing and nobody asked.
+/// The effect of noise in the regressor in a sentence; empty without an effect, unless instruments were requested.
 fn verdict(noise: &NoiseInRegressor, used: bool) -> String {
     let test = &noise.hausman;
     let figures = test
@@ -69,14 +69,14 @@ fn verdict(noise: &NoiseInRegressor, used: bool) -> String {
         .map_or(String::new(), |(f, p)| format!(" (Durbin-Wu-Hausman test: F = {f:.1}, p = {p:.1e})"));
     let followed = noise.fast_motion.map_or(String::new(), |fast| {
         format!(
-            "torque follows {:.0}\u{a0}% of the fast motion, the rest is noise",
+            "{:.0}\u{a0}% of the fast motion agrees with the torque, the rest is noise",
             100.0 * fast.followed.clamp(0.0, 1.0)
         )
     });
     let band = noise.instrument_cutoff_hz.map_or(String::new(), |[_, hz]| format!(" of the motion below {hz:.2} Hz"));
     let lowered = noise
         .cutoff_before_hz
-        .map_or(String::new(), |hz| format!("; the cut-off of the motion was lowered from {hz:.1} Hz with it"));
+        .map_or(String::new(), |hz| format!("; the cut-off of the motion was reduced from {hz:.1} Hz"));
     match noise.verdict {
         NoiseVerdict::BiasesLeastSquares if used => {
             format!(
@@ -84,10 +84,10 @@ fn verdict(noise: &NoiseInRegressor, used: bool) -> String {
             )
         }
         NoiseVerdict::Harmless if used => {
-            format!("instruments{band}; least squares would do: noise of the positions does not show{figures}")
+            format!("instruments{band}; least squares would suffice: position noise has no significant effect{figures}")
         }
         NoiseVerdict::Undecided if used => format!("instruments{band}{figures}"),
-        // Nothing to say, or the problems say it.
+        // No effect, or already reported as a problem.
         NoiseVerdict::BiasesLeastSquares | NoiseVerdict::Harmless | NoiseVerdict::Undecided => String::new(),
     }
 }

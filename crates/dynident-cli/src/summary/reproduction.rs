@@ -1,10 +1,7 @@
-//! The summary of `reproduce`.
-
 use super::text::{table, wrapped};
 use dynident_paper::PaperFile;
 use std::path::Path;
 
-/// What was to be reached, and where to look.
 pub(crate) fn reproduction(file: &PaperFile, out: &Path) -> String {
     let header = ["goal", "value", "at most", ""].map(str::to_owned);
     let rows = file
@@ -17,7 +14,7 @@ pub(crate) fn reproduction(file: &PaperFile, out: &Path) -> String {
         })
         .collect();
     let words = format!(
-        "{} tables and {} figures in {:.1} s, {} departures from the paper's text with their reasons: open {}",
+        "{} tables and {} figures in {:.1} s, {} deviations from the paper's text with their reasons: open {}",
         file.tables.len(),
         file.figures.len(),
         file.seconds,

@@ -1,15 +1,14 @@
-//! Words and numbers in a given width.
+//! Formatting of words and numbers within a given width.
 
 use comfy_table::{CellAlignment, Table, presets};
 
-/// Columns that a summary fills at most: every terminal has them.
 pub(super) const WIDTH: usize = 80;
 
 /// Longest name of a joint or body in a table.
-const NAME: usize = 24;
+const MAX_NAME_COLUMNS: usize = 24;
 
-/// `words` in lines of at most [`WIDTH`] columns; all lines but the first begin with `indent` blanks. A longer word
-/// stays whole, and so does what a no-break space holds together, which becomes a plain one.
+/// Wraps `words` at [`WIDTH`] columns; all lines but the first are indented by `indent` blanks. Longer words are not
+/// split, and no-break spaces become plain spaces without a line break.
 pub(super) fn wrapped(words: &str, indent: usize) -> String {
     let (mut text, mut column) = (String::new(), 0);
     let lead = words.len() - words.trim_start().len();
@@ -32,7 +31,7 @@ pub(super) fn wrapped(words: &str, indent: usize) -> String {
     text.replace('\u{a0}', " ")
 }
 
-/// A table without lines: names to the left, numbers to the right, and no blanks at the ends of lines.
+/// A table without lines: names left-aligned, numbers right-aligned, no trailing blanks.
 pub(super) fn table(header: &[String], numbers: core::ops::Range<usize>, rows: Vec<Vec<String>>) -> String {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header(header);
@@ -48,16 +47,19 @@ pub(super) fn table(header: &[String], numbers: core::ops::Range<usize>, rows: V
     lines.join("\n") + "\n"
 }
 
-/// A name that fits its column: the end is kept, as it distinguishes joints.
 pub(super) fn name(name: &str) -> String {
-    let length = name.chars().count();
-    if length <= NAME {
-        return name.to_owned();
-    }
-    format!("..{}", name.chars().skip(length - NAME + 2).collect::<String>())
+    end_of_name(name, MAX_NAME_COLUMNS)
 }
 
-/// A percentage without its sign.
+/// A name of at most `columns` columns: the end is kept, because it distinguishes joints.
+pub(super) fn end_of_name(name: &str, columns: usize) -> String {
+    let length = name.chars().count();
+    if length <= columns {
+        return name.to_owned();
+    }
+    format!("..{}", name.chars().skip(length - columns + 2).collect::<String>())
+}
+
 pub(super) fn percent(value: Option<f64>) -> String {
     match value {
         Some(value) if value >= 1000.0 => format!("{value:.0}"),
@@ -66,7 +68,7 @@ pub(super) fn percent(value: Option<f64>) -> String {
     }
 }
 
-/// A value and its standard deviation, both to the second digit of the deviation.
+/// A value and its standard deviation, both to the second significant digit of the deviation.
 pub(super) fn with_deviation(value: f64, std: f64) -> [String; 2] {
     if !(std.is_finite() && std > 0.0) {
         return [format!("{value:.5}"), "-".to_owned()];
@@ -79,7 +81,7 @@ pub(super) fn with_deviation(value: f64, std: f64) -> [String; 2] {
     [format!("{value:.decimals$}"), format!("{std:.decimals$}")]
 }
 
-/// A sum that fits `longest` columns: its first terms, and how many there are.
+/// A sum that fits `longest` columns: its first terms, and the number of terms.
 pub(super) fn shortened(expression: &str, longest: usize) -> String {
     if expression.len() <= longest {
         return expression.to_owned();
@@ -92,7 +94,7 @@ pub(super) fn shortened(expression: &str, longest: usize) -> String {
     format!("{}{tail}", &expression[..cut])
 }
 
-/// A sum with six digits of each factor, to be read.
+/// A sum with six significant digits per factor.
 pub(super) fn rounded(expression: &str) -> String {
     let digits = |word: &str| match word.parse::<f64>() {
         Ok(factor) => format!("{factor:.5e}").parse::<f64>().unwrap_or(factor).to_string(),

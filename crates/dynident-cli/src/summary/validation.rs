@@ -1,24 +1,21 @@
-//! The summary of `validate`.
-
 use super::findings::findings;
 use super::text::{name, percent, table, wrapped};
 use dynident::estimation::ValidationReport;
 use dynident::identification::examination::{JointResiduals, LogValidation};
 use dynident::result::LogSummary;
 
-/// A test whose probability is below this counts as negative.
+/// Significance level of the residual tests.
 const SIGNIFICANCE: f64 = 0.01;
 
-/// A model's errors on every log.
 pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> String {
     let mut text = String::new();
     for log in logs {
         let free = match log.physical {
-            Some(_) => format!("free fit {} %, ", percent(log.model.relative_error_percent)),
+            Some(_) => format!("unconstrained fit {} %, ", percent(log.model.relative_error_percent)),
             None => String::new(),
         };
         let headline = format!(
-            "{}: torque error {} % ({free}description's own parameters {} %), {} samples",
+            "{}: torque error {} % ({free}robot description {} %), {} samples",
             log.log,
             percent(written(log).relative_error_percent),
             percent(log.prior.as_ref().and_then(|prior| prior.relative_error_percent)),
@@ -36,7 +33,7 @@ pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> St
     text
 }
 
-/// What the residuals of a held-out log look like, in one line.
+/// The properties of a held-out log's residuals in one line.
 pub(super) fn residuals(log: &LogValidation) -> String {
     let count = |of: &dyn Fn(&JointResiduals) -> bool| log.residuals.iter().filter(|joint| of(joint)).count();
     let all = log.residuals.len();
@@ -59,21 +56,20 @@ pub(super) fn residuals(log: &LogValidation) -> String {
     let band = if covered.is_empty() {
         String::new()
     } else {
-        format!("; the 95 % band holds {:.1} % of the torque", mean(&covered))
+        format!("; {:.1} % of the torque is inside the 95 % band", mean(&covered))
     };
     let mut text = wrapped(
-        &format!("  residuals: coloured in {coloured} of {all} joints, not normal in {odd}{reversal}{band}"),
+        &format!("  residuals: correlated in {coloured} of {all} joints, not normal in {odd}{reversal}{band}"),
         4,
     );
     text += &at_rest(log);
     text
 }
 
-/// Share of the squared error from which on a joint at rest is worth a line.
-const WORTH_TELLING: f64 = 0.3;
+/// Smallest share of the squared error for which a joint at rest is reported.
+const MIN_REPORTED_SHARE: f64 = 0.3;
 
-/// Says so when one joint at rest makes up much of the error: there stiction holds a share of the torque that positions
-/// do not determine.
+/// Reports the joint whose rest contributes much of the error: stiction at rest is not determined by the positions.
 fn at_rest(log: &LogValidation) -> String {
     let all: f64 = log.model.joints.iter().map(|joint| joint.samples as f64 * joint.rmse_nm.powi(2)).sum();
     let most = log
@@ -86,9 +82,9 @@ fn at_rest(log: &LogValidation) -> String {
         })
         .max_by(|a, b| a.0.total_cmp(&b.0));
     match most {
-        Some((share, rest, fast, name)) if share > WORTH_TELLING => wrapped(
+        Some((share, rest, fast, name)) if share > MIN_REPORTED_SHARE => wrapped(
             &format!(
-                "  {:.0} % of the squared error is {} at rest ({rest:.2} Nm, in motion {fast:.2} Nm): stiction holds a part of the torque there that positions do not determine",
+                "  {:.0} % of the squared error occurs while {} is at rest ({rest:.2} Nm, in motion {fast:.2} Nm): the torque of stiction does not follow from the positions",
                 100.0 * share,
                 self::name(name)
             ),
@@ -98,7 +94,7 @@ fn at_rest(log: &LogValidation) -> String {
     }
 }
 
-/// The model that is written: the consistent set where there is one, else the estimate.
+/// The written model: the physically consistent model if there is one, else the estimate.
 pub(super) fn written(log: &LogValidation) -> &ValidationReport {
     log.physical.as_ref().unwrap_or(&log.model)
 }

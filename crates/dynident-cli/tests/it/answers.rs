@@ -1,4 +1,4 @@
-//! Questions on a terminal: what was typed before one is no answer to it, and Ctrl-C ends the wait.
+//! Questions on a terminal: input typed before a question is ignored, and Ctrl-C ends the wait.
 
 use crate::programs::{self, EXPANDS, starts, with_xacro};
 use crate::robots_outside::{robot, study};
@@ -10,7 +10,6 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// The command on a terminal of its own.
 struct OnTerminal {
     program: Child,
     keyboard: File,
@@ -37,7 +36,7 @@ impl OnTerminal {
         let (mut seen, shown) = (keyboard.try_clone().unwrap(), Arc::clone(&screen));
         std::thread::spawn(move || {
             let mut bytes = [0; 1024];
-            // On Linux it is an error when the program has gone.
+            // On Linux, reading fails when the program has ended.
             while let Ok(count @ 1..) = seen.read(&mut bytes) {
                 shown.lock().unwrap().push_str(&String::from_utf8_lossy(&bytes[..count]));
             }
@@ -53,7 +52,7 @@ impl OnTerminal {
         self.screen.lock().unwrap().clone()
     }
 
-    /// Waits until the words stand on the screen so many times.
+    /// Waits until the words are on the screen `times` times.
     fn awaits(&mut self, words: &str, times: usize) {
         for _ in 0..6000 {
             if self.screen().matches(words).count() >= times {
@@ -64,7 +63,6 @@ impl OnTerminal {
         panic!("{words} not {times} times on the screen: {}", self.screen());
     }
 
-    /// The exit status, within a minute.
     fn ends(&mut self) -> Option<i32> {
         for _ in 0..6000 {
             if let Some(status) = self.program.try_wait().unwrap() {
@@ -77,7 +75,7 @@ impl OnTerminal {
     }
 }
 
-/// The robot stops the first run by itself, so that a second question comes.
+/// The robot stops the first run, so that a second question follows.
 const STOPS: &str =
     r#"printf x >>"$1/moved"; sleep 0.3; printf '%s\n' '{"type":"end","status":"stopped","reason":"as asked"}'"#;
 
@@ -99,7 +97,7 @@ fn xacro_starts_after_a_yes_on_the_terminal() {
     permitted.types("y\n");
     permitted.awaits("note: starting the program that expands the robot file: xacro arm.urdf", 1);
     while !folder.path().join("new.toml").exists() {
-        // Lines of the new study that are not sure.
+        // Uncertain lines of the new study.
         permitted.types("\n");
         std::thread::sleep(Duration::from_millis(200));
         assert!(
@@ -113,7 +111,7 @@ fn xacro_starts_after_a_yes_on_the_terminal() {
     assert_eq!(permitted.screen().matches("Start it?").count(), 1);
 }
 
-/// An Enter too many, or a whole answer typed ahead, while the robot moves: the next question waits all the same.
+/// An additional Enter, or an answer typed ahead while the robot moves, does not answer the next question.
 #[test]
 fn what_was_typed_before_a_question_is_no_answer() {
     let folder = tempfile::tempdir().unwrap();
@@ -122,17 +120,16 @@ fn what_was_typed_before_a_question_is_no_answer() {
     terminal.awaits("Is the robot clear?", 1);
     terminal.types("y\ny\n\ny\n");
     terminal.awaits("Is the robot clear?", 2);
-    // Long enough for an answer that had been there.
+    // Long enough for an answer typed ahead to have an effect.
     std::thread::sleep(Duration::from_millis(500));
     assert_eq!(std::fs::read_to_string(folder.path().join("moved")).unwrap(), "x", "{}", terminal.screen());
     assert!(terminal.program.try_wait().unwrap().is_none(), "{}", terminal.screen());
-    // The question is still open.
     terminal.types("n\n");
     assert_eq!(terminal.ends(), Some(1), "{}", terminal.screen());
     assert_eq!(std::fs::read_to_string(folder.path().join("moved")).unwrap(), "x");
 }
 
-/// Ctrl-C at a question: no Enter is needed, nothing moves, and the screen says so.
+/// Ctrl-C at a question: no Enter is needed, nothing moves, and a message is shown.
 #[test]
 fn an_interruption_ends_the_wait_for_an_answer() {
     let folder = tempfile::tempdir().unwrap();
@@ -142,6 +139,6 @@ fn an_interruption_ends_the_wait_for_an_answer() {
     let id = terminal.program.id().to_string();
     assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
     assert_eq!(terminal.ends(), Some(130), "{}", terminal.screen());
-    terminal.awaits("counts as answered with no", 1);
+    terminal.awaits("is treated as answered with no", 1);
     assert!(!folder.path().join("moved").exists());
 }

@@ -1,14 +1,12 @@
-//! Broken studies and tables of states: exit status 2 in good time, and a message that says where.
+//! Broken studies and state tables: exit status 2 within the time limit, and a message with the location.
 use crate::common::{broken, run_in};
 use std::time::{Duration, Instant};
 
-/// The lines of a table in `tests/broken`.
 fn table(name: &str) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(broken().join(name)).unwrap();
     text.lines().map(|line| line.split('\t').map(str::to_owned).collect()).collect()
 }
 
-/// Limit of the contract for one broken input.
 const LIMIT: Duration = Duration::from_secs(10);
 
 fn check(file: &str, arguments: &[&str], expected: &str) -> Option<String> {
@@ -47,7 +45,7 @@ fn every_broken_study_is_refused_with_its_place() {
     assert!(!out.exists(), "a refused study left something behind");
 }
 
-/// A name, an expression or a key of 200,000 characters is shortened where a message quotes it.
+/// A name, an expression or a key of 200,000 characters is shortened in messages.
 #[test]
 fn messages_quote_no_long_text() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! What other people's scripts rest on: exit statuses, JSON, files that are whole or not there.
+//! The contract for scripts: exit statuses, JSON, and files that are complete or absent.
 use crate::common::{broken, command, repository, run_in};
 use core::fmt::Write;
 use serde_json::Value;
@@ -16,8 +16,8 @@ fn has(value: &Value, keys: &[&str]) {
     }
 }
 
-/// A log that a robot could have made, 1,500 rows at 100 Hz: torques of the fixture's arm by the command itself,
-/// friction that opposes the motion, and a noise of a few mNm.
+/// A realistic log, 1,500 rows at 100 Hz: torques of the fixture's arm from the command `evaluate`, friction, and a
+/// noise of a few mNm.
 pub(crate) fn honest_log(folder: &Path) {
     let mut states = "q1,q2,dq1,dq2,ddq1,ddq2\n".to_owned();
     let motion = |t: f64| {
@@ -51,7 +51,7 @@ pub(crate) fn honest_log(folder: &Path) {
     std::fs::write(folder.join("honest.csv"), log).unwrap();
 }
 
-/// Identifies the fixture's arm from one part of an honest log, tested on the other, into `out`; returns standard
+/// Identifies the fixture's arm from one part of a realistic log, validated on the other, into `out`; returns standard
 /// output.
 fn identify_held_out(out: &Path, further: &[&str]) -> crate::common::CommandOutcome {
     honest_log(out);
@@ -175,7 +175,7 @@ fn identify_and_validate_agree_and_print_the_contracts_keys() {
 
 #[test]
 fn two_threads_write_the_same_files_as_one() {
-    // One folder for both: the log's path stands in the result.
+    // One folder for both, because the result contains the log's path.
     let folder = tempfile::tempdir().unwrap();
     let outcome = |threads: &str| {
         let ran = identify_held_out(folder.path(), &["--quiet", "--threads", threads]);
@@ -210,7 +210,7 @@ fn summaries_fit_eighty_columns_and_say_the_important_first() {
     assert!(ran.stderr.is_empty(), "no progress bar where nobody watches: {}", ran.stderr);
     let inspected = run_in(&broken(), &["inspect", &repository("robots/panda.urdf").display().to_string()]).stdout;
     for line in ran.stdout.lines().chain(inspected.lines()) {
-        // Names of files may be as long as they are.
+        // File names may be longer.
         assert!(line.starts_with("wrote ") || line.chars().count() <= 80, "{line}");
     }
     let at = |words: &str| ran.stdout.find(words).unwrap_or_else(|| panic!("no `{words}` in\n{}", ran.stdout));
@@ -235,7 +235,7 @@ fn outputs_are_whole_or_not_there() {
         assert_eq!(std::fs::read_to_string(folder.path().join(name)).unwrap(), old);
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3, "temporary files were left");
-    // A file where the folder should be: refused before the work, and the file stays.
+    // A file at the path of the folder: refused before the work, and the file is kept.
     let file = folder.path().join("result.json").display().to_string();
     let ran = run_in(&broken(), &["identify", "good.toml", "--out", &file]);
     assert_eq!(ran.status, 2, "{}", ran.stderr);
@@ -250,7 +250,7 @@ fn a_reader_that_leaves_early_is_no_error() {
     let folder = tempfile::tempdir().unwrap();
     let header: Vec<String> = ["q", "dq", "ddq"].iter().flat_map(|g| (1..=6).map(move |j| format!("{g}{j}"))).collect();
     let row = vec!["0.1"; 18].join(",");
-    // Far more than a pipe holds.
+    // Far more than the buffer of a pipe.
     let states = format!("{}\n{}", header.join(","), format!("{row}\n").repeat(2000));
     std::fs::write(folder.path().join("states.csv"), states).unwrap();
     for arguments in [

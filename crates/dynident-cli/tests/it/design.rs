@@ -1,18 +1,17 @@
-//! The command `design`: feasible motions, the contract's keys, the same result on any number of threads, refusals and
-//! diagnoses.
+//! The command `design`: feasible motions, the keys of the contract, identical results for any number of threads,
+//! errors and diagnoses.
 use crate::common::{CommandOutcome, repository, run_in};
 use serde_json::Value;
 use std::path::Path;
 
-/// A search that takes a second or so without full optimisation.
+/// A search of about a second without full optimisation.
 const SMALL: &str =
     "search = { starts = 3, rounds = 0, evaluations_per_start = 60, polish_evaluations = 150, search_samples = 81 }";
 
-/// No limits but those that are given.
 const NO_DEFAULTS: &str =
     "[design.defaults]\nfloor = false\nself_collision = false\nacceleration = false\nstop_margin_percent = 0\n";
 
-/// A study on the UR10 with the keys of `[design]` given, in `folder`.
+/// A study on the UR10 with the given keys of `[design]`, in `folder`.
 fn study(folder: &Path, design: &str, acceleration: f64) {
     let robot = repository("robots/ur10.urdf").canonicalize().unwrap();
     let joints = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
@@ -74,12 +73,12 @@ fn a_design_is_feasible_complete_and_the_same_on_any_number_of_threads() {
     assert!(forecast.iter().all(|p| p["std"].as_f64().unwrap() > 0.0 && p["unit"].is_string()), "{forecast:?}");
     assert!(first["notes"][0].as_str().unwrap().contains("smooth"), "{}", first["notes"]);
 
-    // At rest at both ends, and on the grid that was asked for.
+    // At rest at both ends, and on the requested grid.
     let table = std::fs::read_to_string(folder.path().join("out/trajectory.csv")).unwrap();
     let rows: Vec<Vec<f64>> =
         table.lines().skip(1).map(|row| row.split(',').map(|x| x.parse().unwrap()).collect()).collect();
     assert_eq!((rows.len(), rows[0].len(), rows[1000][0]), (1001, 19, 10.0));
-    // The series' coefficients are solved for rest exactly; rounding of sums of ten terms below 100.
+    // The series' coefficients are solved for exact rest; rounding of sums of ten terms below 100.
     assert!([&rows[0], &rows[1000]].iter().all(|row| row[7..].iter().all(|rate| rate.abs() < 1e-11)));
     for (file, holds) in [
         ("preview.svg", "</svg>"),
@@ -106,7 +105,7 @@ fn a_design_is_feasible_complete_and_the_same_on_any_number_of_threads() {
 #[test]
 fn what_cannot_be_kept_has_status_1_and_is_explained() {
     let folder = tempfile::tempdir().unwrap();
-    // The tool cannot be 5 m above the base: no motion keeps this, however slow.
+    // The tool cannot be 5 m above the base: no motion keeps this limit at any speed.
     study(folder.path(), SMALL, 10.0);
     let path = folder.path().join("study.toml");
     let text = std::fs::read_to_string(&path).unwrap();

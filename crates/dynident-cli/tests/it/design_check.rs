@@ -1,4 +1,4 @@
-//! `design --check` and `--check-log`: a motion that is there already, judged like a designed one.
+//! `design --check` and `--check-log`: an existing motion, checked like a designed one.
 use crate::common::{broken, repository, run_in};
 use serde_json::Value;
 use std::path::Path;
@@ -27,8 +27,8 @@ fn study(folder: &Path, name: &str, acceleration: f64) {
     std::fs::write(folder.join(name), text).unwrap();
 }
 
-/// The designed motion as a table is the same motion: the same figures, to what its splines and 100 Hz allow, and under
-/// tighter limits the verdict names what it breaks.
+/// The designed motion as a table has the same results within the accuracy of its splines at 100 Hz, and with tighter
+/// limits the verdict lists the broken limits.
 #[test]
 fn a_designed_motion_given_as_a_file_has_the_figures_of_its_design() {
     let folder = tempfile::tempdir().unwrap();
@@ -55,7 +55,7 @@ fn a_designed_motion_given_as_a_file_has_the_figures_of_its_design() {
     assert!(judged["diagnosis"].to_string().contains("acceleration"), "{}", judged["diagnosis"]);
 }
 
-/// A log says what it has excited; one that the study does not have is named.
+/// The excitation of a log is reported; an unknown log is an error.
 #[test]
 fn a_log_of_the_study_is_judged() {
     let folder = tempfile::tempdir().unwrap();

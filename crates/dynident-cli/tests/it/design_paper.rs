@@ -1,10 +1,9 @@
-//! The paper's design through the command: its optimum, the genetic algorithm's distance from it, Table 3 against the
-//! paper's own limits, and other optimisers for the ordinary problem.
+//! The paper's design with the command: its optimum, the distance of the genetic algorithm from it, Table 3 compared
+//! with the paper's own limits, and other optimisers for the ordinary problem.
 use crate::common::{CommandOutcome, repository, run_in};
 use serde_json::Value;
 use std::path::Path;
 
-/// The example with other words for some of its own, run in `folder`.
 fn run(folder: &Path, example: &str, changes: &[(&str, &str)]) -> (CommandOutcome, Option<Value>) {
     let robot = repository("examples/robots/paper_2r.toml").canonicalize().unwrap();
     let mut text = std::fs::read_to_string(repository(&format!("examples/{example}"))).unwrap();
@@ -18,13 +17,12 @@ fn run(folder: &Path, example: &str, changes: &[(&str, &str)]) -> (CommandOutcom
     (ran, file.map(|file| serde_json::from_str(&file).unwrap()))
 }
 
-/// The example's optimiser.
 const GENETIC: &str = "optimiser = { kind = \"genetic\", bits = 20, population = 40, generations = 500, crossover = 0.5, mutation = 0.01, elite = false }";
 
 #[test]
 fn each_optimiser_tells_its_distance_from_the_optimum() {
-    // From an independent program: 161.3, 176 to 217 over six seeds for the genetic algorithm (with room for other
-    // seeds); the project asks the others for 0.1 %.
+    // From an independent program: 161.3, and 176 to 217 over six seeds for the genetic algorithm (plus a margin for
+    // other seeds); the other optimisers must reach 0.1 %.
     for (optimiser, band) in [
         (GENETIC, 165.0..260.0),
         ("optimiser = \"gradient\"", 161.15..161.46),

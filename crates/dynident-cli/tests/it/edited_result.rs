@@ -4,13 +4,11 @@ use super::common::{CommandOutcome, broken, run_in};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A change of a result.
 type Edit<'a> = &'a dyn Fn(&mut Value);
 
 const STUDY: &str = "[robot]\nfile = \"arm.urdf\"\n[format]\ntime = { column = \"t\" }\nposition = { columns = \"q{1..2}\" }\n\
     torque = { columns = \"tau{1..2}\" }\n[drive]\nfriction = \"stated\"\n[[log]]\nfile = \"log.csv\"\n";
 
-/// A folder with a study and its result.
 fn identified() -> (tempfile::TempDir, Value) {
     let folder = tempfile::tempdir().unwrap();
     for name in ["arm.urdf", "log.csv"] {
@@ -41,7 +39,7 @@ fn refused(outcome: &CommandOutcome, says: &[&str]) {
 fn an_edited_result_is_used_only_by_who_asks_for_it() {
     let (folder, result) = identified();
     let at = folder.path();
-    // Another layout is the same content, and so are other times.
+    // Another layout, and other times, are the same content.
     let mut same = result.clone();
     same["timings_s"]["total"] = json!(77.0);
     write(at, &same);
@@ -54,7 +52,7 @@ fn an_edited_result_is_used_only_by_who_asks_for_it() {
     assert_eq!(export(at, &["json", "--accept-edited"]).status, 0);
     assert!(run_in(at, &["validate", "r.json", "--study", "s.toml", "--accept-edited"]).status < 2);
     refused(&run_in(at, &["reduce", "s.toml", "--like", "r.json", "--out", "f.bin"]), &["edited or damaged"]);
-    // Of before there was a hash.
+    // A file of an earlier version, without a hash.
     edited["provenance"].as_object_mut().unwrap().remove("content_sha256").unwrap();
     write(at, &edited);
     assert_eq!(export(at, &["json"]).status, 0);

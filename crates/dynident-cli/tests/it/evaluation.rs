@@ -1,4 +1,4 @@
-//! `evaluate` against the library to the last digit, and against Pinocchio.
+//! `evaluate` compared with the library to the last digit, and with Pinocchio.
 use crate::common::{repository, run_in};
 use dynident::dynamics::{
     Workspace, coriolis_matrix, forward_dynamics, gravity_torque, gravity_torque_derivative, inverse_dynamics,
@@ -11,16 +11,16 @@ use std::path::Path;
 struct Golden {
     robot: String,
     states: Vec<Value>,
-    /// Pinocchio sorts joints by name: where its joints stand in the tree.
+    /// Index of each joint in Pinocchio, which sorts joints by name.
     place: Vec<usize>,
-    /// Where the description stands.
+    /// Folder of the robot description.
     _folder: tempfile::TempDir,
 }
 
 fn golden(name: &str) -> Golden {
     let text = std::fs::read_to_string(repository(&format!("golden/pinocchio/{name}.json"))).unwrap();
     let value: Value = serde_json::from_str(&text).unwrap();
-    // Without mimics, for every joint of the file moves by itself.
+    // Without mimic joints, so that every joint of the file is independent.
     let text = std::fs::read_to_string(repository(&format!("robots/{name}.urdf"))).unwrap();
     let free: Vec<&str> = text.lines().filter(|line| !line.contains("<mimic")).collect();
     let folder = tempfile::tempdir().unwrap();
@@ -105,7 +105,7 @@ fn torques_are_pinocchios() {
             let tau = numbers(&state["tau"]);
             let largest = tau.iter().fold(0.0_f64, |max, t| max.max(t.abs()));
             for (found, expected) in golden.place.iter().map(|&j| row[j]).zip(&tau) {
-                // The issue's own figure.
+                // The required accuracy.
                 assert!((found - expected).abs() <= 1e-10 * largest, "{name}: {found} {expected}");
             }
         }

@@ -1,4 +1,4 @@
-//! `dynident export`: files, refusals, JSON; what is written is proved in `dynident-export`.
+//! `dynident export`: files, errors, JSON; `dynident-export` tests the content.
 
 use super::common::{CommandOutcome, broken, run_in};
 use serde_json::{Value, json};
@@ -19,13 +19,12 @@ const FORMS: [(&str, &str); 12] = [
     ("simulator-table", "| joint | armature | damping | frictionloss |"),
 ];
 
-/// A folder with the fixture's study and the result of it.
 fn identified() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for name in ["arm.urdf", "log.csv", "good.toml"] {
         std::fs::copy(broken().join(name), folder.path().join(name)).unwrap();
     }
-    // The fixture is short and may have a PROBLEM: its result is there all the same.
+    // The fixture is short and may have a PROBLEM; its result is still written.
     run_in(folder.path(), &["identify", "good.toml", "--out", "r"]);
     folder
 }

@@ -1,10 +1,10 @@
-//! Logs reduced to factors, merged, and a model of them: the same as of the logs.
+//! Logs reduced to factors, merged, and identified: the same model as from the logs.
 use crate::common::{broken, run_in};
 use crate::contract::{honest_log, json};
 use serde_json::Value;
 use std::path::Path;
 
-/// A study of the fixture's arm with the logs `a` and `b`, and nothing that is left to them.
+/// A study of the fixture's arm with the logs `a` and `b`, and no automatic choices.
 pub(crate) fn study(folder: &Path) -> String {
     honest_log(folder);
     let log = folder.join("honest.csv").display().to_string();
@@ -26,7 +26,7 @@ pub(crate) fn study(folder: &Path) -> String {
     path.display().to_string()
 }
 
-/// Runs the command in `folder`, which has to end with `status`; its standard output.
+/// Runs the command in `folder`, which must end with `status`; returns its standard output.
 fn ran(folder: &Path, status: i32, arguments: &[&str]) -> String {
     let outcome = run_in(folder, arguments);
     assert_eq!(outcome.status, status, "{arguments:?}: {}", outcome.stderr);
@@ -42,7 +42,7 @@ fn factors_give_the_model_that_the_logs_give() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path();
     let study = study(folder);
-    // As many segments as the fit itself has, and the study's order of logs: the same numbers, so the same bits.
+    // With the same number of segments and order of logs as in the fit, the results are bit-identical.
     let reduce = |log: &str, further: &[&str]| {
         let file = format!("{log}.factors");
         ran(folder, 0, &[&["reduce", &study, "--log", log, "--segments", "64", "--out", &file], further].concat())
@@ -72,11 +72,11 @@ fn factors_give_the_model_that_the_logs_give() {
         let command = format!("dynident identify --factors {}", files.join(" "));
         assert_eq!(found["provenance"]["command"], Value::String(command));
     }
-    // One robot alone is the fit to its log alone.
+    // One robot alone equals the fit to its log alone.
     status(&["identify", "--out", "second", "--quiet", "--factors", "ab.factors", "--arm", "second"]);
     status(&["identify", "--out", "b", "--quiet", "--factors", "b.factors"]);
     assert_eq!(result(&folder.join("second"))["base_parameters"], result(&folder.join("b"))["base_parameters"]);
-    // Like a model: its cut-off stands in for what the study leaves open.
+    // With --like, the cut-off of a model replaces the open one of the study.
     let open = std::fs::read_to_string(&study).unwrap().replace(", cutoff_hz = 10.0", "");
     std::fs::write(folder.join("open.toml"), open).unwrap();
     let left_open = ["reduce", "open.toml", "--log", "b", "--segments", "64", "--out", "like.factors"];

@@ -1,5 +1,5 @@
-//! Faults of the operating system: a clock that is not set, folders and files that cannot be closed, a kill in the
-//! middle of writing. Made by a small library of C, which is loaded before that of the system.
+//! Faults of the operating system: a clock that is not set, folders and files that cannot be closed, a kill during
+//! writing. They are injected by a small C library, which is loaded before that of the system.
 #![cfg(target_os = "linux")]
 
 use crate::common::{command, repository, run_in};
@@ -8,7 +8,7 @@ use crate::{factors, robots_outside};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The library; `None`, with a line that says so, where there is no compiler.
+/// The library; `None`, with a message, without a compiler.
 #[allow(clippy::print_stdout, reason = "a test that is skipped says so")]
 fn library(folder: &Path) -> Option<PathBuf> {
     let library = folder.join("faults.so");
@@ -35,13 +35,13 @@ fn with_fault(library: &Path, fault: &str, folder: &Path, arguments: &[&str]) ->
     (output.status.code().unwrap_or(-1), said)
 }
 
-/// The files and folders that Dynident left beside its outputs.
+/// Temporary files and folders next to the outputs.
 fn leftovers(folder: &Path) -> Vec<String> {
     let names = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     names.filter(|name| name.starts_with('.')).collect()
 }
 
-/// The last result of a long job is written whatever the clock says and however folders close.
+/// The result of a long job is written for any clock and any error when closing folders.
 #[test]
 fn no_command_panics_for_clocks_and_folders() {
     let place = tempfile::tempdir().unwrap();
@@ -57,7 +57,7 @@ fn no_command_panics_for_clocks_and_folders() {
             let (status, said) = with_fault(&library, fault, folder, arguments);
             assert!(status == 0 || status == 1, "{fault}, {arguments:?}: {said}");
         };
-        // The first of two lists the folder for what others left there.
+        // The first of the two lists the folder for leftovers.
         run(&["identify", &study, "--out", "result", "--quiet"]);
         run(&["reduce", &study, "--out", "a.factors", "--quiet"]);
         run(&["identify", "--factors", "a.factors", "--out", "of_factors", "--quiet"]);
@@ -76,7 +76,7 @@ fn no_command_panics_for_clocks_and_folders() {
     assert_eq!(is_unknown, [false, false, true, true, true, true, false, false, false, false], "{made_at:?}");
 }
 
-/// A disk that cannot write is an error of the command, and leaves what was there.
+/// A disk that cannot write is an error of the command, and existing files are unchanged.
 #[test]
 fn a_disk_that_fails_is_an_error() {
     let place = tempfile::tempdir().unwrap();
@@ -92,7 +92,8 @@ fn a_disk_that_fails_is_an_error() {
     assert_eq!(leftovers(folder), [""; 0]);
 }
 
-/// Killed after writing and before renaming: the next run with the same output removes what was left, and nothing else.
+/// After a kill between writing and renaming, the next run with the same output removes the temporary files, and
+/// nothing else.
 #[test]
 fn the_next_run_removes_the_temporary_files_of_a_killed_one() {
     let place = tempfile::tempdir().unwrap();
@@ -117,7 +118,7 @@ fn the_next_run_removes_the_temporary_files_of_a_killed_one() {
         for _ in 0..2 {
             let (status, said) = with_fault(&library, "kill", folder, arguments);
             assert_eq!(status, -1, "{arguments:?}: {said}");
-            // The second killed run has removed what the first left.
+            // The second killed run has removed the leftovers of the first.
             let own = leftovers(&written).into_iter().filter(|name| name.contains(".dynident-"));
             assert_eq!(own.count(), 1, "{arguments:?}");
         }

@@ -1,9 +1,9 @@
-//! Files, terminals and devices: inputs stay, nothing steers the terminal, what cannot be written is an error.
+//! Files, terminals and devices: inputs are kept, control characters do not reach the terminal, and write errors are
+//! reported.
 use crate::common::{broken, command, repository, run_in};
 use serde_json::Value;
 use std::path::Path;
 
-/// A folder with the fixture's robot, log and study, and a table of states.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for name in ["arm.urdf", "log.csv", "good.toml"] {
@@ -14,7 +14,6 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// Every file of a folder with its content.
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut files: Vec<(String, Vec<u8>)> = std::fs::read_dir(folder)
         .unwrap()
@@ -32,7 +31,7 @@ fn no_output_takes_the_place_of_an_input() {
     let at = folder.path();
     let write = |name: &str, text: &str| std::fs::write(at.join(name), text).unwrap();
     let good = std::fs::read_to_string(at.join("good.toml")).unwrap();
-    // Logs, results and trajectories under the names that commands write.
+    // Logs, results and trajectories with the names of output files.
     for name in ["report.html", "log2.csv"] {
         std::fs::copy(at.join("log.csv"), at.join(name)).unwrap();
     }
@@ -81,7 +80,7 @@ fn no_output_takes_the_place_of_an_input() {
 fn nothing_from_outside_steers_the_terminal() {
     let folder = folder();
     let at = folder.path();
-    // XML knows no escape, but the one-character forms of its sequences.
+    // XML cannot contain the escape character, but the one-character forms of its sequences.
     let robot = std::fs::read_to_string(at.join("arm.urdf")).unwrap();
     let robot =
         robot.replace("shoulder", "s\u{9b}31m\u{202e}houlder").replace("name=\"arm\"", "name=\"\u{9d}0;title\u{9c}\"");
@@ -99,7 +98,6 @@ fn nothing_from_outside_steers_the_terminal() {
         let ran = run_in(at, arguments);
         assert!(!steers(&ran.stdout) && !steers(&ran.stderr), "{arguments:?}: {:?} {:?}", ran.stdout, ran.stderr);
     }
-    // What JSON says is still the name.
     let ran = run_in(at, &["inspect", "arm.urdf", "--json"]);
     let file: Value = serde_json::from_str(&ran.stdout).unwrap();
     assert_eq!(file["joints"][0]["name"], "s\u{9b}31m\u{202e}houlder");
@@ -136,7 +134,7 @@ fn a_log_is_not_taken_for_a_robot() {
     assert!(ran.status == 2 && ran.stderr.contains("a study, not a robot description"), "{}", ran.stderr);
 }
 
-/// Turned signs are named, and the copy is the original byte for byte.
+/// Reversed signs are reported, and the corrected copy equals the original byte for byte.
 #[test]
 fn a_slip_is_named_and_undone_in_a_copy() {
     let folder = tempfile::tempdir().unwrap();
@@ -167,7 +165,7 @@ fn a_slip_is_named_and_undone_in_a_copy() {
         ran.stderr
     );
     assert_eq!(std::fs::read_to_string(folder.path().join("mended.urdf")).unwrap(), original);
-    // A good one has nothing to mend, and a sum that is not reached is no slip of one number.
+    // A correct file has nothing to fix, and a wrong total mass is not a mistake of one number.
     let robot = repository("robots/iiwa14.urdf").display().to_string();
     let ran = run_in(folder.path(), &["inspect", &robot, "--fix", "none.urdf"]);
     assert!(ran.status == 0 && !folder.path().join("none.urdf").exists(), "{}", ran.stderr);

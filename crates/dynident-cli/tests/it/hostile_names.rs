@@ -1,5 +1,5 @@
-//! Hostile names, written into every output and read by the programs that these outputs are for. No name is executed,
-//! no output has more parts than with a plain name, and no character of it is invisible.
+//! Hostile names, written into every output and read by the target programs. No name is executed, no output has more
+//! parts than with a harmless name, and no character is invisible.
 
 use super::common::{repository, run_in};
 use dynident::excitation::Motion;
@@ -21,25 +21,25 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
-/// A name without harm: what every output has with it, it has with the others.
+/// A harmless name: all outputs must have the same structure with the other names.
 const PLAIN: &str = "plain";
 
-/// Names that end strings, comments and elements of one language or another.
+/// Names that end strings, comments and elements in some language.
 const FIXED: [&str; 44] = [
     PLAIN,
-    // Finding A2: code behind the end of a line's comment.
+    // Finding A2: code after the end of a line comment.
     "x\nimport os; os.system('touch MARKER')\n#",
     "x\npub fn pwned() -> i32 { std::process::id() as i32 }\n//",
     "x\nstatic int pwned = (__builtin_puts(\"PWNED\"), 1);\n//",
     "x\nsystem('touch MARKER');\n%",
     "x */ static int pwned(void){return 1;} /*",
-    // Finding A3: characters that nobody sees.
+    // Finding A3: invisible characters.
     "j\u{202e}\u{2066} /*evil*/ \u{2069}\u{200b}",
     "j\u{9b}31m\u{85}x\u{2028}y\u{2029}z",
     "\u{feff}a\u{ad}b\u{e0001}\u{e0041}\u{1d173}\u{61c}\u{180e}\u{fff9}",
     "a\u{1b}[2J\u{1b}]0;title\u{7}\u{8}\u{7f}",
     "\r\nsystem('touch MARKER')\r",
-    // Ends of everything.
+    // Ends of strings, comments and elements.
     "</script><script>document.title=\"PWNED\"</script><img src=x onerror=\"document.title='PWNED'\">",
     "j\"\"\"\nimport os;os.system(\"touch MARKER\")\n\"\"\"",
     "j */ #include \"/etc/passwd\"\n int evil=system(\"id\"); /* \"); system(\"touch MARKER\"); (\"",
@@ -75,7 +75,7 @@ const FIXED: [&str; 44] = [
     "if",
 ];
 
-/// Pieces of which further names are put together.
+/// Pieces of further names.
 const PIECES: [&str; 36] = [
     "\n", "\r", "\u{2028}", "\u{85}", "\\", "/", "*", "*/", "/*", "//", "#", "%", "%{", "%}", "\"", "'", "\"\"\"",
     "'''", "r#\"", "\"#", "?", "??/", "<", ">", "--", "-->", "]]>", "<script>", "&", ";", ": ", "- ", "{", "}",
@@ -104,7 +104,7 @@ fn assert_visible(what: &str, text: &str) {
     }
 }
 
-/// Whether a program can be run; prints that it is missing where it cannot.
+/// Whether a program can be run; prints a message if it is missing.
 #[allow(clippy::print_stdout, reason = "a test says that it was skipped")]
 fn has(program: &str, arguments: &[&str]) -> bool {
     let found = Command::new(program).args(arguments).output().is_ok_and(|output| output.status.success());
@@ -114,7 +114,6 @@ fn has(program: &str, arguments: &[&str]) -> bool {
     found
 }
 
-/// Runs a program in a folder and gives what it printed.
 fn run(folder: &Path, program: &str, arguments: &[&str]) -> String {
     let output = Command::new(program).args(arguments).current_dir(folder).output().unwrap();
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -122,7 +121,7 @@ fn run(folder: &Path, program: &str, arguments: &[&str]) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// The arm of the fixture with a name in all its names.
+/// The arm of the fixture with one name for everything.
 fn arm(number: usize, name: &str) -> Model {
     let model = load_robot(super::common::broken().join("arm.urdf")).unwrap().model;
     let mut base = model.base().clone();
@@ -156,7 +155,7 @@ fn exported(robot: &RobotModel, target: Target, name: &str) -> String {
     text
 }
 
-/// Lines that are no comment, with the robot's identifier as `N`.
+/// Lines of code without comments, with the robot's identifier as `N`.
 fn code(text: &str, mark: &str, identifier: &str) -> String {
     let lines = text.lines().filter(|line| !line.trim_start().starts_with(mark));
     let text = lines.collect::<Vec<_>>().join("\n");
@@ -176,7 +175,7 @@ fn code_in_names_is_not_code_in_exports() {
     for (number, name) in names.iter().enumerate() {
         let robot = robot(number, name);
         let identifier = robot.identifier();
-        // Comments of one line end where lines end, and no line ends but by a newline.
+        // Line comments end only at a newline.
         for (place, (target, mark)) in [
             (Target::Cpp, "//"),
             (Target::Rust, "//"),
@@ -196,7 +195,7 @@ fn code_in_names_is_not_code_in_exports() {
             }
             match target {
                 Target::Cpp => {
-                    // All of them are one file, which is no header.
+                    // All of them form one file, which is not a header.
                     let _ = writeln!(cpp, "{}\nint marker_{number};", text.replace("#pragma once", ""));
                 }
                 Target::Rust => {
@@ -232,7 +231,7 @@ fn code_in_names_is_not_code_in_exports() {
             "-fsyntax-only",
         ];
         run(at, compiler, &[&flags[..], &[&file]].concat());
-        // What the preprocessor leaves: the same code for every name.
+        // After the preprocessor the code is the same for every name.
         let without: Vec<&str> = text.lines().filter(|line| !line.starts_with("#include <")).collect();
         std::fs::write(at.join(&file), without.join("\n")).unwrap();
         let left = run(at, compiler, &["-x", language, standard, "-trigraphs", "-E", "-P", &file]);
@@ -264,7 +263,7 @@ fn code_in_names_is_not_code_in_exports() {
     assert!(!marker.exists(), "a name was executed");
 }
 
-/// Reads every module and every YAML file: the parts at the top are those of the first.
+/// Reads every module and every YAML file: the top-level parts are those of the first.
 const LOOK: &str = r#"
 import ast, glob
 parts = {}
@@ -298,13 +297,13 @@ fn elements(text: &str) -> Vec<(String, Vec<String>)> {
     .collect()
 }
 
-/// Whether XML can hold a name, and readers of descriptions take it as it is.
+/// Whether XML can represent a name, and readers of robot descriptions accept it unchanged.
 fn fits_xml(name: &str) -> bool {
     let is_control = |c: char| c < ' ' && !matches!(c, '\n' | '\r' | '\t') || matches!(c, '\u{fffe}' | '\u{ffff}');
     !name.contains(is_control) && !name.contains("${") && !name.contains("$(")
 }
 
-/// A name as somebody else's file has it: markup is escaped, invisible characters stand there as they are.
+/// A name as in somebody else's file: markup is escaped, invisible characters are kept.
 fn raw(name: &str) -> String {
     let mut text = String::new();
     for c in name.chars() {
@@ -334,7 +333,7 @@ fn names_are_no_elements_of_descriptions() {
         let urdf = exported(&robot, Target::Urdf, name);
         assert!(!urdf.contains("${") && !urdf.contains("$("), "{urdf}");
         if fits_xml(name) {
-            // Readers get the very names back: nothing that refers to a joint by its name is lost.
+            // Readers get exactly the same names, so references by name remain valid.
             let again = read_urdf(&exported(&robot, Target::Urdf, name)).unwrap().model;
             assert_eq!(again.joints()[1].name, robot.model().joints()[1].name);
             assert_eq!(again.name(), robot.model().name());
@@ -343,7 +342,6 @@ fn names_are_no_elements_of_descriptions() {
     }
 }
 
-/// The user's own files with new values.
 fn rewritten(name: &str) {
     let own = raw(name);
     let note = own.replace("--", "- -").replace("--", "- -").replace("&#xd;", " ");
@@ -386,7 +384,7 @@ fn rewritten(name: &str) {
     assert_visible("identified.xml", &written);
     assert_eq!(read_mjcf(&written).unwrap().model.joints()[0].name, model.joints()[0].name);
 
-    // Readers of SDF compare names in elements' texts, from which they take blanks at both ends.
+    // Readers of SDF compare names in the text of elements, from which they trim blanks.
     if name.contains("::") || name.trim() != name || name.is_empty() {
         return;
     }
@@ -422,7 +420,6 @@ fn tables_and_json_hold_names_as_names() {
         assert_eq!((header.len(), table.records().flatten().count()), (3, 3), "{waypoints}");
         assert!(header.iter().all(|field| !field.starts_with(['=', '+', '-', '@'])), "{waypoints}");
 
-        // What a robot is handed, as the file is written.
         let reference = Reference::new(10.0, motion.clone()).unwrap();
         let gain = PerJoint::All(1.0);
         let settings = ControllerSettings::JointPd(JointPdSettings { kp: gain.clone(), kd: gain });
@@ -471,7 +468,6 @@ fn tables_and_json_hold_names_as_names() {
         assert_eq!(again["name"].as_str(), Some(&**name));
         tables += 1;
     }
-    // An empty name is refused.
     assert!(tables > 200, "{tables}");
 }
 
@@ -493,7 +489,7 @@ fn knowledge() -> dynident::export::DriveKnowledge {
     }
 }
 
-/// Names of the elements and of their attributes; the text of scripts is none.
+/// Names of the elements and of their attributes, without the text of scripts.
 fn markup(page: &str) -> (std::collections::BTreeSet<String>, usize) {
     let (mut found, mut scripts) = (std::collections::BTreeSet::new(), 0);
     let mut rest = page;
@@ -533,7 +529,7 @@ fn markup(page: &str) -> (std::collections::BTreeSet<String>, usize) {
 
 #[test]
 fn names_are_no_markup_of_pages() {
-    // The fixture with names that stand nowhere else, identified once; then they become others, in sentences too.
+    // The fixture is identified once with unique names, which are then replaced, also in sentences.
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let urdf = std::fs::read_to_string(super::common::broken().join("arm.urdf")).unwrap();
@@ -579,7 +575,6 @@ fn names_are_no_markup_of_pages() {
     }
 }
 
-/// A result with other names.
 fn renamed(value: &Value, name: &str) -> Value {
     match value {
         Value::String(text) => {
@@ -601,7 +596,7 @@ fn renamed(value: &Value, name: &str) -> Value {
     }
 }
 
-/// The real command on ten names: everything that it prints and writes, and the code that it exports.
+/// The command on ten names: everything that it prints and writes, and the code that it exports.
 #[test]
 fn the_command_executes_no_name() {
     for number in [1, 2, 4, 6, 7, 9, 11, 14, 26, 40] {
@@ -659,7 +654,6 @@ fn the_command_executes_no_name() {
     }
 }
 
-/// No crate writes JSON past the one place for it.
 #[test]
 fn there_is_one_writer_of_json() {
     fn sources(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
@@ -675,7 +669,7 @@ fn there_is_one_writer_of_json() {
     let mut strays = Vec::new();
     for entry in std::fs::read_dir(repository("crates")).unwrap() {
         let folder = entry.unwrap().path();
-        // What benchmarks and Python are given stays in memory or holds no names of files.
+        // Benchmarks and Python keep the JSON in memory, or it contains no file names.
         if ["dynident-text", "dynident-python", "dynident-benchmark", "dynident-testing"]
             .iter()
             .any(|name| folder.ends_with(name))
@@ -688,7 +682,7 @@ fn there_is_one_writer_of_json() {
             let text = std::fs::read_to_string(&file).unwrap();
             let code = text.split("#[cfg(test)]\nmod ").next().unwrap();
             let writes = ["serde_json::to_string", "serde_json::to_vec", "serde_json::to_writer"];
-            // The head of a file of factors is no text for people: its bytes are hashed with the numbers behind it.
+            // The head of a factor file is not read by people; its bytes are hashed with the numbers after it.
             let is_head = file.ends_with("factors/file.rs");
             strays.extend(writes.iter().filter(|word| code.contains(**word) && !is_head).map(|_| file.clone()));
         }

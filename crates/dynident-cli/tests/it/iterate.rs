@@ -1,4 +1,4 @@
-//! `iterate` and `simulate` from outside: files, exit status, resuming.
+//! `iterate` and `simulate` as commands: files, exit status, resuming.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -17,8 +17,8 @@ fn json(file: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()
 }
 
-/// The paper's arm through the command: inside the limits (18), every parameter within 0.007 after three runs at most,
-/// and what the contract promises.
+/// The paper's arm with the command: within the limits (18), every parameter within 0.007 after at most three runs, and
+/// the contract is met.
 #[test]
 fn the_papers_example_converges_and_resumes() {
     let out = tempfile::tempdir().unwrap();
@@ -42,19 +42,18 @@ fn the_papers_example_converges_and_resumes() {
         assert!(parameter["error"].as_f64().unwrap().abs() < 1e-6, "{parameter}");
     }
     assert!(std::fs::read_to_string(out.path().join("report.html")).unwrap().contains("converged"));
-    // Without its last run and its summary it comes to the same files.
+    // Without its last run and its summary it writes the same files again.
     let whole = std::fs::read(&file).unwrap();
     std::fs::remove_file(&file).unwrap();
     std::fs::remove_dir_all(out.path().join(format!("runs/run_{}", runs.len()))).unwrap();
     assert_eq!(dynident(&["iterate"], &study, out.path()).status.code(), Some(0));
     assert_eq!(std::fs::read(&file).unwrap(), whole);
-    // Other settings do not go on from there.
     let other = dynident(&["iterate", "--seed", "9"], &study, out.path());
     assert_eq!(other.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&other.stderr).contains("other settings"));
 }
 
-/// A study that cannot settle in one run: exit status 1, and the file says so.
+/// A study that cannot converge in one run: exit status 1, and the file contains the status.
 #[test]
 fn runs_used_up_are_exit_status_one() {
     let out = tempfile::tempdir().unwrap();

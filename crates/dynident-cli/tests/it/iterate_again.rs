@@ -1,10 +1,10 @@
-//! `iterate` into a folder where something is: what goes on, what is refused, and that nothing is lost.
+//! `iterate` in a folder with existing files: resumed or refused, and nothing is lost.
 
 use crate::common::run_in;
 use std::fmt::Write;
 use std::path::Path;
 
-/// The planar arm along two sines each, from rest, in simulation.
+/// The planar arm along two sines per joint, from rest, in simulation.
 fn study(folder: &Path, iteration: &str) {
     let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/planar2r.urdf");
     let mut table = String::from("t_s,q1,q2,dq1,dq2,ddq1,ddq2\n");
@@ -50,8 +50,8 @@ fn iterate(folder: &Path, further: &[&str]) -> (i32, String) {
     (outcome.status, format!("{}{}", outcome.stdout, outcome.stderr))
 }
 
-/// What the words advise can be followed: more runs, another tolerance, slow runs, another name keep the runs that are
-/// there. What runs are made with is another iteration, and the words name the table and the switch.
+/// Suggested fixes keep the existing runs: more runs, another tolerance, slow runs, another name. Changed conditions of
+/// the runs are another iteration, and the message names the table and the option.
 #[test]
 fn following_the_advice_keeps_the_runs() {
     let folder = tempfile::tempdir().unwrap();
@@ -70,14 +70,13 @@ fn following_the_advice_keeps_the_runs() {
     assert_eq!(status, 0, "{words}");
     assert_eq!(std::fs::read(at.join("out/runs/run_1/run.json")).unwrap(), first);
     assert!(at.join("out/runs/run_2/run.json").exists());
-    // Other gains are another iteration.
     std::fs::write(at.join("study.toml"), text.replace("kp = 25.0", "kp = 24.0")).unwrap();
     let (status, words) = iterate(at, &[]);
     assert_eq!(status, 2, "{words}");
     assert!(words.contains("[controller] differs") && words.contains("--fresh"), "{words}");
 }
 
-/// The controller that is handed on comes with the envelope that its runs had.
+/// The exported controller has the envelope of its runs.
 #[test]
 fn the_controller_that_was_found_has_the_envelope() {
     let folder = tempfile::tempdir().unwrap();
@@ -88,7 +87,6 @@ fn the_controller_that_was_found_has_the_envelope() {
     assert_eq!(file["envelope"]["tracking_error"], serde_json::json!([0.9, 0.9]), "{}", file["envelope"]);
 }
 
-/// A fresh start that is refused removes nothing at all.
 #[test]
 fn a_refused_fresh_start_removes_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -106,7 +104,7 @@ fn a_refused_fresh_start_removes_nothing() {
     }
 }
 
-/// A model of `identify` in the same folder stays until the iteration has found its own robot.
+/// A result of `identify` in the same folder is kept until the iteration has its own result.
 #[test]
 fn a_result_of_identify_stays_until_there_is_another() {
     let folder = tempfile::tempdir().unwrap();
@@ -123,7 +121,7 @@ fn a_result_of_identify_stays_until_there_is_another() {
     for further in [&[][..], &["--fresh"]] {
         let (status, words) = iterate(at, further);
         assert_eq!(status, 1, "{words}");
-        // The page is the iteration's by now.
+        // The report is already that of the iteration.
         assert!(names[..2].iter().all(theirs), "{words}");
     }
     study(at, "max_runs = 2");

@@ -1,19 +1,17 @@
-//! What goes beside the program where it is packed: completions of shells and manual pages.
+//! Files for packages: shell completions and manual pages.
 
 use super::common::{repository, run_in};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Commands that `--help` lists.
 fn listed() -> Vec<String> {
     let help = run_in(Path::new("."), &["--help"]).stdout;
     let commands = help.split("Commands:").nth(1).unwrap().split("\n\n").next().unwrap();
-    // Descriptions go on further to the right.
+    // Descriptions continue with more indentation.
     let lines = commands.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
     lines.map(|line| line.split_whitespace().next().unwrap().to_owned()).filter(|name| name != "help").collect()
 }
 
-/// The program of a shell, if it is there.
 #[allow(clippy::print_stdout, reason = "a test says that it was skipped")]
 fn shell(name: &str) -> Option<Command> {
     let there = Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
@@ -41,7 +39,7 @@ fn shells_read_their_completions() {
     }
     let refused = run_in(Path::new("."), &["completions", "bash", "--json"]);
     assert_eq!((refused.status, refused.stdout.as_str()), (2, ""));
-    assert!(refused.stderr.contains("leave --json out"));
+    assert!(refused.stderr.contains("omit --json"));
     assert_eq!(run_in(Path::new("."), &["completions", "tcsh"]).status, 2);
 }
 
@@ -77,7 +75,7 @@ fn every_command_has_a_manual_page() {
         let text = std::fs::read_to_string(folder.path().join("share/man1").join(name)).unwrap();
         let about = name.trim_end_matches(".1");
         assert!(text.contains(&format!(".TH {about} 1")) && text.contains(".SH SYNOPSIS"), "{name}: {text}");
-        // Options of every command stand on every page.
+        // Global options are on every page.
         assert!(text.contains("\\-\\-threads"), "{name}");
     }
     assert_eq!(run_in(folder.path(), &["man", "share/man1/dynident.1"]).status, 2);

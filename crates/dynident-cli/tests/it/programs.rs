@@ -1,5 +1,5 @@
-//! Programs that files from strangers need: started with permission only, within a time limit, and with their children
-//! stopped. The program `xacro` is a shell script here.
+//! Programs that files from strangers need: started with permission only, within a time limit, and stopped with their
+//! children. The program `xacro` is a shell script here.
 #![cfg(unix)]
 
 use crate::common::{CommandOutcome, broken, command};
@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// A good study with a robot file that has macros, and a program `xacro` that writes its arguments into `ran` and then
-/// does what `rest` says.
+/// executes `rest`.
 pub(crate) fn folder(rest: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
@@ -38,7 +38,6 @@ pub(crate) fn folder(rest: &str) -> tempfile::TempDir {
 
 pub(crate) const EXPANDS: &str = "cat \"$here/expanded.urdf\"";
 
-/// The command with the script on its PATH.
 pub(crate) fn with_xacro(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = command(folder, arguments);
     command.env("PATH", format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap()));
@@ -55,7 +54,7 @@ fn run_in(folder: &Path, arguments: &[&str]) -> CommandOutcome {
     }
 }
 
-/// The arguments with which the script was started, a line for each start.
+/// The arguments with which the script was started, one line per start.
 pub(crate) fn starts(folder: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(folder.join("bin/ran")).unwrap_or_default();
     text.lines().map(str::to_owned).collect()
@@ -68,8 +67,8 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Whatever command reads a robot file: without permission no program runs, nothing is written, and the message names
-/// the file, the option and the command to run by hand.
+/// For every command that reads a robot file: without permission no program runs, nothing is written, and the message
+/// contains the file, the option and the command to run by hand.
 #[test]
 fn no_command_expands_macros_without_permission() {
     let folder = folder(EXPANDS);
@@ -101,7 +100,7 @@ fn no_command_expands_macros_without_permission() {
     }
 }
 
-/// With permission xacro runs once for each command, the screen shows it, and the arguments reach it: from the command
+/// With permission xacro runs once per command, the command is shown, and it receives the arguments from the command
 /// line, and from the study that `new` writes.
 #[test]
 fn permitted_macros_are_expanded_once_with_their_arguments() {
@@ -136,7 +135,6 @@ fn permitted_macros_are_expanded_once_with_their_arguments() {
     assert_eq!((outcome.status, outcome.stdout), (0, plain.stdout), "{}", outcome.stderr);
 }
 
-/// Arguments that nothing reads, or that would be options of the program, are refused before anything is started.
 #[test]
 fn xacro_arguments_are_checked() {
     let folder = folder(EXPANDS);
@@ -161,7 +159,7 @@ fn xacro_arguments_are_checked() {
     assert_eq!(starts(at), [""; 0]);
 }
 
-/// A failure is reported with the program's words, and nothing of them controls the terminal.
+/// A failure is reported with the program's message, without control characters.
 #[test]
 fn a_failure_of_xacro_is_reported() {
     let folder = folder("printf 'no such \\033[31mpackage' >&2; exit 3");
@@ -176,7 +174,7 @@ fn a_failure_of_xacro_is_reported() {
     assert!(output.status.code() == Some(2) && said.contains("not installed"), "{said}");
 }
 
-/// A program that does not end is stopped by its time limit, and by Ctrl-C; its children are stopped with it.
+/// A program that does not end is stopped by its time limit and by Ctrl-C, together with its children.
 #[test]
 fn a_hanging_xacro_is_stopped_with_its_children() {
     let folder = folder("sleep 600 & echo $! >\"$here/pid\"; mv \"$here/pid\" \"$here/child\"; wait");

@@ -1,8 +1,8 @@
-//! The command `reproduce`: every table and figure of the paper, its goals reached, a page that stands alone.
+//! The command `reproduce`: every table and figure of the paper, its goals, and a self-contained page.
 use crate::common::run_in;
 use serde_json::Value;
 
-/// What a person reads of a page: its body without scripts and pictures.
+/// The visible text of a page: its body without scripts and figures.
 fn read(page: &str) -> String {
     let body = page.split_once("</style>").unwrap().1;
     let without = |text: &str, begin: &str, end: &str| -> String {
@@ -33,31 +33,31 @@ fn the_paper_comes_out() {
         assert!(picture.starts_with("<svg") && picture.contains("<p"), "{figure}");
     }
     assert!(file["reached"].as_array().unwrap().iter().all(|goal| goal["met"] == true), "{}", file["reached"]);
-    // Fig. 12, as the paper reads off it: 0.6, 0.15, 0; a tenth of a radian is what its axis lets one read.
+    // Fig. 12, read from the paper: 0.6, 0.15, 0; the axis has a resolution of a tenth of a radian.
     let of = |number: u64| figures.iter().find(|figure| figure["number"] == number).unwrap();
     for (run, paper) in [(1, 0.6), (2, 0.15), (3, 0.0)] {
         let error = of(12)["values"][format!("largest_error_of_run_{run}_rad")].as_f64().unwrap();
         assert!((error - paper).abs() < 0.1, "run {run}: {error}");
     }
-    // The literal column: within 0.01 of the truth after three runs, as the paper has it.
+    // The literal column: within 0.01 of the truth after three runs, as in the paper.
     for number in ["4", "5"] {
         for row in file["tables"][number]["rows"].as_array().unwrap().iter().filter(|row| row[1] == "3") {
             assert!(row[5].as_f64().unwrap() < 0.01, "{row}");
         }
     }
-    // No goal is another one's number again.
+    // No goal repeats the number of another.
     let reached: Vec<f64> =
         file["reached"].as_array().unwrap().iter().map(|goal| goal["value"].as_f64().unwrap()).collect();
     assert!((0..reached.len()).all(|k| !reached[..k].contains(&reached[k])), "{reached:?}");
     the_page_says_it(&std::fs::read_to_string(folder.path().join("out/report.html")).unwrap(), &file);
     both_methods_are_compared(&file["comparison"]);
-    // Its studies run by themselves.
+    // Its studies can be run separately.
     let again =
         run_in(&folder.path().join("out/study"), &["design", "design_fourier.toml", "--out", "again", "--json"]);
     assert_eq!(again.status, 0, "{}", again.stderr);
 }
 
-/// Captions are sentences with units, every table and figure is led to, and what departs or does not come out is said.
+/// Captions are sentences with units, every table and figure is referenced, and deviations and differences are stated.
 fn the_page_says_it(page: &str, file: &Value) {
     assert!(!page.contains("src=\"http"));
     let text = read(page);
@@ -67,7 +67,7 @@ fn the_page_says_it(page: &str, file: &Value) {
     for number in 1..=6 {
         assert!(text.contains(&format!("<h3>Table {number}: ")), "Table {number}");
     }
-    // No keys of JSON, no nanometres, no marks of code.
+    // No JSON keys, no nanometres, no code marks.
     for wrong in ["largest_", "largest error of run 1 in the paper rad", " nm", "`", "section 5"] {
         assert!(
             !text.contains(wrong),
@@ -100,7 +100,7 @@ fn the_page_says_it(page: &str, file: &Value) {
     for what in ["mean of the values before and after", "blended into a line", "Figs. 16, 17", "modified D-H"] {
         assert!(deviations.contains(what), "{what}");
     }
-    // What the paper says and what is not so here.
+    // Statements of the paper that do not hold here.
     let statements = file["statements"].as_array().unwrap();
     for place in ["Table 4", "Table 5", "section 3, Figs. 9, 10"] {
         let statement = statements.iter().find(|statement| statement["place"] == place).unwrap();
@@ -109,7 +109,7 @@ fn the_page_says_it(page: &str, file: &Value) {
     assert!(text.contains("one run is enough for the parameters"));
 }
 
-/// Logistic strokes against a Fourier series with everything else alike.
+/// Logistic strokes compared with a Fourier series under equal conditions.
 fn both_methods_are_compared(comparison: &Value) {
     let cases = comparison["cases"].as_array().unwrap();
     assert_eq!(cases.len(), 3);
@@ -120,16 +120,16 @@ fn both_methods_are_compared(comparison: &Value) {
             }
         }
     }
-    // Another program computed 1.46 for the quotient of the Cramér-Rao bounds of two such motions, 100 seeds of
+    // Another program computed 1.46 for the ratio of the Cramér-Rao bounds of two such motions, 100 seeds of
     // `examples/logistic_against_fourier.rs` 1.30 for that of the errors; two designs differ by a tenth.
     let bound = comparison["bound"].as_f64().unwrap();
     assert!((1.2..1.6).contains(&bound), "{bound}");
-    // Four standard deviations of what so many seeds tell, on either side of the bound.
+    // Four standard deviations for this number of seeds, on either side of the bound.
     let (quotient, std) = (cases[0]["quotient"].as_f64().unwrap(), cases[0]["quotient_std"].as_f64().unwrap());
     assert!((quotient - bound).abs() < 4.0 * std, "{quotient} {std} {bound}");
     assert!(comparison["statement"].as_str().unwrap().contains("does not hold"), "{comparison}");
-    // A differentiator that sees what the arm did needs no second run: without noise and after one run already within
-    // what the paper reaches after three, 0.009.
+    // A differentiator that uses the actual motion needs no second run: without noise and after one run it is already
+    // within the paper's accuracy after three, 0.009.
     for way in 0..2 {
         for method in ["logistic", "fourier"] {
             let error = cases[way][method]["parameter_error"][0].as_f64().unwrap();

@@ -1,12 +1,12 @@
-//! `iterate` with a robot outside, from outside: permission, Ctrl-C, and what is left running. The robot is a shell
-//! script that speaks the line protocol.
+//! `iterate` with an external robot: permission, Ctrl-C, and remaining processes. The robot is a shell script with the
+//! line protocol.
 #![cfg(unix)]
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-/// Says hello, sends one sample of each run, marks its place, and does then what `rest` says.
+/// Sends hello and one sample of each run, creates its marker file, and then executes `rest`.
 pub(crate) fn robot(folder: &Path, rest: &str) -> PathBuf {
     let script = folder.join("robot.sh");
     let text = format!(
@@ -53,7 +53,6 @@ fn iterate(study: &Path, further: &[&str]) -> Child {
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits for a file, as long as the program lives.
 pub(crate) fn awaited(file: &Path, program: &mut Child) {
     while !file.exists() {
         assert!(program.try_wait().unwrap().is_none(), "it ended before {}", file.display());
@@ -69,7 +68,6 @@ pub(crate) fn said(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
-/// Whether a process by the number in the file runs.
 pub(crate) fn runs(file: &Path) -> bool {
     let id = std::fs::read_to_string(file).unwrap();
     let state = Command::new("ps").args(["-o", "stat=", "-p", id.trim()]).output().unwrap();
@@ -77,8 +75,8 @@ pub(crate) fn runs(file: &Path) -> bool {
     !state.is_empty() && !state.starts_with('Z')
 }
 
-/// Ctrl-C in the middle of a run: the robot hears a stop, what was recorded is kept, the exit status is that of an
-/// interruption, the words say how to go on, and no further run is commanded.
+/// Ctrl-C during a run: the robot receives a stop, the log is stored, the exit status is that of an interruption, the
+/// message contains the way to continue, and no further run is commanded.
 #[test]
 fn an_interrupted_run_stops_the_robot() {
     let folder = tempfile::tempdir().unwrap();
@@ -92,7 +90,7 @@ fn an_interrupted_run_stops_the_robot() {
     let output = program.wait_with_output().unwrap();
     let said = said(&output);
     assert_eq!(output.status.code(), Some(130), "{said}");
-    assert!(said.contains("interrupted") && said.contains("goes on with run 1"), "{said}");
+    assert!(said.contains("interrupted") && said.contains("continue with run 1"), "{said}");
     let heard = std::fs::read_to_string(folder.path().join("heard")).unwrap();
     assert!(heard.lines().count() == 1 && heard.contains(r#""type":"stop""#), "{heard}");
     let result = folder.path().join("result");
@@ -104,7 +102,7 @@ fn an_interrupted_run_stops_the_robot() {
     assert!(!runs(&folder.path().join("begun")));
 }
 
-/// A robot that hears nothing: the second Ctrl-C ends everything, its children too.
+/// A robot that does not answer: the second Ctrl-C ends everything, including its children.
 #[test]
 fn a_second_interruption_kills_the_robot() {
     let folder = tempfile::tempdir().unwrap();
@@ -115,18 +113,19 @@ fn a_second_interruption_kills_the_robot() {
     let begun = folder.path().join("begun");
     awaited(&begun, &mut program);
     interrupt(&program);
-    // Both presses are to be seen: signals that wait are one.
+    // Pending signals are merged, so repeat them until both are received.
     while program.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(200));
         interrupt(&program);
     }
     let output = program.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
-    assert!(said(&output).contains("nobody knows whether it does, look at it"), "{}", said(&output));
+    assert!(said(&output).contains("the robot may still be moving, check it first"), "{}", said(&output));
     assert!(!runs(&begun));
 }
 
-/// A key that is held down repeats: two interruptions within 20 ms are one, and the robot has the time to brake.
+/// A key that is held down repeats: two interruptions within 20 ms are treated as one, and the robot has the time to
+/// brake.
 #[test]
 fn a_repeated_key_lets_the_robot_brake() {
     let folder = tempfile::tempdir().unwrap();
@@ -142,10 +141,10 @@ fn a_repeated_key_lets_the_robot_brake() {
     let said = said(&output);
     assert_eq!(output.status.code(), Some(130), "{said}");
     assert!(folder.path().join("stands").exists() && said.contains("the robot has stopped"), "{said}");
-    assert!(!said.contains("nobody knows"), "{said}");
+    assert!(!said.contains("may still be moving"), "{said}");
 }
 
-/// Whose study it is may be somebody else: without permission nothing is started, and the words say what would be.
+/// A study may come from somebody else: without permission nothing is started, and the message contains the command.
 #[test]
 fn a_studys_command_needs_permission() {
     let folder = tempfile::tempdir().unwrap();
@@ -160,7 +159,7 @@ fn a_studys_command_needs_permission() {
     assert!(!folder.path().join("begun").exists());
 }
 
-/// Ctrl-C while the trajectory is looked for ends the command: a search cut short is nobody's trajectory for ever.
+/// Ctrl-C during the trajectory search ends the command: the incomplete trajectory must not be stored.
 #[test]
 fn an_interrupted_search_keeps_no_trajectory() {
     let folder = tempfile::tempdir().unwrap();
@@ -180,7 +179,7 @@ fn an_interrupted_search_keeps_no_trajectory() {
     assert!(said.contains("interrupted") && !result.join("trajectory.json").exists(), "{said}");
 }
 
-/// Nobody's gains are guessed: the words say what to write instead.
+/// There are no default gains: the message contains the lines to write.
 #[test]
 fn a_robot_outside_has_no_default_gains() {
     let folder = tempfile::tempdir().unwrap();
@@ -196,13 +195,13 @@ fn a_robot_outside_has_no_default_gains() {
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(said.contains("no default gains") && said.contains("bandwidth_hz"), "{said}");
     assert!(!folder.path().join("begun").exists());
-    // A bandwidth is enough where the description has inertials.
+    // A bandwidth is enough if the robot description has inertials.
     std::fs::write(&study, text.replace("[iteration]\n", "[iteration]\nbandwidth_hz = 2.0\n")).unwrap();
     let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
     assert!(folder.path().join("begun").exists(), "{}", self::said(&output));
 }
 
-/// A command that was wrong, a limit that was too short, another envelope: corrected, the folder goes on.
+/// After a correction of the command, of a time limit, or of the envelope, the iteration continues.
 #[test]
 fn a_corrected_command_is_no_other_iteration() {
     let folder = tempfile::tempdir().unwrap();
@@ -218,13 +217,13 @@ fn a_corrected_command_is_no_other_iteration() {
     std::fs::write(&study, format!("{corrected}[iteration.envelope]\ntracking_error = 0.25\n")).unwrap();
     let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
     let said = said(&output);
-    // The robot stopped: somebody is to look, and the run is there.
+    // The robot stopped: a person has to check it, and the run is stored.
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("protective stop") && said.contains("ended early"), "{said}");
     assert!(folder.path().join("result/runs/run_1/run.json").exists() && script.exists());
 }
 
-/// A program that does not know of a home is not sent a run from there; a home that was corrected is no other
+/// A program without the capability `home` is not sent a run from home; a corrected home does not start another
 /// iteration.
 #[test]
 fn a_home_needs_a_program_that_knows_it() {
@@ -242,7 +241,7 @@ fn a_home_needs_a_program_that_knows_it() {
     let words = said(&output);
     assert!(words.contains("\"capabilities\":[\"home\"]") && words.contains("mode = \"step\""), "{words}");
     assert!(!folder.path().join("heard").exists());
-    // The program has learned it, and home is another: the folder is still this iteration's.
+    // The program now has the capability, and home differs: the folder still belongs to this iteration.
     let script = std::fs::read_to_string(folder.path().join("robot.sh")).unwrap();
     let learned = script.replace("\"modes\":[\"run\"]", "\"modes\":[\"run\"],\"capabilities\":[\"home\"]");
     std::fs::write(folder.path().join("robot.sh"), learned).unwrap();

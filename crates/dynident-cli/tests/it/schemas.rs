@@ -1,4 +1,4 @@
-//! The schemas that are shipped are those of the types.
+//! The stored schemas are those of the types.
 
 #[path = "../../examples/schemas.rs"]
 #[expect(dead_code, reason = "the example's own main")]
@@ -7,7 +7,6 @@ mod example;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// All files of a folder by name.
 fn files(folder: &Path) -> BTreeMap<String, String> {
     let read = |entry: std::io::Result<std::fs::DirEntry>| {
         let entry = entry.unwrap();

@@ -1,8 +1,8 @@
-//! What the sources of all crates must not call, and where each of these calls is allowed.
+//! Calls that the sources of all crates must not contain, except in the stated files.
 use crate::common::repository;
 use std::path::{Path, PathBuf};
 
-/// What is looked for, the only files that may contain it, and why.
+/// The forbidden calls, the only files that may contain them, and the reason.
 const ONLY_IN: [(&[&str], &[&str], &str); 4] = [
     (
         &["Command::new(", "process::Command", "process::{Child, Command", "CommandExt", ".spawn()"],
@@ -17,7 +17,7 @@ const ONLY_IN: [(&[&str], &[&str], &str); 4] = [
     (
         &["NamedTempFile", "TempDir", "tempdir(", "tempdir_in(", "tempfile("],
         &["dynident-system/src/temporary_folder.rs", "dynident-system/src/whole_file.rs"],
-        "what a killed program leaves has to be removed: dynident_system::write_whole, TemporaryFolder",
+        "temporary files of a killed program must be removed: dynident_system::write_whole, TemporaryFolder",
     ),
     (
         &["format_rfc3339", "SystemTime::now"],
@@ -50,7 +50,6 @@ fn programs_folders_and_clocks_are_used_in_one_place() {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(&crates).unwrap() {
         let folder = entry.unwrap().path();
-        // Helpers of tests alone.
         if !folder.ends_with("dynident-testing") {
             sources(&folder.join("src"), &mut files);
         }
@@ -68,7 +67,7 @@ fn programs_folders_and_clocks_are_used_in_one_place() {
                 }
             }
         }
-        // The search finds what it looks for.
+        // The search works: it finds the allowed calls.
         assert!(places.iter().all(|place| seen.iter().any(|name| name == place)), "{places:?}");
     }
 }

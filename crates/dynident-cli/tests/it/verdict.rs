@@ -1,9 +1,9 @@
-//! A yes that means yes: what speaks against a model is exit status 1 and stands on standard error, whatever is
+//! Positive verdicts are reliable: problems of a model give exit status 1 and are on standard error, whatever is
 //! printed.
 use crate::common::{CommandOutcome, repository, run_in};
 use std::path::Path;
 
-/// Identifies the README's example with a line of its study replaced.
+/// Identifies the README's example with a replaced line in its study.
 fn identify(out: &Path, from: &str, to: &str, further: &[&str]) -> CommandOutcome {
     let examples = repository("examples");
     let study = std::fs::read_to_string(examples.join("ur10_simulated.toml")).unwrap();
@@ -44,7 +44,7 @@ fn a_reversed_torque_of_any_one_joint_is_named() {
     }
 }
 
-/// The same rows as training and test were "held-out 0.40 %", limit passed.
+/// The same rows for training and validation gave "held-out 0.40 %", and passed the limit.
 #[test]
 fn a_log_is_no_test_of_what_was_fitted_to_it() {
     let out = tempfile::tempdir().unwrap();
@@ -66,7 +66,6 @@ fn a_data_folder_that_is_none_is_an_error() {
     assert!(ran.stderr.contains("/nonexistent"), "{}", ran.stderr);
 }
 
-/// The outputs of `identify` in a folder of their own.
 fn outputs(folder: &Path) -> Vec<Vec<u8>> {
     let names = ["found/result.json", "found/report.html", "found/identified.urdf"];
     names.iter().map(|name| std::fs::read(folder.join(name)).unwrap()).collect()
@@ -82,7 +81,7 @@ fn what_is_read_is_not_written_over() {
     ] {
         let path = out.path().join("found").join(name);
         std::fs::copy(&input, &path).unwrap();
-        // By a link, too: it is the same file.
+        // A link to the same file is detected, too.
         let link = out.path().join(format!("link_to_{name}.csv"));
         #[cfg(unix)]
         std::os::unix::fs::symlink(&path, &link).unwrap();
@@ -96,12 +95,12 @@ fn what_is_read_is_not_written_over() {
     }
 }
 
-/// Report, result and description of one run say the same of where they come from, and nothing of this computer.
+/// Report, result and robot description of one run contain the same identity, and nothing about this computer.
 #[test]
 fn outputs_carry_one_identity() {
     let identity = |from: &str, to: &str| -> String {
         let out = tempfile::tempdir().unwrap();
-        // Paths as a user has them, seen from the study.
+        // Paths as a user has them, relative to the study.
         for (source, name) in [("robots", "robots"), ("examples/ur10_simulated", "ur10_simulated")] {
             std::fs::create_dir(out.path().join(name)).unwrap();
             for entry in std::fs::read_dir(repository(source)).unwrap().flatten().filter(|e| e.path().is_file()) {
@@ -137,7 +136,7 @@ fn outputs_carry_one_identity() {
     assert_ne!(identity("name = \"UR10, simulated\"", "name = \"another\""), same, "another study");
 }
 
-/// Without held-out logs the same question is put to the rows that were fitted to.
+/// Without held-out logs the same test uses the fitted rows.
 #[test]
 fn a_reversed_torque_is_found_without_held_out_logs() {
     let out = tempfile::tempdir().unwrap();
@@ -148,7 +147,8 @@ fn a_reversed_torque_is_found_without_held_out_logs() {
     let study = study.replace("../robots", &repository("robots").display().to_string());
     let study = study.replace("role = \"validate\"", "role = \"identify\"");
     let data = examples.display().to_string();
-    // Friction that is chosen cannot be negative: the free fit has none then, and is no better than the consistent set.
+    // Selected friction cannot be negative: the unconstrained fit then has none, and is not better than the consistent
+    // model.
     for (friction, words) in [("stated", "fitted to"), ("auto", "opposite sign")] {
         let study = study.replace("[format]", &format!("[drive]\nfriction = \"{friction}\"\n\n[format]"));
         std::fs::write(out.path().join("study.toml"), study).unwrap();
@@ -162,7 +162,7 @@ fn a_reversed_torque_is_found_without_held_out_logs() {
         assert!(problems.iter().any(|problem| fitted(&problem)), "{problems:?}");
         assert_eq!(result["physical"]["fit"]["difference"]["is_significant"], true);
     }
-    // On the page the problems stand before any figure, and no tick beside them.
+    // On the page the problems are before any value, without a tick.
     let page = std::fs::read_to_string(out.path().join("found/report.html")).unwrap();
     let at = |what: &str| page.find(what).unwrap_or_else(|| panic!("{what} is not on the page"));
     assert!(at("What speaks against loading this model") < at("class=\"key-figures\""));

@@ -1,4 +1,4 @@
-//! A started robot program: lines there and back, in time, until it ends or is ended.
+//! A running robot program: exchanges lines with time limits until it ends or is killed.
 
 use super::RobotFault;
 use super::process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
@@ -13,19 +13,15 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// Longest line that is read, bytes: a sample of a thousand joints is a tenth of it.
-const LONGEST_LINE: u64 = 1 << 20;
-/// Lines that wait to be read.
-const QUEUE: usize = 1024;
-/// What is kept of standard error, bytes.
-const LAST_WORDS: usize = 2000;
-/// How often a silent program is looked at: whether it still lives.
-const LOOK: Duration = Duration::from_millis(50);
+/// Largest line, bytes: about ten times a sample of a thousand joints.
+const MAX_LINE_BYTES: u64 = 1 << 20;
+const QUEUE_LINES: usize = 1024;
+const STDERR_TAIL_BYTES: usize = 2000;
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// What a program that runs the ways of a run says of itself.
-const HOME: &str = "home";
+/// Capability of a program that runs the approach and return paths of a run.
+const HOME_CAPABILITY: &str = "home";
 
-/// Why a line cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 enum LineError {
     #[error("longer than a megabyte")]
@@ -34,39 +30,29 @@ enum LineError {
     NotText,
 }
 
-/// A line, or why there is none.
 type Line = Result<String, LineError>;
 
-/// What comes out of the queue of a client.
 #[derive(Debug)]
 enum Event {
-    /// A line of its standard output.
     Line(Line),
-    /// Its standard output has ended.
     Closed,
-    /// Somebody asks for a stop: the queue is only woken.
+    /// A stop was requested; this event only wakes the reader.
     Woken,
 }
 
-/// What a client was heard to say.
 #[derive(Debug)]
-pub(super) enum Heard {
-    /// A message.
+pub(super) enum Received {
     Message(ToHost),
-    /// Nothing: somebody asks for a stop, and no stop message has been sent yet.
     StopRequested,
 }
 
-/// What came of starting a client.
 #[derive(Debug)]
 pub(super) enum Started {
-    /// It has said hello.
     Ready(Box<Client>),
-    /// A stop was asked for while its hello was awaited.
     StopRequested,
 }
 
-/// The started program. Killed with all of its group when dropped, if it does not end by itself.
+/// The running program. It is killed with its process group when dropped, if it does not end by itself.
 #[derive(Debug)]
 pub(super) struct Client {
     group: ProcessGroup,
@@ -75,17 +61,14 @@ pub(super) struct Client {
     waker: SyncSender<Event>,
     last_words: Arc<Mutex<Vec<u8>>>,
     limits: ProcessLimits,
-    /// For each joint of the model, its place in the client's vectors.
+    /// Index of each joint of the model in the client's vectors.
     pub(super) places: Vec<usize>,
-    /// Torque of each of the client's joints for what it logs as 1.
+    /// Torque per logged unit for each of the client's joints, Nm (N) per unit.
     pub(super) torque_per_unit: Vec<f64>,
-    /// Whether it runs the ways of a run.
     pub(super) runs_ways: bool,
     run_ends: Option<(Instant, f64)>,
     stop: Option<StopSignal>,
-    /// Deregisters when dropped.
     listening: Option<Listening>,
-    /// Whether a motion was asked for and has not been heard to end.
     moving: bool,
     stop_sent: bool,
 }
@@ -101,8 +84,8 @@ impl Client {
             program: program.name().to_owned(),
             reason: error.to_string(),
         })?;
-        // A queue that a client in a hurry fills, so that it waits and memory does not grow.
-        let (sender, events) = sync_channel(QUEUE);
+        // A bounded queue: a fast client waits, and memory does not grow.
+        let (sender, events) = sync_channel(QUEUE_LINES);
         let waker = sender.clone();
         let child = group.program();
         if let Some(output) = child.stdout.take() {
@@ -132,8 +115,8 @@ impl Client {
         };
         client.follow(stop);
         let hello = match client.next("hello", settings.limits.hello_s)? {
-            Heard::Message(message) => message,
-            Heard::StopRequested => return Ok(Started::StopRequested),
+            Received::Message(message) => message,
+            Received::StopRequested => return Ok(Started::StopRequested),
         };
         let ToHost::Hello { protocol, joints: found, modes, logs, capabilities, .. } = hello else {
             return Err(RobotFault::OutOfTurn { found: hello.kind().to_owned(), expected: "hello".to_owned() });
@@ -155,30 +138,27 @@ impl Client {
             .filter(|_| found.len() == joints.len())
             .ok_or(RobotFault::OtherJoints { expected: joints.to_vec(), found })?;
         client.torque_per_unit = torque_per_unit(&logs, joints.len())?;
-        client.runs_ways = capabilities.iter().any(|own| own == HOME);
+        client.runs_ways = capabilities.iter().any(|own| own == HOME_CAPABILITY);
         Ok(Started::Ready(Box::new(client)))
     }
 
-    /// From now on this signal stops the client.
     pub(super) fn follow(&mut self, stop: Option<&StopSignal>) {
         let (waker, id) = (self.waker.clone(), self.group.id());
-        // A full queue is woken enough.
+        // A full queue is not empty, so the reader wakes anyway.
         let wake = move || drop(waker.try_send(Event::Woken));
         self.listening = stop.map(|stop| stop.listen(Box::new(wake), Box::new(move || id.kill())));
         self.stop = stop.cloned();
     }
 
-    /// The longest that a run may take, and when that is over.
+    /// Sets the end of the run and its time limit, s.
     pub(super) fn limit_run(&mut self, run_ends: Option<(Instant, f64)>) {
         self.run_ends = run_ends;
     }
 
-    /// How long each message may take, s.
     pub(super) fn message_s(&self) -> f64 {
         self.limits.message_s
     }
 
-    /// How long a program that streams may be silent, s, where that is stated.
     pub(super) fn silence_s(&self) -> Option<f64> {
         self.limits.silence_s
     }
@@ -197,8 +177,8 @@ impl Client {
         sent.ok_or(()).map_err(|()| self.died(waiting_for))
     }
 
-    /// Sends a stop and hears the client out until its end, which says that the robot stands. Samples on the way go to
-    /// `keep`.
+    /// Sends a stop and reads until the client's end message, which confirms that the robot is at rest. Samples
+    /// received meanwhile are passed to `keep`.
     pub(super) fn stop(&mut self, reason: &str, keep: &mut dyn FnMut(ToHost)) -> Stopping {
         let stop = ToClient::Stop { reason: reason.to_owned() };
         let ends = Instant::now() + Duration::from_secs_f64(self.limits.stop_s);
@@ -207,14 +187,14 @@ impl Client {
         let mut listens = self.send(&stop, "end").is_ok();
         while listens {
             match self.next("end", left().as_secs_f64()) {
-                Ok(Heard::Message(ToHost::End { .. })) => return Stopping::Confirmed,
-                Ok(Heard::Message(message)) => keep(message),
-                // What it writes on its way to the end need not be a message.
-                Ok(Heard::StopRequested) | Err(RobotFault::Garbage { .. }) => {}
+                Ok(Received::Message(ToHost::End { .. })) => return Stopping::Confirmed,
+                Ok(Received::Message(message)) => keep(message),
+                // Invalid lines before the end message are ignored.
+                Ok(Received::StopRequested) | Err(RobotFault::Garbage { .. }) => {}
                 Err(_) => listens = false,
             }
         }
-        // It may be busy with the stop though it does not speak any more.
+        // The program may be stopping the robot although it no longer sends messages.
         if self.group.exit_within(left()).is_some() {
             return Stopping::Unknown;
         }
@@ -222,10 +202,11 @@ impl Client {
         Stopping::Unanswered
     }
 
-    /// Stops the client after a fault in the middle of a motion; none where none was under way.
+    /// Stops the client after a fault during a motion; `None` if no motion was running.
     pub(super) fn stop_after(&mut self, fault: &RobotFault) -> Option<Stopping> {
         if let (RobotFault::Short { .. }, false) = (fault, self.moving) {
-            // By its own word the run is over, and no answer is due. If it is not, it has the time of a stop.
+            // The client reported the end of the run, so no answer is expected. If it still moves, it has the usual
+            // time to stop.
             let _ = self.send(&ToClient::Stop { reason: fault.to_string() }, "end");
             self.limits.bye_s = self.limits.bye_s.max(self.limits.stop_s);
             return Some(Stopping::Unknown);
@@ -233,8 +214,8 @@ impl Client {
         (self.moving && !self.stop_sent).then(|| self.stop(&fault.to_string(), &mut |_| {}))
     }
 
-    /// The next message, in time; or that somebody asks for a stop, as long as none was sent.
-    pub(super) fn next(&mut self, waiting_for: &'static str, limit_s: f64) -> Result<Heard, RobotFault> {
+    /// Waits for the next message within the time limit, or for a stop request if no stop was sent.
+    pub(super) fn next(&mut self, waiting_for: &'static str, limit_s: f64) -> Result<Received, RobotFault> {
         let begin = Instant::now();
         let mut limit = (Duration::from_secs_f64(limit_s), limit_s);
         if let Some((ends, run_s)) = self.run_ends {
@@ -246,14 +227,14 @@ impl Client {
         let mut seen_dead = false;
         loop {
             if !self.stop_sent && self.stop.as_ref().is_some_and(StopSignal::is_requested) {
-                return Ok(Heard::StopRequested);
+                return Ok(Received::StopRequested);
             }
             let left = limit.0.saturating_sub(begin.elapsed());
-            match self.events.recv_timeout(left.min(LOOK)) {
-                Ok(Event::Line(line)) => return self.heard(line).map(Heard::Message),
+            match self.events.recv_timeout(left.min(POLL_INTERVAL)) {
+                Ok(Event::Line(line)) => return self.heard(line).map(Received::Message),
                 Ok(Event::Closed) | Err(RecvTimeoutError::Disconnected) => return Err(self.died(waiting_for)),
-                // Its pipe may be held open by a process that it has started. What it wrote last may still be on its
-                // way when it is first seen dead.
+                // A child process may hold the pipe open. The last lines may still arrive after the program is first
+                // seen dead.
                 Err(RecvTimeoutError::Timeout) if self.group.exit().is_some() => {
                     if seen_dead {
                         return Err(self.died(waiting_for));
@@ -279,10 +260,10 @@ impl Client {
     }
 
     fn died(&mut self, waiting_for: &'static str) -> RobotFault {
-        // Its output is closed: it has ended, is about to, or has closed it on purpose.
+        // Its output is closed: it has ended, is ending, or has closed the output deliberately.
         let exit = self.group.exit_within(Duration::from_millis(500));
         let exit = exit.unwrap_or_else(|| "its standard output is closed".to_owned());
-        // The other thread may still be reading what was written last.
+        // The reader thread may still be reading the last lines.
         std::thread::sleep(Duration::from_millis(20));
         let words = self.last_words.lock().map(|words| String::from_utf8_lossy(&words).trim().to_owned());
         let said = words.ok().filter(|words| !words.is_empty()).map(|words| format!("; it said: {words}"));
@@ -293,7 +274,7 @@ impl Client {
 impl Drop for Client {
     fn drop(&mut self) {
         if self.moving && !self.stop_sent {
-            // Given up in the middle of a motion: whoever still listens is to stop the robot.
+            // The run was abandoned during a motion: the program has to stop the robot.
             let _ = self.send(&ToClient::Stop { reason: "the run was given up".to_owned() }, "end");
         }
         let _ = self.send(&ToClient::Bye {}, "end");
@@ -301,19 +282,18 @@ impl Drop for Client {
         let grace = Duration::from_secs_f64(self.limits.bye_s);
         self.group.exit_within(grace);
         self.group.end(grace);
-        // Its number may be another's from here on.
+        // From here on the process id may be reused.
         self.listening = None;
     }
 }
 
-/// Factors from what a client logs to torque.
 fn torque_per_unit(logs: &LoggedTorque, joints: usize) -> Result<Vec<f64>, RobotFault> {
     let fault = |what: String, fix: &str| RobotFault::LoggedTorque { what, fix: fix.to_owned() };
     match logs {
         LoggedTorque::Drive => Ok(vec![1.0; joints]),
         LoggedTorque::Current { torque_per_ampere } => {
             if torque_per_ampere.len() != joints || torque_per_ampere.iter().any(|k| !k.is_finite() || *k == 0.0) {
-                let fix = "give torque_per_ampere at the joint (torque constant times gear ratio) for each joint";
+                let fix = "set torque_per_ampere at the joint (torque constant times gear ratio) for each joint";
                 return Err(fault(
                     format!("as currents with {} factors for {joints} joints", torque_per_ampere.len()),
                     fix,
@@ -322,8 +302,8 @@ fn torque_per_unit(logs: &LoggedTorque, joints: usize) -> Result<Vec<f64>, Robot
             Ok(torque_per_ampere.clone())
         }
         LoggedTorque::Reduced { without } => {
-            let fix = "what is missing belongs to the robot that is looked for; log the whole torque of the drives (a \
-                       Franka's tau_J, not tau_J_d), or add what the robot adds before you send it";
+            let fix = "the missing part belongs to the identified robot; log the complete torque of the drives (a \
+                       Franka's tau_J, not tau_J_d), or add the missing part before sending";
             Err(fault(format!("without {}", without.join(" and ")), fix))
         }
     }
@@ -338,21 +318,20 @@ fn pass_lines(output: impl Read, sender: &SyncSender<Event>) {
     let mut reader = BufReader::new(output);
     loop {
         let mut bytes = Vec::new();
-        let read = reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes);
-        let unfinished = bytes.len() as u64 >= LONGEST_LINE && bytes.last() != Some(&b'\n');
+        let read = reader.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', &mut bytes);
+        let unfinished = bytes.len() as u64 >= MAX_LINE_BYTES && bytes.last() != Some(&b'\n');
         let line = match read {
             Ok(0) | Err(_) => return,
-            Ok(count) if count as u64 >= LONGEST_LINE => Err(LineError::TooLong),
+            Ok(count) if count as u64 >= MAX_LINE_BYTES => Err(LineError::TooLong),
             Ok(_) => String::from_utf8(bytes).map_err(|_| LineError::NotText),
         };
         if line.as_ref().is_ok_and(|line| line.trim().is_empty()) {
             continue;
         }
-        // Nobody listens any more: the robot was given up.
         if sender.send(Event::Line(line)).is_err() {
             return;
         }
-        // The rest of such a line is no line of its own. What comes after it may be the answer to a stop.
+        // Skip the rest of a line that is too long; the next line may be the answer to a stop.
         if unfinished && reader.skip_until(b'\n').is_err() {
             return;
         }
@@ -367,13 +346,13 @@ fn read_last_words(mut errors: impl Read, words: &Mutex<Vec<u8>>) {
         }
         let Ok(mut words) = words.lock() else { return };
         words.extend_from_slice(&buffer[..count]);
-        let excess = words.len().saturating_sub(LAST_WORDS);
+        let excess = words.len().saturating_sub(STDERR_TAIL_BYTES);
         words.drain(..excess);
     }
 }
 
-/// A message. JSON has no NaN and no infinity, but many programs write them: they are read as missing numbers, so that
-/// the verdict can name the sample.
+/// Parses a message. JSON has no NaN or infinity, but many programs write them; they are read as missing numbers, so
+/// that the error can name the sample.
 fn message(line: &str) -> Result<ToHost, serde_json::Error> {
     serde_json::from_str(line).or_else(|error| {
         let fixed = line.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");

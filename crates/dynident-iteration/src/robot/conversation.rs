@@ -1,6 +1,4 @@
-//! The two ways of a run with a robot program.
-
-use super::client::{Client, Heard};
+use super::client::{Client, Received};
 use super::protocol::{EndStatus, ToClient, ToHost, WayFiles};
 use super::recorder::Recorder;
 use super::stop_reason::Stopping;
@@ -12,10 +10,10 @@ use dynident_simulation::controllers::Measured;
 use std::path::Path;
 use std::time::Instant;
 
-/// Samples that are taken for each of the reference: a log may be finer, but not without end.
-const FINEST: usize = 100;
+/// Largest ratio of recorded samples to samples of the reference.
+const MAX_SAMPLE_RATIO: usize = 100;
 
-/// The client runs by itself and streams what it records.
+/// Mode `run`: the client runs the controller and streams its samples.
 pub(super) fn run(
     client: &mut Client,
     request: &RunRequest<'_>,
@@ -29,11 +27,11 @@ pub(super) fn run(
     send_run(client, request, joints, folder)?;
     let reference = request.reference;
     let all = request.ways.map_or(0, |ways| ways.approach.samples() + ways.back.samples()) + reference.samples();
-    let most = FINEST * all + 1000;
+    let most = MAX_SAMPLE_RATIO * all + 1000;
     let mut stream = StreamWatch::new(client.silence_s());
     let whole_s = recorder.left_s();
     loop {
-        // Samples may come afterwards: what is left of the run counts as well.
+        // Samples may be sent after the motion, so the remaining time of the run is added.
         let longest_s = client.message_s() + recorder.left_s();
         let silence_s = stream.limit_s().filter(|limit_s| *limit_s < longest_s && !recorder.is_at_end_of_part());
         let heard = client.next("sample", silence_s.unwrap_or(longest_s)).map_err(|fault| match (fault, silence_s) {
@@ -41,11 +39,11 @@ pub(super) fn run(
             (fault, _) => fault,
         });
         match heard? {
-            Heard::StopRequested => {
+            Received::StopRequested => {
                 let stopping = stopped(client, recorder, most, INTERRUPTED);
                 return Ok(RobotStatus::Interrupted { stopping });
             }
-            Heard::Message(ToHost::Sample { part, t_s, q, dq, tau }) => {
+            Received::Message(ToHost::Sample { part, t_s, q, dq, tau }) => {
                 if recorder.samples() >= most {
                     return Err(RobotFault::TooMuch { most, duration_s: reference.duration_s() });
                 }
@@ -57,21 +55,20 @@ pub(super) fn run(
                     return Ok(status);
                 }
             }
-            Heard::Message(ToHost::End { status: EndStatus::Stopped, reason }) => {
+            Received::Message(ToHost::End { status: EndStatus::Stopped, reason }) => {
                 return Ok(RobotStatus::Stopped { reason });
             }
-            Heard::Message(ToHost::End { status: EndStatus::Done, .. }) => {
+            Received::Message(ToHost::End { status: EndStatus::Done, .. }) => {
                 recorder.require_whole()?;
                 return Ok(RobotStatus::Done);
             }
-            Heard::Message(other) => {
+            Received::Message(other) => {
                 return Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "sample".to_owned() });
             }
         }
     }
 }
 
-/// Writes the files of a run and asks the client for it.
 fn send_run(client: &mut Client, request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<(), RobotFault> {
     let [trajectory, controller] = handover::write(request, joints, folder)?;
     let paths = handover::write_ways(request, folder)?;
@@ -97,8 +94,8 @@ fn send_run(client: &mut Client, request: &RunRequest<'_>, joints: &[String], fo
     )
 }
 
-/// Stops the client if the newest sample leaves the envelope or the motion oscillates; the status of the run then.
-/// `most` is the number of samples that are kept at most.
+/// Stops the client if the newest sample leaves the envelope or the motion oscillates; returns the status of the run.
+/// `most` is the largest number of stored samples.
 fn stopped_if_unsafe(
     client: &mut Client,
     recorder: &mut Recorder<'_>,
@@ -114,10 +111,10 @@ fn stopped_if_unsafe(
     Some(RobotStatus::Oscillated { oscillation, stopping })
 }
 
-/// What a client's stop message says where a person asked for it.
+/// Reason in the stop message if a person requested the stop.
 const INTERRUPTED: &str = "interrupted";
 
-/// Stops a client. Samples that it still sends are kept as long as they are such.
+/// Stops a client. Samples that it still sends are stored while they are valid.
 fn stopped(client: &mut Client, recorder: &mut Recorder<'_>, most: usize, reason: &str) -> Stopping {
     let order = (client.places.clone(), client.torque_per_unit.clone());
     let mut fine = true;
@@ -132,10 +129,8 @@ fn stopped(client: &mut Client, recorder: &mut Recorder<'_>, most: usize, reason
     })
 }
 
-/// A sample's time, positions, velocities and torques as a client sends them.
 type SentSample<'a> = (Option<f64>, &'a [Option<f64>], Option<&'a [Option<f64>]>, &'a [Option<f64>]);
 
-/// Appends a sample to the record; its velocities, if it has them.
 fn keep_sample(
     (places, torque_per_unit): (&[usize], &[f64]),
     record: &mut Record,
@@ -152,15 +147,17 @@ fn keep_sample(
     Ok(dq)
 }
 
-/// The host runs the controller, sample by sample.
+/// Mode `step`: the host runs the controller, sample by sample.
 pub(super) fn steps(
     client: &mut Client,
     request: &RunRequest<'_>,
     recorder: &mut Recorder<'_>,
 ) -> Result<RobotStatus, RobotFault> {
-    // Checked with the request, here and below.
+    // Already checked with the request.
     let Ok(reference) = request.whole() else {
-        return Ok(RobotStatus::Stopped { reason: "the ways do not belong to the motion".to_owned() });
+        return Ok(RobotStatus::Stopped {
+            reason: "the paths from and to home do not belong to the motion".to_owned(),
+        });
     };
     let reference = &*reference;
     let joints = reference.joints();
@@ -183,16 +180,16 @@ pub(super) fn steps(
     let mut tau = vec![0.0; joints];
     for sample in 0..reference.samples() {
         let (time_s, q, dq) = match client.next("state", client.message_s())? {
-            Heard::Message(ToHost::State { t_s, q, dq }) => (
+            Received::Message(ToHost::State { t_s, q, dq }) => (
                 time(t_s, sample, before_s.as_ref())?,
                 vector(&client.places, &q, "q", sample)?,
                 vector(&client.places, &dq, "dq", sample)?,
             ),
-            Heard::Message(ToHost::End { reason, .. }) => return Ok(RobotStatus::Stopped { reason }),
-            Heard::Message(other) => {
+            Received::Message(ToHost::End { reason, .. }) => return Ok(RobotStatus::Stopped { reason }),
+            Received::Message(other) => {
                 return Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "state".to_owned() });
             }
-            Heard::StopRequested => {
+            Received::StopRequested => {
                 let stopping = stopped(client, recorder, 0, INTERRUPTED);
                 return Ok(RobotStatus::Interrupted { stopping });
             }
@@ -210,7 +207,7 @@ pub(super) fn steps(
         record.q.extend(q);
         record.tau.extend_from_slice(&tau);
         record.samples += 1;
-        // Before the torque is sent: one beyond the envelope never is.
+        // Check before sending: a torque beyond the envelope is never sent.
         if let Some(status) = stopped_if_unsafe(client, recorder, Some(&dq), 0) {
             return Ok(status);
         }
@@ -224,15 +221,14 @@ pub(super) fn steps(
     ended(client, recorder)
 }
 
-/// Waits for the end of a run whose last sample was answered.
 fn ended(client: &mut Client, recorder: &mut Recorder<'_>) -> Result<RobotStatus, RobotFault> {
     match client.next("end", client.message_s())? {
-        Heard::Message(ToHost::End { status: EndStatus::Done, .. }) => Ok(RobotStatus::Done),
-        Heard::Message(ToHost::End { reason, .. }) => Ok(RobotStatus::Stopped { reason }),
-        Heard::Message(other) => {
+        Received::Message(ToHost::End { status: EndStatus::Done, .. }) => Ok(RobotStatus::Done),
+        Received::Message(ToHost::End { reason, .. }) => Ok(RobotStatus::Stopped { reason }),
+        Received::Message(other) => {
             Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "end".to_owned() })
         }
-        Heard::StopRequested => {
+        Received::StopRequested => {
             let stopping = stopped(client, recorder, 0, INTERRUPTED);
             Ok(RobotStatus::Interrupted { stopping })
         }
@@ -256,7 +252,7 @@ fn time(t_s: Option<f64>, sample: usize, before: Option<&f64>) -> Result<f64, Ro
     }
 }
 
-/// A client's vector in the model's order.
+/// Sorts a client's vector into the model's order.
 fn vector(places: &[usize], values: &[Option<f64>], what: &'static str, sample: usize) -> Result<Vec<f64>, RobotFault> {
     let expected = places.len();
     if values.len() != expected {

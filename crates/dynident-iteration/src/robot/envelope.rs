@@ -1,5 +1,3 @@
-//! What no sample of a run may leave: a run that does is stopped.
-
 use super::stop_reason::{Breach, EnvelopeQuantity};
 use super::ways::RunPart;
 use super::workspace::{WorkspaceBox, WorkspaceSettings};
@@ -8,22 +6,21 @@ use dynident_model::Model;
 use dynident_simulation::{PerJoint, Record, Reference, RunLimits, SimulationError, require};
 use serde::{Deserialize, Serialize};
 
-/// Speeds that no robot measures come from positions at least this far apart, seconds of a usual arm: quantised
-/// positions of neighbouring samples say nothing.
+/// Smallest distance of the positions from which speeds are computed if the robot does not measure them, s, for an arm
+/// of 1.2 m; differences of neighbouring quantised positions are too noisy.
 const SPEED_SPAN_S: f64 = 0.01;
 
-/// The default distance from the path that stops a joint that turns, rad.
+/// Default of the largest tracking error of a revolute joint, rad.
 pub(crate) const TRACKING_RAD: f64 = 0.3;
-/// The same of a joint that slides, m of a usual arm.
+/// Default of the largest tracking error of a prismatic joint, m, for an arm of 1.2 m.
 pub(crate) const TRACKING_M: f64 = 0.1;
-/// Room that searches keep inside the envelope, percent.
 const SEARCH_MARGIN_PERCENT: f64 = 10.0;
-/// Room above the description's velocity and effort: controllers overshoot, and sensors are noisy.
-const ROOM: f64 = 1.1;
+/// Factor on the velocity and effort limits of the robot description, for overshoot and sensor noise.
+const LIMIT_FACTOR: f64 = 1.1;
 
-/// `[iteration.envelope]`: in place of the defaults, which are the description's limits: positions as they stand,
-/// velocity and effort with a tenth of room, and a distance from the path of 0.3 rad (0.1 m). Each is one number for
-/// all joints or a list.
+/// Settings `[iteration.envelope]`. The defaults are the limits of the robot description (positions unchanged, velocity
+/// and effort increased by 10 %) and a tracking error of 0.3 rad (0.1 m). Each value is one number for all joints or a
+/// list.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -40,28 +37,28 @@ pub struct EnvelopeSettings {
     /// Largest torque, Nm (N).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque: Option<PerJoint>,
-    /// Largest distance from the path, rad (m).
+    /// Largest tracking error, rad (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_error: Option<PerJoint>,
-    /// A box in the base frame that no link's origin may leave; none by default.
+    /// Box in the base frame that no link origin may leave; default none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workspace: Option<WorkspaceSettings>,
-    /// Room that a search for a motion keeps inside the envelope, percent: of the allowed tracking error for positions
-    /// and the workspace (times the length of the arm), of the limit for a stated velocity or torque. Default 10.
+    /// Margin that motion searches keep inside the envelope, percent: of the allowed tracking error for positions and
+    /// the workspace (times the lever arm), of the limit for a stated velocity or torque. Default 10.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub search_margin_percent: Option<f64>,
 }
 
 impl EnvelopeSettings {
-    /// Room that a search keeps inside the envelope, a share.
+    /// Margin that motion searches keep inside the envelope, as a share.
     pub fn search_margin(&self) -> f64 {
         0.01 * self.search_margin_percent.unwrap_or(SEARCH_MARGIN_PERCENT)
     }
 
-    /// The envelope of a robot: what is stated, else what its description says, else the defaults.
+    /// Returns the envelope of a robot: stated values, else the limits of the robot description, else the defaults.
     ///
     /// # Errors
-    /// Lists of another length; limits that are not positive, positions that are not numbers.
+    /// Lists of a wrong length, limits that are not positive, positions that are not finite.
     pub fn envelope(&self, model: &Model) -> Result<Envelope, SimulationError> {
         let percent = self.search_margin_percent.unwrap_or(SEARCH_MARGIN_PERCENT);
         require((0.0..=90.0).contains(&percent), "envelope.search_margin_percent", percent, "give 0 to 90")?;
@@ -82,8 +79,10 @@ impl EnvelopeSettings {
         Ok(Envelope {
             lower: each("lower", &self.lower, false, &|joint| limits(joint).lower)?,
             upper: each("upper", &self.upper, false, &|joint| limits(joint).upper)?,
-            speed: each("speed", &self.speed, true, &|joint| limits(joint).velocity.map(|limit| ROOM * limit))?,
-            torque: each("torque", &self.torque, true, &|joint| limits(joint).effort.map(|limit| ROOM * limit))?,
+            speed: each("speed", &self.speed, true, &|joint| limits(joint).velocity.map(|limit| LIMIT_FACTOR * limit))?,
+            torque: each("torque", &self.torque, true, &|joint| {
+                limits(joint).effort.map(|limit| LIMIT_FACTOR * limit)
+            })?,
             tracking_error: each("tracking_error", &self.tracking_error, true, &path)?,
             workspace: self.workspace.as_ref().map(|own| own.of(model)).transpose()?,
             speed_span_s: own.seconds(SPEED_SPAN_S),
@@ -91,7 +90,7 @@ impl EnvelopeSettings {
     }
 }
 
-/// What no sample of a run may leave, joint by joint in the model's order; `None` where nothing is known.
+/// Limits of every sample of a run, joint by joint in the model's order; `None` if unknown.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Envelope {
     /// Lowest position, rad (m).
@@ -102,18 +101,18 @@ pub struct Envelope {
     pub speed: Vec<Option<f64>>,
     /// Largest torque, Nm (N).
     pub torque: Vec<Option<f64>>,
-    /// Largest distance from the path, rad (m).
+    /// Largest tracking error, rad (m).
     pub tracking_error: Vec<Option<f64>>,
-    /// Where in the cell the robot may be.
+    /// Region of the cell in which the robot may be.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workspace: Option<WorkspaceBox>,
-    /// Speeds that no robot measures come from positions at least this far apart, s.
+    /// Smallest distance of the positions from which speeds are computed, s.
     #[serde(skip)]
     pub speed_span_s: f64,
 }
 
 impl Envelope {
-    /// The same with joint `j` at `places[j]`.
+    /// Returns the envelope with joint `j` at `places[j]`.
     pub(super) fn in_order(&self, places: &[usize]) -> Self {
         let sorted = |values: &[Option<f64>]| {
             let mut out = vec![None; values.len()];
@@ -133,14 +132,14 @@ impl Envelope {
         }
     }
 
-    /// Puts the envelope in place of the limits of a simulated run that are not stated: torques are cut by the
-    /// simulator, the others stop the run.
+    /// Sets the limits of a simulated run that are not stated. The simulator saturates torques; the other limits stop
+    /// the run.
     pub(crate) fn limit(&self, limits: &mut RunLimits) {
-        // Infinity has no place in files; the largest number has.
+        // JSON has no infinity, so the largest number is used.
         let each = |values: &[Option<f64>], none: f64| {
             Some(PerJoint::Each(values.iter().map(|value| value.unwrap_or(none)).collect()))
         };
-        // The workspace is looked at by itself: the simulator knows joints alone.
+        // The workspace is checked separately, because the simulator only knows joints.
         let RunLimits { torque, lower, upper, speed, tracking_error } = limits;
         for (limit, own, none) in [
             (torque, &self.torque, f64::MAX),
@@ -155,7 +154,7 @@ impl Envelope {
         }
     }
 
-    /// How a motion itself, followed without error, leaves the envelope, if it does.
+    /// Returns the breach of the envelope if the motion is followed without error, if any.
     pub fn broken_by(&self, reference: &Reference, names: &[String]) -> Option<Breach> {
         let motion = reference.motion();
         let outside = self.workspace.as_ref().and_then(|own| own.broken_by(reference));
@@ -170,13 +169,12 @@ impl Envelope {
         of_joints.or_else(|| outside.map(|(sample, own)| own.breach(sample as f64 / reference.rate_hz())))
     }
 
-    /// How a run, or a record of one, has left the workspace, if it has: the first of its joint-major positions.
     pub(crate) fn outside(&self, q: &[f64], samples: usize, rate_hz: f64) -> Option<Breach> {
         let (sample, own) = self.workspace.as_ref()?.first_of(q, samples)?;
         Some(own.breach(sample as f64 / rate_hz))
     }
 
-    /// Whether torques, joint by joint, are inside; the breach if not.
+    /// Returns the breach of the torque limits, if any.
     pub fn torque_breach(&self, tau: &[f64], names: &[String], time_s: f64) -> Option<Breach> {
         (0..tau.len()).find_map(|joint| Some(self.of_torque(joint, tau[joint])?.breach(names, time_s)))
     }
@@ -218,7 +216,7 @@ impl Broken {
     }
 }
 
-/// Where the reference is at a time, rad (m), between its samples by straight lines, at its ends outside.
+/// Position of the reference at a time, rad (m): linear interpolation, constant beyond its ends.
 pub(super) fn target_at(reference: &Reference, joint: usize, time_s: f64) -> f64 {
     let samples = reference.samples();
     let target = &reference.motion().q[joint * samples..(joint + 1) * samples];
@@ -228,14 +226,13 @@ pub(super) fn target_at(reference: &Reference, joint: usize, time_s: f64) -> f64
     target[from] + (place - from as f64) * (target[next] - target[from])
 }
 
-/// Looks at every sample as it comes.
 #[derive(Debug)]
 pub(super) struct EnvelopeWatch<'a> {
     envelope: Option<&'a Envelope>,
     reference: &'a Reference,
-    /// The sample that speeds are taken from.
+    /// Index of the sample from which speeds are computed.
     from: usize,
-    /// Room for where the links are.
+    /// Workspace for the link positions.
     arrays: Option<Arrays>,
 }
 
@@ -245,8 +242,8 @@ impl<'a> EnvelopeWatch<'a> {
         Self { envelope, reference, from: 0, arrays }
     }
 
-    /// How the last sample of a record leaves the envelope, if it does. The record's arrays are sample-major; `dq` are
-    /// measured velocities, where there are any.
+    /// Returns the breach of the envelope at the last sample of a record, if any. The record's arrays are sample-major;
+    /// `dq` are measured velocities, if available.
     pub(super) fn look(&mut self, record: &Record, dq: Option<&[f64]>) -> Option<Breach> {
         let envelope = self.envelope?;
         let (joints, last) = (record.joints.len(), record.samples.checked_sub(1)?);
@@ -275,7 +272,7 @@ impl<'a> EnvelopeWatch<'a> {
         Some(own.breach(arrays, &record.q[last * joints..(last + 1) * joints])?.breach(time_s))
     }
 
-    /// The first breach of a whole record, joint-major: for logs that come when the run is over.
+    /// Returns the first breach in a complete joint-major record, for logs that arrive after the run.
     pub(super) fn first(envelope: Option<&Envelope>, reference: &Reference, record: &Record) -> Option<Breach> {
         envelope?;
         let mut watch = EnvelopeWatch::new(envelope, reference);
@@ -337,7 +334,7 @@ mod tests {
         assert_eq!(broken(&[[0.0, 0.0, 0.0, -9.1, 0.0]]), torque);
     }
 
-    /// A step of quantised positions from one sample to the next is no speed; a speed that lasts is.
+    /// A step of quantised positions between two samples is not a speed; a lasting change is.
     #[test]
     fn speeds_come_from_positions_apart() {
         let step = [[0.0, 0.0, 0.0, 0.0, 0.0], [0.001, 0.0, 0.004, 0.0, 0.0]];
@@ -354,7 +351,7 @@ mod tests {
         let arm = planar_2r(1.0, tip, tip);
         let envelope = EnvelopeSettings::default().envelope(&arm).unwrap();
         assert_eq!(envelope.tracking_error, vec![Some(TRACKING_RAD); 2]);
-        let efforts: Vec<_> = arm.joints().iter().map(|joint| joint.limits.effort.map(|x| ROOM * x)).collect();
+        let efforts: Vec<_> = arm.joints().iter().map(|joint| joint.limits.effort.map(|x| LIMIT_FACTOR * x)).collect();
         assert_eq!(envelope.torque, efforts);
         let stated = EnvelopeSettings { tracking_error: Some(vec![0.1, 0.2].into()), ..EnvelopeSettings::default() };
         assert_eq!(stated.envelope(&arm).unwrap().tracking_error, vec![Some(0.1), Some(0.2)]);

@@ -1,4 +1,4 @@
-//! A robot that a person runs: files out, a log in.
+//! A robot that a person operates with files: the trajectory as output, the log as input.
 
 use super::envelope::EnvelopeWatch;
 use super::folder_forms::{FolderForm, FormSettings, write_forms};
@@ -15,43 +15,41 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Longest reason in stopped.txt that is read, bytes.
-const MOST_STOPPED_BYTES: u64 = 1 << 20;
+const MAX_STOPPED_BYTES: u64 = 1 << 20;
 
-/// Where, for how long to look, and in which forms motions are written.
+/// Settings of a folder robot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FolderSettings {
     /// The folder of the experiment; every run has a folder `run_k` in it.
     pub folder: PathBuf,
-    /// How long to wait for a log, s. Default 0: look once.
+    /// How long to wait for a log, s. Default 0: check once.
     #[serde(default)]
     pub wait_s: f64,
-    /// Further forms of each motion: `"ros2"`, `"urscript"`, `"waypoints"`, `"torque"`, `"current"`. Default none:
-    /// `trajectory.csv` and `controller.json` are always there.
+    /// Additional formats of each motion: `"ros2"`, `"urscript"`, `"waypoints"`, `"torque"`, `"current"`. Default none;
+    /// `trajectory.csv` and `controller.json` are always written.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forms: Vec<FolderForm>,
     /// Rate of the URScript program, Hz: 125 for CB-series, 500 for e-series. Default 125.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub urscript_rate_hz: Option<f64>,
-    /// Torque at the joint for one ampere, Nm/A (N/A), gear included: one number or one for each joint. `current.csv`
-    /// is made with it, and a log may have currents `i1..` in A instead of `tau1..`. Default none.
+    /// Joint torque per ampere, Nm/A (N/A), including the gear: one number or one per joint. It is used for
+    /// `current.csv`, and allows logs with currents `i1..` in A instead of `tau1..`. Default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque_constants: Option<PerJoint>,
 }
 
 impl FolderSettings {
-    /// A folder with the default settings.
+    /// Creates settings for a folder, with default values.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into(), wait_s: 0.0, forms: Vec::new(), urscript_rate_hz: None, torque_constants: None }
     }
 
-    /// Settings of the forms for a robot with this number of joints.
     fn form_settings(&self, joints: usize) -> Result<FormSettings, SimulationError> {
         let constants = self.torque_constants.as_ref().map(|constants| {
             let holds = |value: f64| value.is_finite() && value != 0.0;
-            constants.values("torque_constants", joints, "give Nm (N) at the joint for one ampere", holds)
+            constants.values("torque_constants", joints, "set the joint torque per ampere, Nm/A (N/A)", holds)
         });
         let torque_constants = constants.transpose()?;
         let lacks = self.forms.contains(&FolderForm::Current) && torque_constants.is_none();
@@ -59,11 +57,10 @@ impl FolderSettings {
             !lacks,
             "torque_constants",
             f64::NAN,
-            "forms = [\"current\"] needs Nm (N) at the joint for one ampere",
+            "forms = [\"current\"] needs the joint torque per ampere, Nm/A (N/A)",
         )?;
         let urscript = self.forms.contains(&FolderForm::Urscript);
-        let fix =
-            "URScript is for the six joints of a UR arm: take \"urscript\" out of forms, or lock the other joints";
+        let fix = "URScript supports only the six joints of a UR arm: remove \"urscript\" from forms, or lock the other joints";
         require(!urscript || joints == 6, "joints of a robot with forms = [\"urscript\"]", joints as f64, fix)?;
         let urscript_rate_hz = self.urscript_rate_hz.unwrap_or(UrScriptSettings::default().rate_hz);
         let fix = "give 1 to 500 Hz (125 for CB-series, 500 for e-series)";
@@ -72,31 +69,32 @@ impl FolderSettings {
     }
 }
 
-/// A folder in which a person finds `run_k/trajectory.csv` and `run_k/controller.json`, and drops `run_k/log.csv`
-/// (`t_s, q1.., tau1..`). Where the robot was stopped early, `run_k/stopped.txt` says why, and the log may be short.
+/// A folder in which a person finds `run_k/trajectory.csv` and `run_k/controller.json`, and writes `run_k/log.csv`
+/// (`t_s, q1.., tau1..`). If the robot was stopped early, `run_k/stopped.txt` contains the reason, and the log may be
+/// shorter.
 ///
-/// A log is taken once it is complete: its last line ends, and it reaches the trajectory's end. Files that are there
-/// are not written again unless they differ, so that a second pass disturbs nobody; where they differ and a log is
-/// there, that log belongs to another run, and is refused. Ways to the motion and back are in `approach.csv` and
-/// `return.csv`; logs of them, `approach_log.csv` and `return_log.csv`, are looked at where they are.
+/// A log is read when it is complete: its last line is terminated, and it reaches the end of the trajectory. Unchanged
+/// files are not written again. If the files of a run change although a log exists, the log belongs to another run and
+/// is rejected. The paths from and to home are in `approach.csv` and `return.csv`; their logs `approach_log.csv` and
+/// `return_log.csv` are checked if they exist.
 ///
-/// Before a log is judged it is compared with the motion ([`examine_log`]): a wrong unit, sign, column or time stamp is
-/// named, and the run waits for the corrected file. A log that is corrected later is read again by the next call.
+/// Each log is first compared with the motion ([`examine_log`]): wrong units, signs, columns or time stamps are
+/// reported, and the run waits for the corrected file. If a log is corrected later, the next call reads it again.
 #[derive(Debug)]
 pub struct FolderRobot {
     settings: FolderSettings,
     forms: FormSettings,
-    /// The model by which torques are judged before a run has given one.
+    /// Model for the torque check before a run has provided one.
     prior: Option<ControllerModel>,
     joints: Vec<String>,
     name: String,
 }
 
 impl FolderRobot {
-    /// The robot behind a folder, with the model's joints.
+    /// Creates the robot of a folder, with the model's joints.
     ///
     /// # Errors
-    /// A time to wait that is negative or not finite, forms that lack a setting or do not fit the robot.
+    /// A waiting time that is negative or not finite, formats that lack a setting or do not fit the robot.
     pub fn new(settings: FolderSettings, joints: Vec<String>) -> Result<Self, SimulationError> {
         let wait = settings.wait_s;
         require((0.0..=1e7).contains(&wait), "wait_s", wait, "give 0 to 1e7 s")?;
@@ -105,20 +103,17 @@ impl FolderRobot {
         Ok(Self { settings, forms, prior: None, joints, name })
     }
 
-    /// Sets the model that predicts torques while the controller has none: the unit of recorded torques is judged by
-    /// it.
+    /// Sets the model that predicts torques if the controller has none, to check the unit of recorded torques.
     #[must_use]
     pub fn with_prior(mut self, prior: Option<ControllerModel>) -> Self {
         self.prior = prior;
         self
     }
 
-    /// The log at a path.
     fn read(&self, path: &Path, rate_hz: f64) -> Result<Record, LogTableError> {
         read_log_with_currents(path, &self.joints, rate_hz, self.forms.torque_constants.as_deref())
     }
 
-    /// Compares a log with the reference and the predicted torque.
     fn examined(&self, record: Record, reference: &Reference, model: Option<&ControllerModel>) -> ExaminedLog {
         let torque = model.or(self.prior.as_ref()).map(|model| {
             let rows: Vec<Vec<f64>> = model_torques(reference, model).collect();
@@ -140,7 +135,7 @@ impl FolderRobot {
             && let Some(path) = handover::other(request, &self.joints, folder)?
         {
             let reason = format!(
-                "it is not this run's, so that {} is of another run: move both away",
+                "this file and {} belong to another run: move both to another folder",
                 log.file_name().unwrap_or_default().to_string_lossy()
             );
             return Err(RobotFault::File { path, reason });
@@ -150,7 +145,7 @@ impl FolderRobot {
         write_forms(request, &self.joints, &self.forms, folder)?;
         let ends = Instant::now() + Duration::from_secs_f64(self.settings.wait_s);
         loop {
-            let run = self.look(request, folder)?;
+            let run = self.check(request, folder)?;
             let waiting = matches!(run.status, RobotStatus::Waiting { .. });
             if !waiting || Instant::now() >= ends || request.stop_requested() {
                 return Ok(run);
@@ -159,8 +154,7 @@ impl FolderRobot {
         }
     }
 
-    /// Looks once.
-    fn look(&self, request: &RunRequest<'_>, folder: &Path) -> Result<RobotRun, RobotFault> {
+    fn check(&self, request: &RunRequest<'_>, folder: &Path) -> Result<RobotRun, RobotFault> {
         let log = folder.join("log.csv");
         let waiting = |reason: String| {
             let status = RobotStatus::Waiting { folder: folder.to_owned(), reason };
@@ -168,9 +162,9 @@ impl FolderRobot {
         };
         if !log.exists() {
             let what = match request.ways {
-                None => "run trajectory.csv on the robot and put the log here as log.csv",
+                None => "run trajectory.csv on the robot and save the log here as log.csv",
                 Some(_) => {
-                    "run approach.csv, trajectory.csv and return.csv one after another on the robot, and put the log of trajectory.csv here as log.csv"
+                    "run approach.csv, trajectory.csv and return.csv one after another on the robot, and save the log of trajectory.csv here as log.csv"
                 }
             };
             return Ok(waiting(what.to_owned()));
@@ -181,8 +175,8 @@ impl FolderRobot {
             Err(error) => return Err(RobotFault::File { path: log, reason: error.to_string() }),
         };
         let ways = self.way_records(request, folder)?;
-        let stopped = dynident_files::read_text(&folder.join("stopped.txt"), MOST_STOPPED_BYTES).ok();
-        // A run that was stopped follows the motion only so far; its log is taken as it is.
+        let stopped = dynident_files::read_text(&folder.join("stopped.txt"), MAX_STOPPED_BYTES).ok();
+        // The log of a stopped run follows only a part of the motion, so it is not compared with it.
         let ExaminedLog { record, note, mistakes } = match &stopped {
             Some(_) => ExaminedLog { record, note: None, mistakes: Vec::new() },
             None => self.examined(record, request.reference, request.model),
@@ -190,7 +184,7 @@ impl FolderRobot {
         if !mistakes.is_empty() {
             let each = mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
             return Ok(waiting(format!(
-                "log.csv: {each}. Correct the file and run the same command again: the robot need not move again"
+                "log.csv: {each}. Correct the file and repeat the command; the robot need not move again"
             )));
         }
         let (first, last) = (record.times_s[0], record.times_s[record.samples - 1]);
@@ -199,7 +193,7 @@ impl FolderRobot {
             Some(reason) => RobotStatus::Stopped { reason: reason.trim().chars().take(1000).collect() },
             None if last - first < 0.99 * duration_s - 2.0 / request.reference.rate_hz() => {
                 let reason = format!(
-                    "log.csv covers {:.3} s of {duration_s:.3} s; if the robot was stopped, say why in stopped.txt",
+                    "log.csv covers {:.3} s of {duration_s:.3} s; if the robot was stopped, write the reason to stopped.txt",
                     last - first
                 );
                 return Ok(waiting(reason));
@@ -215,7 +209,6 @@ impl FolderRobot {
         Ok(RobotRun { status, record, truth: None, ways, note })
     }
 
-    /// What somebody logged of the ways, where both logs are there.
     fn way_records(&self, request: &RunRequest<'_>, folder: &Path) -> Result<Option<WayRecords>, RobotFault> {
         let paths = ["approach_log.csv", "return_log.csv"].map(|name| folder.join(name));
         if request.ways.is_none() || !paths.iter().all(|path| path.exists()) {
@@ -229,7 +222,6 @@ impl FolderRobot {
     }
 }
 
-/// The first breach of the ways.
 fn breach_of_ways(request: &RunRequest<'_>, records: Option<&WayRecords>) -> Option<Breach> {
     let (ways, records) = (request.ways?, records?);
     let parts = [(RunPart::Approach, &ways.approach, &records.approach), (RunPart::Return, &ways.back, &records.back)];
@@ -250,10 +242,10 @@ impl Robot for FolderRobot {
 
     fn has_corrected_log(&self, folder_name: &str, reference: &Reference, kept: &Record) -> bool {
         let path = self.settings.folder.join(folder_name).join("log.csv");
-        // A file that is gone, or that is being written, is no correction.
+        // A missing or incomplete file is not a correction.
         let Ok(record) = self.read(&path, reference.rate_hz()) else { return false };
         let same = |found: &Record| (&found.times_s, &found.q, &found.tau) == (&kept.times_s, &kept.q, &kept.tau);
-        // Only the clock may have been changed before the record was kept.
+        // Only the clock may have been changed before the record was stored.
         !same(&record) && !same(&self.examined(record, reference, None).record)
     }
 

@@ -1,5 +1,5 @@
-//! Further files of a motion for robots that no program of Dynident's protocol drives: ROS 2, URScript, waypoints,
-//! torques and currents.
+//! Additional formats of a motion for robots without a Dynident program: ROS 2, URScript, waypoints, torques and
+//! currents.
 
 use super::handover::{model_torques, write_whole};
 use super::{RobotFault, RunRequest};
@@ -13,7 +13,7 @@ use dynident_simulation::controllers::ControllerModel;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A form of a motion, which `design --to` writes too, or of the torques along it.
+/// A format of a motion (the same as of `design --to`) or of the torques along it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -24,26 +24,22 @@ pub enum FolderForm {
     Urscript,
     /// `waypoints.csv`: time and positions.
     Waypoints,
-    /// `torque.csv`: time and the torque that the model expects, Nm (N), for a controller that takes a feed-forward.
+    /// `torque.csv`: time and the model torque, Nm (N), for a controller with feed-forward.
     Torque,
     /// `current.csv`: the same as currents, A, by `torque_constants`.
     Current,
 }
 
-/// Which forms are written, and what they need.
 #[derive(Clone, Debug)]
 pub(super) struct FormSettings {
     pub(super) forms: Vec<FolderForm>,
     pub(super) urscript_rate_hz: f64,
-    /// Torque for one ampere, Nm/A (N/A), joint by joint.
+    /// Torque per ampere, Nm/A (N/A), joint by joint.
     pub(super) torque_constants: Option<Vec<f64>>,
 }
 
-/// Writes the forms of a run's motion, and of the ways to it and back, into its folder. Torques need a model: without
-/// one their files are left out.
-///
-/// # Errors
-/// A motion that a form cannot hold, a file that cannot be written.
+/// Writes the formats of a run's motion and of the paths from and to home into its folder. Torque files are omitted
+/// without a model.
 pub(super) fn write_forms(
     request: &RunRequest<'_>,
     joints: &[String],
@@ -58,7 +54,7 @@ pub(super) fn write_forms(
             let fault = |error: ExportError| RobotFault::File { path: path.clone(), reason: error.to_string() };
             match text.map_err(fault)? {
                 Some(text) => write_whole(&path, &text)?,
-                // Of an earlier call whose controller had a model.
+                // Remove the file of an earlier call whose controller had a model.
                 None if path.exists() => {
                     let fault =
                         |error: std::io::Error| RobotFault::File { path: path.clone(), reason: error.to_string() };
@@ -71,7 +67,7 @@ pub(super) fn write_forms(
     Ok(())
 }
 
-/// The names that `design` gives, for the motion; those of the ways begin with theirs.
+/// File names as in `design`; those of the paths have a prefix.
 fn file_name(part: &str, form: FolderForm) -> String {
     let table = |name: &str| if part == "trajectory" { name.to_owned() } else { format!("{part}_{name}") };
     match form {
@@ -109,7 +105,7 @@ fn text(
     }
 }
 
-/// The motion at a rate, straight between the reference's samples; its end is the last time.
+/// The motion at a rate, by linear interpolation; the last time is the end of the motion.
 fn sampled(reference: &Reference, rate_hz: f64) -> (Vec<f64>, Motion) {
     let own = reference.motion();
     let duration_s = reference.duration_s();
@@ -135,11 +131,11 @@ fn sampled(reference: &Reference, rate_hz: f64) -> (Vec<f64>, Motion) {
     (times_s, motion)
 }
 
-/// `t_s` and the model's torque of every joint, over its constant where there are some.
+/// `t_s` and the model torque of every joint, divided by its torque constant if there is one.
 fn torque_csv(reference: &Reference, model: &ControllerModel, prefix: &str, constants: Option<&[f64]>) -> String {
     let mut text = String::from("t_s");
     for joint in 1..=reference.joints() {
-        // Writing to a string cannot fail, here and below.
+        // Writing to a string cannot fail.
         let _ = write!(text, ",{prefix}{joint}");
     }
     text.push('\n');

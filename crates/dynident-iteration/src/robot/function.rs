@@ -1,5 +1,3 @@
-//! A robot that is a function of this process.
-
 use super::envelope::EnvelopeWatch;
 use super::oscillation_watch::RunOscillations;
 use super::recorder::{empty_record, joint_major};
@@ -10,8 +8,8 @@ use super::{
 use dynident_simulation::controllers::{Controller, Measured};
 use dynident_simulation::{Record, Reference, ReferenceSample, SimulationError};
 
-/// What a function drives its robot with: it asks for the torque of one sample after the other, and every sample that
-/// it asks with is the record.
+/// A controlled run, with which a function drives its robot. The function requests the torque of each sample, and the
+/// samples form the record.
 #[derive(Debug)]
 pub struct ControlledRun {
     run: usize,
@@ -22,17 +20,15 @@ pub struct ControlledRun {
     stop: Option<StopSignal>,
     target: ReferenceSample,
     tau: Vec<f64>,
-    /// Samples before the motion and of it, where the run has ways.
+    /// Samples before the motion and in the motion, if the run has paths from and to home.
     parts: Option<[usize; 2]>,
-    /// Of the whole run, by the robot's clock.
+    /// Record of the whole run, by the robot's clock.
     record: Record,
-    /// The newest sample alone: with its velocities that is all that an envelope looks at.
+    /// The newest sample, for the check of the envelope.
     now: Record,
-    /// Why there is no further torque.
     end: Option<RunEnd>,
 }
 
-/// Why a run is over before its last sample.
 #[derive(Debug)]
 enum RunEnd {
     Interrupted,
@@ -72,27 +68,26 @@ impl ControlledRun {
         self.run
     }
 
-    /// The motion to follow, with the ways to it and back if the run has some; its first sample is where the robot has
-    /// to stand.
+    /// The motion to follow, including the paths from and to home; the robot starts at its first sample.
     pub fn reference(&self) -> &Reference {
         &self.reference
     }
 
-    /// Samples that torque was asked for so far.
+    /// Number of recorded samples.
     pub fn samples_done(&self) -> usize {
         self.record.samples
     }
 
-    /// The drives' torques, Nm (N), for the next sample, where the robot stands at `q` (rad, m) and moves with `dq`
-    /// (rad/s, m/s) at `time_s` by its own clock. None where the robot has to be stopped at once: the sample left the
-    /// envelope, a joint oscillates, a stop was asked for, a number is none, or the run has no further sample. The
-    /// function then returns.
+    /// Returns the drive torques, Nm (N), for the next sample, given the position `q` (rad, m) and the velocity `dq`
+    /// (rad/s, m/s) at `time_s` (s, by the robot's clock). Returns `None` if the robot has to be stopped at once: the
+    /// sample is outside of the envelope, a joint oscillates, a stop was requested, a value is not finite, or the run
+    /// is complete. The function then returns.
     pub fn torque(&mut self, time_s: f64, q: &[f64], dq: &[f64]) -> Option<&[f64]> {
         let sample = self.record.samples;
         if self.end.is_some() || sample >= self.reference.samples() {
             return None;
         }
-        if let Err(end) = self.look_before(sample, time_s, q, dq) {
+        if let Err(end) = self.check_sample(sample, time_s, q, dq) {
             self.end = Some(end);
             return None;
         }
@@ -107,7 +102,7 @@ impl ControlledRun {
         self.record.q.extend_from_slice(q);
         self.record.tau.extend_from_slice(&self.tau);
         self.record.samples += 1;
-        // Before the torque is given: one beyond the envelope never is.
+        // Check before returning: a torque beyond the envelope is never returned.
         self.now.times_s[0] = time_s;
         self.now.q.copy_from_slice(q);
         self.now.tau.copy_from_slice(&self.tau);
@@ -127,7 +122,7 @@ impl ControlledRun {
         Some(&self.tau)
     }
 
-    /// The part of a sample, and the sample from which times count in it.
+    /// The part of a sample, and the sample at which the time of this part is zero.
     fn part_of(&self, sample: usize) -> (RunPart, usize) {
         match self.parts {
             Some([before, _]) if sample < before => (RunPart::Approach, 0),
@@ -137,7 +132,6 @@ impl ControlledRun {
         }
     }
 
-    /// What was recorded of a part.
     fn recorded(&self, wanted: RunPart) -> Record {
         let own = (0..self.record.samples).filter(|&sample| self.part_of(sample).0 == wanted);
         let (Some(first), joints) = (own.clone().next(), self.record.joints.len()) else {
@@ -156,7 +150,7 @@ impl ControlledRun {
         })
     }
 
-    fn look_before(&self, sample: usize, time_s: f64, q: &[f64], dq: &[f64]) -> Result<(), RunEnd> {
+    fn check_sample(&self, sample: usize, time_s: f64, q: &[f64], dq: &[f64]) -> Result<(), RunEnd> {
         if self.stop.as_ref().is_some_and(StopSignal::is_requested) {
             return Err(RunEnd::Interrupted);
         }
@@ -177,7 +171,7 @@ impl ControlledRun {
         }
     }
 
-    fn ended(self, said: Result<(), String>) -> RobotRun {
+    fn ended(self, result: Result<(), String>) -> RobotRun {
         let (end_s, duration_s) = (self.record.times_s.last().copied().unwrap_or(0.0), self.reference.duration_s());
         let is_whole = self.record.samples == self.reference.samples();
         let record = self.recorded(RunPart::Motion);
@@ -185,7 +179,7 @@ impl ControlledRun {
         let ways = self
             .parts
             .map(|_| WayRecords { approach: self.recorded(RunPart::Approach), back: self.recorded(RunPart::Return) });
-        let status = match (self.end, said) {
+        let status = match (self.end, result) {
             (Some(RunEnd::Interrupted), _) => RobotStatus::Interrupted { stopping: Stopping::Confirmed },
             (Some(RunEnd::Breach(breach)), _) => RobotStatus::LeftEnvelope { breach, stopping: Stopping::Confirmed },
             (Some(RunEnd::Oscillation(oscillation)), _) => {
@@ -202,9 +196,9 @@ impl ControlledRun {
     }
 }
 
-/// A robot that is a function of this process: given the controlled run, it brings the robot to the first sample of the
-/// reference, asks for a torque at every sample and applies it, and returns when there is no further one. What it
-/// returns as an error stops the run with that reason.
+/// A robot that is a function of this process. The function receives the controlled run, moves the robot to the first
+/// sample of the reference, requests and applies a torque at every sample, and returns after the last sample. If it
+/// returns an error, the run is stopped with that reason.
 pub struct FunctionRobot<F> {
     joints: Vec<String>,
     function: F,
@@ -214,8 +208,8 @@ impl<F> FunctionRobot<F>
 where
     F: FnMut(ControlledRun) -> (ControlledRun, Result<(), String>),
 {
-    /// A robot of these joints, in the model's order. The function gives the run back with its outcome, so that it may
-    /// be lent to another language meanwhile.
+    /// Creates a robot with these joints, in the model's order. The function returns the run with its outcome, so that
+    /// the run can be passed to another language meanwhile.
     pub fn new(joints: Vec<String>, function: F) -> Self {
         Self { joints, function }
     }
@@ -240,7 +234,7 @@ where
     }
 
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
-        let (run, said) = (self.function)(ControlledRun::new(request, &self.joints)?);
-        Ok(run.ended(said))
+        let (run, result) = (self.function)(ControlledRun::new(request, &self.joints)?);
+        Ok(run.ended(result))
     }
 }

@@ -1,6 +1,3 @@
-//! The files that a robot outside is handed: the trajectory with the model's torques, and the controller with its
-//! model.
-
 use super::term_description::describe;
 use super::{RobotFault, RunRequest};
 use core::fmt::Write as _;
@@ -13,15 +10,15 @@ use std::path::{Path, PathBuf};
 /// Name and version of the schema of `controller.json`.
 pub const CONTROLLER_SCHEMA: &str = "dynident/controller/1";
 
-/// The reference as a table `t_s, q1.., dq1.., ddq1..`, with the torques `tau1..` that the model expects along it, if
-/// there is one: a feed-forward for controllers that have no model of their own.
+/// Returns the reference as a table `t_s, q1.., dq1.., ddq1..`, with the model torques `tau1..` along it if there is a
+/// model: a feed-forward for controllers without a model.
 pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) -> String {
     let joints = reference.joints();
     let mut text = String::from("t_s");
     let prefixes: &[&str] = if model.is_some() { &["q", "dq", "ddq", "tau"] } else { &["q", "dq", "ddq"] };
     for prefix in prefixes {
         for joint in 1..=joints {
-            // Writing to a string cannot fail, here and below.
+            // Writing to a string cannot fail.
             let _ = write!(text, ",{prefix}{joint}");
         }
     }
@@ -41,7 +38,7 @@ pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) ->
     text
 }
 
-/// The torques that a model expects along a reference, sample after sample, Nm (N).
+/// The model torques along a reference, sample by sample, Nm (N).
 pub(super) fn model_torques<'a>(
     reference: &'a Reference,
     model: &ControllerModel,
@@ -56,8 +53,8 @@ pub(super) fn model_torques<'a>(
     })
 }
 
-/// The controller's settings, the joints' order, the envelope that no sample may leave, and the model in numbers:
-/// enough to compute every torque of the controller elsewhere.
+/// Returns the controller's settings, the order of joints, the envelope and the model parameters: enough to compute the
+/// controller's torque elsewhere.
 pub fn controller_json(request: &RunRequest<'_>, joints: &[String]) -> Value {
     let mut file = json!({
         "schema": CONTROLLER_SCHEMA,
@@ -92,7 +89,7 @@ fn model_json(model: &ControllerModel) -> Value {
                 "axis": joint.axis.0,
                 "inertial": inertial.0,
             });
-            // Only of a joint that does not move by itself: `q = Σ multiplier q_joint + offset`.
+            // Only for a dependent joint: `q = Σ multiplier q_joint + offset`.
             if let Some(coupling) = robot.coupling()
                 && !coupling.driving().contains(&place)
             {
@@ -114,14 +111,13 @@ fn model_json(model: &ControllerModel) -> Value {
     })
 }
 
-/// The model whose torques stand in the tables: none where the drives' own loop is to get nothing but the path. A
-/// program adds the torques where a table has them.
+/// The model for the torques in the tables: `None` if the drives' position loop only uses the path. A program adds the
+/// torques if a table contains them.
 fn fed_forward<'a>(request: &RunRequest<'a>) -> Option<&'a ControllerModel> {
     let path_alone = matches!(request.controller, ControllerSettings::PositionLoop(own) if !own.feed_forward);
     request.model.filter(|_| !path_alone)
 }
 
-/// The two files of a request: where they go, and what is in them.
 fn files(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[(PathBuf, String); 2], RobotFault> {
     let [trajectory, controller] = ["trajectory.csv", "controller.json"].map(|name| folder.join(name));
     let mut text = dynident_text::json::to_string_pretty(&controller_json(request, joints))
@@ -130,7 +126,6 @@ fn files(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[
     Ok([(trajectory, trajectory_csv(request.reference, fed_forward(request))), (controller, text)])
 }
 
-/// Writes `trajectory.csv` and `controller.json` into a folder, each whole or not at all.
 pub(super) fn write(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[PathBuf; 2], RobotFault> {
     let [trajectory, controller] = files(request, joints, folder)?;
     write_whole(&trajectory.0, &trajectory.1)?;
@@ -138,7 +133,7 @@ pub(super) fn write(request: &RunRequest<'_>, joints: &[String], folder: &Path) 
     Ok([trajectory.0, controller.0])
 }
 
-/// Writes `approach.csv` and `return.csv` into a folder, where the request has ways.
+/// Writes `approach.csv` and `return.csv` into a folder, if the request has paths from and to home.
 pub(super) fn write_ways(request: &RunRequest<'_>, folder: &Path) -> Result<Option<[PathBuf; 2]>, RobotFault> {
     let Some(ways) = request.ways else { return Ok(None) };
     let paths = ["approach.csv", "return.csv"].map(|name| folder.join(name));
@@ -148,17 +143,17 @@ pub(super) fn write_ways(request: &RunRequest<'_>, folder: &Path) -> Result<Opti
     Ok(Some(paths))
 }
 
-/// The first file in the folder that is there and is another one. Another envelope makes no other run, nor do other
-/// ways.
+/// Returns the first existing file that differs from this request. The envelope and the paths from and to home are
+/// ignored.
 pub(super) fn other(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<Option<PathBuf>, RobotFault> {
     let same = |there: &str, text: &str| there == text || of_the_run(there) == of_the_run(text);
     let differs = |(path, text): &(PathBuf, String)| {
-        path.exists() && !dynident_files::read_text(path, MOST_BYTES).is_ok_and(|there| same(&there, text))
+        path.exists() && !dynident_files::read_text(path, MAX_FILE_BYTES).is_ok_and(|there| same(&there, text))
     };
     Ok(files(request, joints, folder)?.into_iter().find(differs).map(|(path, _)| path))
 }
 
-/// A controller's file but for the envelope and the ways; `Err` with the text itself if it is none.
+/// A controller's file without envelope and paths; `Err` with the text if it is not a JSON object.
 fn of_the_run(text: &str) -> Result<Value, &str> {
     let Ok(Value::Object(mut file)) = serde_json::from_str(text) else { return Err(text) };
     file.remove("envelope");
@@ -166,12 +161,10 @@ fn of_the_run(text: &str) -> Result<Value, &str> {
     Ok(Value::Object(file))
 }
 
-/// Largest file that is compared with what is to be written, bytes.
-const MOST_BYTES: u64 = 1 << 30;
+const MAX_FILE_BYTES: u64 = 1 << 30;
 
-/// Writes a file whole; a file with the same text stays as it is.
 pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), RobotFault> {
-    if dynident_files::read_text(path, MOST_BYTES).is_ok_and(|there| there == text) {
+    if dynident_files::read_text(path, MAX_FILE_BYTES).is_ok_and(|there| there == text) {
         return Ok(());
     }
     dynident_system::write_whole(path, text.as_bytes())

@@ -1,27 +1,26 @@
-//! Torque that does not answer while a joint gets away from its trajectory: what a drive at its limit looks like in
-//! the log of a run that was stopped before that limit could be told by itself.
+//! Detects torque that does not respond while a joint leaves its trajectory: an indication of drive saturation in the
+//! log of a stopped run.
 
 use super::envelope::target_at;
 use dynident_simulation::{Record, Reference};
 
-/// The time that counts: since the distance was last below this share of what the run was stopped at.
-const SINCE: f64 = 0.5;
-/// A torque whose halves of that time differ by less than this share of it did not answer to a distance that doubled.
-const SAME: f64 = 0.1;
-/// Times the deviation of the halves' difference by which noise may hide an answer.
-const NOISE: f64 = 2.0;
-/// Fewest samples of that time.
-const FEWEST: usize = 8;
+/// Share of the final tracking error; the analysed interval begins when the error last was below it.
+const BEGIN_ERROR_SHARE: f64 = 0.5;
+/// Largest relative difference of the torques in both halves of the interval for which the torque has not responded
+/// (the tracking error has doubled).
+const MAX_TORQUE_CHANGE: f64 = 0.1;
+/// Number of standard deviations within which noise may hide a response.
+const NOISE_SIGMAS: f64 = 2.0;
+const MIN_SAMPLES: usize = 8;
 
-/// A joint's torque while its distance from the trajectory doubled.
+/// A joint's torque while its tracking error doubled.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HeldTorque {
     joint: String,
-    /// Its mean, Nm (N).
+    /// Mean torque, Nm (N).
     torque: f64,
-    /// For how long, s.
     duration_s: f64,
-    /// Distance at the begin and at the end, rad (m).
+    /// Tracking error at the begin and at the end, rad (m).
     distances: [f64; 2],
 }
 
@@ -30,23 +29,23 @@ impl core::fmt::Display for HeldTorque {
         let Self { joint, torque, duration_s, distances: [from, to] } = self;
         write!(
             f,
-            "the torque of {joint} stayed at {torque:.3} for {duration_s:.3} s while its distance from the trajectory \
-             grew from {from:.3} to {to:.3}: its drive gives no more, or its gains ask for no more"
+            "the torque of {joint} stayed at {torque:.3} for {duration_s:.3} s while its tracking error \
+             grew from {from:.3} to {to:.3}: its drive is saturated, or its gains are too low"
         )
     }
 }
 
-/// What the record shows of a joint that was too far from the trajectory at a time, s: its torque, where that pushed
-/// the joint back and did not grow. `None` where it did.
+/// Torque of a joint that was too far from the trajectory at a time, s, if the torque opposed the error and did not
+/// grow; `None` otherwise.
 pub(super) fn held_torque(reference: &Reference, record: &Record, name: &str, time_s: f64) -> Option<HeldTorque> {
     let joint = record.joints.iter().position(|own| own == name)?;
     let (q, tau) = (&record.q[record.of(joint)], &record.tau[record.of(joint)]);
     let end = record.times_s.partition_point(|own| *own <= time_s);
     let distance = |k: usize| q[k] - target_at(reference, joint, record.times_s[k]);
     let last = distance(end.checked_sub(1)?);
-    let begin = (0..end).rev().find(|&k| distance(k) * last.signum() < SINCE * last.abs())? + 1;
+    let begin = (0..end).rev().find(|&k| distance(k) * last.signum() < BEGIN_ERROR_SHARE * last.abs())? + 1;
     let torques = &tau[begin..end];
-    if torques.len() < FEWEST {
+    if torques.len() < MIN_SAMPLES {
         return None;
     }
     let mean = |own: &[f64]| own.iter().sum::<f64>() / own.len() as f64;
@@ -57,10 +56,12 @@ pub(super) fn held_torque(reference: &Reference, record: &Record, name: &str, ti
     };
     let torque = mean(torques);
     let noise = (spread(earlier) + spread(later)).sqrt();
-    let pushes_back = torque * last < 0.0 && torque.abs() > NOISE * noise;
-    // An answer is more of the same sign.
-    let answer = (mean(later) - mean(earlier)) * torque.signum();
-    let is_held = pushes_back && answer < SAME * torque.abs() && NOISE * noise < SAME * torque.abs();
+    let pushes_back = torque * last < 0.0 && torque.abs() > NOISE_SIGMAS * noise;
+    // A response has the same sign as the torque.
+    let response = (mean(later) - mean(earlier)) * torque.signum();
+    let is_held = pushes_back
+        && response < MAX_TORQUE_CHANGE * torque.abs()
+        && NOISE_SIGMAS * noise < MAX_TORQUE_CHANGE * torque.abs();
     is_held.then(|| HeldTorque {
         joint: name.to_owned(),
         torque,
@@ -75,7 +76,7 @@ mod tests {
 
     const RATE_HZ: f64 = 500.0;
 
-    /// A joint that should rest at 0 and falls to 0.3 rad within half a second, under this torque; 2 % of noise.
+    /// A joint that should rest at 0 and falls to 0.3 rad within half a second with this torque and 2 % of noise.
     fn fallen(torque: impl Fn(f64) -> f64) -> Option<HeldTorque> {
         let samples = 250;
         let q: Vec<f64> = (0..samples).map(|k| -0.3 * (k as f64 / (samples - 1) as f64).powi(2)).collect();
@@ -86,7 +87,7 @@ mod tests {
         held_torque(&Reference::standing(&[0.0], RATE_HZ, 2.0).unwrap(), &record, "elbow", 0.5)
     }
 
-    /// 300 Nm/rad that end at 3.5 Nm, where the drive has no more.
+    /// 300 Nm/rad, saturated at 3.5 Nm.
     #[test]
     fn a_drive_that_gives_no_more_is_seen() {
         let found = fallen(|q| (-300.0 * q).min(3.5)).unwrap();
@@ -94,7 +95,8 @@ mod tests {
         assert!(found.to_string().starts_with("the torque of elbow stayed at 3.5"), "{found}");
     }
 
-    /// Gains that are too weak push back twice as hard at twice the distance; what pushes on does not push back.
+    /// Weak gains respond with twice the torque to twice the error; a torque in the direction of the error does not
+    /// oppose it.
     #[test]
     fn a_torque_that_answers_is_none_that_is_held() {
         assert_eq!(fallen(|q| -10.0 * q), None);

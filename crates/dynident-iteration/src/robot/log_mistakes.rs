@@ -1,24 +1,24 @@
-//! Mistakes of a recording that a comparison with the commanded motion shows: units, signs, columns, time stamps.
+//! Mistakes in a recording that follow from a comparison with the commanded motion: units, signs, columns, time stamps.
 //!
-//! The clock is found first, by the correlation of recorded and commanded positions, which no unit, offset or sign
-//! changes. Positions are then compared joint by joint, torques with those that a model predicts along the motion.
+//! The clock is determined first, by the correlation of recorded and commanded positions, which is independent of unit,
+//! offset and sign. Positions are then compared joint by joint, and torques with those of a model along the motion.
 
 use super::envelope::target_at;
 use core::fmt;
 use dynident_simulation::{Record, Reference};
 
-/// When a recording is taken for a mistake.
+/// Thresholds for mistakes in a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogMistakeSettings {
-    /// Correlation of recorded with commanded positions from which a comparison is certain. Default 0.95: apart from a
-    /// delay and a scale, the tracking error is then a third of the motion's standard deviation (`1/√(1 + 0.33²)`).
+    /// Smallest correlation of recorded with commanded positions for a reliable comparison. Default 0.95: apart from
+    /// delay and scale, the tracking error is then a third of the motion's standard deviation (`1/√(1 + 0.33²)`).
     pub min_correlation: f64,
-    /// A delay that may be the robot's own, s: up to this much, time stamps are left as they are. Default 0.25.
+    /// Largest delay that the robot may cause, s; up to this value, time stamps are not changed. Default 0.25.
     pub max_lag_s: f64,
-    /// Share by which a ratio may differ from that of a unit. Default 0.15.
+    /// Largest relative deviation of a ratio from that of a unit. Default 0.15.
     pub ratio_tolerance: f64,
-    /// Torque over predicted torque, of every joint, from which the unit is another one; and its inverse. Default 300:
-    /// a description is wrong by far less, and a factor of 1000 is seen with any robot.
+    /// Ratio of recorded to predicted torque of every joint above which the unit is wrong (or below its inverse).
+    /// Default 300: errors of a robot description are much smaller, and a factor of 1000 is detected for any robot.
     pub torque_ratio: f64,
 }
 
@@ -34,16 +34,16 @@ impl Default for LogMistakeSettings {
 pub enum LogMistake {
     /// Time stamps in another unit.
     TimeUnit {
-        /// Its name.
+        /// Name of the unit.
         unit: &'static str,
-        /// Seconds in one of it.
+        /// Its length in seconds.
         seconds: f64,
     },
     /// Positions in another unit.
     PositionUnit {
         /// The joints.
         joints: Vec<String>,
-        /// Recorded over commanded range.
+        /// Ratio of recorded to commanded range.
         ratio: f64,
         /// The unit.
         unit: &'static str,
@@ -53,16 +53,16 @@ pub enum LogMistake {
         /// The joints.
         joints: Vec<String>,
     },
-    /// Columns of positions that hold other joints.
+    /// Position columns that contain other joints.
     ExchangedPositions {
-        /// The joint by the column's name, and the one whose motion the column holds.
+        /// For each column, the joint of its name and the joint whose motion it contains.
         columns: Vec<(String, String)>,
     },
     /// Torques in another unit.
     TorqueUnit {
-        /// Recorded over predicted torque, the middle one of the joints.
+        /// Median over the joints of the ratio of recorded to predicted torque.
         ratio: f64,
-        /// The likely unit, in words.
+        /// The likely unit.
         unit: &'static str,
     },
 }
@@ -81,15 +81,15 @@ impl fmt::Display for LogMistake {
             Self::PositionSign { joints } => {
                 write!(
                     f,
-                    "the positions of {} have the opposite sign: reverse it, and check the torque's",
+                    "the positions of {} have the opposite sign: reverse it, and check the sign of the torque",
                     joints.join(", ")
                 )
             }
             Self::ExchangedPositions { columns } => {
-                let each = columns.iter().map(|(name, holds)| format!("that of {name} holds the motion of {holds}"));
+                let each = columns.iter().map(|(name, holds)| format!("that of {name} contains the motion of {holds}"));
                 write!(
                     f,
-                    "columns of positions are exchanged ({}): name them in the robot's order, q and tau alike",
+                    "columns of positions are exchanged ({}): name both q and tau in the robot's order",
                     each.collect::<Vec<_>>().join(", ")
                 )
             }
@@ -111,9 +111,9 @@ pub struct ExaminedLog {
     pub mistakes: Vec<LogMistake>,
 }
 
-/// Units of time stamps, and seconds in one of each.
+/// Units of time stamps, and their length in seconds.
 const TIME_UNITS: [(&str, f64); 3] = [("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)];
-/// Units of positions, and how many are a radian (metre).
+/// Units of positions, and their number per radian (metre).
 const POSITION_UNITS: [(&str, f64); 4] = [
     ("degrees", 180.0 / core::f64::consts::PI),
     ("milliradians or millimetres", 1000.0),
@@ -121,22 +121,22 @@ const POSITION_UNITS: [(&str, f64); 4] = [
     ("converted from degrees although they were radians", core::f64::consts::PI / 180.0),
 ];
 
-/// Points of the motion that are compared, and delays that are tried, at most.
-const POINTS: usize = 300;
-const DELAYS: usize = 4000;
-/// Share of the motion that a recording may lack.
-const MISSING: f64 = 0.01;
-/// Range of a joint below which its motion is not compared, as a share of the largest one.
-const STANDS: f64 = 0.01;
-/// Difference of correlations that is no difference.
-const ALIKE: f64 = 0.01;
+/// Largest numbers of compared points and of tried delays.
+const MAX_POINTS: usize = 300;
+const MAX_DELAYS: usize = 4000;
+/// Largest share of the motion that may be missing in a recording.
+const MAX_MISSING_SHARE: f64 = 0.01;
+/// Range of a joint below which its motion is not compared, as a share of the largest range.
+const MIN_RANGE_SHARE: f64 = 0.01;
+/// Difference below which two correlations are equal.
+const CORRELATION_TOLERANCE: f64 = 0.01;
 
-/// Compares a recording with the motion that was commanded. `torque` holds the torque that a model predicts at every
-/// sample of the reference, joint by joint, where there is a model.
+/// Compares a recording with the commanded motion. `torque` contains the model torque at every sample of the reference,
+/// joint by joint, if there is a model.
 ///
-/// A constant offset of the time stamps and an early start of the recorder are removed, since no number of the motion
-/// depends on them. Everything else is reported and left as it is. A recording that does not resemble the motion is
-/// returned as it is, without a mistake.
+/// A constant offset of the time stamps and an early start of the recorder are removed, because they do not affect the
+/// result. Other mistakes are reported and not corrected. A recording that does not resemble the motion is returned
+/// unchanged, without a mistake.
 pub fn examine_log(
     record: Record,
     reference: &Reference,
@@ -162,18 +162,17 @@ pub fn examine_log(
     ExaminedLog { record, note, mistakes }
 }
 
-/// How the time stamps of a recording belong to the motion: motion time = stamp · seconds − start.
+/// Relation of the time stamps to the motion: motion time = stamp · seconds − start.
 struct Clock {
     seconds: f64,
     start_s: f64,
-    /// Whether rows before the motion are recorded.
+    /// Whether the recording begins before the motion.
     early: bool,
-    /// Mean over the joints that move.
     correlation: f64,
 }
 
 impl Clock {
-    /// The recording on the motion's clock, and what was done to it.
+    /// Returns the recording on the motion's clock, with a note about the change.
     fn applied(&self, mut record: Record, reference: &Reference) -> (Record, Option<String>) {
         if self.start_s == 0.0 {
             return (record, None);
@@ -181,7 +180,7 @@ impl Clock {
         let (first, start) = (record.times_s[0], self.start_s);
         record.times_s.iter_mut().for_each(|time| *time -= start);
         if !self.early {
-            return (record, Some(format!("the time stamps begin at {first} s; this offset was taken off")));
+            return (record, Some(format!("the time stamps begin at {first} s; this offset was removed")));
         }
         let half = 0.5 / reference.rate_hz();
         let (from, to) = (-half, reference.duration_s() + half);
@@ -194,11 +193,11 @@ impl Clock {
         record.times_s = record.times_s[begin..end].to_vec();
         (record.q, record.tau, record.samples) = (q, tau, end - begin);
         let before = start - first;
-        (record, Some(format!("the recording begins {before:.3} s before the motion; these rows were left out")))
+        (record, Some(format!("the recording begins {before:.3} s before the motion; these rows were removed")))
     }
 }
 
-/// The motion at some points, joint by joint, and which joints move.
+/// The motion at some points, joint by joint, and the indices of the moving joints.
 struct Comparison<'a> {
     reference: &'a Reference,
     times_s: Vec<f64>,
@@ -212,18 +211,17 @@ impl<'a> Comparison<'a> {
         if record.samples < 10 || record.joints.len() != reference.joints() || duration_s <= 0.0 {
             return None;
         }
-        let points = POINTS.min(reference.samples());
+        let points = MAX_POINTS.min(reference.samples());
         let times_s: Vec<f64> = (0..points).map(|k| duration_s * k as f64 / (points - 1).max(1) as f64).collect();
         let of_joint = |joint| times_s.iter().map(|time| target_at(reference, joint, *time)).collect();
         let targets: Vec<Vec<f64>> = (0..reference.joints()).map(of_joint).collect();
         let ranges: Vec<f64> = targets.iter().map(|own| range(own)).collect();
         let largest = ranges.iter().copied().fold(0.0, f64::max);
         let moving: Vec<usize> =
-            (0..ranges.len()).filter(|&joint| largest > 0.0 && ranges[joint] > STANDS * largest).collect();
+            (0..ranges.len()).filter(|&joint| largest > 0.0 && ranges[joint] > MIN_RANGE_SHARE * largest).collect();
         (!moving.is_empty()).then_some(Self { reference, times_s, targets, moving })
     }
 
-    /// The recorded positions of a joint at the points, on a clock.
     fn recorded(&self, record: &Record, joint: usize, seconds: f64, start_s: f64) -> Vec<f64> {
         let own = &record.q[record.of(joint)];
         self.times_s.iter().map(|time| interpolated(&record.times_s, own, (time + start_s) / seconds)).collect()
@@ -244,28 +242,30 @@ impl<'a> Comparison<'a> {
     fn clock(&self, record: &Record, seconds: f64, settings: &LogMistakeSettings) -> Option<Clock> {
         let duration_s = self.reference.duration_s();
         let (first, last) = (record.times_s[0] * seconds, record.times_s[record.samples - 1] * seconds);
-        let missing = MISSING * duration_s + 2.0 / self.reference.rate_hz();
+        let missing = MAX_MISSING_SHARE * duration_s + 2.0 / self.reference.rate_hz();
         let latest = last - duration_s + missing;
         let earliest = first - missing;
         if latest < earliest {
             return None;
         }
-        // The step is a small part of the fastest motion's period; an hour of recording takes coarser ones.
-        let step = (duration_s / POINTS as f64).min(0.02).max((latest - earliest) / DELAYS as f64);
+        // The step is a small part of the fastest motion's period; long recordings use larger steps.
+        let step = (duration_s / MAX_POINTS as f64).min(0.02).max((latest - earliest) / MAX_DELAYS as f64);
         let steps = ((latest - earliest) / step).ceil() as usize;
         let at = |start_s: f64| self.correlation(record, seconds, start_s);
         let coarse = (0..=steps).map(|k| earliest + step * k as f64);
         let best = coarse.map(|start| (at(start), start)).max_by(|a, b| a.0.total_cmp(&b.0))?;
         let fine = (-10..=10).map(|k| best.1 + step * f64::from(k) / 10.0);
         let (correlation, start_s) = fine.map(|start| (at(start), start)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        // Stamps as they are come first, then those of a recording that begins with the motion: the robot may lag.
+        // Prefer unchanged time stamps, then those of a recording that begins with the motion: the robot itself may
+        // lag.
         let covers = |start: f64| start >= earliest && start <= latest;
-        let alike = |start: f64| {
-            covers(start) && ((start_s - start).abs() <= settings.max_lag_s || at(start) >= correlation - ALIKE)
+        let is_equivalent = |start: f64| {
+            covers(start)
+                && ((start_s - start).abs() <= settings.max_lag_s || at(start) >= correlation - CORRELATION_TOLERANCE)
         };
-        let (start_s, early) = if alike(0.0) {
+        let (start_s, early) = if is_equivalent(0.0) {
             (0.0, false)
-        } else if alike(first) {
+        } else if is_equivalent(first) {
             (first, false)
         } else {
             (start_s, true)
@@ -284,8 +284,8 @@ impl<'a> Comparison<'a> {
             let of = |other: usize| correlation(&own, &self.targets[other]);
             let likest = self.moving.iter().copied().max_by(|&a, &b| of(a).abs().total_cmp(&of(b).abs()));
             let Some(holds) = likest.filter(|&other| of(other).abs() >= settings.min_correlation) else { continue };
-            // Two joints may be commanded alike.
-            let holds = if of(joint).abs() >= of(holds).abs() - ALIKE { joint } else { holds };
+            // Several joints may have the same commanded motion.
+            let holds = if of(joint).abs() >= of(holds).abs() - CORRELATION_TOLERANCE { joint } else { holds };
             if holds != joint {
                 exchanged.push((name(joint), name(holds)));
             }
@@ -317,8 +317,8 @@ impl<'a> Comparison<'a> {
     }
 }
 
-/// Torques of every joint that are far from the prediction by one factor. `predicted` holds those of the reference's
-/// samples, joint by joint.
+/// Reports a wrong torque unit: the torques of all joints differ from the prediction by the same large factor.
+/// `predicted` contains the torques at the reference's samples, joint by joint.
 fn torque_unit(
     record: &Record,
     reference: &Reference,
@@ -342,7 +342,7 @@ fn torque_unit(
         let at = |k: usize| (k as f64 / reference.rate_hz() + clock.start_s) / clock.seconds;
         let recorded: Vec<f64> = (0..samples).map(|k| interpolated(&record.times_s, own, at(k))).collect();
         let product: f64 = recorded.iter().zip(predicted).map(|(a, b)| a * b).sum();
-        // Of a joint whose torque is mostly friction the prediction shows nothing.
+        // For a joint with mostly friction torque the prediction is not meaningful.
         if product.abs() < 0.5 * size * norm(&recorded) {
             continue;
         }
@@ -365,7 +365,6 @@ fn range(values: &[f64]) -> f64 {
     high - low
 }
 
-/// The value at a time, straight between neighbours; outside that of the nearest end.
 fn interpolated(times: &[f64], values: &[f64], time: f64) -> f64 {
     let next = times.partition_point(|known| *known <= time).clamp(1, times.len() - 1);
     let (from, to) = (times[next - 1], times[next]);
@@ -373,7 +372,7 @@ fn interpolated(times: &[f64], values: &[f64], time: f64) -> f64 {
     values[next - 1] + share * (values[next] - values[next - 1])
 }
 
-/// Pearson's correlation; 0 where one of them is constant.
+/// Pearson correlation; 0 if one of the signals is constant.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let (mean_a, mean_b) = (mean(a), mean(b));
@@ -393,7 +392,6 @@ mod tests {
     const RATE_HZ: f64 = 200.0;
     const DURATION_S: f64 = 6.0;
 
-    /// Two joints from rest to rest, of different shape.
     fn reference() -> Reference {
         let samples = (DURATION_S * RATE_HZ) as usize + 1;
         let mut motion = Motion::default();
@@ -407,7 +405,7 @@ mod tests {
         Reference::new(RATE_HZ, motion).unwrap()
     }
 
-    /// A robot that follows 20 ms late; its torque is a spring's.
+    /// A robot with a lag of 20 ms; its torque is that of a spring.
     fn recorded(from_s: f64, to_s: f64) -> Record {
         let reference = reference();
         let samples = ((to_s - from_s) * RATE_HZ).round() as usize + 1;
@@ -446,7 +444,7 @@ mod tests {
             let error = found.record.times_s.iter().zip(&right.times_s).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(error < 1e-6 && found.record.q == right.q, "{offset}: {error}");
         }
-        // The recorder starts 0.7 s early and runs on for 2 s, with its own clock.
+        // The recorder starts 0.7 s early and continues for 2 s, with its own clock.
         let mut early = recorded(-0.7, DURATION_S + 2.0);
         early.times_s.iter_mut().for_each(|time| *time += 0.7);
         let found = examined(early);
@@ -454,7 +452,7 @@ mod tests {
         let note = found.note.unwrap();
         assert!(note.contains("before the motion"), "{note}");
         let (first, last) = (found.record.times_s[0], found.record.times_s[found.record.samples - 1]);
-        // To within the delay of the robot, which cannot be distinguished from that of the recorder.
+        // Accurate to the delay of the robot, which cannot be distinguished from that of the recorder.
         assert!(first.abs() < 0.03 && (last - DURATION_S).abs() < 0.03, "{first} {last}");
     }
 
@@ -481,7 +479,7 @@ mod tests {
             (scaled(1e3, |record| &mut record.q), "millimetres"),
             (scaled(1e3, |record| &mut record.tau), "mNm"),
             (scaled(1e-3, |record| &mut record.tau), "kNm"),
-            (exchanged, "that of a holds the motion of b, that of b holds the motion of a"),
+            (exchanged, "that of a contains the motion of b, that of b contains the motion of a"),
             (reversed, "positions of b have the opposite sign"),
         ];
         for (record, words) in cases {
@@ -499,7 +497,6 @@ mod tests {
         }
         let found = examined(rubbing).mistakes;
         assert!(found.len() == 1 && found[0].to_string().contains("mNm"), "{found:?}");
-        // Several at once.
         let mut several = scaled(57.295_78, |record| &mut record.q);
         several.times_s.iter_mut().for_each(|time| *time *= 1e3);
         several.tau.iter_mut().for_each(|tau| *tau *= 1e3);

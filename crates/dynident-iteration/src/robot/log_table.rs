@@ -1,43 +1,42 @@
-//! The log that a person drops: a table `t_s, q1.., tau1..`.
+//! The log that a person provides: a table `t_s, q1.., tau1..`.
 
 use dynident_files::quoted;
 use dynident_simulation::Record;
 use thiserror::Error;
 
-/// Largest log that is read, bytes.
-const LARGEST: u64 = 1 << 30;
+const MAX_LOG_BYTES: u64 = 1 << 30;
 
-/// What is wrong with a log.
+/// An error in a log.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LogTableError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{reason}")]
     Unreadable {
-        /// What the system says.
+        /// Error of the operating system.
         reason: String,
     },
-    /// Its first line does not name a column.
-    #[error("line 1 has no column {column}: give {}, separated by commas; it is `{found}`", expected.join(","))]
+    /// The header lacks a column.
+    #[error("column {column} is missing in line 1 (`{found}`): write {}, separated by commas", expected.join(","))]
     NoColumn {
-        /// The column.
+        /// The missing column.
         column: String,
-        /// All that are needed.
+        /// All required columns.
         expected: Vec<String>,
-        /// The line.
+        /// The header.
         found: String,
     },
-    /// A row of another length, or the last row without its end.
+    /// A row with another number of fields.
     #[error("line {line}: {found} fields where the header has {expected}")]
     Fields {
         /// The line, from 1.
         line: usize,
-        /// Columns of the header.
+        /// Number of columns in the header.
         expected: usize,
-        /// Fields of the row.
+        /// Number of fields in the row.
         found: usize,
     },
-    /// A field that is no finite number.
+    /// A field that is not a finite number.
     #[error("line {line}, column {column}: `{field}` is not a finite number")]
     NotANumber {
         /// The line, from 1.
@@ -47,36 +46,33 @@ pub enum LogTableError {
         /// The field.
         field: String,
     },
-    /// Time that does not go forward.
+    /// Time that does not increase.
     #[error("line {line}: time {time_s} s does not come after the line before")]
     Time {
         /// The line, from 1.
         line: usize,
-        /// Its time.
+        /// Its time, s.
         time_s: f64,
     },
-    /// No rows, or no end of the last line: it is still being written.
+    /// No rows, or an unfinished last line: the file is still being written.
     #[error("the log is not complete: {reason}")]
     Incomplete {
-        /// What is missing.
+        /// The missing part.
         reason: String,
     },
 }
 
-/// Reads a log of the joints: columns `t_s`, `q1..`, `tau1..` by name, in any order, others ignored; seconds, rad (m),
-/// Nm (N).
+/// Reads a log of the joints: columns `t_s`, `q1..`, `tau1..` in any order, other columns ignored; seconds, rad (m), Nm
+/// (N).
 ///
 /// # Errors
-/// [`LogTableError`] with the line; [`LogTableError::Incomplete`] if the last line does not end.
+/// [`LogTableError`] with the line; [`LogTableError::Incomplete`] if the last line is unfinished.
 pub fn read_log_table(path: &std::path::Path, joints: &[String], rate_hz: f64) -> Result<Record, LogTableError> {
     read_log_with_currents(path, joints, rate_hz, None)
 }
 
-/// Reads a log as [`read_log_table`] does. With torque constants, Nm/A (N/A), it may have currents `i1..`, A, where
-/// there is no column `tau1`.
-///
-/// # Errors
-/// As [`read_log_table`].
+/// Reads a log as [`read_log_table`] does. With torque constants, Nm/A (N/A), it may have currents `i1..`, A, instead
+/// of `tau1..`.
 pub(super) fn read_log_with_currents(
     path: &std::path::Path,
     joints: &[String],
@@ -84,13 +80,13 @@ pub(super) fn read_log_with_currents(
     constants: Option<&[f64]>,
 ) -> Result<Record, LogTableError> {
     let unreadable = |error: std::io::Error| LogTableError::Unreadable { reason: error.to_string() };
-    parse(&dynident_files::read_text(path, LARGEST).map_err(unreadable)?, joints, rate_hz, constants)
+    parse(&dynident_files::read_text(path, MAX_LOG_BYTES).map_err(unreadable)?, joints, rate_hz, constants)
 }
 
 fn parse(text: &str, joints: &[String], rate_hz: f64, constants: Option<&[f64]>) -> Result<Record, LogTableError> {
     let incomplete = |reason: &str| LogTableError::Incomplete { reason: reason.to_owned() };
     if !text.ends_with('\n') {
-        return Err(incomplete("its last line has no end"));
+        return Err(incomplete("its last line is unfinished"));
     }
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let (_, first_line) = lines.next().ok_or_else(|| incomplete("it is empty"))?;
@@ -110,7 +106,6 @@ fn parse(text: &str, joints: &[String], rate_hz: f64, constants: Option<&[f64]>)
             })
         })
         .collect::<Result<_, _>>()?;
-    // One row after the other, by columns.
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); expected.len()];
     for (line, text) in lines {
         let line = line + 1;

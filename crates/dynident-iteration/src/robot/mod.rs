@@ -1,5 +1,5 @@
-//! The robot as an experiment sees it: something that runs a trajectory under a controller and gives a record back. The
-//! built-in simulator, another process, or a person with a folder.
+//! Interface of robots: a robot runs a trajectory with a controller and returns a record. Implementations: the built-in
+//! simulator, another process, a function, and a person with a folder.
 
 mod client;
 mod conversation;
@@ -51,51 +51,50 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// What a motion is made for.
+/// Purpose of a motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunPurpose {
-    /// A run.
+    /// A run that is fitted.
     #[default]
     Run,
-    /// So that the robot is warm: a pass along the motion of the run after it.
+    /// A warm-up pass along the motion of the next run.
     WarmUp {
         /// Number of the pass, from 1.
         pass: usize,
-        /// How many there are.
+        /// Number of passes.
         of: usize,
     },
-    /// Another motion, to judge the model that a run has given: the run's number is that one's.
+    /// A held-out motion, which validates the model of the run with this number.
     HeldOut,
 }
 
-/// What a robot is asked to do.
+/// A request to a robot to run a trajectory.
 #[derive(Clone, Copy, Debug)]
 pub struct RunRequest<'a> {
-    /// Number of the run, from 1: the name of its folder, and what a log can be matched by.
+    /// Number of the run, from 1; names its folder.
     pub run: usize,
-    /// What to follow; its rate is the controller's.
+    /// The trajectory; its rate is that of the controller.
     pub reference: &'a Reference,
     /// The controller.
     pub controller: &'a ControllerSettings,
-    /// Its model, if it needs one.
+    /// The controller's model, if it needs one.
     pub model: Option<&'a ControllerModel>,
-    /// What no sample may leave; a run that does is stopped. None watches nothing.
+    /// Limits of every sample; a run that exceeds them is stopped. `None` disables monitoring.
     pub envelope: Option<&'a Envelope>,
     /// Oscillation that stops the run; `None` disables monitoring.
     pub oscillation: Option<OscillationLimits>,
-    /// Who may ask for a stop.
+    /// Signal that stops the run.
     pub stop: Option<&'a StopSignal>,
-    /// Share of the trajectory's own speed that the reference has; 1 but for slow runs before the first.
+    /// Speed of the reference as a share of the trajectory's speed; below 1 only in slow runs before the first run.
     pub speed: f64,
-    /// What it is made for.
+    /// Purpose of the motion.
     pub purpose: RunPurpose,
-    /// The ways to the motion and back: the robot waits where the approach begins, and is left where the return ends.
-    /// Without them it has to stand where the motion begins.
+    /// Paths from home to the motion and back. Without them the robot has to be at the begin of the motion.
     pub ways: Option<&'a Ways>,
 }
 
 impl<'a> RunRequest<'a> {
-    /// A run without a model, an envelope and anybody who may stop it: set the fields.
+    /// Creates a request without model, envelope and stop signal: set the fields as needed.
     pub fn new(run: usize, reference: &'a Reference, controller: &'a ControllerSettings) -> Self {
         Self {
             run,
@@ -111,7 +110,7 @@ impl<'a> RunRequest<'a> {
         }
     }
 
-    /// Name of the folder for its files: a slow run, or one that warms up, is no other's.
+    /// Name of the folder for its files; slow runs and warm-ups have their own folders.
     pub fn folder_name(&self) -> String {
         let run = format!("run_{}", self.run);
         match self.purpose {
@@ -122,21 +121,21 @@ impl<'a> RunRequest<'a> {
         }
     }
 
-    /// What is commanded where one controller runs through all of it: approach, motion and return, or the motion alone.
+    /// Returns the complete commanded trajectory: approach, motion and return, or only the motion.
     ///
     /// # Errors
-    /// Ways of another motion.
+    /// Paths that belong to another motion.
     pub fn whole(&self) -> Result<Cow<'a, Reference>, SimulationError> {
         let whole = self.ways.map(|ways| ways.around(self.reference)).transpose()?;
         Ok(whole.map_or(Cow::Borrowed(self.reference), Cow::Owned))
     }
 
-    /// Whether a stop was asked for.
+    /// Whether a stop was requested.
     pub fn stop_requested(&self) -> bool {
         self.stop.is_some_and(StopSignal::is_requested)
     }
 
-    /// Checks that reference, controller and model belong to so many joints.
+    /// Checks that reference, controller and model fit `joints` joints.
     ///
     /// # Errors
     /// [`SimulationError`].
@@ -154,30 +153,29 @@ impl<'a> RunRequest<'a> {
     }
 }
 
-/// What came back.
+/// Result of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotRun {
     /// How it ended.
     pub status: RobotStatus,
-    /// What was recorded along the motion, up to the end or up to what went wrong. Joints in the model's order, all
-    /// numbers finite.
+    /// The record of the motion, up to its end or the failure. Joints in the model's order, all values finite.
     pub record: Record,
-    /// What truly was along the motion, if the robot is the simulator.
+    /// The true motion, if the robot is the simulator.
     pub truth: Option<Run>,
-    /// What was recorded along the ways, where the request had some and they are known.
+    /// The records of the paths from and to home, if available.
     pub ways: Option<WayRecords>,
-    /// Change of the record's time stamps in words; `None` if they are used as they are.
+    /// Change of the record's time stamps in words; `None` if they are unchanged.
     pub note: Option<String>,
 }
 
 impl RobotRun {
-    /// A run of which nothing was recorded.
+    /// Creates a run without recorded samples.
     pub fn without_samples(status: RobotStatus, joints: &[String], rate_hz: f64) -> Self {
         Self { status, record: recorder::empty_record(joints, rate_hz), truth: None, ways: None, note: None }
     }
 
-    /// How it ended, in words, and what its record shows of why it was stopped: a torque that no longer answered, or an
-    /// oscillation of at least `lowest_hz`.
+    /// Describes how the run ended, and why it was stopped according to its record: torque that did not respond, or an
+    /// oscillation of at least `lowest_hz` (Hz).
     pub fn ending(&self, reference: &Reference, lowest_hz: f64) -> String {
         let of_joint = |(joint, time_s)| held_torque::held_torque(reference, &self.record, joint, time_s);
         let held = self.status.too_far().and_then(of_joint).map(|held| held.to_string());
@@ -187,8 +185,8 @@ impl RobotRun {
         parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
     }
 
-    /// Per joint: largest distance of the recorded positions from the reference at the record's times, rad (m); the
-    /// reference between its samples by straight lines.
+    /// Returns the largest tracking error of each joint at the record's times, rad (m), with linear interpolation of
+    /// the reference.
     pub fn max_error(&self, reference: &Reference) -> Vec<f64> {
         (0..self.record.joints.len())
             .map(|joint| {
@@ -206,61 +204,60 @@ impl RobotRun {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "end", rename_all = "kebab-case")]
 pub enum RobotStatus {
-    /// The whole trajectory was run.
+    /// The trajectory was completed.
     Done,
-    /// The run stopped early: divergence or a limit of the simulator.
+    /// The simulated run stopped early: divergence or a limit.
     Simulated {
-        /// Its verdict.
+        /// Verdict of the simulator.
         verdict: RunStatus,
     },
-    /// The robot stopped early and said why.
+    /// The robot stopped early and gave a reason.
     Stopped {
-        /// What it said.
+        /// The reason.
         reason: String,
     },
-    /// Somebody asked for a stop (Ctrl-C), and the run was given up.
+    /// A stop was requested (Ctrl-C).
     Interrupted {
-        /// What became of the stop.
+        /// Whether the stop was confirmed.
         stopping: Stopping,
     },
-    /// A sample left its envelope, and the run was stopped.
+    /// A sample left the envelope, and the run was stopped.
     LeftEnvelope {
-        /// Which.
+        /// The breach.
         breach: Breach,
-        /// What became of the stop.
+        /// Whether the stop was confirmed.
         stopping: Stopping,
     },
     /// A joint oscillated about its trajectory, and the run was stopped.
     Oscillated {
-        /// Which, and how.
+        /// The oscillation.
         oscillation: JointOscillation,
-        /// What became of the stop.
+        /// Whether the stop was confirmed.
         stopping: Stopping,
     },
-    /// The exchange with the robot failed.
+    /// The communication with the robot failed.
     Failed {
-        /// How.
+        /// The fault.
         fault: RobotFault,
-        /// What became of the stop; none where no motion was under way, and where nobody could be told.
+        /// Whether the stop was confirmed; `None` if no motion was running, or if the robot could not be reached.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         stopping: Option<Stopping>,
     },
-    /// The log is not there yet: somebody has to run the trajectory and drop it.
+    /// The log does not exist yet: a person has to run the trajectory and save it.
     Waiting {
         /// The run's folder.
         folder: PathBuf,
-        /// What is missing.
+        /// The missing input.
         reason: String,
     },
 }
 
 impl RobotStatus {
-    /// Whether the whole trajectory was run.
+    /// Whether the trajectory was completed.
     pub fn is_done(&self) -> bool {
         *self == Self::Done
     }
 
-    /// Whether a limit of a joint ended it, on either side.
     fn is_stopped_by_a_limit(&self) -> bool {
         match self {
             Self::Simulated { verdict } => !verdict.is_done(),
@@ -273,7 +270,7 @@ impl RobotStatus {
         }
     }
 
-    /// The joint that was stopped for its distance from the trajectory, and when, s.
+    /// The joint that was stopped because of its tracking error, and the time, s.
     fn too_far(&self) -> Option<(&str, f64)> {
         match self {
             Self::Simulated { verdict: RunStatus::LimitBroken { time_s, joint, quantity, .. } } => {
@@ -293,7 +290,7 @@ impl core::fmt::Display for RobotStatus {
             Self::Done => write!(f, "done"),
             Self::Simulated { verdict } => write!(f, "{verdict}"),
             Self::Stopped { reason } => write!(f, "the robot stopped: {reason}"),
-            Self::Interrupted { stopping } => write!(f, "a stop was asked for: {stopping}"),
+            Self::Interrupted { stopping } => write!(f, "a stop was requested: {stopping}"),
             Self::LeftEnvelope { breach, stopping } => write!(f, "out of the envelope: {breach}; {stopping}"),
             Self::Oscillated { oscillation, stopping } => write!(f, "{stopping}: {oscillation}"),
             Self::Failed { fault, stopping: None } => write!(f, "{fault}"),
@@ -303,7 +300,7 @@ impl core::fmt::Display for RobotStatus {
     }
 }
 
-/// How an exchange with a robot outside can fail.
+/// A failure of the communication with an external robot.
 #[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
@@ -314,130 +311,130 @@ pub enum RobotFault {
     NotStarted {
         /// The program.
         program: String,
-        /// What the system says.
+        /// Error of the operating system.
         reason: String,
     },
-    /// The program ended in between.
-    #[error("the robot program ended while its {waiting_for} was awaited ({exit}){said}")]
+    /// The program ended during the run.
+    #[error("the robot program ended before it sent its {waiting_for} ({exit}){said}")]
     Died {
-        /// What was awaited.
+        /// The expected message.
         waiting_for: String,
         /// Its exit status.
         exit: String,
-        /// The end of what it wrote to standard error, or nothing.
+        /// The end of its standard error, or an empty string.
         said: String,
     },
-    /// No answer in time.
-    #[error("the robot program gave no {waiting_for} within {limit_s} s")]
+    /// No message within the time limit.
+    #[error("the robot program sent no {waiting_for} within {limit_s} s")]
     Hung {
-        /// What was awaited.
+        /// The expected message.
         waiting_for: String,
-        /// The limit.
+        /// The time limit, s.
         limit_s: f64,
     },
-    /// Samples came in real time, and then none in the middle of the motion.
+    /// Samples arrived in real time and then stopped during the motion.
     #[error(
-        "the robot program sent its samples in real time and then none for {limit_s:.2} s: look at the program; if such a pause is normal, give a larger limits.silence_s"
+        "the robot program sent its samples in real time and then none for {limit_s:.2} s: check the program; if such a pause is normal, increase limits.silence_s"
     )]
     Silent {
-        /// The limit.
+        /// The time limit, s.
         limit_s: f64,
     },
-    /// A line that is no message of the protocol.
-    #[error("the robot program wrote a line that is no message ({reason}): {line}")]
+    /// A line that is not a message of the protocol.
+    #[error("the robot program wrote a line that is not a message ({reason}): {line}")]
     Garbage {
         /// The line, cut to 200 characters.
         line: String,
-        /// What is wrong with it.
+        /// Why it is invalid.
         reason: String,
     },
-    /// A message at the wrong moment.
-    #[error("the robot program wrote a message of type {found} where {expected} was awaited")]
+    /// An unexpected message.
+    #[error("the robot program sent a message of type {found} instead of {expected}")]
     OutOfTurn {
-        /// What came.
+        /// Type of the message.
         found: String,
-        /// What was awaited.
+        /// Expected type.
         expected: String,
     },
-    /// A number that is none, or is missing.
+    /// A value that is missing or not finite.
     #[error("sample {sample} of the robot: {what} is not a finite number")]
     NotANumber {
         /// The sample, from 0.
         sample: usize,
-        /// Which number.
+        /// The value.
         what: String,
     },
-    /// Vectors of another length.
+    /// A vector of a wrong length.
     #[error("sample {sample} of the robot: {what} has {found} entries for {expected} joints")]
     WrongJoints {
         /// The sample, from 0.
         sample: usize,
-        /// Which vector.
+        /// The vector.
         what: String,
-        /// How many joints there are.
+        /// Number of joints.
         expected: usize,
-        /// How many entries came.
+        /// Number of entries.
         found: usize,
     },
     /// The robot has other joints.
-    #[error("the robot names its joints {}; expected {}", found.join(", "), expected.join(", "))]
+    #[error("the robot has the joints {}; expected {}", found.join(", "), expected.join(", "))]
     OtherJoints {
-        /// The model's.
+        /// Joints of the model.
         expected: Vec<String>,
-        /// The robot's.
+        /// Joints of the robot.
         found: Vec<String>,
     },
-    /// Time that does not go forward.
+    /// Time that does not increase.
     #[error("sample {sample} of the robot: time {time_s} s comes after {before_s} s")]
     Time {
         /// The sample, from 0.
         sample: usize,
-        /// Its time.
+        /// Its time, s.
         time_s: f64,
-        /// The time before.
+        /// The previous time, s.
         before_s: f64,
     },
-    /// More samples than any run has.
+    /// More samples than the largest number for this run.
     #[error("the robot sent more than {most} samples for a run of {duration_s} s")]
     TooMuch {
-        /// How many are taken.
+        /// Largest number of samples.
         most: usize,
-        /// The run's length.
+        /// Length of the run, s.
         duration_s: f64,
     },
-    /// Another version of the protocol, or a mode that it does not have.
-    #[error("the robot program speaks {found}, not {expected}")]
+    /// Another version of the protocol, or an unsupported mode.
+    #[error("the robot program supports {found}, not {expected}")]
     Protocol {
-        /// What it says.
+        /// Supported by the program.
         found: String,
-        /// What is needed.
+        /// Required.
         expected: String,
     },
-    /// The robot logs something from which its dynamics cannot be told.
+    /// Logged torque from which the dynamics cannot be identified.
     #[error("the robot logs torque {what}: {fix}")]
     LoggedTorque {
-        /// What it logs.
+        /// The logged quantity.
         what: String,
-        /// What to do.
+        /// Suggested fix.
         fix: String,
     },
-    /// The record ends before the trajectory does.
-    #[error("the robot says done, but its record of the {} ends at {end_s} s of {duration_s} s", .part.name())]
+    /// The record ends before the trajectory.
+    #[error("the robot reported done, but its record of the {} ends at {end_s} s of {duration_s} s", .part.name())]
     Short {
-        /// The record's last time.
+        /// Last time of the record, s.
         end_s: f64,
-        /// The trajectory's.
+        /// Length of the trajectory, s.
         duration_s: f64,
         /// The part of the run.
         #[serde(default, skip_serializing_if = "RunPart::is_motion")]
         part: RunPart,
     },
-    /// A program that does not know of ways would run the motion from wherever its robot stands.
+    /// A program that does not support approach and return paths would start the motion at its current position.
     #[error(
-        "the study states a home, and the robot program does not say in its hello that it runs the ways from there and back (\"capabilities\":[\"home\"]): let it run approach.csv before and return.csv after the trajectory, take mode = \"step\", or take home out of [iteration] and bring the robot to its start yourself"
+        "the study has a home, but the robot program does not report in its hello that it runs the paths from and to home (\"capabilities\":[\"home\"]): let it run approach.csv before and return.csv after the trajectory, use mode = \"step\", or remove home from [iteration] and move the robot to its start yourself"
     )]
     NoWays,
-    /// The controller gave a torque that is not a number.
+    /// The controller's torque is not finite.
     #[error("the controller's torque at sample {sample} is not a finite number")]
     Torque {
         /// The sample, from 0.
@@ -448,29 +445,29 @@ pub enum RobotFault {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says, or what is wrong inside.
+        /// Error of the operating system, or of the content.
         reason: String,
     },
 }
 
-/// A robot: the seam between an experiment and what it runs on.
+/// A robot: the interface between an experiment and the robot, real or simulated.
 pub trait Robot: core::fmt::Debug {
-    /// What it is, for messages.
+    /// Its name, for messages.
     fn name(&self) -> &str;
 
     /// Names of its joints, in the model's order.
     fn joints(&self) -> &[String];
 
-    /// Whether a person has corrected the log of a run since it was read: `folder_name` is that of its request
-    /// ([`RunRequest::folder_name`]), `kept` what was recorded along `reference`. Only a robot whose logs a person
-    /// brings may answer true: then the run is judged anew from the corrected log.
+    /// Whether a person has corrected the log of a run since it was read. `folder_name` is that of its request
+    /// ([`RunRequest::folder_name`]), `kept` the stored record along `reference`. Only a robot with logs from a person
+    /// may return true; the corrected log is then evaluated again.
     fn has_corrected_log(&self, _folder_name: &str, _reference: &Reference, _kept: &Record) -> bool {
         false
     }
 
-    /// Runs a trajectory. What the robot does wrong is the run's [`RobotStatus`], with the records so far.
+    /// Runs a trajectory. Failures of the robot are reported in the run's [`RobotStatus`], with the partial record.
     ///
     /// # Errors
-    /// Only a request without meaning: [`RunRequest::validate`], or settings of the robot that contradict it.
+    /// An invalid request ([`RunRequest::validate`]), or settings of the robot that contradict it.
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError>;
 }

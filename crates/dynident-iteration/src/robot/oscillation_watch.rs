@@ -1,34 +1,29 @@
-//! Looks for oscillations in what a robot does, sample by sample.
-
 use super::envelope::target_at;
 use super::stop_reason::JointOscillation;
 use super::ways::RunPart;
 use crate::oscillation::{OscillationLimits, OscillationWatch, growing_oscillation};
+use crate::rests::highest_speeds;
 use dynident_simulation::{Record, Reference};
 
-/// Samples from which the rate of a log is taken.
+/// Number of samples from which the rate of a log is computed.
 const RATE_SAMPLES: usize = 32;
-/// Share of the fastest joint's velocity that a joint has which does not move in a trajectory.
-const AT_REST: f64 = 0.1;
+/// Reference speed of a joint that does not move in a trajectory, as a share of the fastest joint's speed.
+const REST_SPEED_SHARE: f64 = 0.1;
 
-/// The highest velocity of each joint in a trajectory, rad/s (m/s).
-fn highest_speeds(reference: &Reference) -> Vec<f64> {
-    let motion = reference.motion();
-    let of_joint = |joint: usize| motion.dq[motion.of(joint)].iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
-    let highest: Vec<f64> = (0..motion.joints).map(of_joint).collect();
+/// Highest speed of each joint in a trajectory, rad/s (m/s), with a substitute for joints at rest.
+fn reference_speeds(reference: &Reference) -> Vec<f64> {
+    let highest = highest_speeds([reference]);
     let fastest = highest.iter().copied().fold(0.0, f64::max);
-    highest.into_iter().map(|own| if own > 0.0 { own } else { AT_REST * fastest }).collect()
+    highest.into_iter().map(|own| if own > 0.0 { own } else { REST_SPEED_SHARE * fastest }).collect()
 }
 
-/// Watches all joints along one trajectory.
 #[derive(Debug)]
 pub(crate) struct RunOscillations {
     limits: Option<OscillationLimits>,
-    /// The first sample's time, s, and how many there were.
+    /// Time of the first sample, s, and the number of samples.
     begin: (f64, usize),
-    /// The newest sample: its time, s, and each joint's distance from the trajectory, rad (m).
+    /// The newest sample: its time, s, and the tracking error of each joint, rad (m).
     newest: (f64, Vec<f64>),
-    /// None of a joint whose trajectory rests, like those of all others.
     joints: Vec<Option<OscillationWatch>>,
 }
 
@@ -37,8 +32,8 @@ impl RunOscillations {
         Self { limits, begin: (0.0, 0), newest: (0.0, Vec::new()), joints: Vec::new() }
     }
 
-    /// The next sample along a trajectory: its time, s, and positions, rad (m). The place of the joint that oscillates,
-    /// if one does, with frequency and amplitude.
+    /// Adds a sample along a trajectory: its time, s, and positions, rad (m). Returns the index of an oscillating
+    /// joint, with frequency and amplitude.
     pub(crate) fn look(&mut self, reference: &Reference, time_s: f64, q: &[f64]) -> Option<(usize, JointOscillation)> {
         let limits = self.limits?;
         let distance = |(joint, q): (usize, &f64)| q - target_at(reference, joint, time_s);
@@ -56,7 +51,7 @@ impl RunOscillations {
                 let least = limits.speed_share * speed;
                 (least > 0.0).then(|| OscillationWatch::new(rate_hz, limits.lowest_hz, least)).flatten()
             };
-            self.joints = highest_speeds(reference).into_iter().map(watch).collect();
+            self.joints = reference_speeds(reference).into_iter().map(watch).collect();
         }
         let step_s = time_s - before_s;
         let pairs = self.newest.1.iter().zip(&before).map(|(new, old)| (new - old) / step_s);
@@ -72,7 +67,6 @@ impl RunOscillations {
         })
     }
 
-    /// The first oscillation of a whole run; `q` joint by joint.
     pub(crate) fn first(
         limits: Option<OscillationLimits>,
         reference: &Reference,
@@ -90,8 +84,8 @@ impl RunOscillations {
     }
 }
 
-/// The joint that oscillated most, by its velocity beside that of the trajectory, when a run was stopped; the record is
-/// joint-major.
+/// The joint with the largest oscillation, relative to its speed in the trajectory, when a run was stopped; the record
+/// is joint-major.
 pub(super) fn oscillation_at_end(reference: &Reference, record: &Record, lowest_hz: f64) -> Option<JointOscillation> {
     let times_s = &record.times_s[..record.samples];
     let (begin_s, end_s) = (*times_s.first()?, *times_s.last()?);
@@ -104,7 +98,7 @@ pub(super) fn oscillation_at_end(reference: &Reference, record: &Record, lowest_
         let own = growing_oscillation(&deviations, rate_hz, lowest_hz)?;
         Some((own.amplitude / speed.max(f64::MIN_POSITIVE), joint, own))
     };
-    let all = highest_speeds(reference).into_iter().enumerate().filter_map(of_joint);
+    let all = reference_speeds(reference).into_iter().enumerate().filter_map(of_joint);
     let (_, joint, own) = all.max_by(|one, other| one.0.total_cmp(&other.0))?;
     Some(JointOscillation {
         joint: record.joints[joint].clone(),

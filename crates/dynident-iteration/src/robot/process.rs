@@ -1,5 +1,3 @@
-//! A robot that is another program: started, spoken to by lines, and given up when it does not answer in time.
-
 use super::client::{Client, Started};
 use super::process_settings::{ProcessMode, ProcessSettings};
 use super::recorder::Recorder;
@@ -10,9 +8,9 @@ use dynident_system::{PermittedProgram, TemporaryFolder};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// A robot behind a program's standard input and output. The program is started with the first run and kept for the
-/// next; after a failure it is killed, and the next run starts it anew. On Unix it has a process group of its own,
-/// which ends with this robot: no process of it is left.
+/// A robot behind a program's standard input and output. The program is started with the first run and reused; after a
+/// failure it is killed, and the next run starts it again. On Unix it has its own process group, which ends with this
+/// robot.
 #[derive(Debug)]
 pub struct ProcessRobot {
     settings: ProcessSettings,
@@ -23,8 +21,8 @@ pub struct ProcessRobot {
 }
 
 impl ProcessRobot {
-    /// The robot of a program, with the model's joints. `program` is the command of the settings, as
-    /// [`ProcessSettings::permitted`] gives it.
+    /// Creates the robot of a program, with the model's joints. `program` is the permitted command of the settings
+    /// ([`ProcessSettings::permitted`]).
     ///
     /// # Errors
     /// As [`ProcessSettings::validate`].
@@ -37,7 +35,6 @@ impl ProcessRobot {
         Ok(Self { settings, joints, program, client: None, temporary: None })
     }
 
-    /// The folder of a run's files.
     fn folder(&mut self, name: &str) -> Result<PathBuf, RobotFault> {
         let file = |path: PathBuf| move |error: std::io::Error| RobotFault::File { path, reason: error.to_string() };
         let base = if let Some(folder) = &self.settings.folder {
@@ -54,7 +51,6 @@ impl ProcessRobot {
     }
 
     fn converse(&mut self, request: &RunRequest<'_>, recorder: &mut Recorder<'_>) -> Result<RobotStatus, RobotFault> {
-        // Nothing moves yet.
         let not_begun = RobotStatus::Interrupted { stopping: Stopping::Confirmed };
         if request.stop_requested() {
             return Ok(not_begun);
@@ -65,8 +61,8 @@ impl ProcessRobot {
         };
         let client = match &mut self.client {
             Some(client) => client,
-            none => match Client::start(&self.program, &self.settings, &self.joints, request.stop)? {
-                Started::Ready(client) => none.insert(*client),
+            empty => match Client::start(&self.program, &self.settings, &self.joints, request.stop)? {
+                Started::Ready(client) => empty.insert(*client),
                 Started::StopRequested => return Ok(not_begun),
             },
         };
@@ -105,7 +101,7 @@ impl Robot for ProcessRobot {
             }
             Err(fault) => {
                 let stopping = self.client.as_mut().and_then(|client| client.stop_after(&fault));
-                // Whatever state it is in, the next run must not begin there.
+                // Its state is unknown, so the next run starts a new program.
                 self.client = None;
                 RobotStatus::Failed { fault, stopping }
             }

@@ -1,35 +1,33 @@
-//! A robot program and how it is spoken to.
-
 use dynident_simulation::{SimulationError, require};
 use dynident_system::{PermittedProgram, ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Who runs the control loop.
+/// Which side runs the control loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum ProcessMode {
-    /// The client, at its own rate, from the files that it is handed.
+    /// The client, at its own rate, from the input files.
     #[default]
     Run,
-    /// The host: a torque there, a state back.
+    /// The host: it sends a torque and receives a state for each sample.
     Step,
 }
 
-/// How long the client may take.
+/// Time limits of the client.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ProcessLimits {
     /// From its start to its hello, s. Default 30.
     pub hello_s: f64,
-    /// From one message to the next, s. In the mode `run` what is left of the motion comes on top: a program may send
-    /// its samples afterwards, and the way to the start and back may take this long. Default 60.
+    /// From one message to the next, s. In mode `run` the remaining time of the motion is added, because a program may
+    /// send its samples afterwards; moving to the start and back is limited to this time, too. Default 60.
     pub message_s: f64,
-    /// From one sample to the next in the mode `run`, s, while the samples come in real time: a program that falls
-    /// silent in the middle of a motion is stopped after this. Default ten sample periods, at least 0.2 s. Of programs
-    /// that send their samples afterwards, in batches, or faster or slower than real time it means nothing.
+    /// From one sample to the next in mode `run` while samples arrive in real time, s; a program that is silent for
+    /// longer during a motion is stopped. Default ten sample periods, at least 0.2 s. Not used for programs that send
+    /// samples afterwards, in batches, or faster or slower than real time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub silence_s: Option<f64>,
     /// A whole run, s. Default none.
@@ -47,27 +45,27 @@ impl Default for ProcessLimits {
     }
 }
 
-/// A robot program and how it is spoken to.
+/// Settings of a robot program.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ProcessSettings {
     /// Program and arguments.
     pub command: Vec<String>,
-    /// Who runs the control loop; default the client.
+    /// Which side runs the control loop; default the client.
     #[serde(default)]
     pub mode: ProcessMode,
-    /// How long it may take.
+    /// Its time limits.
     #[serde(default)]
     pub limits: ProcessLimits,
-    /// Folder for the files that are handed over, `run_k/trajectory.csv` and `run_k/controller.json`. Default a
-    /// temporary folder, deleted with the robot.
+    /// Folder for the input files `run_k/trajectory.csv` and `run_k/controller.json`. Default a temporary folder,
+    /// deleted with the robot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub folder: Option<PathBuf>,
 }
 
 impl ProcessSettings {
-    /// The permission to start the command.
+    /// Returns the permission to start the command.
     ///
     /// # Errors
     /// [`ProgramRefused`] if it may not be started.

@@ -1,5 +1,5 @@
-//! The messages between an experiment (the host) and a robot program (the client): one JSON object a line. The book's
-//! page `robot-protocol.md` describes them with examples.
+//! Messages between an experiment (host) and a robot program (client): one JSON object per line. See the page
+//! `robot-protocol.md` of the book.
 
 use super::envelope::Envelope;
 use super::ways::RunPart;
@@ -8,38 +8,39 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the protocol.
 pub const PROTOCOL: &str = "dynident-robot/1";
 
-/// What the host writes to the client's standard input.
+/// Messages of the host, on the client's standard input.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 pub enum ToClient {
-    /// Run the trajectory of a file under the controller of a file, by yourself; then the client sends samples and an
-    /// end.
+    /// Run the trajectory of a file with the controller of a file; the client then sends samples and an end.
     Run {
         /// Number of the run.
         run: usize,
-        /// Samples a second that the controller should run at.
+        /// Rate of the controller, Hz.
         rate_hz: f64,
         /// The trajectory's length, s.
         duration_s: f64,
         /// Path of the trajectory: `t_s, q.., dq.., ddq..` and the model's torques `tau..`, if there is a model.
         trajectory: String,
-        /// Path of the controller.
+        /// Path of the controller's file.
         controller: String,
-        /// What no sample may leave, in the order of the client's joints: the client stops by itself where one does.
+        /// Limits of every sample, in the order of the client's joints; the client itself stops if a sample exceeds
+        /// them.
         #[serde(skip_serializing_if = "Option::is_none")]
         envelope: Option<Envelope>,
-        /// The ways from where the robot waits to the trajectory and back, each a table like it: one controller runs
-        /// all three without a pause. Only to clients that say that they know it.
+        /// Paths from home to the trajectory and back, each a table like the trajectory; one controller runs all three
+        /// without a pause. Only for clients with the capability `home`.
         #[serde(skip_serializing_if = "Option::is_none")]
         home: Option<WayFiles>,
     },
-    /// A run in steps begins: go to the start and send the state. The ways, where there are some, are part of it.
+    /// Begin of a run in mode `step`: move to the start and send the state. The paths from and to home are part of the
+    /// run.
     Begin {
         /// Number of the run.
         run: usize,
-        /// Samples a second.
+        /// Samples per second.
         rate_hz: f64,
-        /// How many torques will come.
+        /// Number of torques that follow.
         samples: usize,
         /// Positions to start from, rad (m).
         q: Vec<f64>,
@@ -49,74 +50,74 @@ pub enum ToClient {
         #[serde(skip_serializing_if = "Option::is_none")]
         envelope: Option<Envelope>,
     },
-    /// Hold this torque for one sample, then send the state.
+    /// Apply this torque for one sample, then send the state.
     Torque {
         /// Nm (N).
         tau: Vec<f64>,
     },
     /// The steps are over: stop, and send an end.
     Finish {},
-    /// Stop the robot at once, whatever it does, and send an end. It may come at any moment of a run, also in place of
-    /// a torque.
+    /// Stop the robot at once and send an end. May arrive at any time of a run, also instead of a torque.
     Stop {
         /// Why.
         reason: String,
     },
-    /// Nothing more will come.
+    /// Last message.
     Bye {},
 }
 
-/// The ways of a run, as files.
+/// Files of the paths from and to home.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WayFiles {
-    /// Path of the way to the trajectory's first posture.
+    /// Path of the file of the approach to the trajectory's first posture.
     pub approach: String,
-    /// Its length, s; 0 where the robot is there already.
+    /// Its length, s; 0 if the robot is there already.
     pub approach_s: f64,
-    /// Path of the way from its last posture.
+    /// Path of the file of the return from the last posture.
     #[serde(rename = "return")]
     pub back: String,
     /// Its length, s.
     pub return_s: f64,
 }
 
-/// What the client writes to its standard output. Missing numbers (`null`) are read and distinguished from garbage.
+/// Messages of the client, on its standard output. Missing numbers (`null`) are accepted, and distinguished from
+/// invalid messages.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ToHost {
-    /// First of all.
+    /// First message.
     Hello {
         /// [`PROTOCOL`].
         protocol: String,
-        /// What the robot is.
+        /// Name of the robot.
         name: String,
         /// Names of its joints, in the order of all its vectors.
         joints: Vec<String>,
-        /// Which of `run` and `step` it offers.
+        /// Supported modes: `run`, `step`.
         modes: Vec<String>,
-        /// What it logs as torque; everything that the drives give, Nm (N), where it does not say.
+        /// Quantity that is logged as torque; default the complete drive torque, Nm (N).
         #[serde(default)]
         logs: LoggedTorque,
-        /// What it can beyond the first version of the protocol: `home` (the ways of a run). Others are not looked at.
+        /// Capabilities beyond the first version of the protocol: `home` (paths of a run). Others are ignored.
         #[serde(default)]
         capabilities: Vec<String>,
     },
     /// One sample of a run.
     Sample {
-        /// The part of the run that it belongs to; the motion where it does not say.
+        /// The part of the run; default the motion.
         #[serde(default)]
         part: RunPart,
         /// Time since the begin of that part, s.
         t_s: Option<f64>,
         /// Positions, rad (m).
         q: Vec<Option<f64>>,
-        /// Velocities, rad/s (m/s), where the robot measures them.
+        /// Velocities, rad/s (m/s), if the robot measures them.
         #[serde(default)]
         dq: Option<Vec<Option<f64>>>,
         /// Torques of the drives, Nm (N).
         tau: Vec<Option<f64>>,
     },
-    /// The state in a run by steps.
+    /// The state in mode `step`.
     State {
         /// Time since the run's begin, s.
         t_s: Option<f64>,
@@ -125,7 +126,7 @@ pub enum ToHost {
         /// Velocities, rad/s (m/s).
         dq: Vec<Option<f64>>,
     },
-    /// The run is over.
+    /// End of the run.
     End {
         /// `done` or `stopped`.
         status: EndStatus,
@@ -135,21 +136,21 @@ pub enum ToHost {
     },
 }
 
-/// What a robot logs as `tau`.
+/// Quantity that a robot logs as `tau`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(tag = "torque", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum LoggedTorque {
-    /// All that the drives give at the joints, Nm (N).
+    /// Complete torque of the drives at the joints, Nm (N).
     #[default]
     Drive,
-    /// Currents of the drives, A, which make so much torque at the joint, gear included.
+    /// Currents of the drives, A, with the joint torque per ampere, gear included.
     Current {
-        /// Nm/A (N/A) at each joint.
+        /// Joint torque per ampere, Nm/A (N/A), for each joint.
         torque_per_ampere: Vec<f64>,
     },
-    /// Torques from which the robot has taken what it adds by itself (gravity, friction).
+    /// Torques without parts that the robot adds itself (gravity, friction).
     Reduced {
-        /// What is missing in them.
+        /// The missing parts.
         without: Vec<String>,
     },
 }
@@ -158,9 +159,9 @@ pub enum LoggedTorque {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EndStatus {
-    /// The whole trajectory.
+    /// The trajectory was completed.
     Done,
-    /// Early.
+    /// The run was stopped early.
     Stopped,
 }
 

@@ -1,5 +1,3 @@
-//! What is recorded of a run as it goes: part after part, each watched along its own way.
-
 use super::envelope::EnvelopeWatch;
 use super::oscillation_watch::RunOscillations;
 use super::stop_reason::{Breach, JointOscillation};
@@ -7,12 +5,11 @@ use super::ways::{RunPart, WayRecords};
 use super::{RobotFault, RobotRun, RobotStatus, RunRequest};
 use dynident_simulation::{Record, Reference};
 
-/// A record to be filled sample by sample: until [`joint_major`] its arrays are sample-major.
+/// An empty record; its arrays are sample-major until [`joint_major`].
 pub(super) fn empty_record(joints: &[String], rate_hz: f64) -> Record {
     Record { joints: joints.to_vec(), rate_hz, samples: 0, times_s: Vec::new(), q: Vec::new(), tau: Vec::new() }
 }
 
-/// From sample-major to joint-major.
 pub(super) fn joint_major(mut record: Record) -> Record {
     let (joints, samples) = (record.joints.len(), record.samples);
     for values in [&mut record.q, &mut record.tau] {
@@ -21,26 +18,22 @@ pub(super) fn joint_major(mut record: Record) -> Record {
     record
 }
 
-/// One part of a run.
 #[derive(Debug)]
 struct Part<'a> {
     which: RunPart,
     reference: &'a Reference,
-    /// Samples of it by the controller's count: those that it shares with the motion are the motion's.
+    /// Number of its samples by the controller's count; samples that it shares with the motion belong to the motion.
     samples: usize,
-    /// Sample-major.
     record: Record,
     watch: EnvelopeWatch<'a>,
     oscillations: RunOscillations,
 }
 
-/// What is recorded of a run, part after part.
 #[derive(Debug)]
 pub(super) struct Recorder<'a> {
     parts: Vec<Part<'a>>,
-    /// The part that samples belong to now.
     at: usize,
-    /// By the controller's count: the time of the sample from which those of the part count, by the robot's clock.
+    /// Time of the sample at which the current part begins, by the robot's clock, s.
     zero_s: f64,
     joints: Vec<String>,
 }
@@ -63,31 +56,28 @@ impl<'a> Recorder<'a> {
         Self { parts, at: 0, zero_s: 0.0, joints: joints.to_vec() }
     }
 
-    /// The record of the part that is run now, sample-major.
     pub(super) fn record(&mut self) -> &mut Record {
         &mut self.parts[self.at].record
     }
 
-    /// Samples of all parts so far.
     pub(super) fn samples(&self) -> usize {
         self.parts.iter().map(|part| part.record.samples).sum()
     }
 
-    /// What is left of the run, s.
+    /// Remaining time of the run, s.
     pub(super) fn left_s(&self) -> f64 {
         let last = |part: &Part<'_>| part.record.times_s.last().copied().unwrap_or(0.0);
         self.parts[self.at..].iter().map(|part| (part.reference.duration_s() - last(part)).max(0.0)).sum()
     }
 
-    /// Whether the part that is run now is recorded to its end: no further sample of it is due.
     pub(super) fn is_at_end_of_part(&self) -> bool {
         self.require_end().is_ok()
     }
 
-    /// Samples from here on are of this part.
+    /// Begins a part; later samples belong to it.
     ///
     /// # Errors
-    /// A part that this run has not, or one before; one of which the end is not there.
+    /// A part that this run does not have, or an earlier one; an incomplete current part.
     pub(super) fn enter(&mut self, part: RunPart) -> Result<(), RobotFault> {
         let expected = self.parts[self.at].which;
         let place = self.parts.iter().position(|own| own.which == part).filter(|place| *place >= self.at);
@@ -104,10 +94,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// That every part was recorded to its end.
-    ///
-    /// # Errors
-    /// Which was not.
+    /// Checks that every part was recorded to its end.
     pub(super) fn require_whole(&mut self) -> Result<(), RobotFault> {
         loop {
             self.require_end()?;
@@ -118,7 +105,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Up to two samples of the slower of the two clocks may be missing, or a hundredth of the part.
+    /// Two samples of the slower of the two clocks may be missing, or a hundredth of the part.
     fn require_end(&self) -> Result<(), RobotFault> {
         let Part { which, reference, record, .. } = &self.parts[self.at];
         let (end_s, duration_s) = (record.times_s.last().copied().unwrap_or(0.0), reference.duration_s());
@@ -129,27 +116,26 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Where the robot's clock says `time_s` at the controller's next sample: the time within its part, which is
-    /// entered. The robot runs approach, motion and return as one.
+    /// Time within its part of the controller's next sample at `time_s` of the robot's clock; begins the part. In this
+    /// mode the robot runs approach, motion and return as one motion.
     pub(super) fn time_of_next(&mut self, time_s: f64) -> f64 {
         while self.parts[self.at].record.samples >= self.parts[self.at].samples && self.at + 1 < self.parts.len() {
-            // The return counts from the last sample of the motion, which it shares.
+            // The return begins at the last sample of the motion, which it shares.
             let last_s = self.parts[self.at].record.times_s.last().copied();
             let shared_s = last_s.filter(|_| self.parts[self.at].which == RunPart::Motion);
             self.zero_s = shared_s.map_or(time_s, |shared_s| self.zero_s + shared_s);
             self.at += 1;
         }
-        // Before the first part nothing is taken off, not even a zero.
+        // Do not even subtract a zero in the first part.
         if self.at == 0 { time_s } else { time_s - self.zero_s }
     }
 
-    /// How the newest sample leaves the envelope, if it does; `dq` are measured velocities, where there are any.
+    /// Returns the breach of the envelope at the newest sample, if any; `dq` are measured velocities, if available.
     pub(super) fn look(&mut self, dq: Option<&[f64]>) -> Option<Breach> {
         let Part { which, record, watch, .. } = &mut self.parts[self.at];
         watch.look(record, dq).map(|breach| Breach { part: *which, ..breach })
     }
 
-    /// The joint that oscillates up to the newest sample, if one does.
     pub(super) fn look_for_oscillation(&mut self) -> Option<JointOscillation> {
         let Part { which, reference, record, oscillations, .. } = &mut self.parts[self.at];
         let last = record.samples.checked_sub(1)?;
@@ -158,7 +144,6 @@ impl<'a> Recorder<'a> {
         Some(JointOscillation { joint: record.joints[joint].clone(), part: *which, ..found })
     }
 
-    /// The run, with what was recorded of it.
     pub(super) fn into_run(self, status: RobotStatus) -> RobotRun {
         let (mut approach, mut motion, mut back) = (None, None, None);
         for own in self.parts {

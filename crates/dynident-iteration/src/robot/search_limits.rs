@@ -1,20 +1,18 @@
-//! The envelope of an iteration as limits of the searches for its motions.
-
 use super::envelope::EnvelopeSettings;
 use super::workspace::{WatchedPoint, WorkspaceBox};
 use dynident_excitation::limits::{BoxLimit, JointLimit, Limits, LinkPoint};
 use dynident_model::Model;
 use dynident_simulation::SimulationError;
 
-/// Distance of the other end of a range that an envelope bounds on one side only, rad (m of a usual arm): out of reach.
-const FAR: f64 = 40.0;
+/// Distance of the unbounded end of a range that the envelope bounds on one side only, rad (m for an arm of 1.2 m):
+/// unreachable.
+const UNREACHABLE_DISTANCE: f64 = 40.0;
 
 impl EnvelopeSettings {
-    /// `limits` narrowed so that a motion which keeps them keeps this envelope, with `margin` (0 to below 1) as room
-    /// for the distance from the path: positions by this share of the tracking error that the envelope allows, at most
-    /// of half the range; watched points by this share of that error times the length of the arm to the point, at most
-    /// of half the box; stated velocity and torque by this share of themselves. A torque is only limited where the
-    /// description has the inertials of all bodies.
+    /// Narrows `limits` so that a motion within them stays in this envelope, with a `margin` (0 to below 1) for the
+    /// tracking error: positions by this share of the allowed tracking error, at most of half the range; watched points
+    /// by this share of that error times the lever arm, at most of half the box; stated velocity and torque by this
+    /// share of themselves. Torque is limited only if the robot description has the inertials of all bodies.
     ///
     /// # Errors
     /// As [`envelope`](Self::envelope).
@@ -23,7 +21,7 @@ impl EnvelopeSettings {
         let errors: Vec<f64> = envelope.tracking_error.iter().map(|error| margin * error.unwrap_or(0.0)).collect();
         let own = model.own_scale();
         let known = model.bodies_without_prior().is_empty();
-        // Defaults from the description already have room: `ROOM` of the envelope.
+        // Defaults from the robot description already have a margin: `LIMIT_FACTOR` of the envelope.
         let kept = |stated: bool| if stated { 1.0 - margin } else { 1.0 };
         for (place, joint) in model.joints().iter().enumerate() {
             let at = limits.joints.iter().position(|limit| limit.joint == joint.name).unwrap_or_else(|| {
@@ -31,7 +29,7 @@ impl EnvelopeSettings {
                 limits.joints.len() - 1
             });
             let limit = &mut limits.joints[at];
-            let far = if joint.turns() { FAR } else { own.metres(FAR) };
+            let far = if joint.turns() { UNREACHABLE_DISTANCE } else { own.metres(UNREACHABLE_DISTANCE) };
             let range = match (envelope.lower[place], envelope.upper[place]) {
                 (Some(lower), Some(upper)) => {
                     let room = errors[place].min(0.5 * margin * (upper - lower));
@@ -60,10 +58,10 @@ impl EnvelopeSettings {
 }
 
 impl WorkspaceBox {
-    /// The box with the watched points, each kept inside by the room that errors of its joints take; none where nothing
-    /// is bounded.
+    /// The box with the watched points, each kept inside by the effect of the tracking errors; `None` if no axis is
+    /// bounded.
     fn limit(&self, model: &Model, errors: &[f64], margin: f64) -> Option<BoxLimit> {
-        let far = model.own_scale().metres(FAR);
+        let far = model.own_scale().metres(UNREACHABLE_DISTANCE);
         let bounds = (0..3).map(|axis| match (self.lower[axis], self.upper[axis]) {
             (Some(lower), Some(upper)) => Some([lower, upper]),
             (Some(lower), None) => Some([lower, lower.max(0.0) + far]),
@@ -91,8 +89,8 @@ impl WatchedPoint {
         Some(LinkPoint { link: link.name.clone(), at_m: at.0, radius_m: 0.0 })
     }
 
-    /// How far the errors of the joints before it, rad (m), can move it: the root of the sum of squares of each error
-    /// times the length of the arm from its joint to the point.
+    /// Displacement of the point by the errors of the joints before it, rad (m): root of the sum of squares of each
+    /// error times the lever arm from its joint to the point.
     fn reach_of_errors(&self, model: &Model, errors: &[f64]) -> f64 {
         let mut length_m = dynident_model::Vec3(self.offset_m).norm();
         let (mut square, mut body) = (0.0, Some(self.body));
@@ -140,7 +138,7 @@ mod tests {
         };
         let found = envelope.narrow(limits.clone(), &model, 0.1).unwrap();
         let [first, second] = [&found.joints[0], &found.joints[1]];
-        // 0.1 · 0.2 rad of room at the upper end; the study's lower end is tighter, and so are its speed and torque.
+        // 0.1 · 0.2 rad of margin at the upper end; the study's lower end, speed and torque are tighter.
         assert_eq!(first.position, Some([-0.5, 2.0 - 0.1 * 0.2]));
         assert_eq!((first.speed, first.torque, first.torque_margin), (Some(1.0), Some(10.0), 0.5));
         assert_eq!(second.position, Some([-1.0 + 0.1 * 0.2, 2.0 - 0.1 * 0.2]));
@@ -151,7 +149,7 @@ mod tests {
         let tool = boxed.points.last().unwrap();
         assert!((tool.radius_m - 0.02 * (0.2_f64.powi(2) + 1.2_f64.powi(2)).sqrt()).abs() < 1e-12, "{tool:?}");
         assert!(found.validate(&model).is_ok());
-        // Without a margin the envelope itself.
+        // Without a margin it equals the envelope.
         let exact = envelope.narrow(limits, &model, 0.0).unwrap();
         assert_eq!(exact.joints[1].position, Some([-1.0, 2.0]));
         assert!(exact.boxes[0].points.iter().all(|point| point.radius_m == 0.0));

@@ -1,13 +1,11 @@
-//! The built-in simulator as a robot.
-
 use super::ways::{WayRecords, cut};
 use super::{Robot, RobotRun, RobotStatus, RunPurpose, RunRequest, Stopping};
 use dynident_simulation::Plant;
 use dynident_simulation::SimulationError;
 use dynident_simulation::{LoopSettings, closed_loop};
 
-/// A [`Plant`] with its sensors and limits, for [`Robot`]. The seed of the noise is that of the settings and the run's
-/// number: runs differ, and the same run is the same again.
+/// A [`Plant`] with its sensors and limits as a [`Robot`]. The seed of the noise combines that of the settings and the
+/// run's number: different runs differ, and a repeated run is identical.
 #[derive(Debug)]
 pub struct SimulatedRobot {
     plant: Plant,
@@ -16,7 +14,7 @@ pub struct SimulatedRobot {
 }
 
 impl SimulatedRobot {
-    /// The simulator of a robot.
+    /// Creates a simulated robot.
     ///
     /// # Errors
     /// As [`LoopSettings::validate`].
@@ -26,7 +24,7 @@ impl SimulatedRobot {
         Ok(Self { plant, settings, joints })
     }
 
-    /// The same with the named joints locked where a run begins, as [`Plant::with_locked`].
+    /// Locks the named joints where a run begins, as [`Plant::with_locked`].
     ///
     /// # Errors
     /// A joint that does not exist.
@@ -56,7 +54,7 @@ impl Robot for SimulatedRobot {
         if let Some(envelope) = request.envelope {
             envelope.limit(&mut settings.limits);
         }
-        // Any odd number spreads neighbours over the seeds.
+        // Multiplication by an odd number distributes neighbouring run numbers over the seeds.
         settings.sensors.seed ^= (request.run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         settings.sensors.seed ^= match request.purpose {
             RunPurpose::Run => 0,
@@ -65,7 +63,7 @@ impl Robot for SimulatedRobot {
         };
         let run = closed_loop(&mut self.plant, controller.as_mut(), &*request.whole()?, &settings)?;
         let record = settings.sensors.record(self.plant.model(), &run)?;
-        // The simulator does not stop for where links are: it is seen when the run is over.
+        // The simulator does not monitor link positions, so they are checked after the run.
         let outside = request.envelope.and_then(|envelope| envelope.outside(&run.q, run.samples, run.rate_hz));
         let status = match &run.status {
             status if status.is_done() && outside.is_none() => RobotStatus::Done,
@@ -77,7 +75,7 @@ impl Robot for SimulatedRobot {
         let Some(ways) = request.ways else {
             return Ok(RobotRun { status, record, truth: Some(run), ways: None, note: None });
         };
-        // Half a sample of room for times that are no whole numbers of periods in the last digit.
+        // Tolerance of half a sample for rounded times.
         let half_s = 0.5 / request.reference.rate_hz();
         let begin_s = ways.approach.duration_s();
         let (from_s, to_s) = (begin_s - half_s, begin_s + request.reference.duration_s() + half_s);

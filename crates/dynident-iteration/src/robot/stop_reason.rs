@@ -1,23 +1,21 @@
-//! Why a run was stopped from here, and what became of the stop.
-
 use super::ways::RunPart;
 use serde::{Deserialize, Serialize};
 
-/// What left its envelope, where and when.
+/// A violated limit of the envelope.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Breach {
     /// The joint, or the link of which a point left the workspace.
     pub joint: String,
-    /// What of it.
+    /// The limited quantity.
     pub quantity: EnvelopeQuantity,
-    /// Its value, rad, rad/s, Nm (m, m/s, N).
+    /// Its value, in rad, rad/s, Nm (m, m/s, N).
     pub value: f64,
     /// The limit.
     pub limit: f64,
-    /// When, s from the begin of the part.
+    /// Time since the begin of the part, s.
     pub time_s: f64,
-    /// The part of the run: the motion, unless it has ways.
+    /// The part of the run; always the motion without approach and return paths.
     #[serde(default, skip_serializing_if = "RunPart::is_motion")]
     pub part: RunPart,
 }
@@ -26,11 +24,10 @@ impl core::fmt::Display for Breach {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let Self { joint, quantity, value, limit, time_s, part } = self;
         let of = if part.is_motion() { String::new() } else { format!(" of the {}", part.name()) };
-        write!(f, "{} of {joint} is {value:.4} at {time_s:.3} s{of}, its limit {limit:.4}", quantity.name())
+        write!(f, "{} of {joint} is {value:.4} at {time_s:.3} s{of}, limit {limit:.4}", quantity.name())
     }
 }
 
-/// A joint or link that left its envelope, by its name.
 #[derive(Debug)]
 pub(super) struct SampleBreach {
     pub(super) name: String,
@@ -56,9 +53,9 @@ pub struct JointOscillation {
     pub frequency_hz: f64,
     /// Amplitude of the velocity about that of the trajectory, rad/s (m/s).
     pub amplitude: f64,
-    /// When it was seen, s from the begin of the part.
+    /// Time of the detection since the begin of the part, s.
     pub time_s: f64,
-    /// The part of the run: the motion, unless it has ways.
+    /// The part of the run; always the motion without approach and return paths.
     #[serde(default, skip_serializing_if = "RunPart::is_motion")]
     pub part: RunPart,
 }
@@ -76,7 +73,7 @@ impl core::fmt::Display for JointOscillation {
     }
 }
 
-/// What an envelope limits.
+/// Quantity that an envelope limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -87,13 +84,13 @@ pub enum EnvelopeQuantity {
     Speed,
     /// Torque, Nm (N).
     Torque,
-    /// Distance from the path, rad (m).
+    /// Tracking error, rad (m).
     TrackingError,
-    /// The x of a point of the base frame, m.
+    /// The x of a point in the base frame, m.
     X,
-    /// Its y.
+    /// Its y, m.
     Y,
-    /// Its z: its height.
+    /// Its z (height), m.
     Z,
 }
 
@@ -112,24 +109,23 @@ impl EnvelopeQuantity {
     }
 }
 
-/// What became of a stop.
+/// Result of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Stopping {
-    /// The robot's program said that the robot stands, or no motion had begun.
+    /// The robot's program confirmed that the robot is at rest, or no motion had begun.
     Confirmed,
-    /// The program did not answer in time and was killed: nobody knows whether the robot stands.
+    /// The program did not answer in time and was killed; the robot may still be moving.
     Unanswered,
-    /// The program ended, or said that its run was over, without an answer to the stop: nobody knows whether the robot
-    /// stands.
+    /// The program ended, or reported the end of its run, without an answer to the stop; the robot may still be moving.
     Unknown,
-    /// Nobody was there to be stopped: it was seen in the log afterwards.
+    /// Detected afterwards in the log; no stop was possible.
     SeenAfterwards,
 }
 
 impl Stopping {
-    /// Whether nobody said that the robot stands.
+    /// Whether the robot may still be moving.
     pub(crate) fn is_open(self) -> bool {
         matches!(self, Self::Unanswered | Self::Unknown)
     }
@@ -140,14 +136,17 @@ impl core::fmt::Display for Stopping {
         match self {
             Self::Confirmed => write!(f, "the robot has stopped"),
             Self::Unanswered => {
-                write!(f, "its program did not answer the stop and was killed: look at the robot before anything else")
+                write!(
+                    f,
+                    "its program did not answer the stop and was killed: the robot may still be moving, check it first"
+                )
             }
             Self::Unknown => {
-                write!(f, "nobody knows whether the robot stands: look at the robot before anything else")
+                write!(f, "the stop was not confirmed: the robot may still be moving, check it first")
             }
             Self::SeenAfterwards => write!(
                 f,
-                "seen in the log when the run was over; if the log is wrong, correct the file: the same command reads it again"
+                "detected in the log after the run; if the log is wrong, correct the file and repeat the command"
             ),
         }
     }

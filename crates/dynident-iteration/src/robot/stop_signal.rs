@@ -1,12 +1,10 @@
-//! A stop that somebody asks for while a robot runs.
-
 use core::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// Asks robots to stop: shared between who may ask (a handler of Ctrl-C, a button) and who runs a robot. Asked once, a
-/// run that is under way gets a stop message, and no further run begins; [`kill_robots`](Self::kill_robots) is for
-/// those who do not want to wait for the answer.
+/// Requests robots to stop. It is shared between the source of requests (a Ctrl-C handler, a button) and the code that
+/// runs a robot. After a request, the current run gets a stop message, and no further run begins;
+/// [`kill_robots`](Self::kill_robots) does not wait for the answer.
 ///
 /// ```
 /// let stop = dynident_iteration::StopSignal::default();
@@ -26,7 +24,6 @@ struct Shared {
     listeners: Mutex<Vec<Listener>>,
 }
 
-/// A robot that runs.
 struct Listener {
     number: u64,
     wake: Box<dyn Fn() + Send>,
@@ -40,25 +37,25 @@ impl fmt::Debug for StopSignal {
 }
 
 impl StopSignal {
-    /// Asks for the stop. Robots that run hear of it at once.
+    /// Requests the stop; running robots are notified at once.
     pub fn request(&self) {
         self.shared.requested.store(true, Ordering::SeqCst);
         self.each(|listener| (listener.wake)());
     }
 
-    /// Whether a stop was asked for.
+    /// Whether a stop was requested.
     pub fn is_requested(&self) -> bool {
         self.shared.requested.load(Ordering::SeqCst)
     }
 
-    /// Kills every program that serves a robot, with all the processes of its group, without a word; whether there was
-    /// one. Nobody knows afterwards whether its robot stands.
+    /// Kills every robot program with its process group, without a stop message; returns whether there was one. The
+    /// robots may still be moving afterwards.
     pub fn kill_robots(&self) -> bool {
         self.each(|listener| (listener.kill)()) > 0
     }
 
-    /// `wake` is called when a stop is asked for, `kill` by [`kill_robots`](Self::kill_robots), until the guard is
-    /// dropped. Neither may wait for anything.
+    /// Registers callbacks: `wake` is called on a stop request, `kill` by [`kill_robots`](Self::kill_robots), until the
+    /// guard is dropped. Both must not block.
     pub(super) fn listen(&self, wake: Box<dyn Fn() + Send>, kill: Box<dyn Fn() + Send>) -> Listening {
         let number = self.shared.next.fetch_add(1, Ordering::SeqCst);
         if let Ok(mut listeners) = self.shared.listeners.lock() {
@@ -67,7 +64,6 @@ impl StopSignal {
         Listening { signal: self.clone(), number }
     }
 
-    /// How many there are.
     fn each(&self, call: impl Fn(&Listener)) -> usize {
         let Ok(listeners) = self.shared.listeners.lock() else { return 0 };
         listeners.iter().for_each(call);
@@ -75,7 +71,6 @@ impl StopSignal {
     }
 }
 
-/// Listens as long as it lives.
 #[derive(Debug)]
 pub(super) struct Listening {
     signal: StopSignal,

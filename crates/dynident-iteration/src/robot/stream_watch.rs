@@ -1,41 +1,37 @@
-//! Whether a program streams its samples in real time, and how long it may then be silent.
+//! Detects whether a program streams its samples in real time, and limits its silence.
 
 use std::time::Instant;
 
-/// Sample periods that a streaming program may be silent for.
-const PERIODS: f64 = 10.0;
-/// It may always be silent for this long, s: schedulers and networks pause for some hundredths of a second.
-const LEAST_S: f64 = 0.2;
-/// A known stream is one as long as the motion's time and the clock differ by at most this, s, and this share: buffers
-/// and networks hold samples back, and clocks differ.
-const LAG_S: f64 = 0.1;
-const DRIFT: f64 = 0.02;
-/// A program is known to stream after this many times the usual silence in which its pace was that of real time. A
-/// simulator on a busy machine has that pace for some tenths of a second by chance.
-const KNOWN_AFTER: f64 = 5.0;
-/// The smallest delays of consecutive windows, each half the usual silence long, differ by at most this, s, and this
-/// share. Some sample of each window meets no busy scheduler, and clocks differ by less.
-const JITTER_S: f64 = 0.005;
-const CLOCK_DRIFT: f64 = 0.005;
+/// Longest silence of a streaming program, in sample periods.
+const MAX_SILENCE_PERIODS: f64 = 10.0;
+/// Smallest limit of silence, s; schedulers and networks pause for some hundredths of a second.
+const MIN_SILENCE_S: f64 = 0.2;
+/// Largest difference of the motion's time and the clock at which a stream is in real time, s, plus this share of the
+/// elapsed time: buffers and networks delay samples, and clocks differ.
+const MAX_LAG_S: f64 = 0.1;
+const MAX_DRIFT_SHARE: f64 = 0.02;
+/// A program is known to stream after it was in real time for this multiple of the usual silence. A simulator on a busy
+/// machine may do so for some tenths of a second by chance.
+const MIN_STREAMING_RATIO: f64 = 5.0;
+/// Largest variation of the smallest delays of consecutive windows (each half the usual silence), s, plus this share of
+/// the time for clock drift. At least one sample of each window is not delayed by the scheduler.
+const MAX_DELAY_VARIATION_S: f64 = 0.005;
+const MAX_CLOCK_DRIFT_SHARE: f64 = 0.005;
 
-/// A sample that has arrived.
 #[derive(Clone, Copy, Debug)]
 struct Arrival {
     at: Instant,
-    /// The motion's own time, s.
     motion_s: f64,
 }
 
-/// Follows when samples arrive. A program that sends its samples after the motion, or simulates faster or slower than
-/// real time, never streams.
+/// Follows the arrival of samples. A program that sends its samples after the motion, or simulates faster or slower
+/// than real time, never streams.
 #[derive(Debug)]
 pub(super) struct StreamWatch {
-    /// The stated limit, s.
     silence_s: Option<f64>,
     stream: Option<Stream>,
 }
 
-/// The samples so far.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     first: Arrival,
@@ -45,15 +41,15 @@ struct Stream {
     is_known: bool,
 }
 
-/// How far samples arrive behind the motion's time, from window to window.
+/// Delay of the samples relative to the motion's time, window by window.
 #[derive(Clone, Copy, Debug)]
 struct Pace {
-    /// When the motion has been in real time since, s of the motion.
+    /// Begin of the real-time interval, in motion time, s.
     since_s: f64,
     window_s: f64,
-    /// Smallest delay of the window, s.
+    /// Smallest delay in the current window, s.
     delay_s: f64,
-    /// Least and largest of the smallest delays of whole windows, s.
+    /// Smallest and largest of the window minima, s.
     extremes: Option<(f64, f64)>,
 }
 
@@ -62,7 +58,6 @@ impl StreamWatch {
         Self { silence_s, stream: None }
     }
 
-    /// A sample of the motion's time `motion_s` has arrived.
     pub(super) fn arrived(&mut self, at: Instant, motion_s: f64) {
         let new = Arrival { at, motion_s };
         let usual_s = self.usual_s();
@@ -76,39 +71,39 @@ impl StreamWatch {
         stream.last = new;
         stream.samples += 1;
         stream.pace.follow(stream.behind_s(), motion_s, usual_s);
-        stream.is_known |= motion_s - stream.pace.since_s >= KNOWN_AFTER * usual_s;
+        stream.is_known |= motion_s - stream.pace.since_s >= MIN_STREAMING_RATIO * usual_s;
     }
 
-    /// The longest silence that is allowed, s; none where the program does not stream in real time.
+    /// The longest allowed silence, s; `None` if the program does not stream in real time.
     pub(super) fn limit_s(&self) -> Option<f64> {
         let stream = self.stream.filter(|stream| stream.is_known)?;
         let elapsed_s = stream.last.at.duration_since(stream.first.at).as_secs_f64();
-        (stream.behind_s().abs() <= LAG_S + DRIFT * elapsed_s).then(|| self.allowed_s())
+        (stream.behind_s().abs() <= MAX_LAG_S + MAX_DRIFT_SHARE * elapsed_s).then(|| self.allowed_s())
     }
 
     fn allowed_s(&self) -> f64 {
         self.silence_s.unwrap_or_else(|| self.usual_s())
     }
 
-    /// The limit where none is stated, s; it also sets the time after which a stream is known.
+    /// Default of the limit, s; it also sets the time after which a stream is known.
     fn usual_s(&self) -> f64 {
         let period_s = self.stream.map_or(0.0, |Stream { first, last, samples, .. }| {
             (last.motion_s - first.motion_s).max(0.0) / samples.saturating_sub(1).max(1) as f64
         });
-        // At most a day: periods are numbers from outside.
-        (PERIODS * period_s).clamp(LEAST_S, 86400.0)
+        // At most a day: periods come from external input.
+        (MAX_SILENCE_PERIODS * period_s).clamp(MIN_SILENCE_S, 86400.0)
     }
 }
 
 impl Stream {
-    /// Time that the last sample arrived after the motion's own, both from the first sample, s.
+    /// Delay of the last sample relative to the motion's time, both since the first sample, s.
     fn behind_s(&self) -> f64 {
         self.last.at.duration_since(self.first.at).as_secs_f64() - (self.last.motion_s - self.first.motion_s)
     }
 }
 
 impl Pace {
-    /// A sample arrived `delay_s` behind the motion's time `motion_s`.
+    /// Adds a sample that arrived with a delay of `delay_s` at the motion time `motion_s`.
     fn follow(&mut self, delay_s: f64, motion_s: f64, usual_s: f64) {
         self.delay_s = self.delay_s.min(delay_s);
         if motion_s - self.window_s < 0.5 * usual_s {
@@ -116,7 +111,7 @@ impl Pace {
         }
         let (least, largest) = self.extremes.unwrap_or((self.delay_s, self.delay_s));
         let (least, largest) = (least.min(self.delay_s), largest.max(self.delay_s));
-        if largest - least <= JITTER_S + CLOCK_DRIFT * (motion_s - self.since_s) {
+        if largest - least <= MAX_DELAY_VARIATION_S + MAX_CLOCK_DRIFT_SHARE * (motion_s - self.since_s) {
             self.extremes = Some((least, largest));
         } else {
             self.extremes = Some((self.delay_s, self.delay_s));
@@ -150,14 +145,14 @@ mod tests {
         assert!(is(limit(watched(None, (550, 500.0, 1.0))), 0.2));
         assert!(is(limit(watched(None, (61, 20.0, 1.003))), 0.5));
         assert!(is(limit(watched(Some(0.1), (550, 500.0, 1.0))), 0.1));
-        // Too few yet; afterwards; a simulator in a hurry, a slow one.
+        // Too few samples; samples after the motion; a fast simulator, a slow one.
         for (samples, pace) in [(450, 1.0), (5000, 50.0), (5000, 1.02), (5000, 0.98), (1, 1.0)] {
             assert_eq!(limit(watched(None, (samples, 500.0, pace))), None, "{samples} {pace}");
         }
         assert_eq!(StreamWatch::new(None).limit_s(), None);
     }
 
-    /// A program that was held up for half a second and then catches up still streams.
+    /// A program that was delayed for half a second and then catches up still streams.
     #[test]
     fn a_stream_that_catches_up_goes_on() {
         let (begin, mut watch) = (Instant::now(), StreamWatch::new(None));
@@ -169,7 +164,7 @@ mod tests {
         assert!((watch.limit_s().unwrap() - 0.2).abs() < 1e-9);
     }
 
-    /// A simulator on a busy machine: real time on average, but slower and faster every quarter of a second.
+    /// A simulator on a busy machine: real time on average, but alternately slower and faster.
     #[test]
     fn a_simulator_whose_pace_varies_does_not_stream() {
         let (begin, mut watch, mut at_s) = (Instant::now(), StreamWatch::new(None), 0.0);
@@ -180,7 +175,7 @@ mod tests {
         }
     }
 
-    /// A known stream remains one through jitter of 50 ms.
+    /// A known stream continues through jitter of 50 ms.
     #[test]
     fn jitter_ends_no_stream() {
         let (begin, mut watch) = (Instant::now(), StreamWatch::new(None));
@@ -193,7 +188,7 @@ mod tests {
         }
     }
 
-    /// A program that writes what it has once a second does not stream.
+    /// A program that writes its samples once a second does not stream.
     #[test]
     fn batches_are_no_stream() {
         let begin = Instant::now();

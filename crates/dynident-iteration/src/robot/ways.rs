@@ -1,32 +1,29 @@
-//! The ways of a run from the posture where the robot waits to the motion and back, and what was recorded along them.
-
 use dynident_excitation::Motion;
 use dynident_simulation::{Record, Reference, SimulationError, require, require_length};
 use serde::{Deserialize, Serialize};
 
-/// How exactly a way ends where the motion begins, rad (m): both come from the same numbers.
-const JOINED: f64 = 1e-9;
+/// Largest distance between the end of a path and the motion, rad (m).
+const JOIN_TOLERANCE: f64 = 1e-9;
 
-/// A part of a run with ways.
+/// Part of a run with approach and return paths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum RunPart {
     /// From home to the motion's first posture.
     Approach,
-    /// The motion itself.
+    /// The motion.
     #[default]
     Motion,
-    /// From the motion's last posture home.
+    /// From the motion's last posture to home.
     Return,
 }
 
 impl RunPart {
-    /// All, in the order in which they are run.
+    /// All parts, in order.
     pub const ALL: [Self; 3] = [Self::Approach, Self::Motion, Self::Return];
 
-    /// Whether it is the motion.
-    #[allow(clippy::trivially_copy_pass_by_ref, reason = "the shape that serde wants")]
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "required by serde")]
     pub(crate) fn is_motion(&self) -> bool {
         *self == Self::Motion
     }
@@ -41,24 +38,29 @@ impl RunPart {
     }
 }
 
-/// The ways of one run, each from rest to rest: from home to the first posture of the motion, and from its last home.
+/// The paths of one run, each from rest to rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ways {
-    /// From home to the motion.
+    /// From home to the first posture of the motion.
     pub approach: Reference,
-    /// From the motion home.
+    /// From the last posture of the motion to home.
     pub back: Reference,
 }
 
 impl Ways {
-    /// That they join a motion: same joints and rate, and no step where one ends and the next begins.
+    /// Checks that they fit a motion: same joints and rate, and no steps between the parts.
     ///
     /// # Errors
-    /// Ways of another motion.
+    /// Paths of another motion.
     pub fn validate(&self, motion: &Reference) -> Result<(), SimulationError> {
         for way in [&self.approach, &self.back] {
-            require_length("joints of the way", motion.joints(), way.joints())?;
-            require(way.rate_hz() == motion.rate_hz(), "rate_hz of the way", way.rate_hz(), "give the motion's rate")?;
+            require_length("joints of the path", motion.joints(), way.joints())?;
+            require(
+                way.rate_hz() == motion.rate_hz(),
+                "rate_hz of the path",
+                way.rate_hz(),
+                "use the rate of the motion",
+            )?;
         }
         let (first, last) = (0, motion.samples() - 1);
         for joint in 0..motion.joints() {
@@ -68,13 +70,18 @@ impl Ways {
                 position(&self.back, 0) - position(motion, last),
             ];
             for step in steps {
-                require(step.abs() <= JOINED, "step from the way to the motion", step, "give ways that end at it")?;
+                require(
+                    step.abs() <= JOIN_TOLERANCE,
+                    "step from the path to the motion",
+                    step,
+                    "use paths that end at the motion",
+                )?;
             }
         }
         Ok(())
     }
 
-    /// The same at a share of their speed.
+    /// Returns the paths at a share of their speed.
     ///
     /// # Errors
     /// As [`Reference::slowed`].
@@ -82,7 +89,7 @@ impl Ways {
         Ok(Self { approach: self.approach.slowed(speed)?, back: self.back.slowed(speed)? })
     }
 
-    /// Approach, motion and return as one: what is commanded where one controller runs through all of them.
+    /// Returns approach, motion and return as one reference, for a controller that runs all of them without a pause.
     ///
     /// # Errors
     /// As [`validate`](Self::validate).
@@ -93,7 +100,7 @@ impl Ways {
         let mut whole = Motion::default();
         whole.reset(motion.joints(), samples);
         whole.dddq.clear();
-        // The shared samples are the motion's own.
+        // The shared samples are those of the motion.
         for (from, to, of) in [
             (0..before, 0, &self.approach),
             (0..motion.samples(), before, motion),
@@ -112,16 +119,16 @@ impl Ways {
     }
 }
 
-/// What was recorded along the ways of a run, times from the begin of each: it is kept, and not identified.
+/// Records of the paths of a run, with times since the begin of each; they are stored but not used for identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WayRecords {
     /// From home to the motion.
     pub approach: Record,
-    /// From the motion home.
+    /// From the motion to home.
     pub back: Record,
 }
 
-/// The samples of a record from a time to a time (that one is not included), with times from `zero_s` on.
+/// The samples of a record in a half-open time window, with times relative to `zero_s`.
 pub(super) fn cut(record: &Record, window_s: [f64; 2], zero_s: f64) -> Record {
     let [from_s, to_s] = window_s;
     let kept: Vec<usize> =
@@ -134,7 +141,7 @@ pub(super) fn cut(record: &Record, window_s: [f64; 2], zero_s: f64) -> Record {
         joints: record.joints.clone(),
         rate_hz: record.rate_hz,
         samples: kept.len(),
-        // The first may come out as less than nothing by a rounding.
+        // Rounding may make the first time negative.
         times_s: kept.iter().map(|&sample| (record.times_s[sample] - zero_s).max(0.0)).collect(),
         q: some(&record.q),
         tau: some(&record.tau),
@@ -156,7 +163,7 @@ mod tests {
         Reference::new(10.0, motion).unwrap()
     }
 
-    /// Each shared sample stands there once.
+    /// Each shared sample appears once.
     #[test]
     fn three_parts_are_one() {
         let ways = Ways { approach: line(0.0, 1.0, 3), back: line(4.0, 0.0, 2) };
@@ -165,10 +172,10 @@ mod tests {
         assert_eq!(whole.motion().q[..7], [0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 0.0]);
         assert_eq!(whole.motion().dq[..7], [1.0, 1.0, 3.0, 3.0, 3.0, 3.0, -4.0]);
         assert_eq!(whole.motion().q[7..], [0.0; 7]);
-        // From where the robot stands already there is nothing to run.
+        // If the robot is already there, the path has one sample.
         let there = Ways { approach: line(1.0, 1.0, 1), back: line(4.0, 4.0, 1) };
         assert_eq!(there.around(&line(1.0, 4.0, 4)).unwrap().motion().q[..4], [1.0, 2.0, 3.0, 4.0]);
-        // A step from one to the next is no way.
+        // A step between the parts is an error.
         assert!(ways.around(&line(1.1, 4.0, 4)).is_err());
     }
 }

@@ -1,5 +1,3 @@
-//! Where in the cell the robot may be: a box of the base frame that no watched point may leave.
-
 use super::stop_reason::{EnvelopeQuantity, SampleBreach};
 use dynident_dynamics::{Workspace as Arrays, body_placements};
 use dynident_model::{Model, Vec3};
@@ -7,11 +5,11 @@ use dynident_simulation::{Reference, SimulationError, require};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// A point this near to the axis of a joint on the base does not move with it, m.
-const ON_AXIS: f64 = 1e-9;
+/// Largest distance from the axis of a joint on the base at which a point does not move with it, m.
+const MAX_AXIS_DISTANCE_M: f64 = 1e-9;
 
-/// `workspace` of `[iteration.envelope]`: a box in the base frame that no link's origin may leave, nor the tool point.
-/// A bound that is infinite is none; the floor is a lower bound of z alone.
+/// Settings `workspace` of `[iteration.envelope]`: a box in the base frame that no link origin and no tool point may
+/// leave. Infinite bounds (default) are inactive; for the floor, set only the lower bound of z.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -20,7 +18,7 @@ pub struct WorkspaceSettings {
     pub lower: [f64; 3],
     /// Highest x, y, z, m.
     pub upper: [f64; 3],
-    /// A point of the last link that is watched as well, in that link's frame, m: what the robot holds.
+    /// An additional point in the frame of the last link, m, for example the tip of a tool.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tool: Option<[f64; 3]>,
 }
@@ -32,10 +30,10 @@ impl Default for WorkspaceSettings {
 }
 
 impl WorkspaceSettings {
-    /// The box with the points of a robot that are watched: the origins of all links that joints move, and the tool.
+    /// Returns the box with the watched points of a robot: the origins of all moving links, and the tool.
     ///
     /// # Errors
-    /// Bounds that are not numbers or leave no room, a tool that is not finite.
+    /// Bounds that are not numbers or leave no space, a tool that is not finite.
     pub fn of(&self, model: &Model) -> Result<WorkspaceBox, SimulationError> {
         for (low, high) in self.lower.into_iter().zip(self.upper) {
             require(low < high, "envelope.workspace", low, "give lower bounds below the upper ones")?;
@@ -44,8 +42,8 @@ impl WorkspaceSettings {
         let mut add = |link: &str, body: usize, offset: Vec3| {
             let joint = &model.tree_joints()[body];
             let away = offset - joint.axis.scale(joint.axis.dot(offset));
-            // What turns on the base about its own axis stays where it is, and so it is no matter of motion.
-            if joint.parent.is_some() || !joint.turns() || away.norm() > ON_AXIS {
+            // A point on the axis of a revolute joint on the base does not move.
+            if joint.parent.is_some() || !joint.turns() || away.norm() > MAX_AXIS_DISTANCE_M {
                 points.push(WatchedPoint {
                     link: link.to_owned(),
                     joint: joint.name.clone(),
@@ -77,39 +75,38 @@ impl WorkspaceSettings {
     }
 }
 
-/// A point of the robot that is watched.
+/// A watched point of the robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WatchedPoint {
-    /// The link that it is the origin of, or the tool.
+    /// The link of which it is the origin, or the tool.
     pub link: String,
     /// The joint that moves it.
     pub joint: String,
-    /// Where it is in that joint's frame, m.
+    /// Position in that joint's frame, m.
     pub offset_m: [f64; 3],
     #[serde(skip)]
     pub(super) body: usize,
 }
 
-/// A box of the base frame with the points that may not leave it.
+/// A box in the base frame with the points that may not leave it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WorkspaceBox {
-    /// Lowest x, y, z, m; none where nothing is stated.
+    /// Lowest x, y, z, m; `None` if unbounded.
     pub lower: [Option<f64>; 3],
-    /// Highest x, y, z, m.
+    /// Highest x, y, z, m; `None` if unbounded.
     pub upper: [Option<f64>; 3],
-    /// What is watched.
+    /// The watched points.
     pub points: Vec<WatchedPoint>,
     #[serde(skip)]
     model: Arc<Model>,
 }
 
 impl WorkspaceBox {
-    /// Room for [`breach`](Self::breach).
     pub(super) fn arrays(&self) -> Arrays {
         Arrays::new(&self.model)
     }
 
-    /// The first point that is outside at the positions `q`, rad (m), all joints in the model's order.
+    /// The first point outside of the box at the positions `q`, rad (m), all joints in the model's order.
     pub(super) fn breach(&self, arrays: &mut Arrays, q: &[f64]) -> Option<SampleBreach> {
         let placements = body_placements(&self.model, arrays, q);
         self.points.iter().find_map(|point| {
@@ -124,7 +121,6 @@ impl WorkspaceBox {
         })
     }
 
-    /// The first sample of joint-major positions at which a point is outside: its number, and how.
     pub(super) fn first_of(&self, q: &[f64], samples: usize) -> Option<(usize, SampleBreach)> {
         let mut arrays = self.arrays();
         let mut at = vec![0.0; self.model.dof()];
@@ -134,7 +130,7 @@ impl WorkspaceBox {
         })
     }
 
-    /// How a motion itself leaves it.
+    /// The first breach if a motion is followed without error.
     pub(super) fn broken_by(&self, reference: &Reference) -> Option<(usize, SampleBreach)> {
         self.first_of(&reference.motion().q, reference.samples())
     }

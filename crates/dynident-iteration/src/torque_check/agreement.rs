@@ -1,31 +1,22 @@
-//! One cause for all joints, where one explains them all.
+//! Selects one cause for all joints, if one explains them all.
 //!
-//! A log is usually wrong in one way. So the candidates are compared over all joints whose difference matters: one that
-//! explains each of them is named, if it leaves clearly less than every other one that does. Where none explains all,
-//! each joint is judged alone, by a stricter rule.
+//! A log usually has a single mistake. So the candidates are compared over all joints with a relevant difference: a
+//! candidate that explains each of them is reported if its residual is clearly smaller than that of every other such
+//! candidate. If none explains all joints, each joint is evaluated alone, with stricter thresholds.
 
+use super::CauseSettings;
 use super::explanation::{Explanation, Fitted, TorqueCandidate};
 
-/// Share of the squared difference that a cause explains at least.
-const LEAST_EXPLAINED: f64 = 0.85;
-/// Minimum ratio of the squared residuals of the second-best and of the named candidate.
-const CLEARLY_BETTER: f64 = 2.0;
-/// The same two for a cause of a single joint beside joints with another one.
-const LEAST_EXPLAINED_ALONE: f64 = 0.95;
-const CLEARLY_BETTER_ALONE: f64 = 4.0;
-
-/// What is named of each joint, and what it leaves.
 #[derive(Clone, Debug)]
 pub(super) struct Agreement {
-    /// The candidate that is named; none where the difference does not matter or the cause is open.
+    /// The reported candidate of each joint; `None` if the difference is not relevant or the cause is undetermined.
     pub(super) named: Vec<Option<Fitted>>,
-    /// Sum over the joints of what is left of the squared difference, as a share of the squared torque.
+    /// Sum over the joints of the unexplained squared difference, as a share of the squared torque.
     pub(super) left: f64,
 }
 
-/// Names a cause for all joints, or for each.
-pub(super) fn agreement(explanations: &[Explanation]) -> Agreement {
-    let named = for_all(explanations).unwrap_or_else(|| each_alone(explanations));
+pub(super) fn agreement(explanations: &[Explanation], thresholds: &CauseSettings) -> Agreement {
+    let named = for_all(explanations, thresholds).unwrap_or_else(|| each_alone(explanations, thresholds));
     let left_of = |(own, named): (&Explanation, &Option<Fitted>)| {
         own.difference_share * (1.0 - named.map_or(0.0, |named| named.explained))
     };
@@ -33,15 +24,15 @@ pub(super) fn agreement(explanations: &[Explanation]) -> Agreement {
     Agreement { named, left }
 }
 
-/// A candidate that explains every joint whose difference matters; the outer option is none where there is no such
-/// candidate.
-fn for_all(explanations: &[Explanation]) -> Option<Vec<Option<Fitted>>> {
+/// A candidate that explains every joint with a relevant difference; `None` if there is no such candidate. The inner
+/// options are `None` if the best one is not clearly better than the others.
+fn for_all(explanations: &[Explanation], thresholds: &CauseSettings) -> Option<Vec<Option<Fitted>>> {
     let matters: Vec<&Explanation> = explanations.iter().filter(|own| own.matters).collect();
     let find =
         |own: &Explanation, kind: TorqueCandidate| own.candidates.iter().copied().find(|one| one.candidate == kind);
     let left = |kind: TorqueCandidate| -> Option<f64> {
         let of_joint = |own: &&Explanation| {
-            let found = find(own, kind).filter(|found| found.explained >= LEAST_EXPLAINED)?;
+            let found = find(own, kind).filter(|found| found.explained >= thresholds.min_explained_share)?;
             Some(own.difference_share * (1.0 - found.explained))
         };
         matters.iter().map(of_joint).sum()
@@ -50,23 +41,25 @@ fn for_all(explanations: &[Explanation]) -> Option<Vec<Option<Fitted>>> {
         TorqueCandidate::ALL.into_iter().filter_map(|kind| Some((kind, left(kind)?))).collect();
     kinds.sort_by(|a, b| a.1.total_cmp(&b.1));
     let (best, least) = *kinds.first()?;
-    let is_clear = kinds.get(1).is_none_or(|(_, left)| *left >= CLEARLY_BETTER * least);
+    let is_clear = kinds.get(1).is_none_or(|(_, left)| *left >= thresholds.min_residual_ratio * least);
     let of = |own: &Explanation| if own.matters && is_clear { find(own, best) } else { None };
     Some(explanations.iter().map(of).collect())
 }
 
-/// A candidate of each joint whose difference matters; none at all where one of them is open, because what is wrong
-/// there may be wrong everywhere.
-fn each_alone(explanations: &[Explanation]) -> Vec<Option<Fitted>> {
-    let named: Vec<Option<Fitted>> = explanations.iter().map(alone).collect();
+/// A candidate for each joint with a relevant difference; none at all if one joint remains undetermined, because its
+/// mistake may affect all joints.
+fn each_alone(explanations: &[Explanation], thresholds: &CauseSettings) -> Vec<Option<Fitted>> {
+    let named: Vec<Option<Fitted>> = explanations.iter().map(|own| alone(own, thresholds)).collect();
     let is_open = explanations.iter().zip(&named).any(|(own, named)| own.matters && named.is_none());
     if is_open { vec![None; explanations.len()] } else { named }
 }
 
-/// The candidate of one joint, if it explains nearly all and far more than every other.
-fn alone(own: &Explanation) -> Option<Fitted> {
-    let best = *own.candidates.first().filter(|best| own.matters && best.explained >= LEAST_EXPLAINED_ALONE)?;
+/// The candidate of one joint, if it explains nearly all and clearly more than every other.
+fn alone(own: &Explanation, thresholds: &CauseSettings) -> Option<Fitted> {
+    let best =
+        *own.candidates.first().filter(|best| own.matters && best.explained >= thresholds.min_explained_share_alone)?;
     let left = |of: &Fitted| 1.0 - of.explained;
-    let is_clear = own.candidates[1..].iter().all(|other| left(other) >= CLEARLY_BETTER_ALONE * left(&best));
+    let is_clear =
+        own.candidates[1..].iter().all(|other| left(other) >= thresholds.min_residual_ratio_alone * left(&best));
     is_clear.then_some(best)
 }

@@ -1,15 +1,13 @@
-//! From what is found of single joints to one statement about the log.
-
 use super::explanation::{Explanation, Fitted, TorqueCandidate};
 use super::{CheckWith, CommandSource, RowScale, TorqueCheck};
 use crate::leg::IterationTask;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Scales of several joints are one scale if they differ by less than this.
-const SAME_SCALE: f64 = 0.02;
+/// Largest difference of torque scales that are reported as a common scale.
+const MAX_COMMON_SCALE_DEVIATION: f64 = 0.02;
 
-/// Why the logged torque of a run is not the commanded one.
+/// Why the logged torque of a run differs from the commanded torque.
 #[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "cause", rename_all = "kebab-case")]
@@ -20,7 +18,7 @@ pub enum TorqueCause {
     Scale {
         /// The joint.
         joint: String,
-        /// Logged per commanded torque.
+        /// Ratio of logged to commanded torque.
         factor: f64,
         /// Half the width of its 95 % interval.
         half_width_95: f64,
@@ -28,7 +26,7 @@ pub enum TorqueCause {
     /// The logged torques of all joints have another scale.
     #[error("the logged torques of all joints are {factor:.3} times the commanded torques")]
     CommonScale {
-        /// Logged per commanded torque.
+        /// Ratio of logged to commanded torque.
         factor: f64,
     },
     /// The logged torque has the opposite sign.
@@ -36,18 +34,18 @@ pub enum TorqueCause {
     Sign {
         /// The joints.
         joints: Vec<String>,
-        /// Whether the log holds the commanded torque, so that the motion shows it.
+        /// Whether the log contains the commanded torque, so that only the motion shows the cause.
         #[serde(default, skip_serializing_if = "core::ops::Not::not")]
         is_commanded: bool,
     },
-    /// Two joints have each other's torque.
+    /// The torques of two joints are exchanged.
     #[error("{}", exchanged_words(joint, of, *.is_commanded))]
     Exchanged {
         /// The joint.
         joint: String,
         /// The joint whose torque it has.
         of: String,
-        /// Whether the log holds the commanded torque, so that the motion shows it.
+        /// Whether the log contains the commanded torque, so that only the motion shows the cause.
         #[serde(default, skip_serializing_if = "core::ops::Not::not")]
         is_commanded: bool,
     },
@@ -63,30 +61,30 @@ pub enum TorqueCause {
         /// The joints.
         joints: Vec<String>,
     },
-    /// The drive gives less than was commanded.
-    #[error("{} where more is commanded: the drive is at its limit", clipped_words(joint, *torque, *.is_commanded))]
+    /// The drive delivers less torque than commanded.
+    #[error("{} although more is commanded: the drive is saturated", clipped_words(joint, *torque, *.is_commanded))]
     Clipped {
         /// The joint.
         joint: String,
         /// The limit, Nm (N).
         torque: f64,
-        /// Whether the log holds the commanded torque, so that the motion shows it.
+        /// Whether the log contains the commanded torque, so that only the motion shows the cause.
         #[serde(default, skip_serializing_if = "core::ops::Not::not")]
         is_commanded: bool,
     },
-    /// Positions and torques of the log belong to different instants.
+    /// Positions and torques of the log were recorded at different times.
     #[error("positions and torques of the log are {:.1} ms apart", 1e3 * .lag_s)]
     Delay {
-        /// By how much the torque comes after the positions, s.
+        /// Delay of the torque relative to the positions, s.
         lag_s: f64,
     },
-    /// The log's clock is not the controller's.
+    /// The clock of the log differs from that of the controller.
     #[error("the clock of the log is {:.2} % {} than that of the controller", .percent.abs(), if *.percent < 0.0 { "faster" } else { "slower" })]
     Clock {
-        /// By how much it is slow, percent.
+        /// Slowness of the log's clock, percent.
         percent: f64,
     },
-    /// The parameters that joints share have other values in the rows of one joint.
+    /// The rows of one joint require other values of shared parameters than the rows of the other joints.
     #[error("the torque of joint {joint} is {factor:.3} ± {half_width_95:.3} times what the torques of the other joints require{}{}", log_words(*.is_commanded), or_words(.or))]
     JointScale {
         /// The joint.
@@ -94,7 +92,7 @@ pub enum TorqueCause {
         /// Joints whose scale would explain the difference nearly as well.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         or: Vec<String>,
-        /// Its torque per torque that the other joints require.
+        /// Ratio of its torque to the torque that the other joints require.
         factor: f64,
         /// Half the width of its 95 % interval.
         half_width_95: f64,
@@ -108,13 +106,13 @@ pub enum TorqueCause {
         joint: String,
         /// Root mean square of the difference as a percentage of the joint's torque.
         difference_percent: f64,
-        /// What explains most of it, the best first.
+        /// The candidates that explain most of it, best first.
         candidates: Vec<TorqueCandidate>,
     },
 }
 
 impl TorqueCause {
-    /// What to do.
+    /// Suggested fix.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Scale { .. } | Self::CommonScale { .. } => {
@@ -127,7 +125,7 @@ impl TorqueCause {
             Self::Gravity { .. } | Self::Friction { .. } => {
                 "log the complete torque of the drives, including what the robot compensates itself"
             }
-            Self::Clipped { .. } => "give a slower motion, or the drive's true torque limit in [design.limits]",
+            Self::Clipped { .. } => "use a slower motion, or correct the torque limit of the drive in [design.limits]",
             Self::Delay { .. } => "log positions and torques of the same instant",
             Self::Clock { .. } => "log the controller's own time",
             Self::JointScale { is_commanded: true, .. } => {
@@ -137,12 +135,12 @@ impl TorqueCause {
                 "correct the scale of this joint's logged torque (torque constant, gear ratio), or its drive's gain"
             }
             Self::Undetermined { .. } => {
-                "compare the logged torque with the commanded torque on the page; log exactly what the drives deliver"
+                "compare the logged with the commanded torque in the report; log the torque that the drives deliver"
             }
         }
     }
 
-    /// Whether the cause is known; otherwise another run may show more.
+    /// Whether the cause is known; otherwise another run may determine it.
     pub fn is_determined(&self) -> bool {
         !matches!(self, Self::Undetermined { .. })
     }
@@ -158,7 +156,7 @@ fn listed(joints: &[String]) -> String {
 fn sign_words(joints: &[String], is_commanded: bool) -> String {
     let joints = listed(joints);
     if is_commanded {
-        format!("the motion of {joints} is opposite to the torque, although the log holds the commanded torque")
+        format!("the motion of {joints} is opposite to the torque, although the log contains the commanded torque")
     } else {
         format!("the logged torque of {joints} has the opposite sign of the commanded torque")
     }
@@ -175,7 +173,7 @@ fn exchanged_words(joint: &str, of: &str, is_commanded: bool) -> String {
 fn clipped_words(joint: &str, torque: f64, is_commanded: bool) -> String {
     if is_commanded {
         format!(
-            "joint {joint} moves as if its torque stayed at {torque:.3} Nm, although the log holds the commanded torque,"
+            "joint {joint} moves as if its torque stayed at {torque:.3} Nm, although the log contains the commanded torque,"
         )
     } else {
         format!("the logged torque of joint {joint} stays at {torque:.3} Nm")
@@ -183,7 +181,7 @@ fn clipped_words(joint: &str, torque: f64, is_commanded: bool) -> String {
 }
 
 fn log_words(is_commanded: bool) -> &'static str {
-    if is_commanded { ", although the log holds the commanded torque" } else { "" }
+    if is_commanded { ", although the log contains the commanded torque" } else { "" }
 }
 
 fn or_words(or: &[String]) -> String {
@@ -208,10 +206,9 @@ impl TorqueCandidate {
     }
 }
 
-/// A candidate that explains less of the squared difference is not listed.
-const LEAST_LISTED: f64 = 0.5;
+/// Smallest explained share of the squared difference of listed candidates.
+const MIN_LISTED_SHARE: f64 = 0.5;
 
-/// The causes that the joints show together.
 pub(super) fn causes(
     task: &IterationTask,
     check: &TorqueCheck,
@@ -248,11 +245,11 @@ pub(super) fn causes(
         let torque = named[joint].map_or(0.0, |found| found.value);
         found.push(TorqueCause::Clipped { joint: names[joint].clone(), torque, is_commanded: false });
     }
-    // Timing means nothing beside torque that is another one.
+    // Timing is not reliable if the torque differs for another reason.
     let has_timing = !explanations.iter().any(|own| own.matters);
     for (joint, explanation) in explanations.iter().enumerate() {
         if explanation.matters && explanation.is_certain && named[joint].is_none() {
-            let likely = explanation.candidates.iter().filter(|one| one.explained >= LEAST_LISTED);
+            let likely = explanation.candidates.iter().filter(|one| one.explained >= MIN_LISTED_SHARE);
             found.push(TorqueCause::Undetermined {
                 joint: names[joint].clone(),
                 difference_percent: explanation.difference_percent,
@@ -263,7 +260,7 @@ pub(super) fn causes(
     if has_timing {
         found.extend(timing(check, with));
     }
-    // Which joint is wrong is clearer once torque is fed forward.
+    // The wrong joint is easier to determine once torque is fed forward.
     let is_early = check.source == CommandSource::PathOnly && with.feeds_forward_later;
     if found.is_empty() && !is_early {
         found.extend(row_scale_causes(check, with.row_scales, &names));
@@ -271,7 +268,6 @@ pub(super) fn causes(
     found
 }
 
-/// A common scale of all joints, or the scale of each of the `scaled` ones.
 fn scale_causes(
     scaled: &[usize],
     explanations: &[Explanation],
@@ -283,7 +279,7 @@ fn scale_causes(
     let mean = scaled.iter().map(|&joint| scale(joint)).sum::<f64>() / scaled.len().max(1) as f64;
     let is_common = scaled.len() > 1
         && scaled.len() == determined
-        && scaled.iter().all(|&joint| (scale(joint) - mean).abs() < SAME_SCALE);
+        && scaled.iter().all(|&joint| (scale(joint) - mean).abs() < MAX_COMMON_SCALE_DEVIATION);
     if is_common {
         return vec![TorqueCause::CommonScale { factor: mean }];
     }
@@ -295,8 +291,8 @@ fn scale_causes(
     scaled.iter().map(of_joint).collect()
 }
 
-/// What the timing shows. A controller that sees positions before the log does has them at their true instants: the log
-/// has them late.
+/// Timing mistakes. If the controller receives positions earlier than the log, it uses their true times: the log is
+/// late.
 fn timing(check: &TorqueCheck, with: &CheckWith<'_>) -> Vec<TorqueCause> {
     let settings = with.settings;
     let mut found = Vec::new();
@@ -313,7 +309,7 @@ fn timing(check: &TorqueCheck, with: &CheckWith<'_>) -> Vec<TorqueCause> {
     found
 }
 
-/// Joints whose rows disagree with those of the others.
+/// Joints whose rows contradict those of the others.
 fn row_scale_causes(check: &TorqueCheck, row_scales: &[Option<RowScale>], names: &[String]) -> Vec<TorqueCause> {
     let of_joint = |(joint, scale): (usize, &Option<RowScale>)| {
         let RowScale { value, std, is_wrong, or } = scale.as_ref()?;

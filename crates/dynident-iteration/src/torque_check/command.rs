@@ -1,5 +1,5 @@
-//! The torque that the controller commanded along a log, computed again from what it was given: the reference, its
-//! model, and the positions in the log.
+//! Recomputes the torque that the controller commanded along a log from its inputs: the reference, its model, and the
+//! positions in the log.
 
 use super::separable_fit::{JointColumns, SHARED, SharedParameter};
 use crate::leg::Leg;
@@ -8,44 +8,38 @@ use dynident_recording::{DecimationSettings, Decimator, Derivatives, Differentia
 use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings, Measured, Target};
 
-/// Positions are smoothed at this multiple of the cut-off of the comparison, so that the smoothing itself is not
-/// compared.
+/// Ratio of the cut-off of the position smoothing to that of the comparison, so that smoothing does not affect the
+/// comparison.
 const SMOOTHING_RATIO: f64 = 4.0;
-/// Rows per second after decimation, as a multiple of the cut-off.
+/// Row rate after decimation over the cut-off of the comparison.
 const ROWS_PER_CUTOFF: f64 = 4.0;
-/// Shared parameters: delays of the positions and of the velocities in the controller, lag of the logged torque (s),
-/// relative rate of the log's clock, and delay of the torque that is fed forward (s). The expected sizes only matter
-/// where the rows determine little, or where another law explains them.
+/// Shared parameters (finite difference, expected size): delays of positions and velocities in the controller, lag of
+/// the logged torque (s), relative rate of the log's clock, delay of the feed-forward torque (s). The expected sizes
+/// only affect parameters that the rows do not determine, or that another law explains.
 const PARAMETERS: [(f64, f64); SHARED] = [(1e-3, 5e-3), (1e-3, 5e-3), (1e-3, 5e-3), (1e-4, 2e-3), (1e-3, 5e-3)];
 
-/// Delays at which the search begins for drives with unknown gains: a late position looks like a stiffer loop.
+/// Start values of the delay for drives with unknown gains (s): a position delay looks like a stiffer loop.
 const DELAYS_S: &[f64] = &[-0.03, -0.02, -0.015, -0.01, -0.0075, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02];
 
 /// How the torque follows from reference and positions.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum CommandLaw<'a> {
-    /// A control law that is completely known: one column, the commanded torque.
-    Known {
-        /// The law.
-        controller: &'a ControllerSettings,
-        /// Its model, if it has one.
-        model: Option<&'a ControllerModel>,
-    },
-    /// The drives close their own position loop with unknown gains. The columns are the torque that is fed forward, the
+    /// A completely known control law: one column, the commanded torque.
+    Known { controller: &'a ControllerSettings, model: Option<&'a ControllerModel> },
+    /// The drives close their own position loop with unknown gains. The columns are the feed-forward torque, the
     /// position error, its rate and its integral.
     OwnLoop {
-        /// What is fed forward; none in a run with nothing but a path.
+        /// Model of the feed-forward torque; `None` in a run with only a path.
         model: Option<&'a ControllerModel>,
     },
 }
 
-/// The shared parameters of the comparison.
 pub(super) fn shared_parameters() -> [SharedParameter; SHARED] {
     PARAMETERS.map(|(difference, expected)| SharedParameter { difference, expected })
 }
 
 impl CommandLaw<'_> {
-    /// Where the search for the shared parameters begins.
+    /// Start values of the shared parameters.
     pub(super) fn starts(self) -> Vec<[f64; SHARED]> {
         match self {
             Self::Known { .. } => vec![[0.0; SHARED]],
@@ -54,7 +48,6 @@ impl CommandLaw<'_> {
     }
 }
 
-/// The motion of one log along one leg.
 #[derive(Debug)]
 pub(super) struct LoggedMotion<'a> {
     leg: &'a Leg,
@@ -68,18 +61,16 @@ pub(super) struct LoggedMotion<'a> {
     pub(super) ddq: Vec<f64>,
 }
 
-/// The motion of one log with the torque, filtered and decimated.
 #[derive(Debug)]
 pub(super) struct ObservedLeg<'a> {
     pub(super) motion: LoggedMotion<'a>,
     decimator: Decimator,
-    /// The logged torque of each joint, filtered and decimated.
     pub(super) torque: Vec<Vec<f64>>,
 }
 
 impl<'a> LoggedMotion<'a> {
-    /// The motion, smoothed below `smoothing_hz`, or by differences of neighbouring samples; none where it is too short
-    /// or not finite.
+    /// The motion, smoothed below `smoothing_hz`, or from differences of neighbouring samples; `None` if it is too
+    /// short or not finite.
     pub(super) fn new(leg: &'a Leg, record: &Record, smoothing_hz: Option<f64>) -> Option<Self> {
         let (joints, samples) = (record.joints.len(), record.samples);
         if samples < 4 || joints != leg.reference().joints() {
@@ -108,7 +99,7 @@ impl<'a> LoggedMotion<'a> {
 }
 
 impl<'a> ObservedLeg<'a> {
-    /// The log, compared below `cutoff_hz`; none where it is too short for the filter or not finite.
+    /// The log below `cutoff_hz`; `None` if it is too short for the filter or not finite.
     pub(super) fn new(leg: &'a Leg, record: &Record, cutoff_hz: f64) -> Option<Self> {
         let motion = LoggedMotion::new(leg, record, Some(SMOOTHING_RATIO * cutoff_hz))?;
         let (rate_hz, joints) = (motion.rate_hz, motion.joints);
@@ -123,12 +114,10 @@ impl<'a> ObservedLeg<'a> {
         (observed.rows() > 0).then_some(observed)
     }
 
-    /// Rows after decimation.
     pub(super) fn rows(&self) -> usize {
         self.torque.first().map_or(0, Vec::len)
     }
 
-    /// One column for each joint, filtered and decimated.
     fn decimated(&self, panel: &[f64]) -> Vec<Vec<f64>> {
         let count = self.motion.joints;
         let mut decimator = self.decimator.with_columns(count);
@@ -137,13 +126,10 @@ impl<'a> ObservedLeg<'a> {
         if rows == 0 { vec![Vec::new(); count] } else { out.chunks_exact(rows).map(<[f64]>::to_vec).collect() }
     }
 
-    /// The measured positions, velocities and accelerations, filtered and decimated like the torque.
     pub(super) fn filtered_motion(&self) -> [Vec<Vec<f64>>; 3] {
         [&self.motion.q, &self.motion.dq, &self.motion.ddq].map(|values| self.decimated(values))
     }
 
-    /// The columns of each joint at some timing: delays of positions and velocities in the controller, lag of the
-    /// torque, and relative rate of the log's clock.
     pub(super) fn columns(&self, law: CommandLaw<'_>, timing: &[f64; SHARED]) -> Vec<JointColumns> {
         let series = match law {
             CommandLaw::Known { controller, model } => {
@@ -162,7 +148,6 @@ impl<'a> ObservedLeg<'a> {
 }
 
 impl LoggedMotion<'_> {
-    /// The commanded torque, joint-major.
     pub(super) fn commanded(
         &self,
         controller: &ControllerSettings,
@@ -181,8 +166,8 @@ impl LoggedMotion<'_> {
         out.iter().all(|value| value.is_finite()).then_some(out)
     }
 
-    /// What drives with their own loop get and see, joint-major: torque fed forward, position error, its rate, and its
-    /// integral.
+    /// Inputs of drives with their own position loop, joint-major: feed-forward torque, position error, its rate, and
+    /// its integral.
     fn own_loop(&self, model: Option<&ControllerModel>, timing: &[f64; SHARED]) -> Vec<Vec<f64>> {
         let mut model = model.cloned();
         let mut out = vec![vec![0.0; self.joints * self.samples]; 4];
@@ -206,7 +191,7 @@ impl LoggedMotion<'_> {
         out
     }
 
-    /// Calls `then` with each sample, its time, and what the controller followed and saw.
+    /// Calls `then` with each sample, its time, and the target and measurement of the controller.
     fn each_instant(&self, timing: &[f64; SHARED], then: &mut dyn FnMut(usize, f64, Target<'_>, Measured<'_>)) {
         let [position_delay_s, velocity_delay_s, torque_lag_s, clock_rate, _] = *timing;
         let [mut q, mut dq, mut ddq, mut seen_q, mut seen_dq] = [(); 5].map(|()| vec![0.0; self.joints]);
@@ -223,7 +208,6 @@ impl LoggedMotion<'_> {
         }
     }
 
-    /// Position, velocity and acceleration of each joint as commanded.
     fn reference(&self, time_s: f64, motion: [&mut [f64]; 3]) {
         let [q, dq, ddq] = motion;
         for joint in 0..self.joints {
@@ -231,7 +215,7 @@ impl LoggedMotion<'_> {
         }
     }
 
-    /// Cubic Hermite interpolation of a joint's values with their derivatives; the end values outside of the log.
+    /// Cubic Hermite interpolation of a joint's values with their derivatives; constant outside of the log.
     fn between(&self, values: &[f64], slopes: &[f64], joint: usize, time_s: f64) -> f64 {
         let own = joint * self.samples;
         let place = ((time_s - self.first_time_s) * self.rate_hz).clamp(0.0, (self.samples - 1) as f64);

@@ -1,8 +1,8 @@
-//! What explains that the logged torque of a joint is not the commanded one.
+//! Candidates that explain why the logged torque of a joint differs from the commanded torque.
 //!
-//! Each candidate is a correction of the commanded torque `u` with few unknowns, and a constant is free in all of them.
-//! A candidate explains the share `1 − RSS_c / RSS_0` of the difference's square. One is named only if it explains
-//! nearly all, and clearly more than every other.
+//! Each candidate is a correction of the commanded torque `u` with few unknowns and a free constant. A candidate
+//! explains the share `1 − RSS_c / RSS_0` of the squared difference. It is reported only if it explains nearly all, and
+//! clearly more than every other.
 
 use super::separable_fit::{JointColumns, centred, coefficients, dot, residual_of, rms, square};
 use crate::leg::IterationTask;
@@ -10,30 +10,31 @@ use crate::torque_check_settings::TorqueCheckSettings;
 use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
 use serde::{Deserialize, Serialize};
 
-/// Rows per independent one: neighbouring rows share most of what the candidates leave.
+/// Number of rows per independent row: the residuals of neighbouring rows are correlated.
 const CORRELATED_ROWS: f64 = 3.0;
-/// Independent rows that a candidate has beyond its unknowns, at least. In a run of a few strokes everything looks like
-/// everything; only a torque that stays at its limit is known sooner.
-const LEAST_FREEDOM: f64 = 16.0;
-/// Share of the torque that the position error makes in drives whose logged torque has the wrong sign.
-const PUSHES: f64 = 0.3;
-/// Gravity is constant where it varies by less than this share.
-const CONSTANT: f64 = 0.05;
-/// Time blocks of the jackknife of a scale.
+/// Smallest number of degrees of freedom of a candidate's fit. In a run of a few strokes the candidates are not
+/// distinguishable; only saturation is detected earlier.
+const MIN_DEGREES_OF_FREEDOM: f64 = 16.0;
+/// Smallest share of the torque from the position error, with negative gain, that indicates a wrong sign of the logged
+/// torque.
+const MIN_REVERSED_SHARE: f64 = 0.3;
+/// Largest relative variation of gravity that is treated as constant.
+const MAX_GRAVITY_VARIATION: f64 = 0.05;
+/// Number of time blocks of the jackknife of a scale.
 const BLOCKS: usize = 10;
-/// Widths of the steps of friction that are tried, as shares of the joint's highest speed.
+/// Trial widths of friction steps, as shares of the joint's highest speed.
 const STEP_WIDTHS: [f64; 3] = [0.02, 0.08, 0.3];
-/// Rows with torque below this share of the largest are not at a limit.
-const BELOW_LIMIT: f64 = 0.85;
-/// Limits of torque that are tried, as shares of the largest commanded torque.
-const CLIP_SHARES: usize = 40;
+/// Rows with torque below this share of the largest are not saturated.
+const UNSATURATED_SHARE: f64 = 0.85;
+/// Number of trial torque limits, evenly spaced up to the largest commanded torque.
+const CLIP_TRIALS: usize = 40;
 
 /// A candidate, without its numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum TorqueCandidate {
-    /// Another scale, positive.
+    /// Another positive scale.
     Scale,
     /// A reversed sign.
     Sign,
@@ -48,70 +49,62 @@ pub enum TorqueCandidate {
 }
 
 impl TorqueCandidate {
-    /// All of them.
     pub(super) const ALL: [Self; 6] =
         [Self::Scale, Self::Sign, Self::Exchanged, Self::Gravity, Self::Friction, Self::Clipped];
 }
 
-/// A candidate with its numbers for one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitted {
     pub(super) candidate: TorqueCandidate,
-    /// Scale, limit of the torque (Nm, N), or number of the other joint.
+    /// Scale, torque limit (Nm, N), or index of the other joint.
     pub(super) value: f64,
-    /// Share of the squared difference that it explains.
     pub(super) explained: f64,
 }
 
-/// What the comparison shows of one joint.
 #[derive(Clone, Debug)]
 pub(super) struct Explanation {
     pub(super) scale: Option<f64>,
     pub(super) scale_std: Option<f64>,
     pub(super) difference_percent: f64,
-    /// The commanded torque, with its constant.
     pub(super) commanded: Vec<f64>,
-    /// Whether the difference matters.
     pub(super) matters: bool,
-    /// Square of the difference as a share of the square of the torque.
+    /// Squared difference as a share of the squared torque.
     pub(super) difference_share: f64,
     /// Whether a difference without a cause is reported: one from a completely known control law, or a scale.
     pub(super) is_certain: bool,
-    /// All candidates, the best first; empty where the difference does not matter.
+    /// All candidates, best first; empty if the difference is not relevant.
     pub(super) candidates: Vec<Fitted>,
 }
 
-/// The torques and motions of all joints, row by row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointData<'a> {
     pub(super) task: &'a IterationTask,
     pub(super) torque: &'a [Vec<f64>],
-    /// The first column is the commanded torque, or what is fed forward; further ones are the drives' own loop.
+    /// The first column is the commanded or feed-forward torque; others belong to the drives' own loop.
     pub(super) columns: &'a [JointColumns],
     pub(super) q: &'a [Vec<f64>],
     pub(super) dq: &'a [Vec<f64>],
     pub(super) ddq: &'a [Vec<f64>],
 }
 
-/// Compares one joint, and finds what explains a difference.
 pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheckSettings) -> Explanation {
     let (y, columns) = (&data.torque[joint], &data.columns[joint]);
     let size = rms(y).max(f64::MIN_POSITIVE);
     let (first, own_loop) = columns.split_first().map_or((&[][..], &[][..]), |(first, rest)| (&first[..], rest));
-    // As it should be: the scale one, the drives' own loop as it fits.
-    let beside: Vec<f64> = y.iter().zip(first).map(|(y, u)| y - u).collect();
-    let difference = residual_of(own_loop, &beside, &coefficients(own_loop, &beside));
+    // Correct log: scale one, with the fitted loop of the drives.
+    let without_feed_forward: Vec<f64> = y.iter().zip(first).map(|(y, u)| y - u).collect();
+    let difference = residual_of(own_loop, &without_feed_forward, &coefficients(own_loop, &without_feed_forward));
     let total = square(&difference).max(f64::MIN_POSITIVE);
     let free = coefficients(columns, y);
     let std = jackknife(columns, y);
     let (scale, scale_std) = (free[0], std[0]);
     let is_scaled = (scale - 1.0).abs() > (0.01 * settings.scale_percent).max(settings.sigmas * scale_std);
-    // Drives that push away from the path would not follow it.
+    // Drives that push away from the path could not follow it.
     let by_error = own_loop.first().map_or(0.0, |error| free[1] * rms(error));
-    let pushes_away = by_error < -PUSHES * size && free[1] < -settings.sigmas * std[1];
+    let pushes_away = by_error < -MIN_REVERSED_SHARE * size && free[1] < -settings.sigmas * std[1];
     let difference_percent = 100.0 * rms(&difference) / size;
     let lacks_weight = difference_percent <= settings.difference_percent
-        && lacks_constant_gravity(data, joint, &beside, settings.difference_percent);
+        && lacks_constant_gravity(data, joint, &without_feed_forward, settings.difference_percent);
     let matters = lacks_weight || is_scaled || pushes_away || difference_percent > settings.difference_percent;
     let mut out = Explanation {
         scale: scale_std.is_finite().then_some(scale),
@@ -131,8 +124,8 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
         return out;
     }
     let free = Free { coefficients: &free, has_scale: scale_std.is_finite(), pushes_away };
-    let candidates = candidates(data, joint, &free, &beside, total);
-    // Another joint that explains the torque alike is no rival of the best one.
+    let candidates = candidates(data, joint, &free, &without_feed_forward, total);
+    // Another joint with the same torque is not a rival of the best candidate.
     for one in candidates {
         if !out.candidates.iter().any(|other| other.candidate == one.candidate) {
             out.candidates.push(one);
@@ -141,26 +134,24 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     out
 }
 
-/// The fit of a joint's torque by all of its columns.
 struct Free<'a> {
     coefficients: &'a [f64],
-    /// Whether the scale has an error bar.
     has_scale: bool,
     /// Whether the drive seems to push away from the path.
     pushes_away: bool,
 }
 
-/// Possible causes of a joint's difference `beside` between logged and commanded torque, the best first. `total` is the
+/// Possible causes of a joint's difference `beside` between logged and commanded torque, best first. `total` is the
 /// squared difference without the part of the drives' own loop.
 fn candidates(data: &JointData<'_>, joint: usize, free: &Free<'_>, beside: &[f64], total: f64) -> Vec<Fitted> {
     let (y, columns) = (&data.torque[joint], &data.columns[joint]);
     let own_loop = columns.get(1..).unwrap_or_default();
-    // Per independent row, so that many unknowns explain nothing by their number.
+    // Per independent row, so that many unknowns do not explain the difference by their number.
     let independent = y.len() as f64 / CORRELATED_ROWS;
     let fitted = |candidate, value, left: &[f64], unknowns: usize| {
         let freedom = independent - unknowns as f64;
         let explained = 1.0 - square(left) / total * independent / freedom;
-        (freedom >= LEAST_FREEDOM).then_some(Fitted { candidate, value, explained })
+        (freedom >= MIN_DEGREES_OF_FREEDOM).then_some(Fitted { candidate, value, explained })
     };
     let mut candidates = Vec::new();
     let left = residual_of(columns, y, free.coefficients);
@@ -171,8 +162,8 @@ fn candidates(data: &JointData<'_>, joint: usize, free: &Free<'_>, beside: &[f64
         let candidate = if scale < 0.0 { TorqueCandidate::Sign } else { TorqueCandidate::Scale };
         candidates.extend(fitted(candidate, scale, &left, 1));
     }
-    candidates.extend(exchanged(data, joint, total).into_iter().filter(|_| independent >= LEAST_FREEDOM));
-    // What is missing, beside the drives' own loop as it then fits.
+    candidates.extend(exchanged(data, joint, total).into_iter().filter(|_| independent >= MIN_DEGREES_OF_FREEDOM));
+    // The missing torque, fitted together with the drives' own loop.
     let missing = |extra: &[Vec<f64>]| {
         let all: Vec<Vec<f64>> = extra.iter().chain(own_loop).cloned().collect();
         let found = coefficients(&all, beside);
@@ -190,7 +181,7 @@ fn candidates(data: &JointData<'_>, joint: usize, free: &Free<'_>, beside: &[f64
     let friction = friction_columns(data, joint);
     let columns_of_friction = friction.len();
     let (friction, left) = missing(&friction);
-    // Friction takes energy out.
+    // Friction dissipates energy.
     if dot(&friction, &data.dq[joint]) > 0.0 {
         candidates.extend(fitted(TorqueCandidate::Friction, 1.0, &left, columns_of_friction));
     }
@@ -199,7 +190,6 @@ fn candidates(data: &JointData<'_>, joint: usize, free: &Free<'_>, beside: &[f64
     candidates
 }
 
-/// What may be missing in the torque of each joint: its gravity, and its friction.
 pub(super) fn may_be_missing(data: &JointData<'_>) -> [Vec<Vec<Vec<f64>>>; 2] {
     let joints = 0..data.torque.len();
     let gravity = joints.clone().map(|joint| gravity_columns(data, joint).unwrap_or_default()).collect();
@@ -217,7 +207,6 @@ pub(super) fn friction_columns(data: &JointData<'_>, joint: usize) -> Vec<Vec<f6
     core::iter::once(dq.clone()).chain(steps).collect()
 }
 
-/// The torque of each other joint.
 fn exchanged(data: &JointData<'_>, joint: usize, total: f64) -> Vec<Fitted> {
     let y = &data.torque[joint];
     let of = |other: usize| {
@@ -230,22 +219,22 @@ fn exchanged(data: &JointData<'_>, joint: usize, total: f64) -> Vec<Fitted> {
     (0..data.torque.len()).filter(|&other| other != joint).filter_map(of).collect()
 }
 
-/// A limit of the torque. The gains of drives with their own loop follow from the rows below it.
+/// A torque limit. The gains of drives with their own loop follow from the rows below it.
 fn clipped(y: &[f64], columns: &[Vec<f64>], total: f64) -> Option<Fitted> {
     let (first, own_loop) = columns.split_first()?;
     let highest = y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-    let below: Vec<usize> = (0..y.len()).filter(|&row| y[row].abs() < BELOW_LIMIT * highest).collect();
+    let below: Vec<usize> = (0..y.len()).filter(|&row| y[row].abs() < UNSATURATED_SHARE * highest).collect();
     let kept = |values: &[f64]| -> Vec<f64> { below.iter().map(|&row| values[row]).collect() };
     let beside: Vec<f64> = y.iter().zip(first).map(|(y, u)| y - u).collect();
     let of_loop = coefficients(&own_loop.iter().map(|column| kept(column)).collect::<Vec<_>>(), &kept(&beside));
     let commanded: Vec<f64> = residual_of(own_loop, &beside, &of_loop).iter().zip(y).map(|(r, y)| y - r).collect();
     let most = commanded.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
     let at = |share: usize| {
-        let limit = most * share as f64 / CLIP_SHARES as f64;
+        let limit = most * share as f64 / CLIP_TRIALS as f64;
         let left = centred(&y.iter().zip(&commanded).map(|(y, u)| y - u.clamp(-limit, limit)).collect::<Vec<_>>());
         Fitted { candidate: TorqueCandidate::Clipped, value: limit, explained: 1.0 - square(&left) / total }
     };
-    (1..CLIP_SHARES).map(at).max_by(|a, b| a.explained.total_cmp(&b.explained))
+    (1..CLIP_TRIALS).map(at).max_by(|a, b| a.explained.total_cmp(&b.explained))
 }
 
 /// The columns of the joint's gravity torque for the mass and the first moments of each body.
@@ -266,19 +255,18 @@ fn gravity_columns(data: &JointData<'_>, joint: usize) -> Option<Vec<Vec<f64>>> 
     (!columns.is_empty()).then_some(columns)
 }
 
-/// Whether the constant that the log lacks is a gravity torque that does not change with the posture, as that of a
-/// vertical slide: half to twice that of the description, and more than the smallest share of the torque that matters.
+/// Whether the constant that the log lacks is a gravity torque that is independent of the posture, as for a vertical
+/// slide: half to twice that of the robot description, and more than the smallest relevant share of the torque.
 fn lacks_constant_gravity(data: &JointData<'_>, joint: usize, beside: &[f64], percent: f64) -> bool {
     let nominal = nominal_gravity(data, joint);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let (weight, missing) = (mean(&nominal), -mean(beside));
-    let is_constant = rms(&centred(&nominal)) < CONSTANT * weight.abs();
+    let is_constant = rms(&centred(&nominal)) < MAX_GRAVITY_VARIATION * weight.abs();
     is_constant
         && 100.0 * missing.abs() > percent * rms(&data.torque[joint])
         && (0.5..=2.0).contains(&(missing / weight))
 }
 
-/// The gravity torque of the description along the rows.
 fn nominal_gravity(data: &JointData<'_>, joint: usize) -> Vec<f64> {
     let model = data.task.robot.model();
     let mut workspace = Workspace::new(model);
@@ -291,16 +279,15 @@ fn nominal_gravity(data: &JointData<'_>, joint: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Whether a torque is about the gravity torque of the description: what is missing points the same way and is neither
-/// less than half nor more than twice as large. Any size is accepted where the description has no masses.
+/// Whether a torque is similar to the gravity torque of the robot description: same sign, and half to twice the size.
+/// Any size is accepted if the robot description has no masses.
 fn is_of_nominal_size(data: &JointData<'_>, joint: usize, missing: &[f64]) -> bool {
     let (nominal, missing) = (centred(&nominal_gravity(data, joint)), centred(missing));
     let own = square(&nominal);
     own == 0.0 || (0.5..=2.0).contains(&(dot(&nominal, &missing) / own))
 }
 
-/// Standard deviation of each coefficient, by leaving out one time block after the other; infinite where the rows do
-/// not determine it.
+/// Standard deviation of each coefficient by the jackknife over time blocks; infinite if the rows do not determine it.
 fn jackknife(columns: &[Vec<f64>], y: &[f64]) -> Vec<f64> {
     let rows = y.len();
     if rows < 2 * BLOCKS {

@@ -1,12 +1,12 @@
-//! Whether the robot moves as its torque says. A log that holds the commanded torque hides drives that deliver another
-//! one, and a robot that runs away is stopped before the log is long enough for a fit.
+//! Checks whether the motion fits the torque. If the log contains the commanded torque, it does not show that drives
+//! deliver another torque; and a robot that runs away is stopped before the log is long enough for a fit.
 //!
-//! * Exchanged joints and a reversed sign show within tenths of a second. In the log: the torque of joint i is the
-//!   command of joint j, its own with the opposite sign, or its own up to a limit. In the motion, where the log holds
-//!   the commanded torque: the acceleration of joint i follows the torque of joint j less gravity, or falls as its own
-//!   rises. Constants are free, so that a wrong mass does not matter.
-//! * A drive at its limit: the rows of the joint fit a model much better with its torque limited,
-//!   `clamp(τ_j, ±L) = W_j θ_j + friction`, than as logged. θ_j is free, so that no description is needed.
+//! * * Exchanged joints and a reversed sign show within tenths of a second. In the log: the torque of joint i is the
+//!   command of joint j, its own with the opposite sign, or its own up to a limit. In the motion, if the log contains
+//!   the commanded torque: the acceleration of joint i follows the torque of joint j without gravity, or decreases
+//!   while its own increases. Constants are free, so wrong masses have no effect.
+//! * * Saturation: the rows of the joint fit a model much better with limited torque, `clamp(τ_j, ±L) = W_j θ_j +
+//!   friction`, than with the logged torque. θ_j is free, so no robot description is needed.
 
 use super::command::LoggedMotion;
 use super::explanation::{JointData, friction_columns};
@@ -15,15 +15,14 @@ use super::{CheckedRun, TorqueCause};
 use crate::leg::IterationTask;
 use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
 
-/// Cut-off of the smoothed motion of a run that ended early, as a share of the sampling rate, and the number of samples
-/// from which it is used.
+/// Cut-off of the smoothed motion of a run that ended early, as a share of the sampling rate, and the smallest number
+/// of samples for smoothing.
 const SMOOTHING_SHARE: f64 = 0.2;
-const FEWEST_SMOOTHED: usize = 30;
-/// Time before the stop that is compared, s: earlier the robot still followed.
+const MIN_SMOOTHED_SAMPLES: usize = 30;
+/// Time before the stop that is compared, s; earlier the robot still followed.
 const BEFORE_STOP_S: f64 = 1.0;
-/// Fewest samples of a run that ended early.
-const FEWEST_SAMPLES: usize = 5;
-/// Delays of positions and velocities in the controller that are tried, s. A filter makes velocities later.
+const MIN_SAMPLES: usize = 5;
+/// Trial delays of positions and velocities in the controller, s; a filter makes velocities later.
 const DELAYS_S: [[f64; 2]; 8] = [
     [0.0, 0.0],
     [0.0, 0.002],
@@ -34,48 +33,46 @@ const DELAYS_S: [[f64; 2]; 8] = [
     [0.01, 0.01],
     [0.01, 0.015],
 ];
-/// Share of the squared torque by which the same torques differ at most, and others at least.
-const SAME: f64 = 0.1;
-const OTHER: f64 = 0.5;
-/// Of two explanations the better one leaves at most this share of what the other leaves.
-const CLEARLY_BETTER: f64 = 0.25;
-/// Correlation between torque and acceleration: of a joint that moves against this torque, negative, at least; of one
-/// that moves by it, at least; of one that moves by another torque, at most.
-const OPPOSITE: f64 = 0.7;
-const FOLLOWS: f64 = 0.9;
-const UNRELATED: f64 = 0.3;
-/// A joint runs away if its mean velocity is at least this share of its mean speed. In an oscillation the torque of a
-/// late drive is opposite to the acceleration.
-const ONE_WAY: f64 = 0.8;
-/// Joints that move with less than this share of the fastest joint's speed are moved by other joints.
-const LEAST_SPEED: f64 = 0.5;
+/// Largest relative squared difference of equal torques, and smallest of different torques.
+const MAX_EQUAL_DIFFERENCE: f64 = 0.1;
+const MIN_OTHER_DIFFERENCE: f64 = 0.5;
+/// Largest ratio of the residuals of the best and the second-best explanation.
+const MAX_BEST_RESIDUAL_RATIO: f64 = 0.25;
+/// Correlation between torque and acceleration: smallest negative correlation of a joint that moves against its torque,
+/// smallest correlation of a joint that follows a torque, largest correlation of a joint that follows another torque.
+const MIN_OPPOSITE_CORRELATION: f64 = 0.7;
+const MIN_FOLLOWING_CORRELATION: f64 = 0.9;
+const MAX_UNRELATED_CORRELATION: f64 = 0.3;
+/// Smallest ratio of mean velocity to mean speed of a joint that runs away. In an oscillation the torque of a delayed
+/// drive also opposes the acceleration.
+const MIN_ONE_WAY_RATIO: f64 = 0.8;
+/// Smallest speed relative to the fastest joint; slower joints are moved by other joints.
+const MIN_SPEED_RATIO: f64 = 0.5;
 
-/// Limits of a logged torque that are tried, as shares of its largest value: noise lifts that above the limit.
-const NEAR_HIGHEST: [f64; 5] = [0.92, 0.94, 0.96, 0.98, 1.0];
-/// A command beyond a limit exceeds it by this factor.
-const BEYOND: f64 = 1.05;
-/// Share of the squared torque that a limited command leaves at most.
-const AT_LIMIT: f64 = 0.02;
-/// Limits that are tried in a motion, as shares of the largest logged torque.
+/// Trial limits of a logged torque as shares of its largest value, which noise increases beyond the limit.
+const LOG_LIMIT_SHARES: [f64; 5] = [0.92, 0.94, 0.96, 0.98, 1.0];
+/// Smallest ratio of a command to the limit that it exceeds.
+const MIN_EXCESS_RATIO: f64 = 1.05;
+/// Largest relative squared residual of a limited command.
+const MAX_LIMITED_RESIDUAL: f64 = 0.02;
+/// Trial limits in a motion as shares of the largest logged torque.
 const LIMIT_SHARES: core::ops::Range<usize> = 4..40;
 const ALL_SHARES: f64 = 40.0;
-/// Share of the squared relative residual that a limit has to explain.
-const LEAST_EXPLAINED: f64 = 0.65;
-/// Relative residual without a limit, from which a limit is looked for.
-const LEAST_UNEXPLAINED: f64 = 0.01;
-/// Rows for each unknown of the model.
-const ROWS_PER_UNKNOWN: usize = 3;
-/// Fewest rows at the limit, and their largest share.
-const FEWEST_AT_LIMIT: usize = 4;
-const MOST_AT_LIMIT: f64 = 0.5;
+/// Smallest share of the squared relative residual that a limit explains.
+const MIN_EXPLAINED_SHARE: f64 = 0.65;
+/// Smallest relative residual without a limit for which a limit is fitted.
+const MIN_RELATIVE_RESIDUAL: f64 = 0.01;
+const MIN_ROWS_PER_UNKNOWN: usize = 3;
+/// Smallest number of rows at the limit, and their largest share.
+const MIN_ROWS_AT_LIMIT: usize = 4;
+const MAX_SHARE_AT_LIMIT: f64 = 0.5;
 
-/// Exchanged joints and reversed signs in a run that ended early; empty where nothing is clear.
 pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<TorqueCause> {
-    let Some((leg, record)) = run.legs.iter().zip(run.records).rfind(|(_, record)| record.samples >= FEWEST_SAMPLES)
+    let Some((leg, record)) = run.legs.iter().zip(run.records).rfind(|(_, record)| record.samples >= MIN_SAMPLES)
     else {
         return Vec::new();
     };
-    let smoothing_hz = (record.samples >= FEWEST_SMOOTHED).then_some(SMOOTHING_SHARE * record.rate_hz);
+    let smoothing_hz = (record.samples >= MIN_SMOOTHED_SAMPLES).then_some(SMOOTHING_SHARE * record.rate_hz);
     let Some(observed) = LoggedMotion::new(leg, record, smoothing_hz) else { return Vec::new() };
     let first = record.samples.saturating_sub((BEFORE_STOP_S * record.rate_hz).ceil() as usize);
     let rows =
@@ -86,7 +83,7 @@ pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<To
         let commanded = rows(&commanded);
         Some((by_command(&logged, &commanded), commanded))
     });
-    // The delays that leave the fewest joints open: light joints hold little but noise.
+    // Use the delays with the fewest undetermined joints; light joints have little torque beyond noise.
     let is_open = |own: &Assignment| *own == Assignment::Open;
     let open = |found: &[Assignment]| found.iter().filter(|own| is_open(own)).count();
     let Some((found, commanded)) = commanded.min_by_key(|(found, _)| open(found)) else { return Vec::new() };
@@ -105,24 +102,24 @@ pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<To
     named(task, &moved, true)
 }
 
-/// Joints whose logged torque stays at a limit that the command exceeds.
 fn limits_in_log(task: &IterationTask, logged: &[Vec<f64>], commanded: &[Vec<f64>]) -> Vec<TorqueCause> {
     let of_joint = |joint: usize| {
         let (y, u) = (&logged[joint], &commanded[joint]);
         let highest = y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
         let left = |limit: f64| y.iter().zip(u).map(|(y, u)| (y - u.clamp(-limit, limit)).powi(2)).sum::<f64>();
-        let limits = NEAR_HIGHEST.map(|share| share * highest).into_iter();
+        let limits = LOG_LIMIT_SHARES.map(|share| share * highest).into_iter();
         let (torque, least) = limits.map(|limit| (limit, left(limit))).min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let beyond = u.iter().filter(|u| u.abs() > BEYOND * torque).count();
-        let explains = least < AT_LIMIT * square(y) && least < CLEARLY_BETTER * left(f64::INFINITY);
-        let is_limited = beyond >= FEWEST_AT_LIMIT && explains;
+        let beyond = u.iter().filter(|u| u.abs() > MIN_EXCESS_RATIO * torque).count();
+        let explains =
+            least < MAX_LIMITED_RESIDUAL * square(y) && least < MAX_BEST_RESIDUAL_RATIO * left(f64::INFINITY);
+        let is_limited = beyond >= MIN_ROWS_AT_LIMIT && explains;
         let joint = task.robot.joint_names()[joint].clone();
         is_limited.then_some(TorqueCause::Clipped { joint, torque, is_commanded: false })
     };
     (0..logged.len()).filter_map(of_joint).collect()
 }
 
-/// Whose torque a joint has.
+/// The torque that a joint has in the log or follows in the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Assignment {
     Own,
@@ -131,14 +128,14 @@ enum Assignment {
     Open,
 }
 
-/// Whose commanded torque each joint has in the log. Joints are only exchanged in pairs.
+/// The commanded torque that each joint has in the log. Joints are only exchanged in pairs.
 fn by_command(logged: &[Vec<f64>], commanded: &[Vec<f64>]) -> Vec<Assignment> {
     let joints = logged.len();
     let share = |to: usize, from: usize, sign: f64| {
         let apart: Vec<f64> = logged[to].iter().zip(&commanded[from]).map(|(a, b)| a - sign * b).collect();
         square(&apart) / square(&logged[to]).max(f64::MIN_POSITIVE)
     };
-    let is_other = |joint: usize| share(joint, joint, 1.0) > OTHER;
+    let is_other = |joint: usize| share(joint, joint, 1.0) > MIN_OTHER_DIFFERENCE;
     let of_joint = |joint: usize| {
         if !is_other(joint) {
             return Assignment::Own;
@@ -148,32 +145,33 @@ fn by_command(logged: &[Vec<f64>], commanded: &[Vec<f64>]) -> Vec<Assignment> {
         let mut found: Vec<(f64, Assignment)> = pairs.map(|other| (pair(other), Assignment::Other(other))).collect();
         found.push((share(joint, joint, -1.0), Assignment::Reversed));
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let is_clear = found[0].0 < SAME && found.get(1).is_none_or(|next| found[0].0 < CLEARLY_BETTER * next.0);
+        let is_clear = found[0].0 < MAX_EQUAL_DIFFERENCE
+            && found.get(1).is_none_or(|next| found[0].0 < MAX_BEST_RESIDUAL_RATIO * next.0);
         if is_clear { found[0].1 } else { Assignment::Open }
     };
     (0..joints).map(of_joint).collect()
 }
 
-/// Whose torque each joint's acceleration follows.
+/// The torque that each joint's acceleration follows.
 fn by_motion(motions: &[Vec<Vec<f64>>; 2], torques: &[Vec<f64>]) -> Vec<Assignment> {
     let [velocities, accelerations] = motions;
     let joints = torques.len();
     let speed = |joint: usize| velocities[joint].iter().map(|dq| dq.abs()).sum::<f64>();
     let fastest = (0..joints).map(speed).fold(0.0, f64::max);
     let runs_away = |joint: usize| {
-        let is_one_way = velocities[joint].iter().sum::<f64>().abs() >= ONE_WAY * speed(joint);
-        is_one_way && speed(joint) >= LEAST_SPEED * fastest
+        let is_one_way = velocities[joint].iter().sum::<f64>().abs() >= MIN_ONE_WAY_RATIO * speed(joint);
+        is_one_way && speed(joint) >= MIN_SPEED_RATIO * fastest
     };
     let follows = |to: usize, from: usize| {
         let (a, b) = (centred(&accelerations[to]), centred(&torques[from]));
         dot(&a, &b) / (square(&a) * square(&b)).sqrt().max(f64::MIN_POSITIVE)
     };
     let is_pair = |a: usize, b: usize| {
-        [a, b].iter().all(|&joint| follows(joint, joint) < UNRELATED && runs_away(joint))
-            && follows(a, b).min(follows(b, a)) > FOLLOWS
+        [a, b].iter().all(|&joint| follows(joint, joint) < MAX_UNRELATED_CORRELATION && runs_away(joint))
+            && follows(a, b).min(follows(b, a)) > MIN_FOLLOWING_CORRELATION
     };
     let of_joint = |joint: usize| {
-        if follows(joint, joint) < -OPPOSITE && runs_away(joint) {
+        if follows(joint, joint) < -MIN_OPPOSITE_CORRELATION && runs_away(joint) {
             return Assignment::Reversed;
         }
         let partner = (0..joints).find(|&other| other != joint && is_pair(joint, other));
@@ -196,7 +194,7 @@ fn named(task: &IterationTask, found: &[Assignment], is_commanded: bool) -> Vec<
     sign.into_iter().chain(exchanged).collect()
 }
 
-/// The gravity torque of the description along the motion, joint-major, Nm (N).
+/// The gravity torque of the robot description along the motion, joint-major, Nm (N).
 fn gravity_along(task: &IterationTask, observed: &LoggedMotion<'_>) -> Vec<f64> {
     let model = task.robot.model();
     let mut workspace = Workspace::new(model);
@@ -211,7 +209,7 @@ fn gravity_along(task: &IterationTask, observed: &LoggedMotion<'_>) -> Vec<f64> 
     out
 }
 
-/// Joints whose drive is at its limit although the log holds a larger torque.
+/// Joints with a saturated drive although the log contains a larger torque.
 pub(super) fn limit_causes(data: &JointData<'_>) -> Vec<TorqueCause> {
     let names = data.task.robot.joint_names();
     let of_joint = |joint: usize| {
@@ -221,12 +219,12 @@ pub(super) fn limit_causes(data: &JointData<'_>) -> Vec<TorqueCause> {
     (0..data.torque.len()).filter_map(of_joint).collect()
 }
 
-/// The limit of a joint's torque that its motion shows, Nm (N), although the log holds a larger one; none where no
-/// limit explains the motion clearly better.
+/// Torque limit of a joint from its motion, Nm (N), although the log contains a larger torque; `None` if no limit
+/// explains the motion clearly better.
 fn limit_in_motion(data: &JointData<'_>, joint: usize) -> Option<f64> {
     let y = &data.torque[joint];
     let columns: Vec<Vec<f64>> = model_columns(data, joint).into_iter().chain(friction_columns(data, joint)).collect();
-    if y.len() < ROWS_PER_UNKNOWN * (columns.len() + 1) {
+    if y.len() < MIN_ROWS_PER_UNKNOWN * (columns.len() + 1) {
         return None;
     }
     let highest = y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
@@ -236,15 +234,16 @@ fn limit_in_motion(data: &JointData<'_>, joint: usize) -> Option<f64> {
         left / square(&centred(&delivered)).max(f64::MIN_POSITIVE)
     };
     let as_logged = left_at(highest);
-    if as_logged <= LEAST_UNEXPLAINED.powi(2) {
+    if as_logged <= MIN_RELATIVE_RESIDUAL.powi(2) {
         return None;
     }
     let at_limit = |limit: f64| y.iter().filter(|y| y.abs() > limit).count();
-    let is_possible =
-        |limit: &f64| (FEWEST_AT_LIMIT as f64..=MOST_AT_LIMIT * y.len() as f64).contains(&(at_limit(*limit) as f64));
+    let is_possible = |limit: &f64| {
+        (MIN_ROWS_AT_LIMIT as f64..=MAX_SHARE_AT_LIMIT * y.len() as f64).contains(&(at_limit(*limit) as f64))
+    };
     let limits = LIMIT_SHARES.map(|share| highest * share as f64 / ALL_SHARES).filter(is_possible);
     let (limit, left) = limits.map(|limit| (limit, left_at(limit))).min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (left < (1.0 - LEAST_EXPLAINED) * as_logged).then_some(limit)
+    (left < (1.0 - MIN_EXPLAINED_SHARE) * as_logged).then_some(limit)
 }
 
 /// The columns of the joint's torque for the inertial parameters of all bodies.
@@ -284,7 +283,7 @@ mod tests {
         assert_eq!(found, [Assignment::Other(1), Assignment::Other(0), own]);
         let reversed = c.iter().map(|tau| -tau).collect();
         assert_eq!(by_command(&[a.clone(), b.clone(), reversed], &commanded), [own, own, Assignment::Reversed]);
-        // Torque of nothing known.
+        // A torque that no joint commanded.
         let other = series(|t| (9.0 * t).sin());
         assert_eq!(by_command(&[other, b, c], &commanded), [Assignment::Open, own, own]);
     }
@@ -298,7 +297,7 @@ mod tests {
         let own = Assignment::Own;
         assert_eq!(by_motion(&motion(&grows), &[falls.clone(), still.clone()]), [Assignment::Reversed, own]);
         assert_eq!(by_motion(&motion(&grows), &[grows.clone(), still.clone()]), [own, own]);
-        // The torque of a late drive in an oscillation.
+        // The torque of a delayed drive in an oscillation.
         let swings = series(|t| (12.0 * t).sin());
         let late = swings.iter().map(|value| -value).collect();
         assert_eq!(by_motion(&motion(&swings), &[late, still.clone()]), [own, own]);

@@ -1,17 +1,17 @@
-//! What the parameters that several joints share show about the scale of each joint's torque.
+//! Scale of each joint's torque from the parameters that several joints share.
 //!
-//! Masses and inertias of a body enter the torque of all joints before it. If the torque of one joint is scaled, its
+//! Masses and inertias of a body affect the torque of all joints before it. If the torque of one joint is scaled, its
 //! rows require other values of these parameters than the rows of the other joints. Around an estimate θ̂ the torque of
 //! joint j with the scale `1 + κ_j` is
 //!
 //! `τ_j = (1 + κ_j) W_j θ ≈ W_j θ + κ_j W_j θ̂`
 //!
-//! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so that it cannot be
-//! seen. Each joint is tested against all others: its κ is free, theirs are zero. The joint whose κ makes the rows most
-//! likely is taken as wrong, and the others are tested again with its κ free. Errors of the model (stiction, backlash)
-//! move the scales of all joints, so that a deviation also has to exceed theirs. Parameters that one joint alone
-//! determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little with the
-//! others gets a wide bar.
+//! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so it is not
+//! detectable. Each joint is tested against all others: its κ is free, the others are zero. The joint whose κ maximises
+//! the likelihood is reported as wrong, and the others are tested again with its κ free. Model errors (stiction,
+//! backlash) affect the scales of all joints, so a deviation must also exceed those of the others. Parameters that only
+//! one joint determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little
+//! with the others gets a wide error bar.
 
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
@@ -23,46 +23,42 @@ use dynident_identification::estimators::estimate;
 use dynident_identification::payload::with_free_gains;
 use dynident_identification::{Execution, Logs, RegressorModel, training_rows};
 
-/// A wider standard deviation says nothing.
-const WIDEST_STD: f64 = 0.3;
-/// Share of a joint's torque that no other parameter may explain, at least: below it errors of the model are magnified.
-const LEAST_OWN_SHARE: f64 = 0.02;
-/// Beyond this deviation the linear equations mean nothing.
-const FURTHEST: f64 = 0.6;
-/// The scale of another joint explains the rows nearly as well if their log-likelihood is lower by less than this:
-/// three and a half standard deviations of independent rows.
-const AS_LIKELY: f64 = 6.0;
+/// Largest standard deviation of a determined scale.
+const MAX_SCALE_STD: f64 = 0.3;
+/// Smallest share of a joint's torque that no other parameter explains; below it model errors are amplified.
+const MIN_OWN_SHARE: f64 = 0.02;
+/// Largest deviation for which the linearisation is valid.
+const MAX_DEVIATION: f64 = 0.6;
+/// Largest difference of the log-likelihood at which the scale of another joint explains the rows nearly as well: three
+/// and a half standard deviations of independent rows.
+const MAX_LOG_LIKELIHOOD_DIFFERENCE: f64 = 6.0;
 
 /// Ratio of the median absolute deviation of a normal distribution to its standard deviation.
 const MEDIAN_TO_STD: f64 = 0.6745;
-/// Fewest other joints whose deviations show the error of the model, and the spread that is assumed of fewer. Of an
-/// honest SCARA, whose first two joints alone share parameters, five standard deviations were seen.
-const FEWEST_OTHERS: usize = 3;
-const SPREAD_OF_FEW: f64 = 2.0;
+/// Smallest number of other joints from which the model error is estimated, and the assumed spread for fewer joints. A
+/// correct SCARA, in which only the first two joints share parameters, reached five standard deviations.
+const MIN_OTHER_JOINTS: usize = 3;
+const DEFAULT_SPREAD: f64 = 2.0;
 
 /// The scale of one joint's torque relative to the other joints.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RowScale {
     pub(crate) value: f64,
     pub(crate) std: f64,
-    /// Whether it is taken as wrong.
     pub(crate) is_wrong: bool,
     /// Joints whose scale explains the rows nearly as well, if it is wrong.
     pub(crate) or: Vec<usize>,
 }
 
-/// The smallest deviation that counts: share of the torque, and number of standard deviations.
+/// The smallest relevant deviation: share of the torque, and number of standard deviations.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LeastDeviation {
     pub(crate) share: f64,
     pub(crate) sigmas: f64,
 }
 
-/// The relative torque scale of each joint by all `runs`; none where it is not determined. `task` is with the friction
-/// in force, `known` the estimate of these runs.
-///
-/// # Errors
-/// Records that do not belong to the task.
+/// The relative torque scale of each joint from all `runs`; `None` if it is not determined. `task` includes the
+/// selected friction, `known` is the estimate of these runs.
 pub(crate) fn row_scales(
     task: &IterationTask,
     runs: &[RunLog<'_>],
@@ -100,7 +96,7 @@ pub(crate) fn row_scales(
     Ok(found().unwrap_or_else(|| vec![None; dof]))
 }
 
-/// Tests one joint after the other, by their places in the problem.
+/// Tests the joints one after the other, by their indices in the problem.
 fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec<Option<RowScale>> {
     let joints = problem.joints().len();
     let mut wrong: Vec<(usize, Vec<usize>)> = Vec::new();
@@ -108,20 +104,22 @@ fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec
         let chosen: Vec<usize> = wrong.iter().map(|(joint, _)| *joint).collect();
         let found = deviations(problem, values, &chosen);
         let likelihood = |joint: usize| found[joint].map_or(f64::NEG_INFINITY, |kappa| kappa.log_likelihood);
-        let counts = |&joint: &usize| {
+        let is_relevant = |&joint: &usize| {
             let is_large = |kappa: Kappa| kappa.value.abs() > least.share.max(least.sigmas * kappa.std);
             found[joint].is_some_and(is_large)
         };
         let open: Vec<usize> = (0..joints).filter(|joint| !chosen.contains(joint)).collect();
-        let worst = open.iter().copied().filter(counts).max_by(|&a, &b| likelihood(a).total_cmp(&likelihood(b)));
-        // More than half of the joints cannot all be wrong against the rest.
-        let stands_out = |&worst: &usize| {
+        let worst = open.iter().copied().filter(is_relevant).max_by(|&a, &b| likelihood(a).total_cmp(&likelihood(b)));
+        // At most half of the joints can be wrong relative to the rest.
+        let is_outlier = |&worst: &usize| {
             let with_it: Vec<usize> = chosen.iter().copied().chain([worst]).collect();
             let spread = spread(&deviations(problem, values, &with_it), &with_it);
             found[worst].is_some_and(|kappa| kappa.value.abs() > least.sigmas * kappa.std * spread)
         };
-        if let Some(worst) = worst.filter(|_| 2 * (chosen.len() + 1) <= joints).filter(stands_out) {
-            let is_rival = |&other: &usize| other != worst && likelihood(other) > likelihood(worst) - AS_LIKELY;
+        if let Some(worst) = worst.filter(|_| 2 * (chosen.len() + 1) <= joints).filter(is_outlier) {
+            let is_rival = |&other: &usize| {
+                other != worst && likelihood(other) > likelihood(worst) - MAX_LOG_LIKELIHOOD_DIFFERENCE
+            };
             wrong.push((worst, open.iter().copied().filter(is_rival).collect()));
             continue;
         }
@@ -134,7 +132,6 @@ fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec
     }
 }
 
-/// The deviation of each joint where those of the joints `chosen` are free.
 fn deviations(problem: &LinearProblem, values: &[f64], chosen: &[usize]) -> Vec<Option<Kappa>> {
     let of_joint = |joint: usize| -> Option<Kappa> {
         let others = chosen.iter().copied().filter(|&one| one != joint);
@@ -144,25 +141,23 @@ fn deviations(problem: &LinearProblem, values: &[f64], chosen: &[usize]) -> Vec<
     (0..problem.joints().len()).map(of_joint).collect()
 }
 
-/// Standard deviation of the deviations of the joints that are not `chosen`, in units of their own; at least one. Its
-/// median does not feel another wrong joint.
+/// Standard deviation of the deviations of the joints that are not `chosen`, in units of their own standard deviations;
+/// at least one. The median is robust against another wrong joint.
 fn spread(found: &[Option<Kappa>], chosen: &[usize]) -> f64 {
     let others = found.iter().enumerate().filter(|(joint, _)| !chosen.contains(joint));
     let mut sizes: Vec<f64> = others.filter_map(|(_, kappa)| kappa.map(|own| (own.value / own.std).abs())).collect();
     sizes.sort_by(f64::total_cmp);
-    if sizes.len() < FEWEST_OTHERS { SPREAD_OF_FEW } else { (sizes[sizes.len() / 2] / MEDIAN_TO_STD).max(1.0) }
+    if sizes.len() < MIN_OTHER_JOINTS { DEFAULT_SPREAD } else { (sizes[sizes.len() / 2] / MEDIAN_TO_STD).max(1.0) }
 }
 
-/// The deviation of a joint's scale.
 #[derive(Clone, Copy, Debug)]
 struct Kappa {
     value: f64,
     std: f64,
-    /// Of all rows with it.
     log_likelihood: f64,
 }
 
-/// κ of the joint `free[place]`, where the joints `free` have one.
+/// κ of the joint `free[place]`, with free κ of all joints in `free`.
 fn kappa(problem: &LinearProblem, values: &[f64], free: &[usize], place: usize) -> Option<Kappa> {
     let columns = problem.columns().len();
     let without_load = vec![vec![0.0; columns]; problem.logs().len()];
@@ -171,14 +166,15 @@ fn kappa(problem: &LinearProblem, values: &[f64], free: &[usize], place: usize) 
     let column = columns + place;
     let (value, std) = (found.values[column], found.std[column]);
     let is_fixed = found.rank.fixed.iter().any(|fixed| fixed.column == column);
-    // Of white noise the deviation is σ over the norm of what the other columns leave of the predicted torque.
+    // For white noise the standard deviation is σ over the norm of the predicted torque that is orthogonal to the other
+    // columns.
     let joint = free[place];
     let of_joint = problem.equations().iter().filter(|equation| equation.joint == joint);
     let norm = of_joint.map(|equation| equation.factor.total().torque_norm().powi(2)).sum::<f64>().sqrt();
     let own_share = found.joint_sigma[joint] / (found.covariance_white[(column, column)].sqrt() * norm);
-    let is_determined = !is_fixed && std > 0.0 && std < WIDEST_STD && own_share > LEAST_OWN_SHARE;
+    let is_determined = !is_fixed && std > 0.0 && std < MAX_SCALE_STD && own_share > MIN_OWN_SHARE;
     let rows = problem.joint_rows();
     let of_rows = |(sigma, rows): (&f64, &usize)| -(*rows as f64) * sigma.max(f64::MIN_POSITIVE).ln();
     let log_likelihood = found.joint_sigma.iter().zip(&rows).map(of_rows).sum();
-    (is_determined && value.abs() < FURTHEST).then_some(Kappa { value, std, log_likelihood })
+    (is_determined && value.abs() < MAX_DEVIATION).then_some(Kappa { value, std, log_likelihood })
 }

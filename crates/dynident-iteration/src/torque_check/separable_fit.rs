@@ -1,49 +1,44 @@
-//! Least squares in which most unknowns are linear: a few timing parameters that all joints share, and some
-//! coefficients of each joint.
+//! Separable least squares: a few nonlinear timing parameters that all joints share, and linear coefficients of each
+//! joint.
 //!
 //! `min Σ_j ‖y_j − A_j(p) c_j‖² / σ_j² + Σ_i p_i² / s_i²` over the shared p and the coefficients c_j. The coefficients
-//! are eliminated (Golub and Pereyra, Inverse Problems 19 (2003) R1, variable projection); p follows by Gauss-Newton
-//! steps with finite differences of the projected residuals. σ_j is the residual of joint j itself, so that a joint
-//! which no p explains does not decide about p.
+//! are eliminated (Golub and Pereyra, Inverse Problems 19 (2003) R1, variable projection); p follows from Gauss-Newton
+//! steps with finite differences of the projected residuals. σ_j is the residual of joint j, so that a joint that no p
+//! explains has little effect on p.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Gauss-Newton steps. The timing is nearly linear: three steps reach rounding on most logs; a clock that is off takes
-/// more.
-const MOST_STEPS: usize = 15;
-/// A step below this share of the finite difference ends the search.
-const SMALL_STEP: f64 = 1e-2;
-/// Smallest residual that a joint is weighted by, as a share of its torque: exact logs would have infinite weights.
-const LEAST_RESIDUAL: f64 = 1e-4;
-/// Singular values below this share of the largest one count as zero.
+/// Largest number of Gauss-Newton steps. The timing is nearly linear: three steps reach rounding on most logs, a wrong
+/// clock needs more.
+const MAX_STEPS: usize = 15;
+/// Smallest step relative to the finite difference; a smaller one ends the search.
+const MIN_RELATIVE_STEP: f64 = 1e-2;
+/// Smallest residual for the weight of a joint, as a share of its torque; exact logs would have infinite weights.
+const MIN_RESIDUAL_SHARE: f64 = 1e-4;
+/// Singular values below this share of the largest one are treated as zero.
 const RANK_TOLERANCE: f64 = 1e-9;
 
-/// Number of shared parameters.
 pub(super) const SHARED: usize = 5;
 
 /// One joint's columns, each with the same number of rows.
 pub(super) type JointColumns = Vec<Vec<f64>>;
 
-/// A shared parameter: its step of finite differences, and the standard deviation of what is expected of it.
+/// A shared parameter: its finite difference, and the standard deviation of its prior.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SharedParameter {
     pub(super) difference: f64,
     pub(super) expected: f64,
 }
 
-/// The solution.
 #[derive(Clone, Debug)]
 pub(super) struct SeparableFit {
-    /// The shared parameters.
     pub(super) shared: [f64; SHARED],
-    /// Their covariance, if neighbouring rows had independent residuals; none where it does not exist.
     pub(super) covariance: Option<DMatrix<f64>>,
-    /// Columns of each joint at these.
     pub(super) columns: Vec<JointColumns>,
 }
 
 impl SeparableFit {
-    /// Standard deviation of a combination of the shared parameters; infinite where it is not determined.
+    /// Standard deviation of a combination of the shared parameters; infinite if it is not determined.
     pub(super) fn std_of(&self, combination: [f64; SHARED]) -> f64 {
         let Some(covariance) = &self.covariance else { return f64::INFINITY };
         let combination = DVector::from_column_slice(&combination);
@@ -51,14 +46,13 @@ impl SeparableFit {
     }
 }
 
-/// Fits `y[joint]` by `columns(shared)[joint]`, from the best of some starts.
 pub(super) fn separable_fit(
     y: &[Vec<f64>],
     parameters: &[SharedParameter; SHARED],
     starts: &[[f64; SHARED]],
     columns: &mut dyn FnMut(&[f64; SHARED]) -> Vec<JointColumns>,
 ) -> SeparableFit {
-    // There may be several minima: the search begins at the best of the starts.
+    // There may be several minima: the search begins at the best start value.
     let starts = starts.iter().map(|start| {
         let shared = *start;
         let at = columns(&shared);
@@ -71,7 +65,7 @@ pub(super) fn separable_fit(
     let best = starts.min_by(|a, b| share(&a.2).total_cmp(&share(&b.2)));
     let (mut shared, mut at, mut residuals) = best.unwrap_or_else(|| ([0.0; SHARED], Vec::new(), Vec::new()));
     let scale = |residuals: &[Vec<f64>]| -> Vec<f64> {
-        let of_joint = |(r, y): (&Vec<f64>, &Vec<f64>)| rms(r).max(LEAST_RESIDUAL * rms(y)).max(f64::MIN_POSITIVE);
+        let of_joint = |(r, y): (&Vec<f64>, &Vec<f64>)| rms(r).max(MIN_RESIDUAL_SHARE * rms(y)).max(f64::MIN_POSITIVE);
         residuals.iter().zip(y).map(of_joint).collect()
     };
     let cost = |residuals: &[Vec<f64>], sigma: &[f64], shared: &[f64; SHARED]| -> f64 {
@@ -79,7 +73,7 @@ pub(super) fn separable_fit(
         of_rows + shared.iter().zip(parameters).map(|(p, own)| (p / own.expected).powi(2)).sum::<f64>()
     };
     let mut covariance = None;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let sigma = scale(&residuals);
         let slopes = slopes(y, parameters, &shared, &residuals, columns);
         let NormalEquations { normal, right } = NormalEquations::new(parameters, &shared, &slopes, &residuals, &sigma);
@@ -101,14 +95,14 @@ pub(super) fn separable_fit(
         let Some((next, there, left)) = taken else { break };
         let moved = (0..SHARED).map(|k| ((next[k] - shared[k]) / parameters[k].difference).abs()).fold(0.0, f64::max);
         (shared, at, residuals) = (next, there, left);
-        if moved < SMALL_STEP {
+        if moved < MIN_RELATIVE_STEP {
             break;
         }
     }
     SeparableFit { shared, covariance, columns: at }
 }
 
-/// Derivatives of the projected residuals by the shared parameters, joint by joint, by finite differences.
+/// Derivatives of the projected residuals with respect to the shared parameters, joint by joint, by finite differences.
 fn slopes(
     y: &[Vec<f64>],
     parameters: &[SharedParameter; SHARED],
@@ -118,9 +112,9 @@ fn slopes(
 ) -> Vec<Vec<Vec<f64>>> {
     let mut slopes: Vec<Vec<Vec<f64>>> = Vec::with_capacity(SHARED);
     for (place, parameter) in parameters.iter().enumerate() {
-        let mut beside = *shared;
-        beside[place] += parameter.difference;
-        let moved = projected(y, &columns(&beside));
+        let mut perturbed = *shared;
+        perturbed[place] += parameter.difference;
+        let moved = projected(y, &columns(&perturbed));
         let slope = |(moved, own): (&Vec<f64>, &Vec<f64>)| {
             moved.iter().zip(own).map(|(a, b)| (a - b) / parameter.difference).collect()
         };
@@ -129,7 +123,6 @@ fn slopes(
     slopes
 }
 
-/// The linear equations of one Gauss-Newton step.
 struct NormalEquations {
     normal: DMatrix<f64>,
     right: DVector<f64>,
@@ -164,8 +157,8 @@ fn projected(y: &[Vec<f64>], columns: &[JointColumns]) -> Vec<Vec<f64>> {
     y.iter().zip(columns).map(|(y, columns)| residual_of(columns, y, &coefficients(columns, y))).collect()
 }
 
-/// The coefficients of `columns` and then of a constant that fit `y` best, those of columns that the rows do not
-/// distinguish as short as possible.
+/// Least squares coefficients of `columns` and then of a constant for `y`; minimum norm for columns that the rows do
+/// not distinguish.
 pub(super) fn coefficients(columns: &[Vec<f64>], y: &[f64]) -> Vec<f64> {
     let (rows, count) = (y.len(), columns.len() + 1);
     if rows == 0 {
@@ -199,12 +192,10 @@ pub(super) fn square(values: &[f64]) -> f64 {
     dot(values, values)
 }
 
-/// Root mean square; zero of no values.
 pub(super) fn rms(values: &[f64]) -> f64 {
     if values.is_empty() { 0.0 } else { (square(values) / values.len() as f64).sqrt() }
 }
 
-/// The values less their mean.
 pub(super) fn centred(values: &[f64]) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     values.iter().map(|value| value - mean).collect()

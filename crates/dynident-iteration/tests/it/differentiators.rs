@@ -1,4 +1,4 @@
-//! The way from positions to velocities and accelerations, chosen from a run's rows.
+//! Selection of the differentiator from a run's rows.
 
 use crate::simulated_arm::{Simulated, described, iterated, settings, strokes_in_turn};
 use dynident_dynamics::{Workspace, inverse_dynamics};
@@ -10,8 +10,7 @@ fn choosing() -> RunIdentificationSettings {
     RunIdentificationSettings { choose_differentiator: true, ..settings().identification }
 }
 
-/// A record of an arm without friction that follows its strokes 20 ms late and to the bit otherwise, with noise of the
-/// positions.
+/// A record of an arm without friction that follows its strokes exactly with a lag of 20 ms, with position noise.
 fn late_record(noise_rad: f64) -> (IterationTask, Record) {
     let robot = dynident_dynamics::ParametricModel::new(described().model().clone(), Vec::new()).unwrap();
     let reference = strokes_in_turn();
@@ -43,12 +42,12 @@ fn ratio(choice: &DifferentiatorChoice, name: &str) -> f64 {
     choice.candidates.iter().find(|candidate| candidate.name == name).unwrap().residual_ratio.unwrap()
 }
 
-/// Where a joint does what it was told but for a delay, and its encoder is coarse, position tells velocity better than
-/// any filter: the ways that know the stroke win, the time warp before the paper's map, which the noise goes through.
+/// With a pure delay and a coarse encoder, differentiators that know the stroke are better than any filter: the time
+/// warp first, then the paper's map, which transmits the noise.
 #[test]
 fn a_pure_delay_and_a_coarse_encoder_ask_for_a_way_that_knows_the_stroke() {
     let (task, record) = late_record(3e-3);
-    // The torque belongs to the sample: nothing is held here.
+    // The torque belongs to the sample; it is not held here.
     let settings = RunIdentificationSettings { held_torque: false, ..choosing() };
     let found = identify_run(&task, std::slice::from_ref(&record), &settings).unwrap();
     let choice = found.differentiator.unwrap();
@@ -56,8 +55,7 @@ fn a_pure_delay_and_a_coarse_encoder_ask_for_a_way_that_knows_the_stroke() {
     assert!(ratio(&choice, "position-map") > 1.0 && ratio(&choice, "butterworth") > 1.0, "{}", choice.sentence());
 }
 
-/// A loop that follows with errors of another shape than a delay: what looks at every sample wins, and the map does
-/// not.
+/// For tracking errors that are not a pure delay, the smoothed deviation is selected instead of the map.
 #[test]
 fn a_closed_loop_asks_for_the_smoothed_deviation() {
     let mut settings = settings();

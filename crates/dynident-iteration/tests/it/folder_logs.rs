@@ -1,5 +1,5 @@
-//! Logs that a person brings: mistakes are named before the robot is blamed, a corrected file is read again, and every
-//! form of the motion is written.
+//! Logs from a person: mistakes are reported before the robot is evaluated, a corrected file is read again, and all
+//! formats of the motion are written.
 
 use super::simulated_arm::{Simulated, described, reference, settings, task};
 use dynident_iteration::robot::{Envelope, FolderForm, FolderRobot, FolderSettings};
@@ -19,7 +19,6 @@ fn prior() -> ControllerModel {
     ControllerModel::from_parameters(robot.model(), robot.terms(), robot.nominal()).unwrap()
 }
 
-/// A log without any mistake, of a run under the first controller.
 fn recorded() -> Record {
     let (controller, model, reference) = (settings().first.unwrap(), prior(), reference());
     let request = RunRequest { model: Some(&model), ..RunRequest::new(1, &reference, &controller) };
@@ -43,8 +42,8 @@ fn waits_for(run: &RobotRun, words: &[&str]) {
     assert!(words.iter().all(|word| reason.contains(word)), "{words:?}: {reason}");
 }
 
-/// Units, signs, columns and clocks are named with the fix before the envelope is looked at; what is harmless is taken,
-/// and stated.
+/// Mistakes of units, signs, columns and clocks are reported with their fix before the envelope is checked; harmless
+/// changes are applied and noted.
 #[test]
 fn mistakes_of_a_log_are_named_before_the_envelope() {
     let folder = tempfile::tempdir().unwrap();
@@ -52,7 +51,7 @@ fn mistakes_of_a_log_are_named_before_the_envelope() {
     robot = robot.with_prior(Some(prior()));
     let (reference, controller, envelope) = (reference(), pd(), envelope());
     let request = RunRequest { envelope: Some(&envelope), ..RunRequest::new(1, &reference, &controller) };
-    waits_for(&robot.run(&request).unwrap(), &["put the log here"]);
+    waits_for(&robot.run(&request).unwrap(), &["save the log here"]);
     let log = robot.run_folder(1).join("log.csv");
     let right = recorded();
     let mut taken = |change: &dyn Fn(&mut Record)| {
@@ -68,12 +67,12 @@ fn mistakes_of_a_log_are_named_before_the_envelope() {
     waits_for(&taken(&|record| scale(&mut record.tau, 1e3)), &["mNm, or currents in mA", "write Nm"]);
     waits_for(&taken(&|record| scale(&mut record.q, -1.0)), &["joint1, joint2 have the opposite sign"]);
     let run = taken(&|record| record.q.rotate_left(record.samples));
-    waits_for(&run, &["that of joint1 holds the motion of joint2"]);
+    waits_for(&run, &["that of joint1 contains the motion of joint2"]);
 
     // Unix time stamps; a recorder that was started 0.7 s early.
     let run = taken(&|record| record.times_s.iter_mut().for_each(|time| *time += 1_700_000_000.25));
     assert!(run.status.is_done() && run.record.q == right.q, "{}", run.status);
-    assert!(run.ending(&reference, 5.0).contains("offset was taken off"), "{}", run.ending(&reference, 5.0));
+    assert!(run.ending(&reference, 5.0).contains("offset was removed"), "{}", run.ending(&reference, 5.0));
     let run = taken(&|record| {
         let rows = (0.7 * right.rate_hz) as usize;
         let rest = (0..rows).map(|k| k as f64 / right.rate_hz);
@@ -87,17 +86,15 @@ fn mistakes_of_a_log_are_named_before_the_envelope() {
         record.samples += rows;
     });
     assert!(run.status.is_done() && run.record.times_s[0].abs() < 0.1, "{}", run.status);
-    assert!(run.ending(&reference, 5.0).contains("s before the motion; these rows were left out"));
+    assert!(run.ending(&reference, 5.0).contains("s before the motion; these rows were removed"));
 
-    // A robot that leaves its envelope is still reported as such, and a right log is taken as it is.
+    // A robot that leaves its envelope is still reported, and a correct log is not changed.
     let run = taken(&|record| record.q[100] += 0.5);
     assert!(matches!(run.status, RobotStatus::LeftEnvelope { .. }), "{}", run.status);
     let run = taken(&|_| {});
     assert!(run.status.is_done() && run.record == right && run.note.is_none(), "{}", run.status);
 }
 
-/// A run whose log was wrong is judged anew once the file is corrected, in the place of the first judgement; one that
-/// is not corrected is not.
 #[test]
 fn a_corrected_log_is_read_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -113,30 +110,30 @@ fn a_corrected_log_is_read_again() {
         (outcome.runs, reason)
     };
     let (runs, reason) = calls(folder.path());
-    assert!(runs.is_empty() && reason.contains("put the log here"), "{reason}");
+    assert!(runs.is_empty() && reason.contains("save the log here"), "{reason}");
     let right = recorded();
-    // No unit explains this one: the zero of a joint.
+    // No unit explains this mistake: a wrong zero of a joint.
     let mut wrong = right.clone();
     wrong.q[..right.samples].iter_mut().for_each(|q| *q += 0.5);
     let log = exchange.join("run_1/log.csv");
     std::fs::write(&log, wrong.csv()).unwrap();
     let (runs, reason) = calls(folder.path());
     assert!(runs.len() == 1 && !runs[0].accepted && reason.contains("correct the file"), "{reason}");
-    // As it was: the run is not made again, and the next one waits.
+    // Unchanged file: the run is not repeated, and the next one waits.
     let (runs, reason) = calls(folder.path());
     assert!(runs.len() == 1 && !runs[0].accepted && reason.contains("run_2"), "{reason}");
     std::fs::write(&log, right.csv()).unwrap();
     let (runs, reason) = calls(folder.path());
     assert!(runs.len() == 1 && runs[0].accepted && reason.contains("run_2"), "{:?} {reason}", runs[0].reason);
     assert_eq!(std::fs::read_to_string(folder.path().join("runs/run_1/log.csv")).unwrap(), right.csv());
-    // A file that is gone or half written is no correction.
+    // A missing or incomplete file is not a correction.
     std::fs::write(&log, "t_s,q1").unwrap();
     assert!(calls(folder.path()).0[0].accepted);
     std::fs::remove_file(&log).unwrap();
     assert!(calls(folder.path()).0[0].accepted);
 }
 
-/// Forms, with the names that `design` gives; readable for others.
+/// All formats, with the names of `design`, can be read back.
 #[test]
 fn every_form_of_a_motion_is_in_its_folder() {
     let folder = tempfile::tempdir().unwrap();
@@ -168,7 +165,7 @@ fn every_form_of_a_motion_is_in_its_folder() {
             assert_eq!(mode(&robot.run_folder(1).join(name)), mode(&own), "{name}");
         }
     }
-    // A log with currents is read by the same constants.
+    // A log with currents is converted with the same constants.
     let right = recorded();
     let mut currents = right.clone();
     for (own, constant) in currents.tau.chunks_exact_mut(right.samples).zip([50.0, 25.0]) {
@@ -179,7 +176,7 @@ fn every_form_of_a_motion_is_in_its_folder() {
     std::fs::write(robot.run_folder(1).join("log.csv"), currents.csv().replace("tau", "i")).unwrap();
     let run = robot.run(&request).unwrap();
     assert!(run.status.is_done() && run.record.tau.iter().zip(&right.tau).all(|(a, b)| (a - b).abs() < 1e-9));
-    // A form without its settings is refused before anything is written.
+    // A format without its settings is rejected before anything is written.
     let refused = |settings: FolderSettings| FolderRobot::new(settings, joints.clone()).unwrap_err().to_string();
     let message = refused(FolderSettings { torque_constants: None, ..settings.clone() });
     assert!(message.contains("torque_constants"), "{message}");
@@ -187,7 +184,6 @@ fn every_form_of_a_motion_is_in_its_folder() {
     assert!(message.contains("six joints"), "{message}");
 }
 
-/// A pipe without a writer in the place of a log does not block.
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_no_log() {

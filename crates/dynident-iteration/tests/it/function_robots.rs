@@ -1,4 +1,4 @@
-//! A robot that is a function: the simulator's own run through it, and a verdict for all that it does wrong.
+//! A robot that is a function: the simulator's run through it, and a verdict for each of its failures.
 
 use crate::robots::{joints, model, pd, reference};
 use dynident_iteration::robot::{ControlledRun, EnvelopeSettings, FunctionRobot};
@@ -6,7 +6,6 @@ use dynident_iteration::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, S
 
 type Outcome = Result<(), String>;
 
-/// A run of what `function` does with the samples: it is given the controlled run and answers with its outcome.
 fn run(
     envelope: bool,
     stop: Option<&StopSignal>,
@@ -25,7 +24,6 @@ fn run(
     (run, asked)
 }
 
-/// Stands where it should for so many samples.
 fn standing(run: &mut ControlledRun, samples: usize) {
     for sample in 0..samples {
         if run.torque(sample as f64 / 500.0, &[-0.4, 0.3], &[0.0, 0.0]).is_none() {
@@ -41,11 +39,10 @@ fn what_it_asks_with_is_the_record() {
         for sample in 0..201 {
             let q = [-0.4 + 1e-3 * f64::from(sample) / 201.0, 0.3];
             let tau = run.torque(f64::from(sample) / 500.0, &q, &[0.1, 0.0]).unwrap();
-            // Joint PD about the standing reference.
+            // Joint PD about the constant reference.
             let expected = [200.0 * (-0.4 - q[0]) - 20.0 * 0.1, 0.0];
             assert!((tau[0] - expected[0]).abs() < 1e-9 && tau[1].abs() < 1e-9, "{tau:?}");
         }
-        // There is no further one.
         assert!(run.torque(0.5, &[-0.4, 0.3], &[0.0, 0.0]).is_none());
         Ok(())
     });
@@ -59,12 +56,11 @@ fn it_is_stopped_before_the_next_torque() {
     let (found, asked) = run(true, None, |run| {
         standing(run, 10);
         assert!(run.torque(0.02, &[0.2, 0.3], &[0.0, 0.0]).is_none());
-        // A function that goes on gets nothing.
+        // A function that continues gets no torque.
         assert!(run.torque(0.022, &[-0.4, 0.3], &[0.0, 0.0]).is_none());
         Ok(())
     });
     assert!(matches!(found.status, RobotStatus::LeftEnvelope { .. }), "{}", found.status);
-    // The sample that left it is kept.
     assert_eq!((asked, found.record.samples), (11, 11));
 
     let stop = StopSignal::default();
@@ -80,7 +76,7 @@ fn it_is_stopped_before_the_next_torque() {
 
 #[test]
 fn what_it_does_wrong_is_named() {
-    // Given as: for each call of torque its time, positions and velocities.
+    // Input: time and positions of each call of `torque`.
     let fault = |calls: &[(f64, &[f64])]| {
         let (found, _) = run(false, None, |run| {
             for (time_s, q) in calls {

@@ -1,4 +1,4 @@
-//! Runs of a motion that is never fitted: the newest model is judged by them, and nothing else changes.
+//! Runs of a held-out motion validate the newest model and change nothing else.
 
 use super::simulated_arm::{self, RATE_HZ, Simulated};
 use dynident_excitation::Motion;
@@ -33,7 +33,7 @@ fn iteration(every: Option<usize>) -> Iteration {
     Iteration::new(simulated_arm::task(), simulated_arm::settings()).unwrap().with_held_out(held_out(every)).unwrap()
 }
 
-/// The arm, which is another one on the held-out motion where it is told so.
+/// The arm; on the held-out motion it has other parameters if requested.
 #[derive(Debug)]
 struct Noted {
     inner: SimulatedRobot,
@@ -69,8 +69,8 @@ impl Robot for Noted {
     }
 }
 
-/// It comes last, once; the runs are those of an iteration without, to the last bit; and the final identification has
-/// it as a test, with the error that its noise leaves.
+/// The held-out run is made once at the end; the runs are bit-identical to those of an iteration without it; and the
+/// final identification uses it for validation, with the error of its noise.
 #[test]
 fn the_newest_model_is_judged_before_it_has_converged() {
     let without = Iteration::new(simulated_arm::task(), simulated_arm::settings()).unwrap();
@@ -91,7 +91,7 @@ fn the_newest_model_is_judged_before_it_has_converged() {
         let prediction = joint.prediction.unwrap();
         assert!(prediction.inside > 0.85 && prediction.rms_error < 0.1, "{prediction:?}");
     }
-    // Taken up again there is nothing to do, and its log is read back as it was judged.
+    // A resumed iteration has nothing to do, and its log is read back unchanged.
     let mut again = Noted::new();
     let taken_up = iterate(&iteration, &mut [&mut again], Some(&store), &mut |_, _| {}).unwrap();
     assert!(again.commanded.is_empty() && taken_up.runs == outcome.runs);
@@ -104,8 +104,8 @@ fn the_newest_model_is_judged_before_it_has_converged() {
     assert!(found.held_out[0].validation.model.relative_error_percent.unwrap() < 2.0);
 }
 
-/// An arm that is another where the fitted motion never goes: the iteration without held-out runs is content, the one
-/// with them is not, and says what the newest model does not predict.
+/// An arm with other parameters outside of the fitted motion: the iteration without held-out runs converges, the one
+/// with them does not, and it reports the failed prediction.
 #[test]
 fn a_model_that_predicts_no_other_motion_has_not_converged() {
     let heavier = Simulated { tip_kg: 1.6, ..Simulated::default() };
@@ -118,14 +118,14 @@ fn a_model_that_predicts_no_other_motion_has_not_converged() {
         panic!("{:?}", outcome.shortfalls)
     };
     assert!(*inside_percent < 50.0, "{inside_percent}");
-    // Nothing else is wrong, and each further run was judged anew.
+    // No other condition is unmet, and each further run was validated again.
     assert!(outcome.shortfalls.iter().all(|own| matches!(own, Shortfall::HeldOutPrediction { .. })));
     assert!(robot.commanded.iter().filter(|own| own.1 == RunPurpose::HeldOut).count() >= 2);
-    assert!(outcome.shortfalls[0].to_string().starts_with("on the held-out motion"));
+    assert!(outcome.shortfalls[0].to_string().starts_with("held-out motion: "));
 }
 
-/// After every run; taken up after either half is gone, the same is made again; what judged a run that is gone goes
-/// with it.
+/// Held-out run after every run: if the run or the held-out run is removed, a resumed iteration repeats it, and a
+/// held-out run without its run is removed.
 #[test]
 fn held_out_runs_belong_to_their_runs() {
     let folder = tempfile::tempdir().unwrap();
@@ -139,24 +139,22 @@ fn held_out_runs_belong_to_their_runs() {
         (1..=runs).flat_map(|run| [(run, RunPurpose::Run), (run, RunPurpose::HeldOut)]).collect();
     assert_eq!(robot.commanded, expected);
     let of_run = |run: usize| store.held_out_log_path(run).parent().unwrap().to_owned();
-    // Only the judgement of the last is gone.
+    // Only the last held-out run is removed.
     std::fs::remove_dir_all(of_run(runs)).unwrap();
     let mut robot = Noted::new();
     let again = iterate(&iteration, &mut [&mut robot], Some(&store), &mut |_, _| {}).unwrap();
     assert_eq!(again.runs, outcome.runs);
     assert_eq!(robot.commanded, [(runs, RunPurpose::HeldOut)]);
-    // The last run itself is gone.
     std::fs::remove_dir_all(store.run_folder(runs)).unwrap();
     let store = IterationStore::open(folder.path(), "test", true).unwrap();
     assert!(!of_run(runs).exists() && of_run(runs - 1).exists());
     let again = iterate(&iteration, &mut [&mut Noted::new()], Some(&store), &mut |_, _| {}).unwrap();
     assert_eq!(again.runs, outcome.runs);
-    // A fresh start removes all of it.
     IterationStore::open(folder.path(), "test", false).unwrap();
     assert!(!of_run(1).exists());
 }
 
-/// A held-out run that is stopped judges nothing, and of a robot outside somebody looks.
+/// A held-out run that is stopped validates nothing, and the iteration of an external robot waits for a person.
 #[test]
 fn a_held_out_run_that_ends_early() {
     let mut settings = simulated_arm::settings();
@@ -167,9 +165,9 @@ fn a_held_out_run_that_ends_early() {
     let mut robot = Noted { stops: true, ..Noted::new() };
     let outcome = iterate(&iteration, &mut [&mut robot], Some(&store), &mut |_, _| {}).unwrap();
     let IterationStatus::Waiting { reason } = &outcome.status else { panic!("{}", outcome.status) };
-    assert!(reason.contains("held-out run after run") && reason.contains("Look at the robot"), "{reason}");
+    assert!(reason.contains("held-out run after run") && reason.contains("Check the robot"), "{reason}");
     assert!(matches!(&outcome.shortfalls[..], [Shortfall::HeldOutFailed { reason }] if reason.contains("protective")));
-    // Legs that are identified together have no one motion beside them.
+    // With several legs there is no single held-out motion.
     let mut task = simulated_arm::task();
     task.legs.push(task.legs[0].clone());
     let legs = Iteration::new(task, simulated_arm::settings()).unwrap().with_held_out(held_out(None));

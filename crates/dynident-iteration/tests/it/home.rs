@@ -1,4 +1,4 @@
-//! Where the robot waits: the ways from there to the motion and back, in every mode, watched, stopped, kept.
+//! The home posture: paths from there to the motion and back, in every mode, monitored, stopped, stored.
 
 use super::robots::{client, joints, model, pd, process_robot};
 use super::simulated_arm::{self, Simulated};
@@ -30,7 +30,7 @@ fn motion(from: [f64; 2], to: [f64; 2]) -> Reference {
         motion.dq[at] = way * 30.0 * (x * (1.0 - x)).powi(2) / 0.5;
         motion.ddq[at] = way * 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / 0.25;
     }
-    // Where the polynomial is off by a rounding the posture is the stated one.
+    // Exact end posture in spite of rounding.
     for joint in 0..2 {
         motion.q[joint * 251 + 250] = to[joint];
     }
@@ -86,7 +86,8 @@ fn envelope(tracking_rad: f64) -> Envelope {
     }
 }
 
-/// `q̇` and `q̈` within half of the limits, one of them just so; from rest to rest and exactly from posture to posture.
+/// `q̇` and `q̈` are within half of the limits, one of them nearly at its limit; each path is from rest to rest and
+/// exactly from posture to posture.
 #[test]
 fn ways_are_as_fast_as_they_may_be() {
     let ways = ways();
@@ -100,18 +101,17 @@ fn ways_are_as_fast_as_they_may_be() {
             assert!(ddq[0].abs() < 1e-12 && ddq[last].abs() < 1e-12);
             let highest = |values: &[f64]| values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
             most = most.max(highest(dq) / (0.5 * [4.0, 5.0][joint])).max(highest(ddq) / (0.5 * 20.0));
-            // Velocities are those of the positions.
+            // Velocities are derivatives of the positions.
             for k in 1..last {
                 assert!(((q[k + 1] - q[k - 1]) * 250.0 - dq[k]).abs() < 1e-3);
             }
         }
-        // A whole number of 100 samples may make it slower.
+        // Rounding to multiples of 100 samples may make the path slower.
         assert!(most <= 1.0 + 1e-9 && most > 0.5, "{most}");
     }
-    // Where the robot stands already there is nothing to run.
     let there = home(START).ways(&model(), &motion(START, START), None).unwrap().ways;
     assert_eq!((there.approach.samples(), there.back.samples()), (1, 1));
-    // Limits of velocity that nobody states are the motion's own.
+    // Without stated velocity limits, those of the motion are used.
     let free = HomeSettings { limits: Limits::default(), ..home([0.2, -0.1]) };
     let reference = motion(START, END);
     let highest = |of: &Reference| of.motion().dq[of.motion().of(0)].iter().fold(0.0_f64, |a, b| a.max(b.abs()));
@@ -121,13 +121,13 @@ fn ways_are_as_fast_as_they_may_be() {
     assert!(matches!(free.ways(&model(), &held, None), Err(HomeError::NoSpeed { joint }) if joint == "joint2"));
 }
 
-/// Height of the tip, from the lengths of the description alone; joints turn from x towards -z.
+/// Height of the tip from the described lengths; joints turn from x towards -z.
 fn tip_m(q: [f64; 2]) -> f64 {
     -0.5 * q[0].sin() - 0.4 * (q[0] + q[1]).sin()
 }
 
-/// The straight way goes through the floor: the way found goes over postures in between, above the floor everywhere.
-/// Where there is none, and where a posture itself is too low, the words say what is hit.
+/// If the direct path crosses the floor, the path goes through via postures and stays above the floor. If there is no
+/// path, or a posture is too low, the message names the obstacle.
 #[test]
 fn a_floor_is_gone_around_or_named() {
     let below = |height_m: f64, posture: [f64; 2]| {
@@ -145,10 +145,9 @@ fn a_floor_is_gone_around_or_named() {
         (0..n).map(|k| tip_m([q[k], q[n + k]])).fold(f64::INFINITY, f64::min)
     };
     assert!(lowest(&found.ways.approach) >= -0.65 && lowest(&found.ways.back) >= -0.65);
-    assert!(tip_m([1.55, 0.0]) < -0.85, "the straight one is far below");
-    // The same again: an iteration that is taken up goes the same ways.
+    assert!(tip_m([1.55, 0.0]) < -0.85, "the direct path is far below");
     assert_eq!(below(-0.65, from).ways(&model(), &reference, None).unwrap(), found);
-    // The elbow alone keeps above no floor that is this high.
+    // No motion of the elbow avoids a floor that is this high.
     let error = below(-0.3, from).ways(&model(), &reference, None).map(|_| ()).unwrap_err();
     assert!(
         matches!(&error, HomeError::Posture { kind: LimitKind::Floor, posture: "the motion's first posture", .. }),
@@ -156,17 +155,17 @@ fn a_floor_is_gone_around_or_named() {
     );
     let error = below(-0.31, from).ways(&model(), &motion([2.82, 0.0], [2.82, 0.0]), None).map(|_| ()).unwrap_err();
     let HomeError::NotClear { kind: LimitKind::Floor, share, .. } = &error else { panic!("{error}") };
-    // Deepest where the arm hangs down.
+    // The lowest point is reached when the arm hangs down.
     assert!((share - 0.5).abs() < 0.2, "{error}");
     assert!(error.to_string().contains("floor of link2"), "{error}");
     let error = below(-0.65, [1.5, 0.0]).ways(&model(), &reference, None).map(|_| ()).unwrap_err();
     assert!(error.to_string().starts_with("home itself breaks the limit of floor"), "{error}");
 }
 
-/// What the described arm cannot hold with what is not known of it, no way holds.
+/// A path keeps the torque limits for all robots within the uncertainty.
 #[test]
 fn the_torque_of_a_way_has_room() {
-    // Level, the arm needs 15.2 Nm at joint 1; with 30 % more 19.8.
+    // Horizontal, the arm needs 15.2 Nm at joint 1; with 30 % more 19.8 Nm.
     let mut level = home([0.0, 0.0]);
     level.limits.joints[0].torque = Some(18.0);
     let reference = motion([1.0, 0.0], [1.0, 0.0]);
@@ -174,7 +173,6 @@ fn the_torque_of_a_way_has_room() {
     assert!(matches!(&error, HomeError::Posture { kind: LimitKind::Torque, posture: "home", .. }), "{error}");
     level.uncertainty_percent = 0.0;
     assert!(level.ways(&model(), &reference, None).is_ok());
-    // A motion that is under way already is not entered from rest.
     let mut moving = reference.motion().clone();
     moving.dq.fill(0.3);
     let moving = Reference::new(500.0, moving).unwrap();
@@ -182,7 +180,7 @@ fn the_torque_of_a_way_has_room() {
     assert!(matches!(&error, HomeError::NotAtRest { begins: true, .. }), "{error}");
 }
 
-/// Whoever runs the loop, the three parts are the same, and the motion's record is the motion's alone.
+/// In all modes the three parts are the same, and the record of the motion contains only the motion.
 #[test]
 fn every_robot_runs_the_ways() {
     let ways = ways();
@@ -209,13 +207,12 @@ fn every_robot_runs_the_ways() {
             let kept = theirs.ways.unwrap();
             assert!(kept.approach.q == parts.approach.q && kept.back.tau == parts.back.tau, "{mode:?}");
         }
-        // Without ways as before.
         assert!(run(&mut robot, None, None).status.is_done());
     }
     let tables = ["approach.csv", "trajectory.csv", "return.csv"]
         .map(|name| std::fs::read_to_string(folder.path().join("run_1").join(name)).unwrap().lines().count() - 1);
     assert_eq!(tables, [ways.approach.samples(), 251, ways.back.samples()]);
-    // A function that stands wherever it is asked to: times are its own clock's, which began at 5 s.
+    // A function that is always at the requested position; its clock begins at 5 s.
     let mut asked = 0;
     let mut function = FunctionRobot::new(joints(), |mut run: ControlledRun| {
         let whole = run.reference().clone();
@@ -233,8 +230,8 @@ fn every_robot_runs_the_ways() {
     assert!((kept.back.times_s[0] - 0.002).abs() < 1e-9 && kept.back.samples == samples[2]);
 }
 
-/// A program that does not say that it runs ways would start the motion from home at once: it is not sent one. In steps
-/// it need not know.
+/// A program without the capability `home` would start the motion from home at once, so it is not sent a run. Mode
+/// `step` does not need the capability.
 #[test]
 fn a_program_that_knows_no_ways_is_told_apart() {
     let folder = tempfile::tempdir().unwrap();
@@ -247,12 +244,11 @@ fn a_program_that_knows_no_ways_is_told_apart() {
     assert!(run(&mut process(ProcessMode::Step, &old, folder.path()), Some(&ways), None).status.is_done());
 }
 
-/// A sample of a way that leaves the envelope stops the run there; one of the motion stops it there, and nobody goes
-/// home.
+/// A sample outside of the envelope stops the run, on a path as well as in the motion; the robot does not return home.
 #[test]
 fn a_breach_ends_the_run_where_it_is() {
     let ways = ways();
-    // Home where the motion begins: joint PD without gravity sags in the motion; the way back would be long.
+    // Home is the begin of the motion: joint PD without gravity sags in the motion.
     let at_start = home(START).ways(&model(), &motion(START, END), None).unwrap().ways;
     assert_eq!(at_start.approach.samples(), 1);
     for mode in [ProcessMode::Run, ProcessMode::Step] {
@@ -279,7 +275,7 @@ fn a_breach_ends_the_run_where_it_is() {
     }
 }
 
-/// A robot that stops on its way home has not made the run; one whose samples say otherwise than they should is known.
+/// A robot that stops on its way home has not completed the run; invalid parts of samples are detected.
 #[test]
 fn a_way_that_is_not_run_to_its_end() {
     let ways = ways();
@@ -296,7 +292,7 @@ fn a_way_that_is_not_run_to_its_end() {
         matches!(&short, RobotStatus::Failed { fault: RobotFault::Short { part: RunPart::Approach, .. }, .. }),
         "{short}"
     );
-    // The program's own fault is a sample of the motion, in the middle of the approach.
+    // The program's error is a sample of the motion during the approach.
     let early = fault("null", "approach").status;
     assert!(
         matches!(&early, RobotStatus::Failed { fault: RobotFault::Short { part: RunPart::Approach, .. }, .. }),
@@ -306,7 +302,6 @@ fn a_way_that_is_not_run_to_its_end() {
     assert!(matches!(&late, RobotStatus::Failed { fault: RobotFault::OutOfTurn { .. }, .. }), "{late}");
 }
 
-/// A person finds the ways beside the trajectory; logs of them are looked at where they are.
 #[test]
 fn a_folder_holds_the_ways() {
     let folder = tempfile::tempdir().unwrap();
@@ -323,7 +318,7 @@ fn a_folder_holds_the_ways() {
     let simulated = run(&mut simulator(), Some(&ways), None);
     std::fs::write(own.join("log.csv"), simulated.record.csv()).unwrap();
     assert!(run(&mut robot, Some(&ways), None).status.is_done());
-    // A home that was corrected makes no other run of a log that is there.
+    // A corrected home posture does not invalidate an existing log.
     let other = home([0.25, -0.1]).ways(&model(), &motion(START, END), None).unwrap().ways;
     assert!(run(&mut robot, Some(&other), None).status.is_done());
     let logs = simulated.ways.unwrap();
@@ -331,7 +326,7 @@ fn a_folder_holds_the_ways() {
     std::fs::write(own.join("return_log.csv"), logs.back.csv()).unwrap();
     let wide = run(&mut robot, Some(&ways), Some(&envelope(1.0)));
     assert!(wide.status.is_done() && wide.ways.is_some(), "{}", wide.status);
-    // Where the log of the motion is inside and one of a way is not.
+    // The log of the motion is inside the envelope, that of a path is not.
     let mut high = envelope(1.0);
     high.upper = vec![Some(0.1), None];
     let status = run(&mut robot, Some(&ways), Some(&high)).status;
@@ -339,7 +334,6 @@ fn a_folder_holds_the_ways() {
     assert_eq!((breach.part, breach.quantity), (RunPart::Approach, EnvelopeQuantity::Position));
 }
 
-/// Notes what it is asked.
 struct Asked(Vec<NextMotion>);
 
 impl Supervisor for Asked {
@@ -355,7 +349,6 @@ impl Supervisor for Asked {
     }
 }
 
-/// The arm of the iteration's tests, which waits hanging to the side.
 fn with_home(posture: [f64; 2]) -> dynident_iteration::IterationSettings {
     let mut settings = simulated_arm::settings();
     settings.safety.home = Some(HomeSettings {
@@ -367,8 +360,8 @@ fn with_home(posture: [f64; 2]) -> dynident_iteration::IterationSettings {
     settings
 }
 
-/// The whole iteration, every run from home and back: it converges to the truth as without, resumes bit for bit, keeps
-/// the logs of the ways beside the others, and a fresh start removes them.
+/// A complete iteration in which every run starts and ends at home: it converges to the truth, resumes bit for bit,
+/// stores the logs of the paths, and a fresh start removes them.
 #[test]
 fn an_iteration_from_home() {
     let simulated = Simulated::default();
@@ -383,10 +376,10 @@ fn an_iteration_from_home() {
     let known = outcome.runs.last().unwrap().knowledge().unwrap();
     let described = simulated_arm::described();
     for ((value, std), truth) in known.values.iter().zip(&known.std).zip(simulated.truth(&described)) {
-        // Eight parameters: 4.5 standard deviations are beyond chance.
+        // Eight parameters: 4.5 standard deviations do not occur by chance.
         assert!((value - truth).abs() < 4.5 * std, "{value} {truth} {std}");
     }
-    // What a person is asked: the slow run first, with ways as slow.
+    // Requests for permission: the slow run first, with paths at the same speed.
     let shown = |place: usize| asked.0[place].ways.as_ref().unwrap();
     assert!(asked.0[0].speed == 0.5 && asked.0[1].speed == 1.0);
     assert_eq!(shown(0).approach_s, 2.0 * shown(1).approach_s);
@@ -395,7 +388,6 @@ fn an_iteration_from_home() {
     assert!(highest("joint1") > 0.0);
     let files = ["log.csv", "approach_log.csv", "return_log.csv"].map(|name| store.run_folder(1).join(name));
     assert!(files.iter().all(|file| file.exists()));
-    // Two runs of it are gone: the same are made again.
     let runs = outcome.runs.len();
     std::fs::remove_dir_all(store.run_folder(runs)).unwrap();
     let again = iterate(&iteration, &mut [&mut simulated.robot()], Some(&store), &mut |_, _| {}).unwrap();
@@ -404,7 +396,6 @@ fn an_iteration_from_home() {
     assert!(!files[0].exists());
 }
 
-/// A way is rehearsed with its motion, and where there is none nothing is commanded.
 #[test]
 fn a_way_is_rehearsed() {
     let simulated = Simulated::default();
@@ -418,12 +409,12 @@ fn a_way_is_rehearsed() {
     };
     let mut settings = with_home([-1.5, 0.4]);
     settings.safety.rehearsal = Some(RehearsalSettings { robots: 0, postures: 10, ..RehearsalSettings::default() });
-    // The motion itself keeps joint 1 above -1.
+    // The motion keeps joint 1 above -1 rad.
     let mut narrow = envelope(1.0);
     narrow.lower = vec![Some(-1.0), None];
     settings.safety.envelope = Some(narrow);
     let reason = refused(settings);
-    assert!(reason.contains("the motion itself leaves the envelope") && reason.contains("-1.5"), "{reason}");
+    assert!(reason.contains("the motion leaves the envelope") && reason.contains("-1.5"), "{reason}");
     let mut settings = with_home([-0.5, 0.4]);
     if let Some(home) = &mut settings.safety.home {
         home.limits.joints.push(JointLimit {
@@ -436,7 +427,6 @@ fn a_way_is_rehearsed() {
     assert!(reason.contains("run 1 is not commanded: home itself breaks the limit of position of joint1"), "{reason}");
 }
 
-/// Whoever asks for a stop while ways are looked for is not asked again.
 #[test]
 fn a_search_for_ways_ends() {
     for at in 1..=5 {

@@ -1,4 +1,4 @@
-//! A run is identified as any log is: every estimator, chosen friction, delays, payloads.
+//! A run is identified like any log: every estimator, selected friction, delays, payloads.
 
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
@@ -27,7 +27,6 @@ fn arm(tip_kg: f64) -> Model {
     planar_2r(1.0, rod, tip)
 }
 
-/// Viscous and Coulomb friction of both joints with this step.
 fn friction(shape: CoulombShape) -> Vec<TorqueTerm> {
     let of_joint = |joint| [TorqueTerm::Viscous(Viscous { joint }), TorqueTerm::Coulomb(Coulomb { joint, shape })];
     (0..2).flat_map(of_joint).collect()
@@ -54,7 +53,7 @@ fn reference() -> Reference {
 
 fn robot(model: &Model, shape: CoulombShape, sensors: SensorSettings) -> SimulatedRobot {
     let plant = Plant::new(model, &friction(shape), &[0.8, 1.5, 0.5, 1.0]).unwrap();
-    // A semi-implicit Euler step moves the arm as if its torque came half a sample later: a lag of a millisecond here.
+    // A semi-implicit Euler step delays the effect of the torque by half a sample: a lag of a millisecond here.
     let integrator = Integrator::Rk4 { steps_per_sample: 4 };
     SimulatedRobot::new(plant, LoopSettings { integrator, sensors, ..LoopSettings::default() }).unwrap()
 }
@@ -88,7 +87,6 @@ fn settings(estimator: Estimator) -> RunIdentificationSettings {
     RunIdentificationSettings { estimation: EstimationSettings::of(estimator), ..RunIdentificationSettings::default() }
 }
 
-/// Viscous and Coulomb friction of both joints, and their error bars.
 fn friction_of(task: &IterationTask, estimate: &RunEstimate) -> Vec<[f64; 2]> {
     let symbols: Vec<String> = task.robot.layout().columns().iter().map(dynident_dynamics::Column::symbol).collect();
     let value = |symbol: &str| {
@@ -116,12 +114,11 @@ fn every_estimator_that_needs_no_more_than_a_log_identifies_a_run() {
         let name = estimator.name();
         let found = identify_run(&task, std::slice::from_ref(&record), &settings(estimator)).unwrap();
         for ([found, std], truth) in friction_of(&task, &found).into_iter().zip([0.8, 1.5, 0.5, 1.0]) {
-            // Five bars; or a twentieth of the Coulomb friction, of whose step the smoothing of the motion blurs a
-            // share.
+            // Five error bars, or a twentieth of the Coulomb friction, whose step the smoothing blurs.
             assert!((found - truth).abs() < (5.0 * std).max(0.05) && std < 0.3, "{name}: {found} +- {std} for {truth}");
         }
         assert!(found.possible.is_some(), "{name}: {:?}", found.impossible);
-        // The record has no delay but the half sample of a held torque, which is taken out.
+        // The only delay of the record is half a sample of held torque, which is compensated.
         let lags: Vec<f64> = found.torque_lags.iter().flatten().map(|lag| lag.lag_s).collect();
         assert!(lags.iter().all(|lag| lag.abs() < 1e-3), "{name}: {lags:?}");
     }
@@ -152,7 +149,7 @@ fn friction_is_chosen_once_and_kept_by_the_runs_after() {
     assert!(first.friction.iter().all(|joint| joint.terms.is_some()), "{:?}", first.friction);
     assert!(second.friction.is_empty());
     let chosen = iteration.robot(&outcome.runs).unwrap();
-    // A step fifty times narrower than the stated one is distinguished from it.
+    // A step that is fifty times narrower than the stated one is detected.
     let widths: Vec<CoulombShape> = chosen
         .terms()
         .iter()
@@ -160,11 +157,10 @@ fn friction_is_chosen_once_and_kept_by_the_runs_after() {
         .collect();
     assert!(widths.iter().all(|shape| *shape != stated), "{widths:?}");
     assert_eq!(second.values.len(), chosen.base().count());
-    // Stored runs read back: a killed iteration goes on with the chosen terms.
+    // Stored runs are read back: a killed iteration continues with the selected terms.
     let text = serde_json::to_string(&outcome.runs).unwrap();
     let read: Vec<dynident_iteration::RunRecord> = serde_json::from_str(&text).unwrap();
     assert_eq!(iteration.robot(&read).unwrap().terms(), chosen.terms());
-    // Friction of a joint that this robot does not have: another robot's runs, which is said and not passed over.
     let mut of_another = read;
     let friction = &mut of_another[0].estimate.as_mut().unwrap().friction;
     friction[0].terms = Some(vec![TorqueTerm::Viscous(Viscous { joint: 7 })]);
@@ -187,8 +183,8 @@ fn a_payload_that_is_known_is_taken_off() {
     let found = identify_run(&task, std::slice::from_ref(&record), &settings).unwrap();
     let truth = task.robot.nominal_base().unwrap();
     for (k, truth) in truth.iter().enumerate().filter(|(_, truth)| **truth != 0.0) {
-        // Bodies only: friction is no nominal value. Without the payload taken off, first moments would be 1 and 2 too
-        // large.
+        // Only bodies, because friction has no nominal value. If the payload were not subtracted, the first moments
+        // would be too large by 1 and 2.
         let (value, std) = (found.values[k], found.std[k]);
         assert!((value - truth).abs() < 5.0 * std && std < 0.2, "{k}: {value} +- {std} for {truth}");
     }

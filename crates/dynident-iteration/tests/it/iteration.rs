@@ -1,5 +1,3 @@
-//! The paper's planar arm through the whole iteration.
-
 #![allow(clippy::print_stdout, reason = "tests")]
 
 use dynident_dynamics::ParametricModel;
@@ -19,11 +17,10 @@ fn paper_arm() -> Model {
     planar_2r(1.0, tip, tip)
 }
 
-/// Base parameters of the arm in the order of the base columns: m r_x, m r_y and I_zz of each link with what is
-/// carried.
+/// Base parameters of the arm in the order of the base columns: m r_x, m r_y and I_zz of each link including its load.
 const TRUTH: [f64; 6] = [2.0, 0.0, 2.0, 1.0, 0.0, 1.0];
 
-/// The best single stroke inside the paper's limits (18): reading-notes 4.
+/// The best single stroke within the paper's limits (18): reading-notes 4.
 const STROKE: [f64; 2] = [1.991, 1.046];
 const DELTA_S: f64 = 5.74;
 
@@ -50,7 +47,6 @@ fn exact() -> LoopSettings {
     LoopSettings { integrator: Integrator::Rk4 { steps_per_sample: 1 }, ..LoopSettings::default() }
 }
 
-/// No prior: the description's inertials are unknown to the iteration.
 fn unknown_arm() -> ParametricModel {
     ParametricModel::new(paper_arm(), Vec::new()).unwrap().with_nominal(vec![0.0; 20]).unwrap()
 }
@@ -67,7 +63,7 @@ fn papers_gains() -> ControllerSettings {
     ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(vec![2.0, 4.0], vec![20.0, 4.0]))
 }
 
-/// Goes on to the last run whatever happens.
+/// Settings with which the iteration never converges before its last run.
 fn never_settled(mut settings: IterationSettings, max_runs: usize) -> IterationSettings {
     settings.settled.parameter_tolerance = 0.0;
     settings.settled.parameter_sigmas = 0.0;
@@ -84,7 +80,7 @@ fn one_leg(rate_hz: f64) -> IterationTask {
     }
 }
 
-/// The goal: 0.007 after three runs, 1e-6 after six, inside the limits (18).
+/// Accuracy: 0.007 after three runs, 1e-6 after six, within the limits (18).
 #[test]
 fn the_papers_arm_is_found_in_both_orders_of_work() {
     for scheme in [Scheme::AllJoints, Scheme::StepByStep] {
@@ -97,18 +93,18 @@ fn the_papers_arm_is_found_in_both_orders_of_work() {
         println!("{scheme:?} {errors:?}");
         assert!(outcome.runs.iter().all(|run| run.accepted));
         assert!(errors[2] < 0.007 && errors[5] < 1e-6, "{scheme:?}: {errors:?}");
-        // The physically consistent set in the controller has the same base parameters: the constraint is not active.
+        // The physically consistent model in the controller has the same base parameters, because the constraint is
+        // inactive.
         let possible = outcome.runs[5].estimate.as_ref().unwrap().possible.as_ref().unwrap();
         assert!(worst(&unknown_arm().base().values(possible)) < 1e-5);
-        // The better model follows better.
         let [first, last] = [0, 5].map(|run: usize| outcome.runs[run].tracking_error());
         assert!(last < 1e-3 * first, "{first} {last}");
     }
 }
 
-/// The paper's own way: joint 2 alone with joint 1 locked, then the other way round; the map of Eqs. 15, 16 (branch by
-/// the estimated lag); every estimate straight into the controller. The map is biased while the joint lags, and the
-/// iteration takes the bias away: 0.02 after three runs at 100 Hz, where the paper has 0.009 on a faster trajectory.
+/// The paper's scheme: joint 2 with joint 1 locked, then the reverse; the map of Eqs. 15, 16 (branch by the estimated
+/// lag); every estimate directly in the controller. The map is biased while the joint lags, and the iteration reduces
+/// the bias: 0.02 after three runs at 100 Hz, where the paper has 0.009 on a faster trajectory.
 #[test]
 fn the_literal_scheme_converges_from_the_papers_start() {
     let legs = [1, 0].map(|joint| {
@@ -125,16 +121,16 @@ fn the_literal_scheme_converges_from_the_papers_start() {
     let outcome = iterate(&iteration, &mut [&mut second, &mut first], None, &mut |_, _| {}).unwrap();
     let errors: Vec<f64> = outcome.runs.iter().map(|run| worst(&run.estimate.as_ref().unwrap().values)).collect();
     println!("{errors:?}");
-    // Run by run better until what is left is the controller's own lag at 100 Hz.
+    // Each run is better, down to the controller's own lag at 100 Hz.
     assert!(errors[0] > 0.5 && errors[1] < errors[0] && errors[2] < 0.03 && errors[5] < 0.003, "{errors:?}");
-    // The estimates go into the controller as they are.
+    // The controller uses the unconstrained estimates.
     assert!(matches!(outcome.runs[1].controller.model, Some(ModelParameters::Base(_))));
     // Tracking errors of joint 2 as in reading-notes 2 and Fig. 12: 0.62, 0.12, below 0.01.
     let tracking: Vec<f64> = outcome.runs.iter().map(|run| run.max_tracking_error_rad[1]).collect();
     assert!((tracking[0] - 0.62).abs() < 0.02 && tracking[1] < 0.15 && tracking[2] < 0.01, "{tracking:?}");
 }
 
-/// Joint 1 after joint 2: what is known is held, and its own parameters come out.
+/// Joint 1 after joint 2: known parameters are fixed, and the others are estimated.
 #[test]
 fn known_parameters_are_held() {
     for scheme in [Scheme::AllJoints, Scheme::StepByStep] {
@@ -156,7 +152,6 @@ fn known_parameters_are_held() {
     }
 }
 
-/// A controller that cannot hold the arm: the verdict says so, and no run is lost.
 #[test]
 fn an_arm_that_cannot_follow_is_refused() {
     let limits = RunLimits { tracking_error: Some(1e-4.into()), ..RunLimits::default() };
@@ -169,7 +164,6 @@ fn an_arm_that_cannot_follow_is_refused() {
     assert_eq!(stiffness, [1.0, 2.0, 4.0, 8.0]);
 }
 
-/// A record that holds nothing that counts determines nothing, and that is no convergence.
 #[test]
 fn rows_that_do_not_count_are_no_estimate() {
     let (reference, _) = reference(&[1, 0], 100.0);

@@ -1,4 +1,4 @@
-//! Controllers that act late: gains that bear it, and the rehearsal that shows it.
+//! Delayed controllers: gains that tolerate the delay, and the rehearsal that detects it.
 
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
@@ -14,10 +14,10 @@ use dynident_simulation::{LoopSettings, Plant, Reference, SensorSettings, closed
 use std::path::Path;
 
 const RATE_HZ: f64 = 500.0;
-/// 8 ms.
+/// 8 ms in samples.
 const LATE: usize = 4;
 
-/// A UR10 that folds its arm and stretches it again: the inertia about its first joints changes tenfold.
+/// A UR10 that folds and stretches its arm: the inertia about its first joints changes by a factor of ten.
 fn folding() -> (ParametricModel, Reference) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/ur10.urdf");
     let model = load_robot(&path).unwrap().model;
@@ -41,7 +41,7 @@ fn derived(delay_s: f64) -> DerivedControllers {
     derived_controllers(&robot, &[&reference], &gains_of(delay_s)).unwrap()
 }
 
-/// 4 Hz with drives that are as heavy as typical ones at least.
+/// 4 Hz with drives of at least typical inertia.
 fn gains_of(delay_s: f64) -> GainSettings {
     let (bandwidth_hz, uncertainty_percent, light_delay_s) = (4.0.into(), 30.0, delay_s);
     GainSettings {
@@ -59,8 +59,8 @@ fn joint_pd(derived: &DerivedControllers) -> JointPdSettings {
     pd.clone()
 }
 
-/// Largest distance from the path of a robot with so many times the masses, its gravity compensated so that nothing but
-/// the delay can throw it; infinite where the run ends early.
+/// Largest tracking error of a robot with scaled masses and compensated gravity, so that only the delay causes errors;
+/// infinite if the run ends early.
 fn largest_error(gains: &JointPdSettings, mass: f64) -> f64 {
     let (robot, reference) = folding();
     let bodies = robot.model().inertial_count();
@@ -76,8 +76,9 @@ fn largest_error(gains: &JointPdSettings, mass: f64) -> f64 {
     run.max_error.iter().copied().fold(if run.status.is_done() { 0.0 } else { f64::INFINITY }, f64::max)
 }
 
-/// Joint PD at 4 Hz swings with 8 ms of delay, for a folded arm is much lighter than its gains are for. The derived
-/// gains bear it, however light the robot is within the uncertainty; without a delay they are what was asked for.
+/// Joint PD at 4 Hz oscillates with 8 ms of delay, because a folded arm has a much lower inertia than its gains assume.
+/// The derived gains tolerate it for all masses within the uncertainty; without a delay they have the requested
+/// bandwidth.
 #[test]
 fn derived_gains_hold_a_late_controller() {
     let names = folding().0.joint_names();
@@ -85,7 +86,7 @@ fn derived_gains_hold_a_late_controller() {
     assert!(lowered_bandwidths("none", &fast.model_free_hz, &names, &4.0.into()).is_empty());
     let lowered = lowered_bandwidths("none", &slow.model_free_hz, &names, &4.0.into());
     assert!(lowered.iter().any(|one| one.joint == names[0] && one.hz < 4.0 && one.hz > 0.5), "{lowered:?}");
-    // A distance of 0.3 rad is what stops a robot by default.
+    // An error of 0.3 rad stops a robot by default.
     assert!(largest_error(&joint_pd(&fast), 0.7) > 1.0);
     for mass in [0.7, 1.0, 1.3] {
         let error = largest_error(&joint_pd(&slow), mass);
@@ -93,7 +94,7 @@ fn derived_gains_hold_a_late_controller() {
     }
 }
 
-/// The first run of `gains` with gravity compensated, rehearsed with that delay (its default where none).
+/// The first run of `gains` with compensated gravity, rehearsed with that delay (default if `None`).
 fn rehearsed(gains: &JointPdSettings, delay_s: Option<f64>) -> IterationOutcome {
     let (robot, reference) = folding();
     let stated = EnvelopeSettings { tracking_error: Some(0.5.into()), ..EnvelopeSettings::default() };
@@ -111,14 +112,14 @@ fn rehearsed(gains: &JointPdSettings, delay_s: Option<f64>) -> IterationOutcome 
     iterate(&iteration, &mut [&mut simulated], None, &mut |_, _| {}).unwrap()
 }
 
-/// Gains that a late controller cannot have are refused before anything moves; the words name the delay and its key.
-/// Where the study states that there is none the same gains are commanded, and the derived ones always.
+/// Gains that are unstable with the delay are refused before anything moves; the message contains the delay and its
+/// key. If the study states no delay, the same gains are commanded; derived gains always are.
 #[test]
 fn a_late_controller_is_rehearsed() {
     let fast = joint_pd(&derived(0.0));
     let refused = rehearsed(&fast, None);
     let IterationStatus::Refused { reason } = &refused.status else { panic!("{}", refused.status) };
-    assert!(refused.runs.is_empty() && reason.contains("ms late (rehearsal.delay_s)"), "{reason}");
+    assert!(refused.runs.is_empty() && reason.contains("ms of controller delay (rehearsal.delay_s)"), "{reason}");
     let own_s = RehearsalSettings::default().delay_s(folding().0.model());
     for (gains, delay_s) in [(fast, Some(0.0)), (joint_pd(&derived(own_s)), None)] {
         let commanded = rehearsed(&gains, delay_s);
@@ -126,9 +127,9 @@ fn a_late_controller_is_rehearsed() {
     }
 }
 
-/// Drives of which the description says nothing: the first model has a typical inertia of theirs and no friction, which
-/// would be pushed against where it is not. With 8 ms of delay computed torque stays faster than joint PD, for its
-/// gains follow the posture.
+/// Without described drives, the first model has typical drive inertia and no friction, which would be overcompensated
+/// if it does not exist. With 8 ms of delay computed torque has a higher bandwidth than joint PD, because its gains
+/// depend on the posture.
 #[test]
 fn the_first_model_has_typical_drives() {
     let (bare, reference) = folding();
@@ -146,6 +147,6 @@ fn the_first_model_has_typical_drives() {
         assert!((pair[0] / typical - 1.0).abs() < 1e-12 && pair[1] == 0.0, "{joint}: {pair:?}");
     }
     assert!(derived.first_hz.iter().zip(&derived.model_free_hz).all(|(first, without)| first > without));
-    // Stated drives are believed.
+    // Stated drive parameters are used.
     assert!(derived_controllers(&bare, &[&reference], &gains).unwrap().first_model.is_none());
 }

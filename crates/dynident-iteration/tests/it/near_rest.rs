@@ -1,4 +1,4 @@
-//! Joints that stick and break loose: what their friction does near rest is in no law of the smoothed velocity.
+//! Joints that stick and break loose: no law of the smoothed velocity describes their friction near rest.
 
 use crate::simulated_arm::{Simulated, arm, friction, reference, settings};
 use dynident_dynamics::{Column, ParametricModel};
@@ -12,7 +12,7 @@ use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, R
 
 const DRY: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
 
-/// A run under gains that friction holds back: 3 and 2 Nm at rest that fall to 1.5 and 1 once a joint moves.
+/// A run with low gains and stiction: 3 and 2 Nm at rest, 1.5 and 1 Nm in motion.
 fn record(seed: u64) -> Record {
     let shape = DRY;
     let mut terms = Vec::new();
@@ -35,7 +35,6 @@ fn record(seed: u64) -> Record {
     robot.run(&RunRequest::new(1, &reference, &pd)).unwrap().record
 }
 
-/// What such a run says, of a robot that is described with viscous and dry friction.
 fn identified(record: &Record, set_aside_near_rest: bool) -> (ParametricModel, RunEstimate) {
     let robot = ParametricModel::new(arm(1.0, 1.0), friction(DRY)).unwrap();
     let task = IterationTask::new(robot.clone(), reference()).unwrap();
@@ -58,16 +57,16 @@ fn bars_off(set_aside_near_rest: bool) -> f64 {
     (sum / count).sqrt()
 }
 
-/// With the rows near rest the bars are a fraction of the errors; without them they hold. Of 24 numbers the root mean
-/// square is 1 ± 0.15, and Student's distribution of some ten segments makes it 1.15: below 1.5.
+/// With the rows near rest the errors exceed the error bars; without them the error bars are valid. The root mean
+/// square of 24 numbers is 1 ± 0.15, and Student's distribution with about ten segments makes it 1.15, so it is below
+/// 1.5.
 #[test]
 fn bars_hold_where_joints_stick_and_break_loose() {
     let (with, without) = (bars_off(false), bars_off(true));
     assert!(with > 2.0 && without < 1.5, "{with} with rows near rest, {without} without");
 }
 
-/// What was set aside is said, at most half of a run, with what friction leaves there: no more than the friction that
-/// holds the joint.
+/// The excluded share is reported (at most half of a run), with the residual there, which is at most the dry friction.
 #[test]
 fn what_is_set_aside_near_rest_is_said() {
     let (_, found) = identified(&record(1), true);

@@ -1,5 +1,5 @@
-//! Loops that are too fast: derived gains that bear light drives, runs that are stopped where a joint oscillates, and
-//! torque that chatters in a log.
+//! Loops that are too fast: derived gains that tolerate light drives, runs that are stopped because a joint oscillates,
+//! and torque chatter in a log.
 
 use crate::simulated_arm::{Simulated, settings, task};
 use dynident_dynamics::ParametricModel;
@@ -16,12 +16,12 @@ use dynident_simulation::{Integrator, Plant, Reference, SimulationError};
 use std::collections::VecDeque;
 
 const RATE_HZ: f64 = 500.0;
-/// Steps of the simulation in a sample, and of the delay: 5 ms.
+/// Simulation steps per sample, and in the delay of 5 ms.
 const STEPS: usize = 4;
 const LATE_STEPS: usize = 10;
 const BANDWIDTH_HZ: f64 = 4.0;
 
-/// An upper arm with a gripper. The description states 30 Nm, ten times what the light joint needs.
+/// An upper arm with a gripper. The robot description states 30 Nm, ten times as much as the light joint needs.
 fn arm() -> ParametricModel {
     let joint = |name: &str, parent: &str, child: &str, x: f64, effort: f64| {
         format!(
@@ -47,7 +47,6 @@ fn arm() -> ParametricModel {
     ParametricModel::new(read_urdf(&text).unwrap().model, terms.collect()).unwrap()
 }
 
-/// Both joints there and back in 4 s, twice.
 fn reference() -> Reference {
     let samples = 4001;
     let mut motion = Motion::default();
@@ -63,7 +62,7 @@ fn reference() -> Reference {
 }
 
 fn derived(lightest_drive: f64) -> DerivedControllers {
-    // The robot waits for every torque: that it has a delay all the same nobody has stated.
+    // No delay is stated, because the robot waits for every torque.
     let gains = GainSettings {
         bandwidth_hz: BANDWIDTH_HZ.into(),
         uncertainty_percent: 30.0,
@@ -75,7 +74,7 @@ fn derived(lightest_drive: f64) -> DerivedControllers {
     derived_controllers(&arm(), &[&reference()], &gains).unwrap()
 }
 
-/// The first run of these gains on the arm, whose drives have 0.2 and 0.01 kg m² and act 5 ms late; and how it ended.
+/// The first run of these gains on the arm, whose drives have 0.2 and 0.01 kg m² and a delay of 5 ms; and how it ended.
 fn first_run(gains: &DerivedControllers, is_watched: bool) -> (RobotRun, String) {
     let (robot, reference) = (arm(), reference());
     let model = robot.model();
@@ -112,8 +111,8 @@ fn first_run(gains: &DerivedControllers, is_watched: bool) -> (RobotRun, String)
     (run, ending)
 }
 
-/// A gripper ten times as light as a typical drive, under 4 Hz gains with 5 ms of delay: the run is stopped for an
-/// oscillation, and the verdict names joint, frequency and the key to change, also if a limit of velocity ends the run
+/// A gripper with a tenth of the typical drive inertia, with 4 Hz gains and 5 ms of delay: the run is stopped for an
+/// oscillation, and the verdict names joint, frequency and the key to change, also if a velocity limit ends the run
 /// first.
 #[test]
 fn a_light_joint_that_oscillates_is_named() {
@@ -130,8 +129,8 @@ fn a_light_joint_that_oscillates_is_named() {
     assert!(matches!(watched.status, RobotStatus::Oscillated { .. } | RobotStatus::LeftEnvelope { .. }), "{words}");
 }
 
-/// The same arm with the default: the gains are stable with a tenth of the typical inertia. The heavy joint keeps its
-/// bandwidth.
+/// The same arm with the default settings: the gains are stable with a tenth of the typical inertia. The heavy joint
+/// keeps its bandwidth.
 #[test]
 fn derived_gains_bear_a_light_joint() {
     let gains = derived(0.1);
@@ -162,14 +161,14 @@ impl Robot for Chattering {
         let of = run.record.of(1);
         let samples = run.record.samples;
         for (k, tau) in run.record.tau[of].iter_mut().enumerate().skip(samples / 2).take(samples / 5) {
-            // 50 Hz at 500.
+            // 50 Hz at 500 Hz.
             *tau += if k % 10 < 5 { 16.0 } else { -16.0 };
         }
         Ok(run)
     }
 }
 
-/// Far above the cut-off of the fit nothing of it is left, and the iteration converges as before; but it is reported.
+/// The chatter is far above the cut-off of the fit, so the iteration converges as before; but the chatter is reported.
 #[test]
 fn torque_that_chatters_is_reported() {
     let mut robot = Chattering(Simulated::default().robot());
@@ -183,7 +182,7 @@ fn torque_that_chatters_is_reported() {
         assert!((found.frequency_hz - 50.0).abs() < 1.0 && (found.share - 0.2).abs() < 0.02, "{found:?}");
         assert!((found.amplitude - 16.0).abs() < 3.0, "{found:?}");
     }
-    // It is not the noise of the log, 0.055 Nm.
+    // It is not included in the noise of the log, 0.055 Nm.
     let first = &outcome.runs[0].evidence.as_ref().unwrap().joints[1];
     assert!(first.torque_noise < 0.083, "{first:?}");
 }

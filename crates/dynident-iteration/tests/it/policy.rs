@@ -1,5 +1,3 @@
-//! What the next run is, from the records alone.
-
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
 use dynident_identification::examination::{LagChoice, TorqueLag};
@@ -20,7 +18,6 @@ fn iteration() -> Iteration {
     Iteration::new(task, IterationSettings::default()).unwrap()
 }
 
-/// An estimate of six parameters, all alike.
 fn estimate(value: f64, std: f64) -> RunEstimate {
     RunEstimate {
         values: vec![value; 6],
@@ -40,7 +37,7 @@ fn estimate(value: f64, std: f64) -> RunEstimate {
     }
 }
 
-/// A run of a controller with the model `model` (without one if none), its tracking error and what it determined.
+/// A run of a controller with the model `model` (or without a model), its tracking error and its estimate.
 fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimate: RunEstimate) -> RunRecord {
     let model = model.map(|value| ModelParameters::All(vec![value; 20]));
     RunRecord {
@@ -63,7 +60,6 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
     }
 }
 
-/// A log that shows nothing against its run: what the model before predicted, torque that is all explained.
 fn evidence() -> RunEvidence {
     let joint = JointEvidence {
         torque_rms: 10.0,
@@ -88,13 +84,13 @@ fn model(plan: &RunPlan) -> Option<f64> {
     plan.model.as_ref().map(|model| model.values()[0])
 }
 
-/// Bad tracking speaks against the model that was loaded, not against what the run says of the parameters.
+/// Bad tracking is evidence against the loaded model, not against the estimate of the run.
 #[test]
 fn a_rejected_run_with_narrower_bars_gives_the_next_model() {
     let first = run(1, None, 0.5, true, estimate(1.0, 1.0));
     let plan = planned(&[first.clone(), run(2, Some(1.0), 2.0, false, estimate(3.0, 0.1))]);
     assert_eq!((model(&plan), plan.damping), (Some(3.0), 1.0));
-    // Bars as wide as before: nothing new; back to the controller without a model, stiffer.
+    // Error bars as wide as before: back to the controller without a model, with higher gains.
     let plan = planned(&[first, run(2, Some(1.0), 2.0, false, estimate(3.0, 1.0))]);
     assert_eq!((model(&plan), plan.stiffness), (None, 2.0));
 }
@@ -104,14 +100,13 @@ fn a_model_that_was_tried_and_rejected_is_not_tried_again() {
     let records = [
         run(1, None, 0.5, true, estimate(1.0, 1.0)),
         run(2, Some(1.0), 0.2, true, estimate(2.0, 1.0)),
-        // The step from 1 to 2 was too much, and this run determines less than the one before.
+        // The step from 1 to 2 was too large, and this run determines less than the one before.
         run(3, Some(2.0), 2.0, false, estimate(9.0, 5.0)),
     ];
     let plan = planned(&records);
     assert_eq!((model(&plan), plan.damping), (Some(1.5), 0.5));
 }
 
-/// A controller without a model that hardly moves the arm does not wipe out what was known.
 #[test]
 fn a_poor_run_does_not_take_the_place_of_a_good_one() {
     let precise = run(2, Some(1.0), 2.0, false, estimate(3.0, 0.1));
@@ -119,12 +114,12 @@ fn a_poor_run_does_not_take_the_place_of_a_good_one() {
     let poor = run(3, None, 0.4, true, estimate(7.0, 1.0));
     let first = run(1, None, 0.5, true, estimate(1.0, 1.0));
     assert_eq!(model(&planned(&[first.clone(), precise.clone(), poor.clone()])), Some(3.0));
-    // Unless the precise one was tried, and failed.
+    // Unless the precise estimate was tried and failed.
     let poor = RunRecord { run: 4, ..poor };
     assert_eq!(model(&planned(&[first, precise, failed, poor])), Some(7.0));
 }
 
-/// Error bars as wide as the parameters: that nothing has moved by more than them says nothing.
+/// With error bars as wide as the parameters, constant parameters are not converged.
 #[test]
 fn what_is_hardly_known_has_not_settled() {
     let records = |std: f64| {
@@ -134,7 +129,6 @@ fn what_is_hardly_known_has_not_settled() {
     assert_eq!(iteration().next(&records(0.01)).unwrap(), Next::Finished(IterationStatus::Converged));
 }
 
-/// Two runs that meet everything.
 fn good_pair() -> [RunRecord; 2] {
     [1, 2].map(|number| run(number, Some(1.0), 1e-4, true, estimate(1.0, 0.01)))
 }
@@ -143,7 +137,7 @@ fn shortfalls(records: &[RunRecord]) -> Vec<Shortfall> {
     iteration().shortfalls(records).unwrap()
 }
 
-/// Tracking that no longer falls is no success by itself: the iteration ends, and says what is not met.
+/// Tracking that no longer improves is not convergence: the iteration ends and reports the unmet condition.
 #[test]
 fn standing_still_is_not_success() {
     let still = |number| run(number, Some(1.0), 1.17, true, estimate(1.0, 0.01));
@@ -157,7 +151,7 @@ fn standing_still_is_not_success() {
     assert_eq!((*error_rad, *floor_rad), (1.17, None));
 }
 
-/// At the floor that noise, friction and delay explain tracking cannot get better: up to twice it counts.
+/// Tracking cannot be better than the floor from noise, friction and delay: up to twice the floor is accepted.
 #[test]
 fn tracking_at_its_floor_is_met() {
     for (error, met) in [(1.9e-3, true), (2.1e-3, false)] {
@@ -170,7 +164,6 @@ fn tracking_at_its_floor_is_met() {
     }
 }
 
-/// Each condition alone keeps the iteration from converging, and is named with joint and numbers.
 #[test]
 fn every_condition_counts_by_itself() {
     assert!(shortfalls(&good_pair()).is_empty());
@@ -207,13 +200,12 @@ fn every_condition_counts_by_itself() {
     assert!(message.contains("earlier version"), "{message}");
     let message = with(&|record| (record.accepted, record.reason) = (false, Some("it fell".to_owned())));
     assert!(message.contains("it fell"), "{message}");
-    // A flat top without a stated limit, of a joint that follows all the same, is a matter of the motion.
+    // Constant peak torque without a stated limit, in a joint that follows, is caused by the motion.
     let mut records = good_pair();
     joint(&mut records[1], &|shown| shown.clipping = Some(clipped(false)));
     assert!(shortfalls(&records).is_empty());
 }
 
-/// What all good runs say together is what counts, where they are pooled.
 #[test]
 fn the_next_model_is_that_of_all_good_runs() {
     let mut last = run(2, Some(1.0), 0.1, true, estimate(3.0, 0.1));

@@ -1,11 +1,9 @@
-//! Knowing more with every run: all good runs in one fit.
-
 use crate::simulated_arm::{Simulated, described, iterated, settings};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::{IterationSettings, RunEstimate};
 use dynident_simulation::SensorSettings;
 
-/// Four runs whatever they show.
+/// Settings for four runs without convergence.
 fn four_runs() -> IterationSettings {
     let mut settings = settings();
     settings.settled.parameter_sigmas = 0.0;
@@ -14,7 +12,7 @@ fn four_runs() -> IterationSettings {
     settings
 }
 
-/// Geometric mean of the bars of what is determined.
+/// Geometric mean of the error bars of the determined parameters.
 fn bars(estimate: &RunEstimate) -> f64 {
     let own = estimate.std.iter().filter(|std| **std > 0.0);
     (own.clone().map(|std| std.ln()).sum::<f64>() / own.count() as f64).exp()
@@ -25,9 +23,9 @@ fn errors_in_bars(estimate: &RunEstimate, truth: &[f64]) -> Vec<f64> {
     pairs.filter(|(_, std)| **std > 0.0).map(|((value, truth), std)| (value - truth) / std).collect()
 }
 
-/// Bars after k runs are at most 1.1/√k of the first's, and they hold: over seeds the errors are 0.8 to 1.2 of them,
-/// and 93 to 97 % lie inside 95 % intervals. Of few seeds both have the leeway of their number: errors of one seed are
-/// correlated, so that a seed counts as four of its own.
+/// Error bars after k runs are at most 1.1/√k of those of the first, and they are valid: over seeds the errors are 0.8
+/// to 1.2 of them, and 93 to 97 % are inside 95 % intervals. The tolerances for a few seeds are wider; errors of one
+/// seed are correlated, so a seed counts like four independent numbers.
 #[test]
 fn bars_narrow_with_every_run_and_hold() {
     let described: ParametricModel = described();
@@ -45,20 +43,19 @@ fn bars_narrow_with_every_run_and_hold() {
         }
         let errors = errors_in_bars(outcome.runs[3].pooled.as_ref().unwrap(), &simulated.truth(&described));
         square += errors.iter().map(|error| error * error).sum::<f64>();
-        // Half a 95 % interval by Student's law; segments leave some twenty degrees of freedom.
+        // Half a 95 % interval of Student's distribution; segments have about twenty degrees of freedom.
         inside += errors.iter().filter(|error| error.abs() <= 2.05).count() as f64;
         count += errors.len() as f64;
     }
     let (rms, inside) = ((square / count).sqrt(), 100.0 * inside / count);
     println!("error over bar {rms:.3}, inside {inside:.1} % of {count}");
-    // Two deviations of a root mean square, and of a share of 5 %, of four numbers a seed.
+    // Two standard deviations of a root mean square, and of a share of 5 %, with four numbers per seed.
     let numbers = 4.0 * seeds as f64;
     let leeway = 2.0 / (2.0 * numbers).sqrt();
     assert!(rms >= 0.8 - leeway && rms <= 1.2 + leeway, "{rms}");
     assert!((inside - 95.0).abs() <= 2.0 + 2.0 * 100.0 * (0.05 * 0.95 / numbers).sqrt(), "{inside}");
 }
 
-/// Without pooling every run stands alone, as the paper has it.
 #[test]
 fn runs_may_stand_alone() {
     let mut settings = four_runs();

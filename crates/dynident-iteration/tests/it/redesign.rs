@@ -1,4 +1,4 @@
-//! The next motion designed with what is known: bars, forecasts, limits, and the same again after a stop.
+//! Redesign of the next motion: error bars, forecasts, limits, and reproducibility after a stop.
 
 use crate::simulated_arm::{Simulated, described, reference, settings};
 use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 const DURATION_S: f64 = 20.0;
 
-/// The largest torque of each joint, Nm: ample, and as little as holds the arm and moves it.
+/// Torque limits of the joints, Nm: ample, and barely enough to hold and move the arm.
 const AMPLE_NM: [f64; 2] = [60.0, 25.0];
 const SCARCE_NM: [f64; 2] = [42.0, 16.0];
 
@@ -39,7 +39,7 @@ fn limits(torque_nm: [f64; 2]) -> Limits {
     Limits { joints: names.iter().zip(torque_nm).map(of_joint).collect(), ..Limits::default() }
 }
 
-/// Few evaluations, for what does not ask how good a motion is.
+/// Few evaluations, for tests that do not depend on the quality of a motion.
 fn search() -> DesignSettings {
     DesignSettings {
         starts: Some(2),
@@ -67,7 +67,6 @@ fn redesigned(settings: IterationSettings) -> Iteration {
     repeated(settings).with_planner(Arc::new(redesign(20.0, AMPLE_NM)))
 }
 
-/// So many runs whatever they show.
 fn runs(count: usize) -> IterationSettings {
     let mut settings = settings();
     settings.settled.parameter_sigmas = 0.0;
@@ -90,13 +89,14 @@ fn covariance(estimate: &RunEstimate) -> DMatrix<f64> {
     DMatrix::from_fn(count, count, |row, column| estimate.covariance[row][column])
 }
 
-/// States that no design has seen, by rules of their own, at which the torque of all joints is predicted.
+/// Validation states that no design has used.
 fn elsewhere() -> Motion {
     let mut states = Motion::default();
     states.reset(2, 400);
     for joint in 0..2 {
         for sample in 0..400 {
-            // Additive recurrences fill the range evenly (Roberts's constants), all three of a joint independently.
+            // Additive recurrences fill the range evenly (Roberts's constants), independently for the three quantities
+            // of a joint.
             let share = |k: f64| (k * (sample as f64 + 1.0)).fract() * 2.0 - 1.0;
             let (place, shift) = (joint * 400 + sample, joint as f64 * 0.37);
             states.q[place] = 2.0 * share(0.856_674_883_8 + shift);
@@ -107,8 +107,8 @@ fn elsewhere() -> Motion {
     states
 }
 
-/// The root mean square of the ten largest axes of the ellipsoid, measured by the torque that they leave uncertain
-/// elsewhere: `√ Σ λ(C M)`, M summed from single regressors.
+/// Root mean square of the ten largest axes of the ellipsoid, scaled by the torque uncertainty at the validation
+/// states: `√ Σ λ(C M)`, M summed from single regressors.
 fn worst_bars(estimate: &RunEstimate) -> f64 {
     let (robot, states) = (described(), elsewhere());
     let count = robot.layout().columns().len();
@@ -139,11 +139,11 @@ fn worst_bars(estimate: &RunEstimate) -> f64 {
     values.iter().take(10).sum::<f64>().sqrt()
 }
 
-/// Pooled runs of one motion narrow the worst bars by the root of their number, within a tenth; three of which two are
-/// redesigned leave 30 % less than that, and less than the repeated ones do. Bars from twenty segments are good to 16 %
-/// each, those of some directions of some seeds together to a tenth: so much the mean over seeds may differ. What was
-/// forecast comes within 15 points of what is reached each time (two such bars, three directions that matter), and
-/// within 7 on average.
+/// Pooled runs of one motion reduce the widest error bars by the root of their number, within a tenth; three runs of
+/// which two are redesigned leave 30 % less than that, and less than the repeated ones. Error bars from twenty segments
+/// are accurate to 16 % each, those of some directions and seeds together to a tenth, so the mean over seeds may differ
+/// by this. The forecast is within 15 points of the result in each run (two such error bars, three relevant
+/// directions), and within 7 on average.
 #[test]
 fn redesigned_runs_tell_more_and_as_much_as_was_forecast() {
     let seeds = dynident_testing::count(2, 20);
@@ -176,9 +176,9 @@ fn redesigned_runs_tell_more_and_as_much_as_was_forecast() {
     assert!(off.iter().all(|off| off.abs() <= 15.0) && mean.abs() <= 7.0, "{off:?}");
 }
 
-/// Along a redesigned motion no model on the surface of the 95 % ellipsoid, where they are farthest from the estimate,
-/// needs more torque than a limit; torques by the controllers' recursion, sample by sample. Limits of position,
-/// velocity and acceleration are kept at every sample, and the motion begins and ends where the first began.
+/// Along a redesigned motion no model on the surface of the 95 % ellipsoid needs more torque than a limit; torques are
+/// computed by the controllers' recursion, sample by sample. Limits of position, velocity and acceleration are kept at
+/// every sample, and the motion begins and ends at the begin of the first.
 #[test]
 fn every_model_in_the_uncertainty_keeps_the_limits() {
     let iteration = repeated(runs(2)).with_planner(Arc::new(redesign(20.0, SCARCE_NM)));
@@ -193,7 +193,7 @@ fn every_model_in_the_uncertainty_keeps_the_limits() {
         let start = reference().motion().q[reference().motion().of(joint).start];
         assert!((motion.q[own.start] - start).abs() < 1e-12 && (motion.q[own.end - 1] - start).abs() < 1e-9);
     }
-    // Of ten degrees of freedom, from the table.
+    // χ² of ten degrees of freedom, from the table.
     let radius = 18.307_f64.sqrt();
     assert_eq!(known.values.len(), 10);
     let eigen = SymmetricEigen::new(covariance(known));
@@ -216,14 +216,13 @@ fn every_model_in_the_uncertainty_keeps_the_limits() {
     for joint in 0..2 {
         assert!(largest[joint] <= forecast[joint] * (1.0 + 1e-9), "{largest:?} {forecast:?}");
         assert!(forecast[joint] <= SCARCE_NM[joint], "{forecast:?}");
-        // And no more than the uncertainty is kept free.
+        // The margin is not larger than the uncertainty.
         assert!(largest[joint] >= 0.9 * forecast[joint], "{largest:?} {forecast:?}");
     }
-    // The limits are what shapes the motion: the estimate alone comes near one of them.
+    // The limits shape the motion: the estimate alone nearly reaches one of them.
     assert!((0..2).any(|joint| forecast[joint] >= 0.8 * SCARCE_NM[joint]), "{forecast:?}");
 }
 
-/// Plans nothing: what it is asked for was planned before.
 #[derive(Debug)]
 struct Never;
 
@@ -233,7 +232,6 @@ impl MotionPlanner for Never {
     }
 }
 
-/// Allows the first runs only.
 struct Until(usize);
 
 impl Supervisor for Until {
@@ -242,8 +240,8 @@ impl Supervisor for Until {
     }
 }
 
-/// Whoever stops after a motion was planned goes on with that motion, and all comes out bit for bit as without a stop:
-/// from the motions in the runs' folders, without asking the planner again.
+/// An iteration that is stopped after planning continues with the stored motion, and the result is bit-identical to one
+/// without a stop; the motions are read from the runs' folders without calling the planner.
 #[test]
 fn a_resumed_iteration_has_the_same_motions() {
     let whole = run(&redesigned(runs(3)), &mut robot(1), None);
@@ -259,18 +257,15 @@ fn a_resumed_iteration_has_the_same_motions() {
         assert!(planned.join("motion.csv").is_file() && planned.join("plan.json").is_file());
     }
     let resumed = run(&repeated(runs(3)).with_planner(Arc::new(Never)), &mut robot(1), Some(&open()));
-    // Not printed: it is long.
     assert!(resumed.runs[1].motion == whole.runs[1].motion, "the motion of run 2");
     assert!(resumed == whole, "some number of a record");
     assert!(!folder.path().join("runs/planned_3").exists());
-    // All that the folder says, motions too.
     let kept: Vec<RunRecord> = open().records().unwrap();
     assert!(kept == whole.runs, "what the folder holds");
     assert!(kept[0].motion.is_none() && kept[1].motion != kept[2].motion);
-    // A motion that is gone is missed by its name, and runs that are begun anew leave nothing behind.
     std::fs::remove_file(folder.path().join("runs/run_2/motion.csv")).unwrap();
     let error = open_error(folder.path());
-    assert!(error.contains("run_2/motion.csv") && error.contains("put it back"), "{error}");
+    assert!(error.contains("run_2/motion.csv") && error.contains("put the file back"), "{error}");
     IterationStore::open(folder.path(), "test", false).unwrap();
     assert_eq!(std::fs::read_dir(folder.path().join("runs")).unwrap().count(), 0);
 }
@@ -279,8 +274,8 @@ fn open_error(folder: &std::path::Path) -> String {
     IterationStore::open(folder, "test", true).unwrap_err().to_string().replace('\\', "/")
 }
 
-/// An iteration that has converged goes on while the next motion is worth a run, and says what it declined; where
-/// nothing is worth one it ends as it would with one motion, with the same runs up to there.
+/// A converged iteration continues while the next motion is worth a run, and reports the motion that it declined; if no
+/// motion is worth a run, it ends like an iteration with one motion, with the same runs.
 #[test]
 fn goes_on_while_a_motion_is_worth_a_run() {
     let plain = run(&repeated(settings()), &mut robot(1), None);
@@ -302,7 +297,6 @@ fn goes_on_while_a_motion_is_worth_a_run() {
     }
 }
 
-/// What cannot be redesigned is said; limits that leave no motion make a repeated one, with the reason.
 #[test]
 fn what_cannot_be_redesigned() {
     let windows = vec![vec![[0.0, 20.0]]; 2];
@@ -310,10 +304,10 @@ fn what_cannot_be_redesigned() {
     task.legs = vec![Leg::windowed(reference(), windows).unwrap()];
     let iteration = Iteration::new(task, runs(2)).unwrap().with_planner(Arc::new(redesign(20.0, AMPLE_NM)));
     let error = iterate(&iteration, &mut [&mut robot(1)], None, &mut |_, _| {}).unwrap_err().to_string();
-    assert!(error.contains("run 2") && error.contains("one trajectory"), "{error}");
+    assert!(error.contains("run 2") && error.contains("a single leg"), "{error}");
 
     let mut narrow = limits(AMPLE_NM);
-    // Less than the uncertainty of the model alone may add.
+    // Less torque than the uncertainty of the model alone needs.
     narrow.joints[1].torque = Some(1e-3);
     let leg = Leg::whole(reference()).unwrap();
     let planner = Redesign::new(family(), narrow, search(), RedesignSettings::default(), &leg).unwrap();
@@ -321,9 +315,9 @@ fn what_cannot_be_redesigned() {
     let record = &outcome.runs[1];
     let forecast = record.forecast.as_ref().unwrap();
     assert!(!forecast.redesigned && record.motion.is_none());
-    assert!(forecast.reason.as_ref().unwrap().contains("limits leave no motion"), "{:?}", forecast.reason);
+    assert!(forecast.reason.as_ref().unwrap().contains("no motion within the limits"), "{:?}", forecast.reason);
     assert_eq!(forecast.gain_percent, forecast.repeat_gain_percent);
-    // Once more is 1 - 1/√2.
+    // Repeating the motion gives 1 - 1/√2.
     assert!((forecast.gain_percent - 100.0 * (1.0 - 0.5_f64.sqrt())).abs() < 1e-6, "{}", forecast.gain_percent);
     for percent in [0.0, -1.0, 101.0, f64::NAN] {
         let settings = RedesignSettings { least_gain_percent: percent };

@@ -1,4 +1,4 @@
-//! Before a motion is commanded: gains that come from a model, rehearsal, slow runs first.
+//! Before a motion is commanded: gains from a model, rehearsal, slow runs first.
 
 use super::robots::{joints, pd, reference};
 use dynident_dynamics::{ParametricModel, Workspace, mass_matrix};
@@ -20,7 +20,6 @@ fn robot() -> ParametricModel {
     ParametricModel::new(model(), Vec::new()).unwrap()
 }
 
-/// The simulator, which notes at which share of its speed each motion was commanded, and how long that took.
 #[derive(Debug)]
 struct Noted {
     inner: SimulatedRobot,
@@ -68,18 +67,18 @@ fn refused(robot: ParametricModel, settings: IterationSettings) -> String {
     reason
 }
 
-/// Gains that let the arm fall are seen before it does: nothing is commanded, and the words say what to do.
+/// Gains that let the arm fall are detected in the rehearsal: nothing is commanded, and the message contains the fix.
 #[test]
 fn an_arm_that_would_fall_is_not_commanded() {
     let soft = ControllerSettings::JointPd(JointPdSettings { kp: 1.0.into(), kd: 0.5.into() });
     let settings = IterationSettings { model_free: soft, safety: safety(envelope()), ..IterationSettings::default() };
     let reason = refused(robot(), settings);
-    assert!(reason.contains("is not held") && reason.contains("tracking error"), "{reason}");
+    assert!(reason.contains("does not follow the motion") && reason.contains("tracking error"), "{reason}");
     assert!(reason.contains("bandwidth_hz"), "{reason}");
 }
 
-/// A motion that goes right up to a stop is passed by the robot that follows it: the words say that the motion needs
-/// room, for no gains hold a robot on a line that it may not cross.
+/// A motion that reaches an end stop leaves no margin for the tracking error: the message requests a margin instead of
+/// other gains.
 #[test]
 fn a_motion_up_to_the_stops_is_told_to_keep_off_them() {
     let motion = reference();
@@ -88,11 +87,10 @@ fn a_motion_up_to_the_stops_is_told_to_keep_off_them() {
     let tight = Envelope { upper: vec![Some(highest + 1e-9), None], ..envelope() };
     let settings = IterationSettings { model_free: pd(), safety: safety(tight), ..IterationSettings::default() };
     let reason = refused(robot(), settings);
-    assert!(reason.contains("is not held") && reason.contains("position of joint1"), "{reason}");
+    assert!(reason.contains("does not follow the motion") && reason.contains("position of joint1"), "{reason}");
     assert!(reason.contains("stop_margin_percent"), "{reason}");
 }
 
-/// A motion that asks for more torque, or goes where it may not, is not commanded.
 #[test]
 fn a_motion_outside_of_the_envelope_is_not_commanded() {
     let settings = |envelope: Envelope| IterationSettings {
@@ -105,14 +103,13 @@ fn a_motion_outside_of_the_envelope_is_not_commanded() {
     assert!(reason.contains("torque along the motion") && reason.contains("0.5000"), "{reason}");
     let narrow = Envelope { lower: vec![Some(-0.2), None], ..envelope() };
     let reason = refused(robot(), settings(narrow));
-    assert!(reason.contains("motion itself leaves") && reason.contains("position of joint1"), "{reason}");
+    assert!(reason.contains("motion leaves") && reason.contains("position of joint1"), "{reason}");
 }
 
-/// A model that no body can have is not loaded.
 #[test]
 fn a_model_without_a_mass_matrix_is_not_loaded() {
     let mut parameters = robot().nominal().to_vec();
-    // The tip's inertia about its axis far below zero.
+    // Negative inertia of the tip about its axis.
     parameters[10..20].iter_mut().for_each(|value| *value *= -1.0);
     let impossible = robot().with_nominal(parameters).unwrap();
     let settings = IterationSettings {
@@ -125,11 +122,11 @@ fn a_model_without_a_mass_matrix_is_not_loaded() {
     assert!(reason.contains("not positive definite"), "{reason}");
 }
 
-/// What a rehearsal shows is kept with the run: the smallest eigenvalue is that of the mass matrix, smaller than at any
-/// posture of the motion.
+/// The result of a rehearsal is stored with the run: the smallest eigenvalue is that of the mass matrix over the
+/// workspace.
 #[test]
 fn what_a_rehearsal_shows_is_kept() {
-    // These gains are the simulator's: it is not late.
+    // These gains are the simulator's, without delay.
     let rehearsal = Some(RehearsalSettings { delay_s: Some(0.0), ..RehearsalSettings::default() });
     let settings = IterationSettings {
         model_free: pd(),
@@ -145,12 +142,12 @@ fn what_a_rehearsal_shows_is_kept() {
     let matrix = mass_matrix(&model, &mut Workspace::new(&model), &[-0.4, 0.3]).to_vec();
     let own = nalgebra::DMatrix::from_fn(2, 2, |i, j| matrix[2 * i + j]).symmetric_eigenvalues().min();
     assert!(shown.smallest_eigenvalue > 0.0 && shown.smallest_eigenvalue <= own * (1.0 + 1e-12), "{shown:?} {own}");
-    // Robots 30 % heavier sag more than the true one.
+    // Robots that are 30 % heavier sag more than the true one.
     let worst = outcome.runs[0].max_tracking_error_rad.iter().zip(&shown.largest_tracking_error_rad);
     assert!(worst.into_iter().all(|(run, rehearsed)| rehearsed >= run), "{shown:?}");
 }
 
-/// `K_p = ω² (1 - u) M_jj`, `K_d = 2 ω (1 - u) M_jj` of a motion at rest in one posture.
+/// `K_p = ω² (1 - u) M_jj`, `K_d = 2 ω (1 - u) M_jj` for a motion at rest in one posture.
 #[test]
 fn gains_come_from_inertia_and_bandwidth() {
     let model = model();
@@ -169,7 +166,7 @@ fn gains_come_from_inertia_and_bandwidth() {
     for (joint, bandwidth_hz) in [(0, 2.0), (1, 3.0)] {
         let omega = core::f64::consts::TAU * bandwidth_hz;
         let inertia = 0.7 * matrix[3 * joint];
-        // Rounding of a difference of torques, no more.
+        // Only rounding of a difference of torques.
         assert!((pd.kp.of(joint) / (omega * omega * inertia) - 1.0).abs() < 1e-10);
         assert!((pd.kd.of(joint) / (2.0 * omega * inertia) - 1.0).abs() < 1e-10);
         assert!((computed.kp.of(joint) - omega * omega).abs() < 1e-9);
@@ -180,7 +177,6 @@ fn gains_come_from_inertia_and_bandwidth() {
     assert!(error.contains("nominal inertia") && error.contains(&joints()[0]), "{error}");
 }
 
-/// The first run only, slowest first, and what they record is not identified.
 #[test]
 fn slow_runs_come_first() {
     let steps = SafetySettings { speed_steps: vec![0.1, 0.5, 1.0], ..SafetySettings::default() };

@@ -1,5 +1,5 @@
-//! The seam: the same run by the simulator, by a program in either mode, and by a folder; and a verdict in time for
-//! everything that programs and people do wrong.
+//! The robot interface: the same run by the simulator, by a program in both modes, and by a folder; and a timely
+//! verdict for all failures of programs and people.
 
 use dynident_excitation::Motion;
 use dynident_iteration::robot::{
@@ -26,7 +26,7 @@ pub(crate) fn model() -> Model {
     load_robot(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/planar2r.urdf")).unwrap().model
 }
 
-/// The example program beside this test: `cargo test` builds it.
+/// The example program next to this test: `cargo test` builds it.
 pub(crate) fn client() -> PathBuf {
     let test = std::env::current_exe().unwrap();
     test.parent()
@@ -71,14 +71,13 @@ fn fault(mode: ProcessMode, name: &str) -> (RobotFault, RobotRun) {
     (fault, run)
 }
 
-/// The robot of a program that is permitted.
 pub(crate) fn process_robot(settings: ProcessSettings, joints: Vec<String>) -> Result<ProcessRobot, SimulationError> {
     let program = settings.permitted(ProgramPermission::Allow).unwrap();
     ProcessRobot::new(settings, joints, program)
 }
 
-/// A program that serves the simulator gives what the simulator gives, bit for bit, whoever runs the loop, though its
-/// joints stand in another order; and again in a second run of the same program.
+/// A program that serves the simulator returns the same samples as the simulator, bit for bit, in both modes and with
+/// another order of joints; also in a second run of the same program.
 #[test]
 fn programs_give_what_the_simulator_gives() {
     let plant = Plant::new(&model(), &[], &[]).unwrap();
@@ -95,7 +94,6 @@ fn programs_give_what_the_simulator_gives() {
     }
 }
 
-/// Everything a program can do wrong has its own verdict, and what came before is kept.
 #[test]
 fn programs_that_fail_have_a_verdict() {
     let at_50: [(&str, IsExpected); 9] = [
@@ -126,13 +124,12 @@ fn programs_that_fail_have_a_verdict() {
     }
     let (died, run) = fault(ProcessMode::Step, "die");
     assert!(matches!(died, RobotFault::Died { .. }) && run.record.samples == 50, "{died}");
-    // A stop that the robot reports is no fault.
     let stopped = self::run(&mut process_robot(settings(ProcessMode::Run, "stop"), joints()).unwrap());
     assert!(matches!(&stopped.status, RobotStatus::Stopped { reason } if reason == "protective stop"));
     assert_eq!(stopped.record.samples, 50);
 }
 
-/// A program that hangs is given up at the limit and killed: the call returns long before the program's hour is over.
+/// A program that hangs is killed at the time limit, long before its hour is over.
 #[test]
 fn programs_that_hang_are_given_up() {
     let limits =
@@ -162,7 +159,7 @@ fn programs_that_are_not_there_are_named() {
     assert!(process_robot(ProcessSettings { command: Vec::new(), ..settings }, joints()).is_err());
 }
 
-/// The folder waits for a whole log, takes it, and says what is wrong with one that cannot be read.
+/// The folder robot waits for a complete log, and reports the error in one that cannot be read.
 #[test]
 fn a_folder_waits_for_its_log() {
     let folder = tempfile::tempdir().unwrap();
@@ -178,7 +175,6 @@ fn a_folder_waits_for_its_log() {
     let simulated = run(&mut SimulatedRobot::new(plant, LoopSettings::default()).unwrap());
     let csv = simulated.record.csv();
     let log = own.join("log.csv");
-    // Still being copied: half a line, half a log.
     std::fs::write(&log, &csv[..csv.len() / 2]).unwrap();
     waiting(&run(&mut robot), "not complete");
     let half: String = csv.lines().take(100).flat_map(|line| [line, "\n"]).collect();
@@ -191,7 +187,6 @@ fn a_folder_waits_for_its_log() {
     let done = run(&mut robot);
     assert!(done.status.is_done());
     assert_eq!(done.record, simulated.record);
-    // The log of another trajectory is not taken for this one's.
     let other = Reference::standing(&[-0.4, 0.31], 500.0, 0.4).unwrap();
     let controller = pd();
     let request = RunRequest::new(1, &other, &controller);
@@ -204,7 +199,7 @@ fn a_folder_waits_for_its_log() {
     assert_eq!(stopped.record.samples, 99);
 }
 
-/// The book's lines are the protocol's: a program's can be read, and Dynident's are what it writes.
+/// The lines in the book follow the protocol: those of a program can be read, and those of Dynident are what it writes.
 #[test]
 fn the_book_tells_the_protocol() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/robot-protocol.md");
@@ -259,8 +254,8 @@ fn the_book_tells_the_protocol() {
     assert!(read >= 7 && own.iter().all(|line| page.contains(line)), "{read}");
 }
 
-/// What is handed over holds the controller's torque: the table's is the model's inverse dynamics, the file's numbers
-/// are the model's.
+/// The input files contain the controller's torque: the table has the model's inverse dynamics, the file the model's
+/// parameters.
 #[test]
 fn what_is_handed_over_is_enough() {
     let model = model();
@@ -286,12 +281,11 @@ fn what_is_handed_over_is_enough() {
     let inertial: Vec<f64> = serde_json::from_value(file["model"]["joints"][1]["inertial"].clone()).unwrap();
     assert_eq!(inertial, model.inertials()[1].0);
     assert_eq!(file["model"]["joints"][1]["parent"], "joint1");
-    // Requests without meaning are refused before anybody is spoken to.
     let mut robot = process_robot(settings(ProcessMode::Run, ""), joints()).unwrap();
     assert!(robot.run(&RunRequest { model: None, ..request }).is_err());
 }
 
-/// Drives whose own loop is to get nothing but the path are handed no torques: a program adds what the table has.
+/// Drives with a position loop without feed-forward get no torques, because a program adds the torques of the table.
 #[test]
 fn a_loop_without_feed_forward_gets_no_torques() {
     let believed = ControllerModel::new(&model(), &[], &[]).unwrap();
@@ -308,8 +302,8 @@ fn a_loop_without_feed_forward_gets_no_torques() {
     }
 }
 
-/// MuJoCo behind the example program, in both modes and under four controllers, against the built-in simulator. Needs
-/// Python with MuJoCo: DYNIDENT_PYTHON names the interpreter.
+/// MuJoCo behind the example program, in both modes and with four controllers, compared with the built-in simulator.
+/// Needs Python with MuJoCo: DYNIDENT_PYTHON is the interpreter.
 #[test]
 #[ignore = "needs Python with MuJoCo in DYNIDENT_PYTHON; .ci/run runs it"]
 fn mujoco_is_a_robot() {
@@ -331,7 +325,7 @@ fn mujoco_is_a_robot() {
     }
     let reference = Reference::new(1000.0, motion).unwrap();
     let terms: Vec<TorqueTerm> = (0..7).map(|joint| TorqueTerm::Viscous(Viscous { joint })).collect();
-    // What the controller believes of friction, one law of each kind that has no memory.
+    // Friction in the controller's model: one law of each kind without memory.
     let shape = CoulombShape::Smooth { width: 0.05 };
     let mut laws = terms.clone();
     laws.extend([

@@ -1,5 +1,3 @@
-//! A constant torque that one run has and the others have not.
-
 use super::simulated_arm::{Simulated, friction, reference, settings};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::{
@@ -9,14 +7,13 @@ use dynident_model::terms::{CoulombShape, Offset, TorqueTerm};
 use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerSettings, JointPdSettings};
 
-/// The arm whose joints may have a constant torque.
 fn described() -> ParametricModel {
     let mut terms = friction(CoulombShape::Smooth { width: 0.1 });
     terms.extend([0, 1].map(|joint| TorqueTerm::Offset(Offset { joint })));
     ParametricModel::new(super::simulated_arm::described().model().clone(), terms).unwrap()
 }
 
-/// Three runs under joint PD; `added` is what the sensor of joint 2 reads too much in the second.
+/// Three runs with joint PD; `added` is the sensor offset of joint 2 in the second run.
 fn records(added: f64) -> Vec<Record> {
     let controller = ControllerSettings::JointPd(JointPdSettings { kp: 1200.0.into(), kd: 120.0.into() });
     let (mut robot, reference) = (Simulated::default().robot(), reference());
@@ -45,7 +42,7 @@ fn identified(records: &[Record], run_offsets: RunOffsets) -> RunEstimate {
     identify_runs(&task, &runs, &identification).unwrap()
 }
 
-/// By how many bars parameters that are no offsets differ, at most; and by how much the offset of joint 2 does, Nm.
+/// Largest difference of parameters other than offsets, in error bars, and difference of the offset of joint 2, Nm.
 fn apart(one: &RunEstimate, other: &RunEstimate) -> (f64, f64) {
     let names = described().base().expressions();
     let (mut bars, mut offset) = (0.0_f64, 0.0);
@@ -60,12 +57,11 @@ fn apart(one: &RunEstimate, other: &RunEstimate) -> (f64, f64) {
     (bars, offset)
 }
 
-/// What one run has of its own is found, with its bar, and moves no other parameter.
 #[test]
 fn an_offset_of_one_run_is_its_own() {
     let records = records(2.0);
     let found = identified(&records, RunOffsets::WhereSeen);
-    // Two thirds above the mean of all three, the others a third below; joint 1 has none.
+    // Two thirds above the mean of the three runs, the others a third below; joint 1 has no offset.
     assert_eq!(found.run_offsets.len(), 6);
     for own in &found.run_offsets {
         let expected = match (own.joint, own.run) {
@@ -76,24 +72,24 @@ fn an_offset_of_one_run_is_its_own() {
         assert!((own.deviation - expected).abs() < 4.5 * own.std && own.std < 0.1, "{own:?}");
     }
     assert_eq!(found, identified(&records, RunOffsets::PerRun));
-    // All of it is the offset's: the others are what they are without, the mean is a third of 2 Nm higher.
+    // The other parameters are unchanged, and the mean is a third of 2 Nm higher.
     let without = identified(&self::records(0.0), RunOffsets::PerRun);
     let (bars, offset) = apart(&found, &without);
     assert!(bars < 1e-6 && (offset - 2.0 / 3.0).abs() < 1e-6, "{bars} bars, {offset} Nm");
-    // One offset for all moves them.
+    // A shared offset biases them.
     let shared = identified(&records, RunOffsets::Shared);
     let (bars, _) = apart(&shared, &identified(&self::records(0.0), RunOffsets::Shared));
     assert!(shared.run_offsets.is_empty() && bars > 0.1, "{bars}");
 }
 
-/// Runs that share their offset get no columns that are not needed: the fit is the one without, bit for bit.
+/// Runs with equal offsets get no additional columns: the fit is bit-identical to one without.
 #[test]
 fn offsets_that_are_the_same_are_shared() {
     let mut records = records(0.0);
     let found = identified(&records, RunOffsets::WhereSeen);
     assert!(found.run_offsets.is_empty());
     assert_eq!(found, identified(&records, RunOffsets::Shared));
-    // What is clear and does not matter is left alone, too: 0.02 Nm of some 10.
+    // A significant but irrelevant offset is ignored: 0.02 Nm of about 10 Nm.
     let own = records[1].of(1);
     records[1].tau[own].iter_mut().for_each(|tau| *tau += 0.02);
     assert!(identified(&records, RunOffsets::WhereSeen).run_offsets.is_empty());

@@ -1,5 +1,5 @@
-//! A SCARA: its slide moves along gravity, so that its weight is a constant force, as is the difference between both
-//! directions of dry friction.
+//! A SCARA: its slide moves along gravity, so its weight is a constant force, like the difference of dry friction
+//! between both directions.
 
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
@@ -15,7 +15,6 @@ use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, R
 
 const RATE_HZ: f64 = 250.0;
 
-/// Two links in the plane, the vertical slide, and the tool that turns about it.
 fn model() -> Model {
     let joint = |name: &str, kind: &str, parent: &str, child: &str, x: f64| {
         format!(
@@ -54,7 +53,6 @@ fn terms(shape: CoulombShape) -> Vec<TorqueTerm> {
     (0..4).flat_map(of_joint).collect()
 }
 
-/// Sums of sines from rest to rest, 10 s.
 fn reference() -> Reference {
     let samples = (10.0 * RATE_HZ) as usize + 1;
     let mut motion = Motion::default();
@@ -96,7 +94,7 @@ fn settings() -> IterationSettings {
     settings
 }
 
-/// With friction that is the same both ways and 8 N at the slide.
+/// With symmetric friction and 8 N at the slide.
 fn iterated(seed: u64) -> (Iteration, IterationOutcome) {
     let model = model();
     let shape = CoulombShape::Smooth { width: 0.01 };
@@ -119,8 +117,8 @@ fn iterated(seed: u64) -> (Iteration, IterationOutcome) {
     (iteration, outcome)
 }
 
-/// No friction by direction is offered on the slide, whose error bar would be many times its size; and no seed is
-/// refused for it.
+/// Direction-dependent friction is not a candidate at the slide, because its error bar would be many times its size;
+/// and no seed is refused because of it.
 #[test]
 fn a_slide_along_gravity_has_no_friction_by_direction() {
     for seed in 1..=3 {
@@ -129,7 +127,7 @@ fn a_slide_along_gravity_has_no_friction_by_direction() {
         let chosen = &outcome.runs[0].estimate.as_ref().unwrap().friction;
         let slide = &chosen[2];
         assert!(slide.terms.is_some() && slide.candidates.iter().all(|own| !own.term.contains("asymmetric coulomb")));
-        // Joints whose axes gravity does not turn may have it.
+        // Joints on which gravity has no constant effect may have it.
         assert!(chosen[0].candidates.iter().any(|own| own.term.contains("asymmetric coulomb")));
         let robot = iteration.robot(&outcome.runs).unwrap();
         let known = outcome.runs.last().unwrap().knowledge().unwrap();

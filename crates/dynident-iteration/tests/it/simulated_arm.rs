@@ -1,4 +1,4 @@
-//! A planar arm with friction and noise, and an iteration of it that converges where nothing is wrong.
+//! A planar arm with friction and noise, and an iteration that converges for a correct robot.
 
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
@@ -14,7 +14,7 @@ use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, R
 
 pub(crate) const RATE_HZ: f64 = 500.0;
 
-/// What is simulated: where it differs from the description, what its drives give, what its log is like.
+/// The simulated robot: deviations from the robot description, properties of the drives and of the log.
 pub(crate) struct Simulated {
     pub(crate) length_m: f64,
     pub(crate) tip_kg: f64,
@@ -56,7 +56,6 @@ impl Simulated {
         SimulatedRobot::new(plant, settings).unwrap()
     }
 
-    /// All true parameters: the bodies', then friction's.
     pub(crate) fn parameters(&self) -> Vec<f64> {
         let [one, two] = self.coulomb;
         let mut all = arm(1.0, self.tip_kg).parameter_vector();
@@ -64,13 +63,12 @@ impl Simulated {
         all
     }
 
-    /// True base parameters, in the columns of the described robot.
     pub(crate) fn truth(&self, described: &ParametricModel) -> Vec<f64> {
         described.base().values(&self.parameters())
     }
 }
 
-/// The robot as it is described: the tip's mass is not known, nor is friction.
+/// The described robot: the tip's mass and the friction are unknown.
 pub(crate) fn described() -> ParametricModel {
     ParametricModel::new(arm(1.0, 1.0), friction(CoulombShape::Smooth { width: 0.1 })).unwrap()
 }
@@ -97,11 +95,12 @@ pub(crate) fn reference() -> Reference {
     Reference::new(RATE_HZ, motion).unwrap()
 }
 
-/// The joints take turns: joint 2 makes two strokes there and back while joint 1 rests, then the other way round; 24 s.
+/// The joints move one after the other: joint 2 makes two strokes back and forth while joint 1 rests, then the reverse;
+/// 24 s.
 pub(crate) fn strokes_in_turn() -> Reference {
     let samples = (24.0 * RATE_HZ) as usize;
     let mut motion = Motion { samples, joints: 2, ..Motion::default() };
-    // A quintic of 3 s from rest to rest, as position, velocity and acceleration of the share of the way.
+    // A quintic of 3 s from rest to rest, as position, velocity and acceleration relative to the distance.
     let quintic = |t: f64| {
         let (s, per_s) = ((t / 3.0).clamp(0.0, 1.0), 1.0 / 3.0_f64);
         [
@@ -127,7 +126,8 @@ pub(crate) fn task() -> IterationTask {
     IterationTask::new(described(), reference()).unwrap()
 }
 
-/// The first run under the description, then the finite-time law; the deviation smoothed, torque and columns alike.
+/// The first run with the nominal model, then the finite-time law; the deviation smoothed, torque and columns with the
+/// same filter.
 pub(crate) fn settings() -> IterationSettings {
     let mut settings = IterationSettings {
         start: StartWith::Prior,

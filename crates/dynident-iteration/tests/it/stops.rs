@@ -1,5 +1,5 @@
-//! Stops: asked for, or because a sample leaves its envelope; in every mode, with a robot that answers and with one
-//! that does not; and no process of a robot is left.
+//! Stops: requested, or because a sample leaves the envelope; in every mode, with a robot that answers and with one
+//! that does not; and no process of a robot remains.
 
 use super::robots::{client, joints, pd, process_robot, reference};
 use dynident_dynamics::ParametricModel;
@@ -36,26 +36,24 @@ fn settings(mode: ProcessMode, command: Vec<String>) -> ProcessSettings {
     ProcessSettings { command, mode, limits, folder: None }
 }
 
-/// What the program wrote into its marker file, once it has.
 fn marked(folder: &Path) -> String {
-    // A program that never comes to its mark is a failure, not a test without an end.
+    // Fail instead of waiting forever.
     for _ in 0..30_000 {
         match std::fs::read_to_string(folder.join("marker")) {
             Ok(word) => return word,
             Err(_) => std::thread::sleep(Duration::from_millis(2)),
         }
     }
-    panic!("the program never came to its mark");
+    panic!("the program never wrote its marker");
 }
 
-/// Whether a process by this number runs: one that has ended and that nobody has asked for does not.
+/// Whether a process with this id runs (zombies excluded).
 fn runs(id: &str) -> bool {
     let state = Command::new("ps").args(["-o", "stat=", "-p", id]).output().unwrap();
     let state = String::from_utf8_lossy(&state.stdout).trim().to_owned();
     !state.is_empty() && !state.starts_with('Z')
 }
 
-/// A run that is stopped once the program has marked its place.
 fn stopped_at_the_mark(robot: &mut ProcessRobot, folder: &Path) -> RobotRun {
     let stop = StopSignal::default();
     std::thread::scope(|scope| {
@@ -68,7 +66,7 @@ fn stopped_at_the_mark(robot: &mut ProcessRobot, folder: &Path) -> RobotRun {
     })
 }
 
-/// The program is silent in the middle of a motion: the stop is the next message it gets, and the samples are kept.
+/// The program is silent during a motion: the stop is the next message it gets, and the samples are kept.
 #[test]
 fn a_stop_reaches_the_robot_in_every_mode() {
     for mode in BOTH {
@@ -77,7 +75,6 @@ fn a_stop_reaches_the_robot_in_every_mode() {
         let run = stopped_at_the_mark(&mut robot, folder.path());
         assert_eq!(run.status, RobotStatus::Interrupted { stopping: Stopping::Confirmed }, "{mode:?}");
         assert_eq!((run.record.samples, run.record.q.len()), (50, 100), "{mode:?}");
-        // The next run is not begun.
         let stop = StopSignal::default();
         stop.request();
         let (reference, controller) = (reference(), pd());
@@ -87,7 +84,8 @@ fn a_stop_reaches_the_robot_in_every_mode() {
     }
 }
 
-/// A program that does not answer its stop is killed, behind a shell as well, and the verdict says that nobody knows.
+/// A program that does not answer its stop is killed, also behind a shell, and the verdict states that the robot may
+/// still be moving.
 #[test]
 fn a_robot_that_ignores_its_stop_is_killed() {
     for shell in [false, true] {
@@ -102,12 +100,12 @@ fn a_robot_that_ignores_its_stop_is_killed() {
         let mut robot = process_robot(settings, joints()).unwrap();
         let run = stopped_at_the_mark(&mut robot, folder.path());
         assert_eq!(run.status, RobotStatus::Interrupted { stopping: Stopping::Unanswered });
-        assert!(run.status.to_string().contains("look at the robot"));
+        assert!(run.status.to_string().contains("check it first"));
         assert!(!runs(&marked(folder.path())), "behind a shell: {shell}");
     }
 }
 
-/// A minute of motion, whose program goes as fast as it can or, paced, in real time, and misbehaves after four seconds.
+/// A minute of motion. The program runs as fast as possible or, paced, in real time, and fails after four seconds.
 fn streamed(fault: &str, paced: bool, silence_s: Option<f64>) -> (RobotRun, Duration) {
     let folder = tempfile::tempdir().unwrap();
     let mut own = command(fault, folder.path());
@@ -124,9 +122,9 @@ fn streamed(fault: &str, paced: bool, silence_s: Option<f64>) -> (RobotRun, Dura
     (run, begin.elapsed())
 }
 
-/// A program that streams in real time and falls silent, its robot in the middle of a motion, is stopped after
-/// `silence_s` (one second, for a busy machine pauses programs for longer than the default), and not after `message_s`
-/// and the rest of the motion, two minutes here.
+/// A program that streams in real time and becomes silent during a motion is stopped after `silence_s` (one second,
+/// because a busy machine pauses programs for longer than the default), and not after `message_s` plus the rest of the
+/// motion, two minutes here.
 #[test]
 fn a_stream_that_falls_silent_is_stopped() {
     for (fault, expected) in [("wait", Stopping::Confirmed), ("ignore", Stopping::Unanswered)] {
@@ -135,12 +133,12 @@ fn a_stream_that_falls_silent_is_stopped() {
             panic!("{fault}: {}", run.status)
         };
         assert_eq!((limit_s, stopping, run.record.samples), (1.0, Some(expected), 2000), "{fault}");
-        // Four seconds of motion, the silence and the stop; the rest is for a busy machine.
+        // Four seconds of motion, the silence and the stop; the rest is a margin for a busy machine.
         assert!(took < Duration::from_secs(30), "{fault}: {took:?}");
     }
 }
 
-/// What is no stream in real time may pause; so may one whose pauses are stated.
+/// A program that does not stream in real time may pause; so may one with a larger stated limit.
 #[test]
 fn a_pause_of_what_is_no_stream_is_nothing() {
     let (run, _) = streamed("pause", false, None);
@@ -155,8 +153,8 @@ fn a_pause_of_what_is_no_stream_is_nothing() {
     assert!(run.status.is_done(), "{}", run.status);
 }
 
-/// Who hangs behind a shell is given up with all of its group; a program that dies while a process of its own holds its
-/// output is known to be dead, and that process goes as well.
+/// A program that hangs behind a shell is killed with its group. If a program dies while its child process holds its
+/// output open, its death is detected and the child is killed, too.
 #[test]
 fn no_process_of_a_robot_is_left() {
     let folder = tempfile::tempdir().unwrap();
@@ -172,7 +170,7 @@ fn no_process_of_a_robot_is_left() {
 
     let folder = tempfile::tempdir().unwrap();
     settings = self::settings(ProcessMode::Run, command("orphan", folder.path()));
-    // Far longer than this test may last: death is seen by the process.
+    // Far longer than this test may take: death is detected from the process.
     settings.limits.message_s = 3000.0;
     let run = process_robot(settings, joints()).unwrap().run(&request).unwrap();
     let RobotStatus::Failed { fault: RobotFault::Died { exit, said, .. }, .. } = &run.status else {
@@ -182,7 +180,6 @@ fn no_process_of_a_robot_is_left() {
     assert!(!runs(&marked(folder.path())));
 }
 
-/// A second Ctrl-C does not wait: the program's group is killed from another thread.
 #[test]
 fn robots_can_be_killed_at_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -228,9 +225,9 @@ fn watched(mode: ProcessMode, envelope: &Envelope, folder: &Path, unwatched: boo
     robot.run(&RunRequest { envelope: Some(envelope), ..RunRequest::new(1, &reference, &controller) }).unwrap()
 }
 
-/// The arm sags under joint PD: the first sample that is too far from the path ends the run, with joint, quantity,
-/// value, limit and time, whether the program watches or not; and in the mode step the next thing the program hears is
-/// a stop.
+/// The arm sags with joint PD: the first sample that is too far from the path ends the run, with joint, quantity,
+/// value, limit and time, whether or not the program monitors the envelope; in mode `step` the next message to the
+/// program is a stop.
 #[test]
 fn a_sample_outside_of_the_envelope_stops_the_run() {
     let tight = Envelope { tracking_error: vec![None, Some(0.01)], ..envelope() };
@@ -244,37 +241,35 @@ fn a_sample_outside_of_the_envelope_stops_the_run() {
         assert_eq!((&*joint, quantity, limit), ("joint2", EnvelopeQuantity::TrackingError, 0.01));
         assert!(value.abs() > 0.01 && time_s > 0.0, "{breach}");
         let text = run.status.to_string();
-        assert!(text.contains("tracking error of joint2") && text.contains("its limit 0.0100"), "{text}");
+        assert!(text.contains("tracking error of joint2") && text.contains("limit 0.0100"), "{text}");
         if mode == ProcessMode::Step {
-            // The state of sample k follows k torques: none came after the breach.
+            // The state of sample k follows k torques: none was sent after the breach.
             let last = run.record.samples - 1;
             assert!(marked(folder.path()).ends_with(&format!("after {last} torques")));
         }
     }
-    // A torque beyond the envelope is never sent.
     let folder = tempfile::tempdir().unwrap();
     let weak = Envelope { torque: vec![Some(1.0), Some(1.0)], ..envelope() };
     let run = watched(ProcessMode::Step, &weak, folder.path(), false);
     assert!(matches!(&run.status, RobotStatus::LeftEnvelope { breach, .. }
         if breach.quantity == EnvelopeQuantity::Torque && breach.value.abs() > 1.0));
     assert!(run.record.samples > 1, "at rest on the path a joint PD asks for nothing");
-    // Inside a wide one nothing happens.
     let wide = Envelope { tracking_error: vec![Some(3.0); 2], speed: vec![Some(50.0); 2], ..envelope() };
     for mode in BOTH {
         assert!(watched(mode, &wide, folder.path(), false).status.is_done());
     }
 }
 
-/// The lower one of the planar arm's elbow and tip, and its height by trigonometry: axes along y, links of 0.5 and 0.4
-/// m along x.
+/// The lower of the planar arm's elbow and tip, and its height by trigonometry: axes along y, links of 0.5 and 0.4 m
+/// along x.
 fn lower_point(q: [f64; 2]) -> (&'static str, f64) {
     let elbow = -0.5 * q[0].sin();
     let tip = elbow - 0.4 * (q[0] + q[1]).sin();
     if tip < elbow { ("the tool", tip) } else { ("link2", elbow) }
 }
 
-/// A box of the base frame: the run ends at the first sample at which elbow or tip is outside, in both modes, whether
-/// the program knows of boxes or not (this one does not); the motion itself and its simulation are held against it.
+/// Workspace box: the run ends at the first sample with elbow or tip outside, in both modes, whether or not the program
+/// supports boxes (this one does not); the motion and its simulation are checked, too.
 #[test]
 fn a_link_that_leaves_the_workspace_stops_the_run() {
     let model = load_robot(urdf()).unwrap().model;
@@ -290,7 +285,7 @@ fn a_link_that_leaves_the_workspace_stops_the_run() {
     let point = |sample: usize| lower_point([whole.record.q[sample], whole.record.q[samples + sample]]);
     let height = |sample: usize| point(sample).1;
     let lowest = (0..samples).map(height).fold(f64::INFINITY, f64::min);
-    // Halfway from where it begins to its lowest point.
+    // Halfway from its begin to its lowest point.
     let limit = 0.5 * (height(0) + lowest);
     assert!(limit < height(0) - 1e-3, "{} to {lowest}", height(0));
     let first = (0..samples).find(|&sample| height(sample) < limit).unwrap();
@@ -305,11 +300,10 @@ fn a_link_that_leaves_the_workspace_stops_the_run() {
         assert!((breach.time_s - whole.record.times_s[first]).abs() < 1e-9, "{breach}");
         assert!(run.status.to_string().contains(&format!("z of {} is", point(first).0)), "{}", run.status);
     }
-    // What is handed over names what is watched.
+    // The input file lists the watched points.
     let told = serde_json::to_value(boxed(limit)).unwrap();
     assert_eq!(told["workspace"]["lower"], serde_json::json!([null, null, limit]));
     assert_eq!(told["workspace"]["points"][1]["link"], "the tool");
-    // The built-in simulator says it when the run is over.
     let plant = Plant::new(&model, &[], &[]).unwrap();
     let mut simulator = SimulatedRobot::new(plant, LoopSettings::default()).unwrap();
     let (reference, controller) = (reference(), pd());
@@ -320,7 +314,7 @@ fn a_link_that_leaves_the_workspace_stops_the_run() {
         matches!(&status, RobotStatus::LeftEnvelope { breach, .. } if breach.quantity == EnvelopeQuantity::Z),
         "{status}"
     );
-    // A box that the motion itself leaves; one without room.
+    // A box that the motion leaves; an empty box.
     let motion = reference.motion();
     let of_path = |sample: usize| lower_point([motion.q[sample], motion.q[motion.samples + sample]]).1;
     let path_lowest = (0..motion.samples).map(of_path).fold(f64::INFINITY, f64::min);
@@ -332,7 +326,7 @@ fn a_link_that_leaves_the_workspace_stops_the_run() {
     assert!(none.of(&model).unwrap_err().to_string().contains("envelope.workspace"));
 }
 
-/// Nobody can stop a person's robot, but a log that leaves the envelope is no good run.
+/// A person's robot cannot be stopped, but a log that leaves the envelope is rejected.
 #[test]
 fn a_folders_log_is_watched_afterwards() {
     let folder = tempfile::tempdir().unwrap();
@@ -350,13 +344,12 @@ fn a_folders_log_is_watched_afterwards() {
     std::fs::write(robot.run_folder(1).join("log.csv"), simulated.record.csv()).unwrap();
     let status = robot.run(&request).unwrap().status;
     assert!(matches!(status, RobotStatus::LeftEnvelope { stopping: Stopping::SeenAfterwards, .. }), "{status}");
-    // Another envelope is no other run: the log is taken.
     let wide = Envelope { tracking_error: vec![Some(3.0); 2], ..envelope() };
     let run = robot.run(&RunRequest { envelope: Some(&wide), ..request }).unwrap();
     assert!(run.status.is_done(), "{}", run.status);
 }
 
-/// Samples may come when the motion is over: its length counts on top of the limit for messages.
+/// Samples may be sent after the motion: its length is added to the time limit for messages.
 #[test]
 fn samples_may_come_afterwards() {
     let folder = tempfile::tempdir().unwrap();
@@ -369,7 +362,7 @@ fn samples_may_come_afterwards() {
     assert!(run.status.is_done(), "{}", run.status);
 }
 
-/// Stops after so many runs; notes what it was asked.
+/// Stops after a number of runs; records the requests for permission.
 struct Watcher {
     stop: StopSignal,
     stop_after: usize,
@@ -398,7 +391,7 @@ impl Supervisor for Watcher {
 fn iteration(safety: SafetySettings) -> Iteration {
     let robot = ParametricModel::new(load_robot(urdf()).unwrap().model, Vec::new()).unwrap();
     let mut settings = IterationSettings { model_free: pd(), controller: pd(), safety, ..IterationSettings::default() };
-    // Never settled: it is stops that end these.
+    // Prevents convergence, so that stops end the iteration.
     settings.settled.most_uncertain = 0.0;
     Iteration::new(IterationTask::new(robot, reference()).unwrap(), settings).unwrap()
 }
@@ -407,7 +400,6 @@ fn watcher(stop_after: usize) -> Watcher {
     Watcher { stop: StopSignal::default(), stop_after, asked: Vec::new(), made: 0 }
 }
 
-/// Between two runs: the next one is not commanded, and a later call goes on with it.
 #[test]
 fn a_stop_between_runs_ends_the_iteration() {
     let folder = tempfile::tempdir().unwrap();
@@ -418,14 +410,13 @@ fn a_stop_between_runs_ends_the_iteration() {
         let mut watcher = watcher(1);
         let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher).unwrap();
         let IterationStatus::Interrupted { reason } = &outcome.status else { panic!("{}", outcome.status) };
-        assert!(reason.contains(&format!("goes on with run {}", runs + 1)), "{reason}");
+        assert!(reason.contains(&format!("continue with run {}", runs + 1)), "{reason}");
         assert_eq!((outcome.runs.len(), watcher.asked.len()), (runs, 1));
         assert_eq!(watcher.asked[0].run, runs);
     }
 }
 
-/// In the middle of a run: the run does not count, what was recorded of it is kept beside the runs, and a fresh start
-/// removes it with them.
+/// During a run: the run is not used, its log is stored in a separate folder, and a fresh start removes it.
 #[test]
 fn a_run_that_is_cut_short_is_kept_aside() {
     let folder = tempfile::tempdir().unwrap();
@@ -442,7 +433,7 @@ fn a_run_that_is_cut_short_is_kept_aside() {
         iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher).unwrap()
     });
     let IterationStatus::Interrupted { reason } = &outcome.status else { panic!("{}", outcome.status) };
-    assert!(reason.contains("goes on with run 1") && outcome.runs.is_empty(), "{reason}");
+    assert!(reason.contains("continue with run 1") && outcome.runs.is_empty(), "{reason}");
     let kept = folder.path().join("runs/interrupted_1");
     assert_eq!(std::fs::read_to_string(kept.join("log.csv")).unwrap().lines().count(), 51);
     assert!(store.records().unwrap().is_empty());
@@ -450,8 +441,8 @@ fn a_run_that_is_cut_short_is_kept_aside() {
     assert!(!kept.exists());
 }
 
-/// A fault in the middle of a motion stops the robot as a breach does: a program that answers has the time of a stop,
-/// though it needs longer than a bye; the verdict says what is known, and what was recorded is kept beside the runs.
+/// A fault during a motion stops the robot like a breach: a program that answers has the time of a stop, even if it is
+/// longer than that of a bye; the verdict states whether the stop was confirmed, and the log is stored.
 #[test]
 fn a_fault_in_the_middle_of_a_motion_is_a_stop() {
     for (fault, at) in [("nan", 50), ("joints", 50), ("backwards", 50), ("garbage", 50), ("megabyte", 50)] {
@@ -463,14 +454,14 @@ fn a_fault_in_the_middle_of_a_motion_is_a_stop() {
         let mut robot = process_robot(settings(ProcessMode::Run, own), joints()).unwrap();
         let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher(0)).unwrap();
         let IterationStatus::Refused { reason } = &outcome.status else { panic!("{fault}: {}", outcome.status) };
-        let words = ["the robot has stopped", "what was recorded of it", "goes on with run 1"];
+        let words = ["the robot has stopped", "its recorded part", "continue with run 1"];
         assert!(words.iter().all(|word| reason.contains(word)), "{fault}: {reason}");
-        // It came to its own end: nobody killed it while its brakes were closing.
+        // The program ended by itself; it was not killed while its brakes were closing.
         assert_eq!(marked(folder.path()), "stands", "{fault}");
         let kept = std::fs::read_to_string(folder.path().join("runs/interrupted_1/log.csv")).unwrap();
         assert_eq!(kept.lines().count(), at + 1, "{fault}");
     }
-    // Who says nothing more, and who is gone: nobody knows.
+    // Silent or dead programs: the stop is not confirmed.
     let open = [("hang", Stopping::Unanswered), ("die", Stopping::Unknown), ("short", Stopping::Unknown)];
     for (fault, expected) in open {
         let folder = tempfile::tempdir().unwrap();
@@ -481,11 +472,11 @@ fn a_fault_in_the_middle_of_a_motion_is_a_stop() {
         let status = run.unwrap().status;
         let RobotStatus::Failed { stopping: Some(stopping), .. } = &status else { panic!("{fault}: {status}") };
         assert_eq!(*stopping, expected, "{fault}");
-        assert!(status.to_string().contains("look at the robot"), "{status}");
+        assert!(status.to_string().contains("check it first"), "{status}");
     }
 }
 
-/// After a breach in the first run the next one begins slow again: what it runs under has never been seen.
+/// After a breach in the first run the next one begins with slow runs again, because its controller is untested.
 #[test]
 fn the_run_after_a_breach_begins_slow_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -505,11 +496,11 @@ fn the_run_after_a_breach_begins_slow_again() {
     let iteration = iteration(safety(None, &[0.5, 1.0]));
     let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher).unwrap();
     let speeds: Vec<(usize, f64)> = watcher.asked.iter().map(|motion| (motion.run, motion.speed)).collect();
-    // Once a run got to its end there are no slow ones.
+    // After a completed run there are no slow runs.
     assert_eq!(speeds, [(2, 0.5), (2, 1.0), (3, 1.0)], "{}", outcome.status);
 }
 
-/// A run of a robot outside that ends early is looked at by a person before the next one: one run for each call.
+/// After an early end of a run of an external robot a person has to check it: one run per call.
 #[test]
 fn after_an_early_end_somebody_looks() {
     let folder = tempfile::tempdir().unwrap();
@@ -520,13 +511,13 @@ fn after_an_early_end_somebody_looks() {
     for runs in [1, 2] {
         let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher(0)).unwrap();
         let IterationStatus::Waiting { reason } = &outcome.status else { panic!("{}", outcome.status) };
-        assert!(reason.contains("out of the envelope") && reason.contains("Look at the robot"), "{reason}");
+        assert!(reason.contains("out of the envelope") && reason.contains("Check the robot"), "{reason}");
         assert_eq!(outcome.runs.len(), runs);
         assert!(outcome.runs.iter().all(|run| !run.done && !run.accepted));
     }
 }
 
-/// A fresh start removes what an iteration wrote, and nothing else: not through a link, not what a person put there.
+/// A fresh start removes only files of an iteration: not through a link, and no files of a person.
 #[cfg(unix)]
 #[test]
 fn a_fresh_start_removes_only_its_own() {
@@ -544,13 +535,11 @@ fn a_fresh_start_removes_only_its_own() {
         let error = IterationStore::open(folder, "other", false).unwrap_err().to_string();
         assert!(error.contains(what), "{error}");
     };
-    // Notes of a person stay, and so does everything else.
     let notes = own.join("runs/run_1/notes.txt");
     std::fs::write(&notes, "cable loose").unwrap();
     refused(&own, "notes.txt");
     assert!(own.join("runs/run_1/run.json").exists());
     std::fs::remove_file(notes).unwrap();
-    // Runs behind a link stay.
     let link = folder.path().join("linked");
     std::fs::create_dir(&link).unwrap();
     std::os::unix::fs::symlink(own.join("runs"), link.join("runs")).unwrap();
@@ -559,8 +548,7 @@ fn a_fresh_start_removes_only_its_own() {
     std::fs::remove_file(link.join("runs")).unwrap();
     std::fs::create_dir(link.join("runs")).unwrap();
     std::os::unix::fs::symlink(own.join("runs/run_1"), link.join("runs/run_1")).unwrap();
-    refused(&link, "move it away");
-    // Of somebody else's folder that is no run's nothing is touched.
+    refused(&link, "move it to another folder");
     std::fs::create_dir(own.join("runs/run_fast")).unwrap();
     IterationStore::open(&own, "other", false).unwrap();
     assert!(own.join("runs/run_fast").exists() && !own.join("runs/run_1").exists());

@@ -1,5 +1,5 @@
-//! The logged torque against the commanded one: every fault of a log is named, no correct log is doubted, and nothing
-//! converges on a wrong one.
+//! Comparison of logged and commanded torque: every mistake of a log is reported, no correct log is, and no iteration
+//! converges with a wrong log.
 
 use super::simulated_arm::{self, Simulated, arm};
 use dynident_dynamics::{Workspace, gravity_torque};
@@ -10,7 +10,6 @@ use dynident_iteration::{
 use dynident_simulation::controllers::PositionLoopSettings;
 use dynident_simulation::{ControllerSettings, Record, SensorSettings, SimulationError};
 
-/// A robot whose log is not what its drives did.
 struct Faulty<'a> {
     inner: SimulatedRobot,
     fault: &'a dyn Fn(&mut Record),
@@ -34,7 +33,7 @@ impl Robot for Faulty<'_> {
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         let mut run = self.inner.run(request)?;
         (self.fault)(&mut run.record);
-        // A robot outside tells no truth.
+        // An external robot does not provide the true motion.
         Ok(RobotRun { truth: None, ..run })
     }
 }
@@ -45,7 +44,6 @@ fn iterated(simulated: &Simulated, settings: IterationSettings, fault: &dyn Fn(&
     iterate(&iteration, &mut [&mut robot], None, &mut |_, _| {}).unwrap()
 }
 
-/// Multiplies the torque of the joints.
 fn scaled(record: &mut Record, factors: [f64; 2]) {
     for (joint, factor) in factors.into_iter().enumerate() {
         let own = record.of(joint);
@@ -53,7 +51,6 @@ fn scaled(record: &mut Record, factors: [f64; 2]) {
     }
 }
 
-/// The torque of each joint of the true robot that holds it against gravity.
 fn without_gravity(record: &mut Record) {
     let model = arm(1.0, Simulated::default().tip_kg);
     let mut workspace = Workspace::new(&model);
@@ -67,7 +64,6 @@ fn without_gravity(record: &mut Record) {
     }
 }
 
-/// What its drives lose by friction is missing.
 fn without_friction(record: &mut Record) {
     let times = record.times_s.clone();
     for (joint, (viscous, dry)) in [(0.8, 1.5), (0.5, 1.0)].into_iter().enumerate() {
@@ -98,8 +94,8 @@ fn causes(outcome: &IterationOutcome) -> Vec<TorqueCause> {
     outcome.shortfalls.iter().filter_map(of).collect()
 }
 
-/// No fault, for sensors with noise, with a late feedback, and with a controller that differentiates its encoders: the
-/// check passes in every run, and its scales are one within a percent.
+/// Correct logs with sensor noise, feedback delay, and a controller that differentiates its encoders: the check passes
+/// in every run, and its scales are one within a percent.
 #[test]
 fn correct_logs_pass() {
     let noisy = Simulated::default().sensors;
@@ -120,7 +116,7 @@ fn correct_logs_pass() {
     }
 }
 
-/// Each fault is named after the first run, and the model of its log never reaches a controller.
+/// Each mistake is reported after the first run, and the model of the wrong log never reaches a controller.
 #[test]
 fn a_wrong_torque_is_named_and_never_loaded() {
     let named = |fault: &dyn Fn(&mut Record)| -> Vec<TorqueCause> {
@@ -153,7 +149,7 @@ fn a_wrong_torque_is_named_and_never_loaded() {
     );
     assert_eq!(named(&|log| scaled(log, [-1.0, -1.0])), [TorqueCause::Sign { joints: both(), is_commanded: false }]);
     assert_eq!(named(&without_gravity), [TorqueCause::Gravity { joints: both() }]);
-    // With gravity alone in the first controller it is less than a twentieth of the torque.
+    // With only gravity in the first controller it is less than a twentieth of the torque.
     let outcome = iterated(&Simulated::default(), simulated_arm::settings(), &without_friction);
     assert!(!outcome.status.is_converged() && outcome.runs.len() <= 2, "{}", outcome.status);
     assert_eq!(causes(&outcome), [TorqueCause::Friction { joints: both() }]);
@@ -171,7 +167,7 @@ fn a_wrong_torque_is_named_and_never_loaded() {
     assert!(matches!(named(&late)[..], [TorqueCause::Delay { lag_s }] if (lag_s + 0.02).abs() < 2e-3));
 }
 
-/// Torque that follows nothing known: it is said so, and no cause is claimed.
+/// An unknown disturbance of the torque is reported without a cause.
 #[test]
 fn a_difference_without_a_known_cause_has_none() {
     let wave = |log: &mut Record| {
@@ -186,7 +182,7 @@ fn a_difference_without_a_known_cause_has_none() {
     assert!(matches!(&found[..], [TorqueCause::Undetermined { joint, .. }] if joint == "joint2"), "{found:?}");
 }
 
-/// Drives with their own loop, whose gains nobody stated: the torque that is fed forward shows the scale.
+/// Drives with their own loop and unknown gains: the feed-forward torque determines the scale.
 #[test]
 fn the_scale_of_drives_with_their_own_loop_is_found() {
     let mut settings = simulated_arm::settings();
@@ -206,7 +202,6 @@ fn the_scale_of_drives_with_their_own_loop_is_found() {
     assert!(joint == "joint2" && (factor - 1.12).abs() < 0.02, "{joint} {factor}");
 }
 
-/// What the records decide, and nothing else: a run with a wrong log ends the iteration, and says how to go on.
 #[test]
 fn after_a_wrong_log_no_run_is_planned() {
     let iteration = Iteration::new(simulated_arm::task(), simulated_arm::settings()).unwrap();

@@ -1,5 +1,5 @@
-//! Success means success: what an iteration says of robots that follow, clip, log late, fall, stick, or are another
-//! arm.
+//! Convergence only for correct models: verdicts for robots that follow, clip, log with a delay, fall, stick, or differ
+//! from their robot description.
 
 use crate::simulated_arm::{Simulated, described, friction, iterated, settings, strokes_in_turn};
 use dynident_dynamics::ParametricModel;
@@ -26,19 +26,19 @@ fn a_robot_as_described_converges_with_nothing_unmet() {
     let (_, outcome) = iterated(&Simulated::default(), settings());
     assert_eq!(outcome.status, IterationStatus::Converged, "{}", words(&outcome));
     assert!(outcome.shortfalls.is_empty() && outcome.runs.iter().all(|run| run.accepted), "{}", words(&outcome));
-    // White noise of 0.05 Nm, and what 1200 Nm/rad make of encoders that know 2e-5 rad.
+    // White noise of 0.05 Nm, plus the effect of encoders with a resolution of 2e-5 rad at 1200 Nm/rad.
     for joint in &outcome.runs[0].evidence.as_ref().unwrap().joints {
         assert!((joint.torque_noise / 0.055 - 1.0).abs() < 0.2 && joint.row_noise < 0.012, "{joint:?}");
     }
     let last = outcome.runs.last().unwrap().evidence.as_ref().unwrap();
     for joint in &last.joints {
-        // 95 % of a 95 % band; four deviations of the share of 200 independent rows are 6 %.
+        // 95 % of a 95 % band; four standard deviations of the share of 200 independent rows are 6 %.
         assert!((joint.prediction.unwrap().inside - 0.95).abs() < 0.06, "{joint:?}");
         assert_eq!((joint.clipping, joint.oscillation), (None, None));
     }
 }
 
-/// A drive that gives less than the motion takes, and nobody has said so.
+/// A drive that delivers less torque than the motion needs, without a stated limit.
 #[test]
 fn a_robot_that_clips_never_converges() {
     let torque = Some(vec![1e3, 8.0].into());
@@ -52,8 +52,8 @@ fn a_robot_that_clips_never_converges() {
     assert!(words.contains("torque of joint joint2"), "{words}");
 }
 
-/// A drive that gives so little that its joint leaves the envelope in the slow motion before the first run: too short a
-/// log for a verdict of clipping, and "a first controller that holds the robot" was all that was advised.
+/// A drive that is so weak that its joint leaves the envelope in the slow motion before the first run. The log was too
+/// short for a clipping verdict, and the only advice was "a first controller that holds the robot".
 #[test]
 fn a_drive_at_its_limit_is_named_where_the_envelope_stops_it_first() {
     let torque = Some(vec![1e3, 1.2].into());
@@ -64,24 +64,24 @@ fn a_drive_at_its_limit_is_named_where_the_envelope_stops_it_first() {
     settings.safety.speed_steps = vec![0.5];
     let (_, outcome) = iterated(&clipping, settings);
     let words = words(&outcome);
-    // Noise of 0.05 Nm in its mean over a few samples.
+    // Noise of 0.05 Nm in the mean over a few samples.
     let held = [" stayed at 1.1", " stayed at 1.2"].iter().any(|held| words.contains(held));
     assert!(words.contains("the torque of joint2 stayed at") && held, "{words}");
-    // Beside the slowed trajectory, to which the distance is the envelope's.
-    assert!(words.contains(" to 0.200: its drive gives no more"), "{words}");
+    // Relative to the slowed trajectory, whose tracking error is that of the envelope.
+    assert!(words.contains(" to 0.200: its drive is saturated"), "{words}");
 }
 
 fn logged_late(delay_s: f64) -> (Simulated, IterationOutcome) {
     let sensors = SensorSettings { position_delay_s: delay_s.into(), ..Simulated::default().sensors };
     let simulated = Simulated { sensors, ..Simulated::default() };
     let mut settings = settings();
-    // Where the log is late the tracking that it shows is not small.
+    // If the log is late, its tracking error is not small.
     settings.settled.floor_ratio = 3.0;
     let (_, outcome) = iterated(&simulated, settings);
     (simulated, outcome)
 }
 
-/// A lag of some milliseconds is found, taken off the rows, and said; the parameters are the arm's.
+/// A lag of some milliseconds is estimated, compensated and reported; the parameters are correct.
 #[test]
 fn a_lag_is_taken_off_and_the_arm_is_found() {
     for delay_s in [2e-3, 8e-3] {
@@ -89,21 +89,22 @@ fn a_lag_is_taken_off_and_the_arm_is_found() {
         let words = words(&outcome);
         assert_eq!(outcome.status, IterationStatus::Converged, "{words}");
         let known = outcome.runs.last().unwrap().knowledge().unwrap();
-        // Late positions are early torque; a lag is measured to a hundredth of a sample or so.
+        // A delay of the positions is a negative lag of the torque; a lag is estimated to about a hundredth of a
+        // sample.
         for lag in &known.torque_lags {
             let lag = lag.unwrap();
             assert!((lag.lag_s + delay_s).abs() < 0.2e-3 && lag.taken_off_s < -0.8 * delay_s, "{lag:?}");
         }
         let truth = simulated.truth(&described());
         for ((value, truth), std) in known.values.iter().zip(&truth).zip(&known.std) {
-            // Four deviations: the mean of ten parameters' largest error is at 1.5.
+            // Four standard deviations: the largest error of ten parameters is 1.5 on average.
             assert!((value - truth).abs() <= 4.0 * std, "{value} for {truth} +- {std}: {words}");
         }
     }
 }
 
-/// Stiff drives close their own loop and log 8 ms late. With that delay in the loop they would swing, so it is not in
-/// it; what could be reached was "not known", and no run was good enough.
+/// Stiff drives close their own loop and log with a delay of 8 ms. With that delay in the loop they would oscillate, so
+/// it is not in the loop; the reachable error was "not known", and no run was good enough.
 #[test]
 fn the_delay_of_a_log_is_none_of_a_loop_that_could_not_bear_it() {
     let delay_s = 8e-3;
@@ -117,13 +118,14 @@ fn the_delay_of_a_log_is_none_of_a_loop_that_could_not_bear_it() {
     let words = words(&outcome);
     assert_eq!(outcome.status, IterationStatus::Converged, "{words}");
     for joint in &outcome.runs.last().unwrap().evidence.as_ref().unwrap().joints {
-        // What the log shows late: at most the delay times a velocity of 1 rad/s or so, and what the drives leave.
+        // Effect of the delay: at most the delay times a velocity of about 1 rad/s, plus the tracking error of the
+        // drives.
         assert!(joint.tracking_floor_rad.is_some_and(|floor| (1e-3..0.02).contains(&floor)), "{joint:?}");
     }
 }
 
-/// A controller that sees its joints some samples late pushes them ahead. No log shows that delay but by the tracking
-/// error; it is found, explains the error, and is said.
+/// A controller with a feedback delay of some samples pushes the joints ahead. Only the tracking error shows that
+/// delay; it is estimated, explains the error, and is reported.
 #[test]
 fn the_delay_of_the_feedback_explains_the_tracking_error() {
     let late = SensorSettings { feedback_delay_samples: 3, ..Simulated::default().sensors };
@@ -142,7 +144,7 @@ fn the_delay_of_the_feedback_explains_the_tracking_error() {
     }
 }
 
-/// A robot that is far from where its log says: whatever the fit makes of it, this is no success.
+/// A robot whose true position differs from its log: this is not a success, however good the fit is.
 #[test]
 fn a_long_lag_is_no_success() {
     let (_, outcome) = logged_late(25e-3);
@@ -157,7 +159,6 @@ fn a_long_lag_is_no_success() {
     assert!(lags.into_iter().any(|lag_s| (lag_s - 25e-3).abs() < 1e-3), "{words}");
 }
 
-/// The first controller cannot hold the arm: its run is no good one, and the iteration goes on from what it told.
 #[test]
 fn a_run_that_falls_is_not_good() {
     let weak = ControllerSettings::JointPd(JointPdSettings { kp: 3.0.into(), kd: 2.0.into() });
@@ -169,7 +170,6 @@ fn a_run_that_falls_is_not_good() {
     let first = &outcome.runs[0];
     assert!(first.max_tracking_error_rad.iter().any(|error| *error > 1.0), "{words}");
     assert!(!first.accepted && first.reason.as_ref().unwrap().contains("left its trajectory"), "{words}");
-    // Nothing of it is in the fit of the good runs.
     let last = outcome.runs.last().unwrap();
     assert!(outcome.status.is_converged() && last.tracking_error() < 1e-3, "{words}");
     let good = outcome.runs.iter().filter(|run| run.accepted).count();
@@ -186,8 +186,8 @@ fn another_arm_than_described_never_converges() {
     }
 }
 
-/// A link some percent longer than described: friction and bodies take most of it, and what is left of the torque is
-/// less than real friction leaves. That another length explains it is said, with the length.
+/// A link that is some percent longer than described: friction and bodies absorb most of the effect, and the residual
+/// is smaller than that of real friction. The other length is reported as the better explanation.
 #[test]
 fn a_length_that_is_a_little_off_never_converges_and_is_named() {
     for length_m in [0.96, 1.04] {
@@ -200,12 +200,12 @@ fn a_length_that_is_a_little_off_never_converges_and_is_named() {
         });
         let found: Vec<_> = lengths.collect();
         let [(Some(joint), factor)] = &found[..] else { panic!("{length_m} m: {found:?} {words}") };
-        // The arm is 1 m by its description; a tenth of the error is what the parabola may miss.
+        // The described arm is 1 m long; the parabola may miss a tenth of the error.
         assert!(joint == "joint2" && (factor - length_m).abs() < 0.004, "{length_m} m: {factor} {words}");
     }
 }
 
-/// Friction that breaks loose with a step, in a joint whose model has a smooth one of a wide range.
+/// Friction that breaks loose with a step, in a joint whose model has a wide smooth step.
 #[test]
 fn a_joint_that_sticks_never_converges() {
     let sticking =
@@ -214,8 +214,8 @@ fn a_joint_that_sticks_never_converges() {
     assert!(!outcome.status.is_converged(), "{}", words(&outcome));
 }
 
-/// Dry friction with stiction, and joints that rest while another moves: the torque at rest is whatever holds the
-/// joint. The model's step is a narrow smooth one.
+/// Dry friction with stiction, and joints that rest while another moves: the torque at rest is undetermined. The model
+/// has a narrow smooth step.
 #[test]
 fn an_arm_that_rests_with_dry_friction_is_found() {
     let narrow = CoulombShape::Smooth { width: 5e-3 };
@@ -228,7 +228,7 @@ fn an_arm_that_rests_with_dry_friction_is_found() {
     assert_eq!(outcome.status, IterationStatus::Converged, "{words}");
     let known = outcome.runs.last().unwrap().knowledge().unwrap();
     let errors = known.values.iter().zip(simulated.truth(&robot)).zip(&known.std).map(|((value, truth), std)| {
-        // What is not excited has no bar.
+        // Parameters that are not excited have no error bar.
         if *std > 0.0 { (value - truth) / std } else { 0.0 }
     });
     let errors: Vec<f64> = errors.collect();
@@ -236,8 +236,8 @@ fn an_arm_that_rests_with_dry_friction_is_found() {
     for joint in &outcome.runs[0].evidence.as_ref().unwrap().joints {
         assert!((0.044..0.083).contains(&joint.torque_noise) && joint.row_noise < 0.013, "{joint:?}");
     }
-    // Of ten independent numbers the root mean square is beyond 1.6 once in some two hundred times. With the rows at
-    // rest it was 2.4 here, and bodies of the paper's arm were off by 15 bars.
+    // The root mean square of ten independent numbers exceeds 1.6 once in about two hundred times. With the rows at
+    // rest it was 2.4 here, and bodies of the paper's arm were wrong by 15 error bars.
     let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
     assert!(rms < 1.6, "{errors:?} {words}");
 }

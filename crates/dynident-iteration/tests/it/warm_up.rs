@@ -1,5 +1,3 @@
-//! The motion made over and over before a run, and what it shows of friction.
-
 use super::simulated_arm::{self, RATE_HZ, Simulated};
 use dynident_iteration::{
     Iteration, IterationStatus, IterationStore, NextMotion, Robot, RobotRun, RobotStatus, RunPurpose, RunRequest,
@@ -7,13 +5,12 @@ use dynident_iteration::{
 };
 use dynident_simulation::{SensorSettings, SimulationError};
 
-/// The arm of which dry friction falls with every motion, as grease that warms; what was commanded is noted.
+/// The arm with dry friction that decreases with every motion, like warming grease; records the commanded motions.
 #[derive(Debug)]
 struct Cold {
     coulomb: [f64; 2],
     inner: SimulatedRobot,
     commanded: Vec<(usize, RunPurpose, f64)>,
-    /// The pass that a brake ends.
     stops_in: Option<usize>,
 }
 
@@ -39,7 +36,7 @@ impl Robot for Cold {
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         self.commanded.push((request.run, request.purpose, request.speed));
         let mut run = arm(self.coulomb).run(request)?;
-        // Half of what is above the warm value goes with every motion.
+        // Half of the excess above the warm value disappears with every motion.
         for (value, warm) in self.coulomb.iter_mut().zip([1.5, 1.0]) {
             *value = 0.5 * (*value + warm);
         }
@@ -60,8 +57,8 @@ fn iteration(warm_up_s: f64) -> Iteration {
     Iteration::new(simulated_arm::task(), settings).unwrap()
 }
 
-/// The motion lasts 20 s: 50 s are three passes, after the slow run and before the first, and no more in the same call.
-/// What friction lost and every pass took follows from the work of the torque along the motion.
+/// The motion lasts 20 s, so 50 s are three passes, after the slow run and before the first run, once per call. Power
+/// loss and friction torque follow from the work of the torque along the motion.
 #[test]
 fn passes_come_before_the_first_run_of_a_call() {
     let folder = tempfile::tempdir().unwrap();
@@ -76,7 +73,7 @@ fn passes_come_before_the_first_run_of_a_call() {
     let shown = outcome.runs[0].warm_up.as_ref().unwrap();
     let duration_s = simulated_arm::reference().duration_s();
     assert!(shown.passes == 3 && (shown.duration_s - 3.0 * duration_s).abs() < 1e-9);
-    // Of dry and viscous friction, from the velocities of the motion alone.
+    // Expected from dry and viscous friction with the velocities of the motion.
     let reference = simulated_arm::reference();
     let motion = reference.motion();
     let (mut way, mut square) = ([0.0; 2], [0.0; 2]);
@@ -88,7 +85,7 @@ fn passes_come_before_the_first_run_of_a_call() {
     }
     let power =
         |coulomb: [f64; 2]| (0..2).map(|j| coulomb[j] * way[j] + [0.8, 0.5][j] * square[j]).sum::<f64>() / duration_s;
-    // The slow run has halved it once.
+    // The slow run has halved the excess once.
     let [first, second, third] = [[2.25, 1.5], [1.875, 1.25], [1.6875, 1.125]].map(power);
     for (found, expected) in shown.lost_power_w.iter().zip([first, second, third]) {
         // The arm is some mrad and mrad/s off its path.
@@ -102,9 +99,7 @@ fn passes_come_before_the_first_run_of_a_call() {
     assert!(joint == 0 && (torque + 0.5625).abs() < 0.05, "{torque}");
     let sentence = shown.sentence(&["one".to_owned(), "two".to_owned()]);
     assert!(sentence.contains("3 times, 60 s") && sentence.contains("most at one"), "{sentence}");
-    // Kept with the run; nothing of the passes is.
     assert_eq!(store.records().unwrap()[0].warm_up.as_ref(), Some(shown));
-    // A further call warms up before its own first run, and not before none.
     let mut settings = simulated_arm::settings();
     settings.safety.warm_up_s = 10.0;
     settings.max_runs = 3;
@@ -117,7 +112,6 @@ fn passes_come_before_the_first_run_of_a_call() {
     assert_eq!(cold.commanded, expected);
 }
 
-/// Friction that no longer changes shows no drift, with the noise of sensors as well.
 #[test]
 fn a_warm_robot_shows_no_drift() {
     let mut robot = Simulated::default().robot();
@@ -137,14 +131,14 @@ impl Supervisor for Asked {
     }
 }
 
-/// Who is asked hears which pass it is; a pass that ends early ends the call.
+/// Requests for permission contain the pass; a pass that ends early ends the call.
 #[test]
 fn a_pass_that_ends_early_is_looked_at() {
     let mut cold = Cold { stops_in: Some(2), ..Cold::new() };
     let mut asked = Asked(Vec::new());
     let outcome = iterate_supervised(&iteration(50.0), &mut [&mut cold], None, &mut asked).unwrap();
     let IterationStatus::Waiting { reason } = &outcome.status else { panic!("{}", outcome.status) };
-    assert!(reason.contains("pass 2 of 3 of the warm-up") && reason.contains("Look at the robot"), "{reason}");
+    assert!(reason.contains("pass 2 of 3 of the warm-up") && reason.contains("Check the robot"), "{reason}");
     assert!(outcome.runs.is_empty() && cold.commanded.len() == 3);
     assert_eq!(asked.0[2].purpose, RunPurpose::WarmUp { pass: 2, of: 3 });
 }
