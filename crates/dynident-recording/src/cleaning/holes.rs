@@ -1,18 +1,17 @@
-//! Holes in the rows that are short against the motion: filled, so that the motion goes on, and marked.
+//! Fills holes in the rows that are short compared with the motion, and marks the filled rows.
 
 use crate::clock::timeline::Places;
 use crate::log::RawBlock;
 
 /// Degree of the polynomials across holes.
 const DEGREE: usize = 5;
-/// Fewest and most rows on either side that a hole is filled from.
+/// Minimum and maximum number of rows on either side from which a hole is filled.
 const FEWEST: usize = 6;
 pub(super) const MOST: usize = 64;
 
-/// Values at `places` of the polynomial of degree 5 that lies nearest to `values` at `known`.
+/// Values at `places` of the least-squares polynomial of degree 5 through `values` at `known`.
 ///
-/// Polynomials orthonormal over the known places, made by two Gram-Schmidt passes on the powers, and carried along to
-/// the wanted ones.
+/// The basis is orthonormal over `known`: two Gram-Schmidt passes on the powers, evaluated at `places` as well.
 fn polynomial(known: &[f64], values: &[f64], places: &[f64]) -> Vec<f64> {
     let count = known.len();
     let middle = 0.5 * (known[0] + known[count - 1]);
@@ -45,7 +44,7 @@ fn polynomial(known: &[f64], values: &[f64], places: &[f64]) -> Vec<f64> {
     out
 }
 
-/// The last rows before a block, for holes at its begin.
+/// Last rows before a block, for holes at its start.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Before {
     pub(super) raw: RawBlock,
@@ -62,7 +61,6 @@ fn channels_mut(block: &mut RawBlock) -> impl Iterator<Item = &mut Vec<f64>> {
     q.iter_mut().chain(tau).chain(dq).chain(ddq).chain(temperature_c)
 }
 
-/// Appends some rows of a block to another.
 fn append(to: &mut RawBlock, from: &RawBlock, rows: core::ops::Range<usize>) {
     to.row.extend_from_slice(&from.row[rows.clone()]);
     to.time_s.extend_from_slice(&from.time_s[rows.clone()]);
@@ -71,7 +69,7 @@ fn append(to: &mut RawBlock, from: &RawBlock, rows: core::ops::Range<usize>) {
     }
 }
 
-/// A block with as many channels and no rows.
+/// A block with the same channels and no rows.
 fn empty_like(block: &RawBlock) -> RawBlock {
     let none = |channels: &[Vec<f64>]| vec![Vec::new(); channels.len()];
     RawBlock {
@@ -85,17 +83,18 @@ fn empty_like(block: &RawBlock) -> RawBlock {
     }
 }
 
-/// A block with its holes filled; `invented` are the places of the rows that were not measured.
+/// A block with its holes filled; `invented` are the indices of the rows that were not measured.
 pub(super) struct Filled {
     pub(super) raw: RawBlock,
     pub(super) places: Places,
     pub(super) invented: Vec<usize>,
-    /// For every row of the block as it came its place in this one.
+    /// For each row of the original block, its index in this block.
     pub(super) moved: Vec<usize>,
 }
 
-/// Fills the holes of a block, positions by one polynomial of degree 5 through the rows on either side (twice as many
-/// as are missing, 6 to 64), all else by straight lines. A hole with too few rows beside it begins a new piece instead.
+/// Fills the holes of a block: positions by one polynomial of degree 5 through the rows on either side (twice the
+/// number of missing rows, 6 to 64), other channels by straight lines. A hole with too few rows next to it starts a new
+/// piece instead.
 pub(super) fn fill(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawBlock>) -> Filled {
     let mut out = Filled {
         raw: empty_like(block),
@@ -131,7 +130,7 @@ pub(super) fn fill(before: &Before, block: &RawBlock, places: &Places, next: Opt
     out
 }
 
-/// The rows of one hole; `None` with too few rows beside it.
+/// The rows of one hole; `None` if too few rows are next to it.
 fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawBlock>, hole: usize) -> Option<Before> {
     let earlier = before.raw.rows();
     let joined = |k: usize| if k < earlier { (&before.raw, &before.places, k) } else { (block, places, k - earlier) };
@@ -144,7 +143,7 @@ fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawB
     let missing = (to - from).round() as usize;
     let missing = missing.checked_sub(1).filter(|missing| *missing > 0)?;
     let wanted = (2 * missing).clamp(FEWEST, MOST);
-    // Uninterrupted rows on either side, nearest first; behind the block's end those of the next one, evenly spaced.
+    // Uninterrupted rows on either side, nearest first; after the block's end, rows of the next block, evenly spaced.
     let is_seam = |k: usize| {
         let (_, places, k) = joined(k);
         places.begins[k] || places.holes.contains(&k)
@@ -192,7 +191,7 @@ fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawB
     Some(rows)
 }
 
-/// The last rows of a block, for holes at the begin of the next.
+/// The last rows of a block, for holes at the start of the next.
 pub(super) fn last_rows(block: &RawBlock, places: &Places) -> Before {
     let from = block.rows().saturating_sub(MOST);
     let mut raw = empty_like(block);

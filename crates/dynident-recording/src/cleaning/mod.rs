@@ -1,10 +1,9 @@
-//! From rows as they were read to rows that a motion is made of.
+//! Cleans the rows of a log before a motion is made from them.
 //!
-//! [`CleanRows`] reads two blocks ahead and, on the way: finds single torque samples far from those around them
-//! (`outliers`) and torque that stands still while its joint moves (`held`: repeated, or saturated), both marked so
-//! that no row of a fit holds them; replaces lone spikes of a position (`spikes`); gives each row its place by the
-//! clock; and fills holes that are short against the motion (`holes`), marked likewise. What it did is kept for the
-//! report.
+//! [`CleanRows`] reads two blocks ahead. It finds single torque samples far from their neighbours (`outliers`) and
+//! torque that stays constant while its joint moves (`held`: repeated or saturated), and marks both so that no row of a
+//! fit uses them. It replaces single spikes of a position (`spikes`), assigns each row its place on the clock, and
+//! fills and marks holes that are short compared with the motion (`holes`). The report lists these corrections.
 
 mod held;
 mod holes;
@@ -22,16 +21,16 @@ use holes::{Before, Filled, fill, last_rows};
 use set_aside::Tally;
 use std::collections::VecDeque;
 
-/// Some rows, ready for the grid.
+/// Rows that are ready for the grid.
 #[derive(Debug, Default)]
 pub(crate) struct CleanBlock {
     pub(crate) raw: RawBlock,
     pub(crate) places: Places,
-    /// For each joint the rows whose torque does not count, ascending.
+    /// For each joint the rows whose torque is ignored, ascending.
     pub(crate) marked: Vec<Vec<usize>>,
 }
 
-/// A log's rows, read ahead and cleaned.
+/// Reads the rows of a log ahead and cleans them.
 #[derive(Debug)]
 pub(crate) struct CleanRows {
     reader: RawBlocks,
@@ -43,7 +42,7 @@ pub(crate) struct CleanRows {
     /// Cleaned, not placed.
     cleaned: VecDeque<(RawBlock, Vec<Vec<usize>>)>,
     ended: bool,
-    /// The last torques as logged and positions as cleaned.
+    /// Last torques as logged and last positions as cleaned.
     tail: [Vec<Vec<f64>>; 2],
     /// Smallest and largest torque of each joint, and its spread.
     extremes: Vec<[f64; 2]>,
@@ -72,7 +71,7 @@ impl CleanRows {
         }
     }
 
-    /// The same, its rows read ahead by a thread of their own from now on.
+    /// Reads rows ahead in a separate thread from now on.
     pub(crate) fn read_beside(self) -> Self {
         Self { reader: self.reader.beside(), ..self }
     }
@@ -81,17 +80,16 @@ impl CleanRows {
         &self.reader
     }
 
-    /// What was set aside so far.
     pub(crate) fn set_aside(&self) -> Vec<SetAside> {
         self.tally.all()
     }
 
-    /// Holes that were filled, and the samples in them.
+    /// Number of filled holes, and of samples in them.
     pub(crate) fn bridged(&self) -> [u64; 2] {
         self.bridged
     }
 
-    /// The next rows; `None` at the end. `read` sees every block as it was logged.
+    /// The next rows; `None` at the end. `read` is called with every block as logged.
     pub(crate) fn next_block(&mut self, read: &mut dyn FnMut(&RawBlock)) -> Result<Option<CleanBlock>, RecordingError> {
         while self.cleaned.len() < 2 && !(self.ended && self.waiting.is_none()) {
             let next = self.read(read)?;
@@ -108,7 +106,7 @@ impl CleanRows {
         } else {
             let holes = places.holes.len() as u64;
             let Filled { raw, places, invented, moved } = fill(&self.before, &raw, &places, next);
-            // A hole that could not be filled begins a piece.
+            // A hole that could not be filled starts a new piece.
             self.bridged[0] += if invented.is_empty() { 0 } else { holes };
             self.bridged[1] += invented.len() as u64;
             let marked = marked.into_iter().map(|marked| {
@@ -136,7 +134,7 @@ impl CleanRows {
         Ok(Some(block))
     }
 
-    /// Finds what does not count, and puts something sane in its place.
+    /// Finds invalid samples and replaces them.
     fn clean(&mut self, mut block: RawBlock) -> (RawBlock, Vec<Vec<usize>>) {
         let rows = block.rows();
         self.tally.rows += rows as u64;
@@ -146,7 +144,7 @@ impl CleanRows {
         }
         let next = self.waiting.as_ref();
         for (joint, marked) in marked.iter_mut().enumerate() {
-            // Positions first: whether a joint moves is asked of them.
+            // Positions first: the test for held torque uses them.
             let joined = |tail: &[f64], own: &[f64], next: Option<&[f64]>, most: usize| -> Vec<f64> {
                 let ahead = next.map_or(&[][..], |next| &next[..next.len().min(most)]);
                 [tail, own, ahead].concat()
@@ -208,18 +206,18 @@ impl CleanRows {
     }
 }
 
-/// From the value above a twentieth of all to the one below a twentieth.
+/// Difference of the 95 % and the 5 % quantile.
 fn spread(mut values: Vec<f64>) -> f64 {
     let part = values.len() / 20;
     let above = values.len() - 1 - part;
     let (below, largest, _) = values.select_nth_unstable_by(above, f64::total_cmp);
     let largest = *largest;
-    // The one value of a single sample is both.
+    // With a single sample both quantiles are the same value.
     let smallest = if part < above { *below.select_nth_unstable_by(part, f64::total_cmp).1 } else { largest };
     largest - smallest
 }
 
-/// Keeps the last samples of what has passed.
+/// Keeps the last samples for the next block.
 fn keep_last(tail: &mut Vec<f64>, own: &[f64]) {
     tail.extend_from_slice(own);
     let unneeded = tail.len().saturating_sub(held::AROUND);

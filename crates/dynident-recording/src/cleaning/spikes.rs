@@ -1,44 +1,45 @@
-//! Single positions that no motion makes.
+//! Finds and replaces single positions that no motion can cause.
 
 use super::outliers::{limit_of, middle_size};
 use crate::quantisation::{quantisation_step, usual_change};
 
-/// Samples to either side that a judgement needs.
+/// Samples needed on either side of a tested sample.
 pub(super) const REACH: usize = 4;
-/// Robust standard deviations of the fourth difference that a spike has to stand off.
+/// Minimum size of a spike in robust standard deviations of the fourth difference.
 const TIMES_NOISE: f64 = 12.0;
-/// Samples over which the noise is taken to be alike.
+/// Window over which the noise is taken as stationary, samples.
 const NOISE_SPAN: usize = 512;
-/// How closely the fourth differences around a spike have to be its own (RMS), as a share of the largest; those of a
-/// kink differ by a sixth.
+/// Maximum RMS deviation of the fourth differences around a spike from the pattern of a spike, as a share of the
+/// largest; for a kink it is a sixth.
 const ALIKE: f64 = 0.08;
-/// The same where noise of three deviations would allow more.
+/// The same limit where three standard deviations of the noise exceed it.
 const ALIKE_IN_NOISE: f64 = 0.14;
-/// Least size in steps of a quantised encoder.
+/// Minimum size in steps of a quantised encoder.
 const QUANTA: f64 = 3.5;
 const NORMAL: f64 = 1.4826;
 const FEWEST: usize = 64;
-/// With more spikes than this share they are the nature of the signal.
+/// Maximum share of spikes; above it the deviations belong to the signal.
 const LARGEST_SHARE: f64 = 0.05;
 
-/// Replaces lone spikes of `own` (a part of `x`) by the cubic through their four neighbours and returns their places.
+/// Replaces single spikes of `own` (a range of `x`) by the cubic through their four neighbours and returns their
+/// indices.
 ///
-/// The fourth difference of a lone spike A is `A (1, -4, 6, -4, 1)`, of a jump `A (1, -3, 3, -1)`, of a kink
-/// `A (1, -2, 1)`: a spike is known by its pattern, so that neither a jump of the angle nor an acceleration that begins
-/// at once is taken for one. It has to stand off by twelve robust standard deviations of the fourth differences nearby.
+/// The fourth difference of a spike A is `A (1, -4, 6, -4, 1)`, of a jump `A (1, -3, 3, -1)`, of a kink `A (1, -2, 1)`.
+/// This pattern distinguishes a spike from a jump of the angle or a sudden acceleration. Its size must exceed twelve
+/// robust standard deviations of the fourth differences nearby.
 pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec<usize> {
     let n = x.len();
     if n < FEWEST {
         return Vec::new();
     }
     let fourth = |x: &[f64], i: usize| {
-        // Differences of differences: positions far from zero keep their digits.
+        // Differences of differences keep the digits of positions far from zero.
         let d = [x[i - 1] - x[i - 2], x[i] - x[i - 1], x[i + 1] - x[i], x[i + 2] - x[i + 1]];
         (d[3] - d[2]) - 2.0 * (d[2] - d[1]) + (d[1] - d[0])
     };
     let all: Vec<f64> = (2..n - 2).map(|i| fourth(x, i)).collect();
     let overall = NORMAL * middle_size(all.iter().copied());
-    // Place, size, distance in units of the least, and whether it is the pattern of a spike.
+    // Index, size, ratio to the minimum size, and whether the pattern is that of a spike.
     let mut apart: Vec<(usize, f64, f64, bool)> = Vec::new();
     let inside = own.start.max(REACH)..own.end.min(n - REACH);
     let half = NOISE_SPAN / 2;
@@ -52,7 +53,7 @@ pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec
             let at = |k: usize| all[i + k - 4];
             let peak = at(2);
             let size = peak.abs();
-            // A rounded sum of doubles is no spike.
+            // Ignore rounding errors.
             if size <= 0.5 * least || size <= 1e-12 * x[i].abs() || (0..5).any(|k| at(k).abs() > size) {
                 continue;
             }
@@ -63,7 +64,7 @@ pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec
         }
         from = to.max(from + 1);
     }
-    // Other roughness as large as that speaks against spikes: a motion with noise of long tails.
+    // Other roughness of the same size indicates noise with long tails, not spikes.
     let limit = limit_of(apart.iter().map(|(_, _, times, is_lone)| if *is_lone { *times } else { times.min(1.0) }));
     let lone = apart.into_iter().filter(|(_, _, times, is_lone)| *is_lone && *times > limit);
     let mut found: Vec<(usize, f64)> = lone.map(|(i, size, ..)| (i, size)).collect();
@@ -73,7 +74,7 @@ pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec
     if let Some(step) = quantisation_step(x) {
         found.retain(|(_, size)| size.abs() > QUANTA * step);
     }
-    // At rest a count of the encoder to and fro is none.
+    // At rest, single encoder counts back and forth are not spikes.
     found.retain(|(i, size)| {
         let nearby = &x[i.saturating_sub(NOISE_SPAN / 4)..(i + NOISE_SPAN / 4).min(n)];
         usual_change(nearby).is_none_or(|change| size.abs() > QUANTA * change)
@@ -108,7 +109,7 @@ mod tests {
             }
             assert_eq!(replace_spikes(&mut x, 0..n), places, "{sigma}");
             for i in 0..n {
-                // The cubic's own noise is below σ, and its bias 9 h⁴ of the fourth derivative: 1e-9.
+                // The cubic's noise is below σ; its bias is 9 h⁴ times the fourth derivative: 1e-9.
                 assert!((x[i] - clean[i]).abs() < 8.0 * sigma + 1e-8, "{sigma} {i}");
             }
         }
@@ -121,7 +122,7 @@ mod tests {
         let kink = |i: usize| motion(i) + (i as f64 - 2500.0).max(0.0) * 1e-4;
         let starts = |i: usize| (i as f64 - 2500.0).max(0.0).powi(2) * 1e-5;
         let encoder = |i: usize| (motion(i) / 1e-3).round() * 1e-3;
-        // A joint at rest on the edge of a count, printed with five digits.
+        // A joint at rest between two encoder counts, printed with five digits.
         let digits = |x: f64| format!("{x:.4e}").parse::<f64>().unwrap();
         let rest = |i: usize| {
             digits(

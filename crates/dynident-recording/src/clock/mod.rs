@@ -1,8 +1,8 @@
-//! From rows with stamps to pieces of samples on a uniform clock.
+//! Converts rows with time stamps to pieces of samples on a uniform clock.
 //!
-//! [`Clock`] is the decision about the rate, and whether the stamps, the stamps smoothed (`drift`) or the even spacing
-//! are to be believed. The `Timeline` gives each row its place by it, the `Segmenter` cuts a stream of rows at gaps,
-//! and its `Resampler` puts each piece on a grid of its own.
+//! [`Clock`] is the decision on the rate and on the times of the samples: stamps, smoothed stamps (`drift`) or even
+//! spacing. The `Timeline` assigns each row its place, the `Segmenter` cuts the rows at gaps, and its `Resampler`
+//! interpolates each piece on a separate grid.
 
 mod drift;
 mod resampler;
@@ -14,51 +14,50 @@ use drift::{Drift, smoothed, windows};
 use crate::log::ClockRule;
 use serde::{Deserialize, Serialize};
 
-/// Jitter below which the question of the clock is idle: standard deviation of the steps over their mean. At 0.1 % of a
-/// step the position error of a wrong decision is a thousandth of the motion within one step.
+/// Jitter below which spacing is even: standard deviation of the steps over their mean. At 0.1 % of a step the position
+/// error of a wrong decision is a thousandth of the motion within one step.
 pub(crate) const NEGLIGIBLE_JITTER: f64 = 1e-3;
 
-/// Stamps closer together than this part of the mean step carry no information beside the noise: the second is left out
-/// when stamps are interpolated.
+/// Minimum distance of two stamps, as a share of the mean step. The second of two closer stamps is mostly noise and is
+/// ignored in the interpolation.
 pub(crate) const SHORTEST_STEP: f64 = 0.1;
 
-/// Share by which one spacing has to predict positions better than another to be believed.
+/// Minimum relative improvement of the position prediction for choosing one spacing over another.
 const CLEARLY: f64 = 0.1;
 
-/// Share of rows with equal stamps that have the positions of the one before where rows are repeated.
+/// Minimum share of rows with equal stamps that also repeat the position, for rows to be treated as repeated.
 const MOST_REPEAT: f64 = 0.9;
 
-/// What the first rows say about the clock.
+/// Properties of the clock, estimated from the first rows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Clock {
-    /// Samples per second on the uniform grid.
+    /// Sample rate of the uniform grid, Hz.
     pub rate_hz: f64,
-    /// Whether samples count as evenly spaced (the stamps only gave the mean rate).
+    /// Whether samples are treated as evenly spaced (only the mean rate is taken from the stamps).
     pub uniform: bool,
-    /// Median step in seconds.
+    /// Median step, s.
     pub median_step_s: f64,
-    /// Whether rows whose stamp equals the one before repeat it: they are no samples. Otherwise such stamps are
-    /// rounded, and their rows are as far apart as all others.
+    /// Whether a row with the same stamp as the previous row is a copy of it and is ignored. Otherwise equal stamps are
+    /// rounded, and their rows have the usual spacing.
     #[serde(default)]
     pub repeats_rows: bool,
-    /// RMS error with which each position follows from its four neighbours by a cubic, relative to the motion, if the
-    /// spacing is taken as even; `None` if the question was idle.
+    /// RMS error of the cubic prediction of each position from its four neighbours, relative to the motion, for even
+    /// spacing; `None` if it was not needed.
     pub misfit_uniform: Option<f64>,
-    /// The same if the stamps are believed.
+    /// The same for the stamps.
     pub misfit_stamps: Option<f64>,
-    /// Steps by which the stamps, smoothed, stray from an even grid (largest less smallest); `None` if the question was
-    /// idle.
+    /// Range of the deviation of the smoothed stamps from an even grid, steps; `None` if it was not needed.
     #[serde(default)]
     pub drift_steps: Option<f64>,
-    /// Rows over which stamps are smoothed by local lines; 0 if they are not.
+    /// Number of rows over which stamps are smoothed by local lines; 0 if they are not smoothed.
     #[serde(default)]
     pub smoothing_rows: usize,
-    /// The decision in a sentence.
+    /// The decision in one sentence.
     pub evidence: String,
 }
 
-/// Where samples stand.
+/// Times of the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Spacing {
     /// At equal steps.
@@ -81,19 +80,20 @@ impl Clock {
 
 /// Decides on the clock from the stamps `time_s` and positions `q` (one slice for each joint) of the first rows.
 ///
-/// Rule: with a jitter below [`NEGLIGIBLE_JITTER`] spacing is even. Otherwise two questions. *Do single stamps tell
-/// when their samples were taken?* Every sample is predicted from its four neighbours by the cubic through them, once
-/// at even spacing and once at the stamps; where sampling was regular and only the stamps jitter (a time taken after
-/// transmission), the first predicts better, and the other way round. Stamps are believed if they predict at least 10 %
-/// better. *Does the rate change slowly?* No cubic over five samples can tell, and noise of the position hides jitter
-/// besides; but stamps that stray ever further from an even grid do. Where they stray by more than a step, and the rate
-/// varies by more than 0.1 %, samples stand at the stamps smoothed by local lines, over as many rows as predict
-/// left-out stamps best: the drift is followed, jitter is averaged out.
+/// With a jitter below [`NEGLIGIBLE_JITTER`] spacing is even. Otherwise:
 ///
-/// Equal stamps: where such rows repeat the positions of the one before and others do not, rows are repeated and take
-/// no time. Otherwise stamps are rounded to more than a step, and the mean step counts every row.
+/// 1. Does each stamp show when its sample was taken? Every sample is predicted from its four neighbours by the cubic
+///    through them, at even spacing and at the stamps. If only the stamps jitter (a time taken after transmission),
+///    even spacing predicts better. The stamps are used if they predict at least 10 % better.
+/// 2. Does the rate change slowly? A cubic over five samples cannot show this. If the smoothed stamps deviate from an
+///    even grid by more than a step and the rate varies by more than 0.1 %, the smoothed stamps are used. The smoothing
+///    window minimises the prediction error of left-out stamps, so that the drift is followed and jitter averaged out.
 ///
-/// Steps are the unit throughout, so nothing depends on the unit of time. `Err` holds the reason why no rate follows.
+/// Equal stamps: if such rows repeat the positions of the previous row and others do not, the rows are copies and take
+/// no time. Otherwise stamps are rounded to more than a step, and the mean step includes every row.
+///
+/// Steps are the unit throughout, so the result is independent of the unit of time. `Err` holds the reason why no rate
+/// can be determined.
 pub(crate) fn clock(
     rule: ClockRule,
     time_s: &[f64],
@@ -126,7 +126,7 @@ pub(crate) fn clock(
     result.misfit_stamps = Some(stamps);
     result.drift_steps = drift.map(|drift| drift.steps);
     let smoothing_rows = drift.map_or(0, |drift| 2 * drift.half + 1);
-    // Rounding alone makes stamps stray by what they are rounded to, either way.
+    // Rounded stamps deviate by the rounding step in either direction.
     let by_rounding = if rounded > 0 { 2.0 * median_s / mean_s } else { 0.0 };
     let stamps_predict_better = stamps.partial_cmp(&((1.0 - CLEARLY) * uniform)) == Some(core::cmp::Ordering::Less);
     (result.uniform, result.smoothing_rows) = match rule {
@@ -143,16 +143,16 @@ pub(crate) fn clock(
     Ok(result)
 }
 
-/// The steps between successive rows, without gaps.
+/// Steps between successive rows, without gaps.
 struct MeanStep {
     mean_s: f64,
     /// Median of the positive steps, gaps included.
     median_s: f64,
     /// Standard deviation over the mean.
     jitter: f64,
-    /// Stamps that equal the one before because they are rounded.
+    /// Number of stamps equal to the previous one because of rounding.
     rounded: usize,
-    /// Whether stamps that equal the one before belong to rows that repeat it.
+    /// Whether rows with the previous stamp are copies of the previous row.
     repeats_rows: bool,
 }
 
@@ -181,19 +181,19 @@ impl MeanStep {
         Ok(Self { mean_s, median_s, jitter: deviation / mean_s, rounded, repeats_rows })
     }
 
-    /// The jitter, and how many of the stamps are rounded.
+    /// Describes the jitter and the number of rounded stamps.
     fn jitter_in_words(&self, stamps: usize) -> String {
         let by_rows = match self.rounded {
             0 => String::new(),
             rounded => {
-                format!("; {rounded} of {stamps} stamps equal the one before: they are rounded, and all rows count")
+                format!("; {rounded} of {stamps} stamps equal the one before: they are rounded, and all rows are used")
             }
         };
         format!("{:.3} % jitter{by_rows}", 100.0 * self.jitter)
     }
 }
 
-/// The decision in a sentence.
+/// Describes the decision in one sentence.
 fn decision_in_words(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option<Drift>) -> String {
     let spacing = match clock.spacing() {
         Spacing::Even => "even spacing".to_owned(),
@@ -202,7 +202,7 @@ fn decision_in_words(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option
     };
     let strays = drift.map_or_else(String::new, |drift| {
         let Drift { steps, variation, .. } = drift;
-        format!("; the stamps stray {steps:.2} steps from an even grid, the rate varies by {:.2} %", 100.0 * variation)
+        format!("; the stamps drift {steps:.2} steps from an even grid, the rate varies by {:.2} %", 100.0 * variation)
     });
     match rule {
         ClockRule::Auto if clock.spacing() == Spacing::Smoothed => {
@@ -210,12 +210,12 @@ fn decision_in_words(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option
         }
         ClockRule::Auto => format!("{spacing}, decided by the {misfit}{strays}"),
         ClockRule::Uniform | ClockRule::Stamps | ClockRule::Smoothed => {
-            format!("{spacing}, as asked; {misfit}{strays}")
+            format!("{spacing}, as configured; {misfit}{strays}")
         }
     }
 }
 
-/// Whether the rows `equal` have the positions of the row before, while `all` rows mostly have not.
+/// Whether the rows `equal` have the positions of the previous row, while most of `all` rows do not.
 fn repeat_the_one_before(q: &[Vec<f64>], equal: &[usize], all: impl Iterator<Item = usize>) -> bool {
     let is_same = |i: usize| q.iter().all(|q| q[i] == q[i - 1]);
     let share = |rows: &mut dyn Iterator<Item = usize>| {
@@ -226,9 +226,9 @@ fn repeat_the_one_before(q: &[Vec<f64>], equal: &[usize], all: impl Iterator<Ite
     share(&mut equal.iter().copied()) > MOST_REPEAT && share(others) < 1.0 - MOST_REPEAT
 }
 
-/// How far the stamps stray from an even grid; smoothed over as many rows as predict left-out stamps best, and over
-/// more as long as positions follow from their neighbours clearly worse than at even spacing: jitter that lasts for
-/// several rows (packets that come late together) is none of the rate.
+/// Drift of the stamps from an even grid. The smoothing window minimises the error for left-out stamps. It is enlarged
+/// while positions are predicted clearly worse than at even spacing, because jitter over several rows (packets that
+/// arrive late together) is not a change of the rate.
 fn drift(time_s: &[f64], row: &[u64], q: &[Vec<f64>], rate_hz: f64, longest_step_s: f64) -> Option<Drift> {
     let place: Vec<f64> = row.iter().map(|row| *row as f64).collect();
     let stamp: Vec<f64> = time_s.iter().map(|time_s| time_s * rate_hz).collect();
@@ -249,7 +249,8 @@ fn drift(time_s: &[f64], row: &[u64], q: &[Vec<f64>], rate_hz: f64, longest_step
     found
 }
 
-/// RMS misfit of the cubic through two neighbours on either side, over all joints in units of each joint's deviation.
+/// RMS misfit of the cubic through two neighbours on either side, over all joints, in units of each joint's standard
+/// deviation: at even spacing and at the stamps.
 fn misfits(time_s: &[f64], q: &[Vec<f64>], mean: f64, max_gap: f64) -> (f64, f64) {
     let (mut uniform, mut stamps, mut count) = (0.0, 0.0, 0.0);
     let scales: Vec<f64> = q.iter().map(|q| deviation(q)).collect();
@@ -301,8 +302,7 @@ pub(crate) fn lagrange(at: f64, nodes: [f64; 4]) -> [f64; 4] {
 mod tests {
     use super::*;
 
-    /// Stamps with two decimals of a recorder at 125 Hz and 200 Hz: four steps of 10 ms for five rows, one for two. The
-    /// rate is that of the rows.
+    /// Stamps with two decimals of a recorder at 125 Hz and 200 Hz: four steps of 10 ms for five rows, or one for two.
     #[test]
     fn rounded_stamps_keep_the_rate_of_the_rows() {
         for rate_hz in [125.0, 200.0, 1000.0] {
@@ -315,10 +315,10 @@ mod tests {
         }
     }
 
-    /// Rows that stand twice are no samples: the rate is that of the others. A robot at rest whose stamps are rounded
-    /// repeats its positions as well, and no row of it is another's copy.
+    /// Copied rows are ignored in the rate. A robot at rest with rounded stamps also repeats its positions, but its
+    /// rows are not copies.
     #[test]
-    fn repeated_rows_are_told_from_a_robot_at_rest() {
+    fn repeated_rows_are_distinguished_from_a_robot_at_rest() {
         let twice = |i: u32| f64::from(i / 2) * 0.008;
         let row: Vec<u64> = (0..2000).collect();
         let time: Vec<f64> = (0..2000).map(twice).collect();
@@ -347,14 +347,14 @@ mod tests {
     }
 
     #[test]
-    fn the_data_tell_whether_stamps_or_samples_jitter() {
+    fn jitter_of_stamps_and_of_samples_is_distinguished() {
         assert!(decided(false).uniform, "{:?}", decided(false));
         assert!(!decided(true).uniform, "{:?}", decided(true));
         assert!((decided(true).rate_hz - 200.0).abs() < 0.1);
     }
 
-    /// The decision for samples taken at `taken(row)` steps and stamped `stamp(row)`, with noise of the position, in
-    /// units of time of which a second has `unit`.
+    /// The decision for samples taken at `taken(row)` steps and stamped `stamp(row)`, with position noise, for `unit`
+    /// time units per second.
     fn decided_in(unit: f64, sigma: f64, taken: impl Fn(usize) -> f64, stamp: impl Fn(usize) -> f64) -> Clock {
         let n = 20_000;
         let noise = crate::derivative::test_signals::normal(4, n);
@@ -366,14 +366,14 @@ mod tests {
 
     #[test]
     fn drift_is_followed_under_noise_that_hides_it_from_the_cubic() {
-        // Blocks of 500 rows at rates some percent apart.
+        // Blocks of 500 rows at rates that differ by some percent.
         let rate = |block: usize| 1.0 + 0.06 * (block as f64 * 2.4).sin();
         let taken = |i: usize| (0..i / 500).map(|b| 500.0 * rate(b)).sum::<f64>() + (i % 500) as f64 * rate(i / 500);
         for unit in [1e-3, 1.0, 1e3] {
             for sigma in [0.0, 1e-4] {
                 let found = decided_in(unit, sigma, taken, |i| taken(i) + jitter(i));
                 assert_eq!(found.spacing(), Spacing::Smoothed, "{unit} {sigma}: {found:?}");
-                // Nothing depends on the unit of time.
+                // The result is independent of the unit of time.
                 let other = decided_in(1.0, sigma, taken, |i| taken(i) + jitter(i));
                 assert_eq!(found.smoothing_rows, other.smoothing_rows, "{unit} {sigma}");
             }
@@ -395,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn no_rate_follows_from_a_clock_that_stands() {
+    fn a_stopped_clock_has_no_rate() {
         assert!(clock(ClockRule::Auto, &[0.0; 5], &[0, 1, 2, 3, 4], &[], 5.0).is_err());
         assert!(clock(ClockRule::Auto, &[0.0], &[0], &[], 5.0).is_err());
     }
