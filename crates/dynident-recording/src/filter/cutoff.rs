@@ -1,51 +1,51 @@
-//! A cut-off chosen from the data: where the motion's acceleration has faded into the noise of the position.
+//! Estimates the cut-off: the frequency above which position noise exceeds the motion's acceleration.
 
 use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
 
-/// Samples that are looked at, at most.
+/// Maximum number of samples that are used.
 pub(crate) const CUTOFF_SAMPLES: usize = 1 << 16;
 
-/// Part of the acceleration's power (noise subtracted) that the pass band has to hold.
+/// Share of the acceleration's power (noise subtracted) in the pass band.
 const POWER_SHARE: f64 = 0.9999;
-/// Two-way Butterworth filters of order 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it.
-/// What the filter takes from positions alone, and not from torque, biases the fit; this margin keeps it to 0.4 % at
-/// the motion's highest frequency.
+/// Ratio of the cut-off to the maximum frequency of the motion. Two-way Butterworth filters of order 4 pass 99.6 % of
+/// the amplitude at half their cut-off and 86 % at 0.8 of it. Attenuation of positions but not of torque biases the
+/// fit; this ratio limits it to 0.4 %.
 const MARGIN: f64 = 2.0;
-/// A spectrum this far above the noise floor counts as motion.
+/// Minimum ratio of the spectrum to the noise floor for motion.
 const ABOVE_NOISE: f64 = 10.0;
-/// No cut-off comes closer to the sampling rate than this part of it.
+/// Maximum ratio of the cut-off to the sampling rate.
 const HIGHEST: f64 = 0.4;
 
-/// A cut-off and why.
+/// A cut-off with its evidence.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CutoffChoice {
-    /// The cut-off for all joints.
+    /// Cut-off of all joints, Hz.
     pub cutoff_hz: f64,
-    /// What each joint alone would ask for; `None` for a joint that does not move.
+    /// Cut-off that each joint needs, Hz; `None` for a joint that does not move.
     pub joints_hz: Vec<Option<f64>>,
-    /// Where each joint's motion has faded into the noise of its position; `None` for a joint that does not move.
+    /// Frequency at which each joint's motion falls below its position noise, Hz; `None` for a joint that does not
+    /// move.
     #[serde(default)]
     pub faded_hz: Vec<Option<f64>>,
-    /// The choice in a sentence.
+    /// The choice in one sentence.
     pub evidence: String,
 }
 
 /// Chooses one cut-off for all joints from uniformly sampled positions `q` (one slice for each joint; at most the first
 /// 65 536 samples are used).
 ///
-/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, three pieces, so that
-/// nothing depends on the unit of time):
-/// * Noise in the position makes the spectrum of the acceleration rise with frequency. Behind the peak of the
-///   velocity's spectrum, the first frequency at which the acceleration's (smoothed over a quarter octave) comes within
-///   twice its minimum is the valley where motion has faded into noise.
-/// * Data that were filtered before have their valley far above the motion: there the frequency counts below which
+/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, three pieces;
+/// independent of the unit of time):
+/// * Position noise makes the spectrum of the acceleration rise with frequency. Above the peak of the velocity's
+///   spectrum, the valley is the first frequency at which the acceleration's spectrum (smoothed over a quarter octave)
+///   falls below twice its minimum. There the motion disappears in the noise.
+/// * Data that were filtered before have their valley far above the motion. Hence the second frequency, below which
 ///   99.99 % of the acceleration's power up to the valley lies.
 ///
-/// The joint asks for twice the lower of the two; the log's cut-off is the highest of its joints', at most 0.4 of the
-/// rate. A joint whose spectrum nowhere stands above ten times its median over the upper half of the band does not
-/// count.
+/// The joint needs twice the lower of the two; the cut-off of the log is the maximum over the joints, at most 0.4 of
+/// the rate. A joint is ignored if its spectrum never exceeds ten times its median over the upper half of the band.
 pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
     let spectra: Vec<Option<Spectrum>> = q.iter().map(|q| spectrum(q.as_ref())).collect();
     let joints: Vec<Option<Content>> =
@@ -61,14 +61,14 @@ pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
             cutoff_hz: 0.1 * rate_hz,
             joints_hz,
             faded_hz,
-            evidence: "no joint moves above its noise: a tenth of the sampling rate".to_owned(),
+            evidence: "no joint moves above its noise: the cut-off is a tenth of the sampling rate".to_owned(),
         },
         Some((joint, content)) => CutoffChoice {
             cutoff_hz: asked(content),
             joints_hz,
             faded_hz,
             evidence: format!(
-                "joint {} (0-based) reaches highest: its acceleration fades into the noise ({:.1e} per sample of position) at {:.3} Hz, \
+                "joint {} (0-based) needs the highest cut-off: its acceleration falls below the noise ({:.1e} per sample of position) at {:.3} Hz, \
                  and 99.99 % of its power below that lies below {:.3} Hz; times {MARGIN}, at most {HIGHEST} of the rate",
                 joint, content.noise, content.valley_hz, content.power_hz,
             ),
@@ -85,13 +85,13 @@ struct Content {
 
 /// The spectrum of a joint's position and acceleration.
 struct Spectrum {
-    /// Of the second difference, bin by bin from the second on.
+    /// Spectrum of the second difference, from the second bin on.
     acceleration: Vec<f64>,
-    /// The same as position.
+    /// Spectrum of the position, from the second bin on.
     position: Vec<f64>,
     /// Variance of the position noise of one sample.
     floor: f64,
-    /// Samples of a piece.
+    /// Samples per piece.
     length: usize,
 }
 
@@ -134,8 +134,7 @@ fn content(spectrum: &Spectrum, rate_hz: f64) -> Option<Content> {
     Some(Content { power_hz: hertz(last.unwrap_or(end)), valley_hz: hertz(valley), noise: floor.sqrt() })
 }
 
-/// Index (bin minus one) at which the acceleration's spectrum has come down to twice its minimum behind the main
-/// motion.
+/// Index (bin minus one) at which the acceleration's spectrum has fallen to twice its minimum above the main motion.
 fn valley(acceleration: &[f64]) -> usize {
     let bins = acceleration.len();
     let sums: Vec<f64> = core::iter::once(0.0)
@@ -162,7 +161,7 @@ fn previous_power_of_two(n: usize) -> usize {
     n.checked_ilog2().map_or(1, |log| 1 << log)
 }
 
-/// Welch's power spectrum: bin k is the variance per bin of white noise of unit variance being one.
+/// Welch's power spectrum, scaled so that white noise of unit variance has 1 in each bin.
 /// Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70.
 pub(crate) fn welch(signal: &[f64], length: usize) -> Option<Vec<f64>> {
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
@@ -194,7 +193,7 @@ mod tests {
     use super::*;
     use core::f64::consts::TAU;
 
-    /// White noise of unit variance from a linear congruential generator, twelve uniforms a sample.
+    /// White noise of unit variance from a linear congruential generator, twelve uniform numbers per sample.
     fn noise(n: usize) -> Vec<f64> {
         let mut state = 12345_u64;
         let mut uniform = || {
@@ -217,13 +216,13 @@ mod tests {
                 })
                 .collect();
             let choice = cutoff(&[q], rate);
-            // The highest harmonic is 2 Hz and carries a third of the acceleration's power.
+            // The highest harmonic is 2 Hz and has a third of the acceleration's power.
             assert!((2.0..6.0).contains(&choice.cutoff_hz), "sigma {sigma}: {choice:?}");
         }
     }
 
     #[test]
-    fn joints_that_stand_still_do_not_decide() {
+    fn joints_at_rest_are_ignored() {
         let q = [noise(5000), vec![1.0; 5000]];
         let choice = cutoff(&q, 100.0);
         assert_eq!(choice.joints_hz, [None, None], "{choice:?}");
