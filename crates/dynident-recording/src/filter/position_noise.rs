@@ -1,25 +1,25 @@
-//! The noise of the positions that a filter cannot take away: its density just above what passes.
+//! Position noise in the pass band, estimated from its density just above the cut-off.
 
 use super::cutoff::{CUTOFF_SAMPLES, welch};
 
-/// Pieces of a spectrum: enough bins between cut-off and four times that for a quartile.
+/// Maximum samples per piece of a spectrum: enough bins between the cut-off and four times the cut-off for a quartile.
 const PIECE_SAMPLES: usize = 1 << 12;
 
-/// For every joint the standard deviation of white noise, one sample of its position, that has the density which the
-/// uniformly sampled positions `q` have between the cut-off and four times that, the lower quartile there: the noise
-/// that also stands below the cut-off, where the motion covers it. Zero for a joint whose position never changes, and
-/// where there are too few samples to tell.
+/// Standard deviation of white position noise per sample, for every joint. Its density is the lower quartile of the
+/// spectrum of the uniformly sampled positions `q` between the cut-off and four times the cut-off: the noise that is
+/// also present below the cut-off, where the motion hides it. Zero for a joint whose position never changes, and for
+/// too few samples.
 ///
-/// A motion that the cut-off was made for has faded there: what is left of it would be a noise of far less than a
-/// hundredth of the acceleration below the cut-off. So a joint that moves is never taken for noise; and positions that
-/// were filtered before they were logged, whose spectrum is empty near half the rate, still show theirs.
+/// A motion for which the cut-off was chosen has decayed there: its remainder is a noise of far less than a hundredth
+/// of the acceleration below the cut-off. Hence motion is not mistaken for noise, and the estimate is also valid for
+/// positions that were filtered before they were logged, whose spectrum is empty near half the rate.
 ///
 /// Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70, on second differences.
 pub fn position_noise<S: AsRef<[f64]>>(q: &[S], rate_hz: f64, cutoff_hz: f64) -> Vec<f64> {
     NoiseSpectra::of(q, rate_hz).beyond(cutoff_hz)
 }
 
-/// The spectra that noise is told from, whatever the cut-off; none for a joint that does not tell.
+/// Spectra for the noise estimate, for any cut-off; `None` for a joint without a valid spectrum.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NoiseSpectra {
     joints: Vec<Option<Vec<f64>>>,
@@ -27,12 +27,12 @@ pub(crate) struct NoiseSpectra {
 }
 
 impl NoiseSpectra {
-    /// Of the uniformly sampled positions `q`.
+    /// Spectra of the uniformly sampled positions `q`.
     pub(crate) fn of<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> Self {
         Self { joints: q.iter().map(|q| spectrum(q.as_ref())).collect(), rate_hz }
     }
 
-    /// [`position_noise`] with a cut-off.
+    /// [`position_noise`] for one cut-off.
     pub(crate) fn beyond(&self, cutoff_hz: f64) -> Vec<f64> {
         let of_joint = |spectrum: &Vec<f64>| noise_beyond(spectrum, self.rate_hz, cutoff_hz);
         self.joints.iter().map(|spectrum| spectrum.as_ref().and_then(of_joint).unwrap_or(0.0)).collect()
@@ -51,10 +51,9 @@ fn spectrum(q: &[f64]) -> Option<Vec<f64>> {
 
 fn noise_beyond(spectrum: &[f64], rate_hz: f64, cutoff_hz: f64) -> Option<f64> {
     let bins = spectrum.len();
-    // Those of a real signal's transform.
     let length = 2 * (bins - 1);
     let bin = |hertz: f64| (hertz / rate_hz * length as f64) as usize;
-    // At least eight bins, the highest ones at worst.
+    // At least eight bins, if necessary the highest ones.
     let from = bin(cutoff_hz).clamp(1, bins.saturating_sub(8).max(1));
     let to = bin(4.0 * cutoff_hz).clamp(from + 8, bins.max(from + 8)).min(bins);
     let response = |k: usize| (2.0 * (core::f64::consts::PI * k as f64 / length as f64).sin()).powi(4);
@@ -68,7 +67,7 @@ mod tests {
     use super::*;
     use core::f64::consts::TAU;
 
-    /// Gaussian noise from a linear congruential generator, twelve uniforms a sample.
+    /// Gaussian noise from a linear congruential generator, twelve uniform numbers per sample.
     fn noise(n: usize, seed: u64) -> Vec<f64> {
         let mut state = seed;
         let mut uniform = || {
@@ -88,7 +87,7 @@ mod tests {
             .collect();
         let resting: Vec<f64> = noise(n, 2).iter().map(|noise| 0.3 + sigma * noise).collect();
         let found = position_noise(&[moving, resting, vec![0.3; n]], rate, 5.0);
-        // Bins of 4 pieces each: their lower quartile lies a third below the mean, so the root some 18 % low.
+        // Bins of 4 pieces each: their lower quartile is a third below the mean, so the root is about 18 % low.
         for noise in &found[..2] {
             assert!((0.65..1.0).contains(&(noise / sigma)), "{found:?}");
         }
@@ -97,7 +96,7 @@ mod tests {
 
     #[test]
     fn positions_filtered_before_they_were_logged_keep_their_noise() {
-        // A moving mean of eleven samples: gain 0.92 at 10 Hz, nothing left near half the rate.
+        // A moving mean of eleven samples: gain 0.92 at 10 Hz, nearly zero at half the rate.
         let raw = noise(20_010, 3);
         let q: Vec<f64> = raw.windows(11).map(|x| x.iter().sum::<f64>() / 11.0).collect();
         let found = position_noise(&[q], 500.0, 8.0)[0];
@@ -105,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn short_and_broken_series_have_none() {
+    fn short_and_invalid_series_have_no_noise() {
         assert_eq!(position_noise(&[vec![], vec![1.0; 10], vec![f64::NAN; 100]], 100.0, 10.0), [0.0; 3]);
         assert!(position_noise(&[noise(64, 4)], 100.0, 1000.0)[0] > 0.0);
         assert!(position_noise(&[noise(64, 4)], 100.0, 0.0)[0] > 0.0);

@@ -1,24 +1,23 @@
-//! The blocks of a log one after another, read here or on a thread of their own.
+//! Reads the blocks of a log one after another, optionally in a separate thread.
 
 use super::reader::{LinesDropped, LogReader, RawBlock};
 use crate::error::RecordingError;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
-/// Blocks that may wait: enough that neither side stands still for the other's longer ones.
+/// Capacity of the queue: enough that neither side waits for a slow block of the other.
 const WAITING: usize = 4;
 
-/// Where blocks come from.
 #[derive(Debug)]
 enum Source {
     Here(Box<LogReader>),
     Beside { blocks: Receiver<Read>, thread: Option<JoinHandle<()>> },
 }
 
-/// A block or the end, and what was left out so far.
+/// A block or the end, and the rows left out so far.
 type Read = (Result<Option<RawBlock>, RecordingError>, LinesDropped);
 
-/// The blocks of one pass over a log, the same wherever they are read.
+/// The blocks of one pass over a log.
 #[derive(Debug)]
 pub(crate) struct RawBlocks {
     label: String,
@@ -32,7 +31,7 @@ impl RawBlocks {
         Self { label, source: Source::Here(Box::new(reader)), dropped: LinesDropped::default() }
     }
 
-    /// The same, read ahead by a thread of its own from now on.
+    /// Reads ahead in a separate thread from now on.
     pub(crate) fn beside(self) -> Self {
         let Source::Here(mut reader) = self.source else { return self };
         let (give, blocks) = sync_channel(WAITING);
@@ -40,7 +39,7 @@ impl RawBlocks {
             loop {
                 let read = next_of(&mut reader);
                 let is_last = !matches!(read, Ok(Some(_)));
-                // Nobody listens any more where the pass has ended before the log.
+                // The receiver is gone if the pass ended before the log.
                 if give.send((read, reader.dropped().clone())).is_err() || is_last {
                     return;
                 }
@@ -52,7 +51,7 @@ impl RawBlocks {
     /// The next rows; `None` at the end.
     ///
     /// # Errors
-    /// What reading them can give.
+    /// Errors of [`LogReader::next_block`].
     pub(crate) fn next_block(&mut self) -> Result<Option<RawBlock>, RecordingError> {
         let (read, dropped) = match &mut self.source {
             Source::Here(reader) => (next_of(reader), reader.dropped().clone()),
@@ -70,7 +69,7 @@ impl RawBlocks {
         read
     }
 
-    /// What messages call the log.
+    /// Name of the log in messages.
     pub(crate) fn label(&self) -> &str {
         &self.label
     }
@@ -92,7 +91,7 @@ mod tests {
     use crate::log::JointSamples;
 
     #[test]
-    fn the_same_blocks_are_read_here_and_beside() {
+    fn a_thread_reads_the_same_blocks() {
         let mut q: Vec<f64> = (0..20_000).map(f64::from).collect();
         q[7] = f64::NAN;
         let samples = JointSamples::at_rate(10.0, vec![q.clone()], vec![q]);
@@ -109,7 +108,7 @@ mod tests {
         }
         assert_eq!((here.dropped(), here.dropped().missing), (beside.dropped(), 1));
         assert_eq!(beside.next_block().unwrap(), None);
-        // A pass that ends before the log leaves no thread that waits for ever.
+        // A pass that ends before the log does not leave a waiting thread.
         drop(blocks().beside());
     }
 }

@@ -1,12 +1,11 @@
-//! `"q{1..7}_rad"`: many column names in one text.
+//! Expands ranges in column names: `"q{1..7}_rad"`.
 
 use crate::error::FormatError;
 
-/// More columns than any log has; keeps an absurd range from exhausting memory.
+/// Maximum number of columns in a range; protects the memory.
 const MAX_EXPANSION: u64 = 4096;
 
-/// The names that `pattern` stands for: `q{1..3}` gives `q1 q2 q3`, `{01..12}` keeps leading zeros, a text without a
-/// range stands for itself.
+/// Expands `pattern`: `q{1..3}` gives `q1 q2 q3`, `{01..12}` keeps leading zeros, a text without a range is unchanged.
 pub(crate) fn expanded(key: &str, pattern: &str) -> Result<Vec<String>, FormatError> {
     let range = pattern.find('{').and_then(|open| {
         let close = open + pattern[open..].find('}')?;

@@ -1,4 +1,4 @@
-//! The columns of one table that a log's description asks for, found by name or index.
+//! Selects the columns of a table by name or index.
 
 use super::channels::ColumnRef;
 use super::row_count::RowCount;
@@ -6,16 +6,16 @@ use super::source::{LogSource, LogTable};
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 
-/// A table under way, and the columns of it that are wanted.
+/// A table that is being read, and its requested columns.
 #[derive(Debug)]
 pub(super) struct ColumnSelection {
     pub(super) label: String,
     pub(super) table: Box<dyn LogTable>,
     /// Column of each slot.
     fields: Vec<usize>,
-    /// The row last read, one value for each slot.
+    /// The current row, one value for each slot.
     pub(super) values: Vec<f64>,
-    /// Rows passed so far.
+    /// Number of rows read or skipped so far.
     pub(super) rows: u64,
 }
 
@@ -24,7 +24,7 @@ impl ColumnSelection {
         Self { label, table, fields: Vec::new(), values: Vec::new(), rows: 0 }
     }
 
-    /// Asks for `column`; its values appear at the returned slot of every row.
+    /// Requests `column`; returns the slot of its values in every row.
     pub(super) fn want(&mut self, key: &str, column: &ColumnRef) -> Result<usize, RecordingError> {
         let field = self.field(key, column)?;
         if let Some(known) = self.fields.iter().position(|wanted| *wanted == field) {
@@ -34,8 +34,8 @@ impl ColumnSelection {
         Ok(self.fields.len() - 1)
     }
 
-    /// Data rows of the table's source: one pass without a look at the numbers. Which rows there are may hang on
-    /// what is asked for. A pass that was made for `known` is not made again.
+    /// Counts the data rows of the table's source in one pass without parsing numbers. The rows may depend on the
+    /// requested columns. The result is cached in `known`.
     pub(super) fn count_rows(&self, source: &dyn LogSource, known: &RowCount) -> Result<u64, RecordingError> {
         known.of(&self.fields, source.path(), || {
             let (mut table, mut rows) = (source.open()?, 0);
@@ -47,7 +47,7 @@ impl ColumnSelection {
         })
     }
 
-    /// Ends the asking.
+    /// Completes the selection.
     pub(super) fn ready(&mut self) {
         self.table.select(&self.fields);
         self.values = vec![0.0; self.fields.len()];
@@ -73,7 +73,7 @@ impl ColumnSelection {
                             "the file has no header line: give 0-based indices, or set header = true"
                         }
                         LogPlace::Whole { .. } | LogPlace::Row { .. } => {
-                            "its columns have no names: give 0-based indices"
+                            "the columns have no names: give 0-based indices"
                         }
                     };
                     return Err(unknown(name.clone(), hint.to_owned()));
@@ -100,19 +100,19 @@ impl ColumnSelection {
         Ok(found)
     }
 
-    /// Passes over one row; false at the end.
+    /// Skips one row; false at the end.
     pub(super) fn skip_row(&mut self) -> Result<bool, RecordingError> {
         let found = self.table.skip_row()?;
         self.rows += u64::from(found);
         Ok(found)
     }
 
-    /// Whether the row last read has an empty, NaN or infinite field.
+    /// Whether the current row has an empty, NaN or infinite field.
     pub(super) fn missing(&self) -> bool {
         !self.values.iter().all(|value| value.is_finite())
     }
 
-    /// The error for the missing value in the row last read.
+    /// The error for a missing value in the current row.
     pub(super) fn missing_error(&self) -> RecordingError {
         let slot = self.values.iter().position(|value| !value.is_finite()).unwrap_or(0);
         let field = self.fields[slot];
@@ -123,7 +123,7 @@ impl ColumnSelection {
         }
     }
 
-    /// Name and index of a wanted column, for messages.
+    /// Name and index of a requested column, for messages.
     pub(super) fn label_of_slot(&self, slot: usize) -> String {
         column_label(self.table.names(), self.fields[slot])
     }
@@ -139,7 +139,7 @@ pub(super) fn column_label(names: Option<&[String]>, field: usize) -> String {
 
 fn existing_names(wanted: &str, names: &[String]) -> String {
     const SHOWN: usize = 40;
-    // Bounded: a line of a megabyte may hold half a million names.
+    // Bounded, because a line of a megabyte may contain half a million names.
     const COMPARED: usize = 1000;
     let nearest = names.iter().take(COMPARED).min_by_key(|name| edit_distance(wanted, name)).map_or("", String::as_str);
     let cut = |name: &str| name.chars().take(60).flat_map(char::escape_debug).collect::<String>();
@@ -149,7 +149,8 @@ fn existing_names(wanted: &str, names: &[String]) -> String {
     format!("did you mean `{}`? There are: {list}{more}{delimiter}", cut(nearest))
 }
 
-/// Levenshtein distance over the first 64 characters; another digit counts three: `tau1` is no misspelling of `tau2`.
+/// Levenshtein distance over the first 64 characters; a changed digit costs three, because `tau1` is not a misspelling
+/// of `tau2`.
 fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().take(64).collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();
@@ -171,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn edit_distance_counts_single_edits() {
+    fn edit_distance_is_the_number_of_edits() {
         assert_eq!(edit_distance("kitten", "sitting"), 3);
         assert_eq!(edit_distance("", "abc"), 3);
         assert_eq!(edit_distance("q1_rad", "q1_rad"), 0);
