@@ -10,16 +10,16 @@ use super::{FileLog, Log};
 use crate::error::RecordingError;
 use std::path::Path;
 
-/// Largest position or torque: its squares and its second differences per second squared are finite.
+/// Maximum position or torque: its squares and its second differences per second squared are finite.
 const LARGEST: f64 = 1e60;
 
-/// Rows of a [`RawBlock`] at most.
+/// Maximum number of rows in a [`RawBlock`].
 const BLOCK_ROWS: usize = 4096;
 
-/// Some successive rows of a log in joint values (SI), as they were logged: no filter, no resampling.
+/// Successive rows of a log in joint values (SI), as logged: no filter, no resampling.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawBlock {
-    /// 0-based data row in the file of each sample; holes where rows were left out.
+    /// 0-based data row in the file of each sample; not contiguous where rows were left out.
     pub row: Vec<u64>,
     /// Seconds after the first data row of the file.
     pub time_s: Vec<f64>,
@@ -42,7 +42,7 @@ impl RawBlock {
     }
 }
 
-/// What the reader left out.
+/// Rows that the reader left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LinesDropped {
@@ -51,7 +51,7 @@ pub struct LinesDropped {
     /// Rows left out by `drop_rows`, `drop_time_s`, `drop_where` and `keep_where`.
     #[serde(default)]
     pub by_rule: u64,
-    /// File and line of a cut-off last row.
+    /// File and line of a truncated last row.
     pub truncated: Option<String>,
 }
 
@@ -64,14 +64,14 @@ struct Group {
     columns: Vec<Vec<f64>>,
 }
 
-/// One pass over a log: raw columns become joint values in SI, ranges and missing values are dealt with.
+/// One pass over a log: converts raw columns to joint values in SI and applies ranges and rules for missing values.
 #[derive(Debug)]
 pub struct LogReader {
     label: String,
     joints: Vec<String>,
     tables: Vec<ColumnSelection>,
     groups: Vec<Group>,
-    /// Slot of the time column in the main table and its factor to seconds.
+    /// Slot of the time column in the main table, and its factor to seconds.
     time: Option<(usize, f64)>,
     period_s: f64,
     first_stamp_s: Option<f64>,
@@ -87,10 +87,10 @@ pub struct LogReader {
 }
 
 impl LogReader {
-    /// Begins a pass over `log`.
+    /// Starts a pass over `log`.
     ///
     /// # Errors
-    /// If the description is wrong, a file is missing or empty, or a column does not exist.
+    /// If the format is invalid, a file is missing or empty, or a column does not exist.
     pub fn open(log: &Log) -> Result<Self, RecordingError> {
         let format = &log.format;
         format.validate(&log.joints)?;
@@ -136,7 +136,7 @@ impl LogReader {
         &self.dropped
     }
 
-    /// What messages call the log.
+    /// Name of the log in messages.
     pub fn label(&self) -> &str {
         &self.label
     }
@@ -146,10 +146,10 @@ impl LogReader {
         self.time.map_or_else(|| "none".to_owned(), |(slot, _)| self.tables[0].label_of_slot(slot))
     }
 
-    /// Reads up to 4096 rows into `block`; false when the log has ended (and `block` is empty).
+    /// Reads up to 4096 rows into `block`; false at the end of the log (with an empty `block`).
     ///
     /// # Errors
-    /// If a row cannot be read, files of one log differ in length, or the selection leaves no row at all.
+    /// If a row cannot be read, files of one log differ in length, or the selection contains no row.
     pub fn next_block(&mut self, block: &mut RawBlock) -> Result<bool, RecordingError> {
         block.row.clear();
         block.time_s.clear();
@@ -208,7 +208,7 @@ impl LogReader {
             self.finished = true;
             return Ok(());
         }
-        // The first row is always read: times count from it.
+        // Always read the first row, because times are relative to it.
         if self.next_row > 0 && self.next_row < self.rows[0] {
             return self.skip_row();
         }
@@ -232,7 +232,7 @@ impl LogReader {
         let time_s = match self.time {
             Some((slot, seconds)) => {
                 let stamp = self.tables[0].values[slot];
-                // The difference of the stamps first: nanoseconds since 1970 do not survive the multiplication.
+                // Subtract stamps before scaling: nanoseconds since 1970 lose precision in the multiplication.
                 (stamp - *self.first_stamp_s.get_or_insert(stamp)) * seconds
             }
             None => row as f64 * self.period_s,
@@ -273,7 +273,7 @@ impl LogReader {
         let values = &self.tables[0].values;
         let since = |stamp: f64| (stamp - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.1);
         let time_s = self.time.map_or(row as f64 * self.period_s, |(slot, _)| since(values[slot]));
-        // Rows that are left out may hold anything.
+        // Rows that a rule leaves out may contain invalid values.
         if self.rules.drops(row, time_s, values) {
             self.dropped.by_rule += u64::from(row >= self.rows[0]);
             return Ok(());
@@ -285,7 +285,7 @@ impl LogReader {
         Ok(())
     }
 
-    /// The files of one log must end together; one cut-off last row is forgiven.
+    /// Checks that the files of one log end together; one truncated last row is tolerated.
     fn check_ends(&mut self, ended: usize) -> Result<(), RecordingError> {
         for table in &self.tables {
             if let Some(place) = table.table.truncated() {
@@ -304,7 +304,7 @@ impl LogReader {
     }
 }
 
-/// The channel groups of a log; opens the files of groups that have their own, each once.
+/// The channel groups of a log. Opens each separate file of a group once.
 fn channel_groups(log: &Log, tables: &mut Vec<ColumnSelection>) -> Result<Vec<Group>, RecordingError> {
     let (format, main) = (&log.format, log.source());
     let mut paths = vec![main.path().map(Path::to_owned)];

@@ -1,4 +1,4 @@
-//! What the first rows of a log decide: its clock, the cut-off that its motion asks for, the noise of its positions.
+//! Properties of a log that are estimated from its first rows: clock, cut-off, position noise.
 
 use crate::cleaning::replace_spikes;
 use crate::clock::segments::{PlacedRows, Segmenter};
@@ -12,7 +12,7 @@ use crate::quantisation::quantisation_step;
 use crate::report::rows_to_a_value;
 use std::sync::Arc;
 
-/// What the first rows decide, whatever is done with the rows.
+/// Estimates from the first rows.
 #[derive(Debug)]
 pub(super) struct Opening {
     pub(super) clock: Clock,
@@ -21,15 +21,15 @@ pub(super) struct Opening {
     /// Quantisation steps of positions and torques, joint by joint.
     pub(super) position_steps: Vec<Option<f64>>,
     pub(super) torque_steps: Vec<Option<f64>>,
-    /// Rows to new positions and to new torques, where a recorder repeats them.
+    /// Number of rows per new position and per new torque, if a recorder repeats them.
     pub(super) rows_to_a_value: [Option<u64>; 2],
 }
 
 impl Opening {
-    /// Of `log`: its first rows are read once, however many passes begin.
+    /// Estimates for `log`; its first rows are read once for all passes.
     ///
     /// # Errors
-    /// If they cannot be read, or no rate follows from them.
+    /// If the rows cannot be read, or do not determine a rate.
     pub(super) fn of(log: &Log, keep_outliers: bool) -> Result<Arc<Self>, RecordingError> {
         log.found_once(keep_outliers, || Self::read(log, keep_outliers))
     }
@@ -54,7 +54,7 @@ impl Opening {
                 misfit_stamps: None,
                 drift_steps: None,
                 smoothing_rows: 0,
-                evidence: "even spacing: the rate is given, there are no stamps".to_owned(),
+                evidence: "even spacing: the rate is given, the log has no stamps".to_owned(),
             },
             None => clock(format.clock, &first.time_s, &first.row, &first.q, format.max_gap_steps)
                 .map_err(|reason| RecordingError::NoRate { log: log.source().label(), column: time_label, reason })?,
@@ -81,7 +81,7 @@ struct FirstRows {
 }
 
 impl FirstRows {
-    /// With what messages call the time column.
+    /// The first rows, and the name of the time column for messages.
     fn of(log: &Log) -> Result<(Self, String), RecordingError> {
         let mut reader = LogReader::open(log)?;
         let columns = || vec![Vec::new(); log.joints.len()];
