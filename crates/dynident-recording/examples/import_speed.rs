@@ -1,4 +1,4 @@
-//! How fast a log of a million samples of seven joints becomes a motion:
+//! Measures the time to convert a log with a million samples of seven joints to a motion:
 //! `cargo run --release -p dynident-recording --example import_speed [ROWS]`.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a benchmark for people")]
 

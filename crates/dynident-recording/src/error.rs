@@ -177,7 +177,7 @@ pub enum RecordingError {
         problem: String,
     },
     /// The row or time range contains no row.
-    #[error("{log}: the selection ({selection}) contains none of the {rows} rows that were read; widen it")]
+    #[error("{log}: the selection ({selection}) leaves no row after {rows} rows were read; widen it")]
     EmptySelection {
         /// Label of the log.
         log: String,
@@ -225,7 +225,7 @@ pub enum RecordingError {
     },
     /// The rows are not ordered by time.
     #[error(
-        "{log}: {backward} of {rows} stamps are earlier than the previous one: the rows are not in order of time; \
+        "{log}: {backward} of {rows} stamps are earlier than the previous one: the rows are in no order of time; \
          sort them by the time column (`sort` or pandas' `sort_values`), or name another column as time"
     )]
     Unordered {

@@ -63,8 +63,8 @@ impl SetAside {
         let share = 100.0 * self.share;
         match self.reason {
             Reason::Outlier => format!(
-                "{samples} samples ({share:.2} %) stand far off those before and behind them, e.g. {value:.4} for about \
-                 {expected:.4} at {time_s:.3} s (row {row}); they are left out of torque and regressor"
+                "{samples} samples ({share:.2} %) stand far off those before and behind them, e.g. {value:.4} for \
+                 about {expected:.4} at {time_s:.3} s (row {row}); they are left out of torque and regressor"
             ),
             Reason::Held => format!(
                 "is repeated {places} times while the joint moves, {samples} samples ({share:.2} %) in all, e.g. \
@@ -72,8 +72,8 @@ impl SetAside {
             ),
             Reason::Saturated => format!(
                 "saturated: constant at an extreme of the channel {places} times while the joint moves, {samples} \
-                 samples ({share:.2} %) in all, e.g. {value:.4} from {time_s:.3} s (row {row}) on; they are left out of \
-                 torque and regressor"
+                 samples ({share:.2} %) in all, e.g. {value:.4} from {time_s:.3} s (row {row}) on; they are left out \
+                 of torque and regressor"
             ),
             Reason::Spike => format!(
                 "{samples} single samples ({share:.2} %) are spikes, e.g. {value:.6} instead of about {expected:.6} at \

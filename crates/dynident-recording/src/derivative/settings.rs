@@ -64,6 +64,7 @@ pub enum DifferentiatorSettings {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cutoff_hz: Option<f64>,
     },
+    /// [`FourierFit`]: a series fitted to the positions of the whole piece.
     FourierFit {
         /// Base frequency of the motion, Hz.
         base_hz: f64,

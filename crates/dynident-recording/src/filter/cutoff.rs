@@ -68,8 +68,9 @@ pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
             joints_hz,
             faded_hz,
             evidence: format!(
-                "joint {} (0-based) needs the highest cut-off: its acceleration falls below the noise ({:.1e} per sample of position) at {:.3} Hz, \
-                 and 99.99 % of its power below that lies below {:.3} Hz; times {MARGIN}, at most {HIGHEST} of the rate",
+                "joint {} (0-based) needs the highest cut-off: its acceleration falls below the noise ({:.1e} per \
+                 sample of position) at {:.3} Hz, and 99.99 % of its power below that lies below {:.3} Hz; times \
+                 {MARGIN}, at most {HIGHEST} of the rate",
                 joint, content.noise, content.valley_hz, content.power_hz,
             ),
         },

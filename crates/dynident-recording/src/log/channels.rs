@@ -178,7 +178,7 @@ impl ChannelGroup {
             if let Some(unknown) = unit.values().iter().find(|unit| si_factor(unit, quantity).is_none()) {
                 return Err(FormatError::new(
                     at("unit"),
-                    format!("`{unknown}` is not a unit of {key}"),
+                    format!("`{unknown}` is no unit of {key}"),
                     format!("use one of: {}", unit_names(quantity).join(", ")),
                 ));
             }

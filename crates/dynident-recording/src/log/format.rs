@@ -7,6 +7,7 @@ use super::units::Quantity;
 use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
 
+/// Whether the first row contains the column names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(from = "WrittenHeader", into = "WrittenHeader")]
@@ -287,7 +288,7 @@ impl LogFormat {
                 return wrong("rate_hz", &format!("{rate} is not a valid rate"), fix);
             }
             (Some(time), None) if !(1e-15..=1e6).contains(&time.scale) => {
-                let problem = format!("{:?} is not a valid tick length", time.scale);
+                let problem = format!("{:?} is no length of a tick", time.scale);
                 return wrong("time.scale", &problem, "give 1e-15 to 1e6 units per tick, or leave it out");
             }
             _ => {}

@@ -99,6 +99,7 @@ pub trait LogSource: fmt::Debug + Send + Sync {
 pub struct LogGroup {
     /// Name in messages, such as a topic; `None` for a single group.
     pub name: Option<String>,
+    /// Range of its columns.
     pub columns: Range<usize>,
     /// Index of its column of time stamps in seconds, if the format has one.
     pub time: Option<usize>,

@@ -1,10 +1,10 @@
-//! The findings of an [`ImportReport`], as sentences.
+//! Writes the findings of an [`ImportReport`] as sentences.
 
 use super::{ChannelReport, DerivativeComparison, Finding, ImportReport, Jump, Level};
 use crate::cleaning::{Reason, SetAside};
 use crate::log::Quantity;
 
-/// Share of samples set aside below which they are only information.
+/// Maximum share of rejected samples for the level [`Level::Info`].
 const FEW: f64 = 5e-3;
 
 /// `2nd`, `3rd`, `4th`, ..
@@ -19,7 +19,7 @@ fn ordinal(number: u64) -> String {
     format!("{number}{ending}")
 }
 
-/// Findings in the order in which they were found.
+/// Findings in the order of the checks.
 #[derive(Default)]
 struct Findings(Vec<Finding>);
 
@@ -29,7 +29,7 @@ impl Findings {
     }
 }
 
-/// Name of a channel in findings, and whether it is one that every log has.
+/// Name of a channel in findings, and whether every log has this channel.
 struct Channel {
     name: String,
     measured: bool,
@@ -43,7 +43,7 @@ impl Channel {
 }
 
 impl ImportReport {
-    /// Writes the findings that follow from the other fields, the gravest first.
+    /// Derives the findings from the other fields, most severe first.
     pub(crate) fn find(&mut self) {
         let mut findings = Findings::default();
         self.find_in_clock(&mut findings);
@@ -67,7 +67,7 @@ impl ImportReport {
         self.findings = findings.0;
     }
 
-    /// Rate and gaps.
+    /// Sample rate and gaps.
     fn find_in_clock(&self, findings: &mut Findings) {
         findings.add(
             Level::Info,
@@ -91,7 +91,7 @@ impl ImportReport {
         if self.bridged[0] > 0 {
             let [gaps, samples] = self.bridged;
             let message = format!(
-                "{gaps} gaps, short against the motion, were bridged; the {samples} samples in them count as no rows"
+                "{gaps} gaps, short against the motion, were bridged; the {samples} samples in them are not used as rows"
             );
             findings.add(Level::Info, "time", message);
         }
@@ -109,14 +109,14 @@ impl ImportReport {
         }
     }
 
-    /// Stamps that are equal, go backwards or lie too close.
+    /// Stamps that are equal, go backwards or are too close.
     fn find_in_stamps(&self, findings: &mut Findings) {
         if self.duplicate_stamps > 0 {
             let what = if self.clock.repeats_rows {
                 "rows repeat the one before, stamp and positions; they are left out, and the rate is that of the others"
             } else {
-                "stamps equal the one before; if they are rounded that does no harm, for the rate is that of all rows \
-                 over the time they span"
+                "stamps equal the one before; rounded stamps are harmless, because the rate is the number of all rows \
+                 over the time span"
             };
             findings.add(Level::Warning, "time", format!("{} {what}", self.duplicate_stamps));
         }
@@ -129,18 +129,18 @@ impl ImportReport {
         }
         if self.crowded_samples > 0 {
             let message =
-                format!("{} samples stand too close to the one before and were left out", self.crowded_samples);
+                format!("{} samples are too close to the one before and were left out", self.crowded_samples);
             findings.add(Level::Info, "time", message);
         }
     }
 
-    /// Values that the recorder repeats for several rows.
+    /// Values that the recorder repeats over several rows.
     fn find_repeated_values(&self, findings: &mut Findings) {
         for (quantity, every) in [("position", self.rows_to_a_position), ("torque", self.rows_to_a_torque)] {
             let Some(every) = every else { continue };
             let message = format!(
-                "new values come at every {} row only ({:.4} Hz), the rows between repeat them, which makes steps of the \
-                 motion and a lag: log at the robot's own rate, or keep one row in {every}",
+                "values change only at every {} row ({:.4} Hz); the repeated rows cause steps in the motion and a lag: \
+                 log at the robot's sample rate, or keep one row in {every}",
                 ordinal(every),
                 self.rate_hz / every as f64
             );
@@ -148,7 +148,7 @@ impl ImportReport {
         }
     }
 
-    /// Rows and samples left out.
+    /// Rows and samples that were left out.
     fn find_left_out(&self, findings: &mut Findings) {
         if self.dropped.missing > 0 {
             findings.add(
@@ -158,10 +158,10 @@ impl ImportReport {
             );
         }
         if self.dropped.by_rule > 0 {
-            findings.add(Level::Info, "rows", format!("{} rows were left out as asked", self.dropped.by_rule));
+            findings.add(Level::Info, "rows", format!("{} rows were left out by the rules", self.dropped.by_rule));
         }
         if let Some(place) = &self.dropped.truncated {
-            findings.add(Level::Info, "rows", format!("the cut-off last line was left out ({place})"));
+            findings.add(Level::Info, "rows", format!("the truncated last line was left out ({place})"));
         }
         for found in &self.set_aside {
             let name = format!("{} {}", found.channel.key(), found.joint);
@@ -170,7 +170,7 @@ impl ImportReport {
         }
     }
 
-    /// A channel that is dead or saturated.
+    /// A dead or saturated channel.
     fn find_dead_or_saturated(&self, channel: &ChannelReport, findings: &mut Findings) {
         let Channel { name, measured } = Channel::of(channel);
         if channel.constant() {
@@ -193,13 +193,13 @@ impl ImportReport {
         }
     }
 
-    /// Whole turns, outliers and steps of a channel.
+    /// Whole turns, outliers and quantisation of a channel.
     fn find_jumps(&self, channel: &ChannelReport, findings: &mut Findings) {
         let Channel { name, measured } = Channel::of(channel);
         if channel.turns > 0 {
             let message = format!(
-                "jumps by a whole turn {} times: the angles wrap, and a motion cannot be made of them; unwrap them \
-                 (numpy.unwrap) before they are read",
+                "jumps by a whole turn {} times: the angles wrap, so the motion cannot be determined; unwrap them \
+                 (numpy.unwrap) before reading",
                 channel.turns
             );
             findings.add(Level::Problem, &name, message);
@@ -208,8 +208,8 @@ impl ImportReport {
             && !self.sets_aside(channel)
         {
             let message = format!(
-                "{} samples stand alone, the worst in row {} of those used: {:.6e} after {:.6e}; empty the field \
-                 and write `missing = \"drop\"`",
+                "{} samples are isolated, the worst in row {} of those used: {:.6e} after {:.6e}; empty the field and \
+                 set `missing = \"drop\"`",
                 channel.lone_samples, worst.row, worst.value, worst.before
             );
             findings.add(if measured { Level::Problem } else { Level::Warning }, &name, message);
@@ -221,7 +221,7 @@ impl ImportReport {
         }
     }
 
-    /// The joints whose positions jump, and what to do about it.
+    /// The joints with jumps in their positions, and the advice.
     fn position_jumps(&self) -> Option<(String, String)> {
         let jumping = |channel: &ChannelReport| Some((channel.joint.clone(), channel.jumps, channel.worst_jump?));
         let all: Vec<(String, u64, Jump)> = self.channels.iter().filter_map(jumping).collect();
@@ -232,28 +232,28 @@ impl ImportReport {
         let wrap = all.iter().find_map(|(joint, _, jump)| Some((joint, jump, jump.period?)));
         if let Some((joint, jump, period)) = wrap {
             let message = format!(
-                "jumps from one end of its range to the other, {:.6} to {:.6} at row {} of those used: it wraps around with a \
-                 period of about {period:.4}, as a counter does that overflows; unwrap it (numpy.unwrap with that `period`) \
-                 before it is read",
+                "jumps from one end of its range to the other, {:.6} to {:.6} at row {} of those used: it wraps around \
+                 with a period of about {period:.4}, like a counter that overflows; unwrap it (numpy.unwrap with that \
+                 `period`) before reading",
                 jump.before, jump.after, jump.row
             );
             return Some((joint.clone(), message));
         }
         let joints = all.iter().map(|(joint, ..)| &joint[..]).collect::<Vec<_>>().join(", ");
         let cause = if all.iter().filter(|(.., jump)| jump.row == worst.row).count() > 1 {
-            "rows are missing there without a gap of the stamps, or the log is put together from pieces"
+            "rows are missing there without a gap in the stamps, or the log is composed of pieces"
         } else {
             "the encoder stood still or lost counts, or rows are missing there"
         };
         let message = format!(
-            "jumps {most} times, the farthest from {:.6} to {:.6} at row {} of those used, where no other step is larger \
-             than {:.2e}: {cause}; read what lies before and after as logs of their own (`rows`)",
+            "jumps {most} times, the farthest from {:.6} to {:.6} at row {} of those used, where no other step is \
+             larger than {:.2e}: {cause}; read the parts before and after as separate logs (`rows`)",
             worst.before, worst.after, worst.row, worst.largest_other
         );
         Some((joints, message))
     }
 
-    /// A logged derivative that differs from the position's.
+    /// A logged derivative that differs from that of the position.
     fn find_difference(&self, quantity: &str, comparison: &DerivativeComparison, findings: &mut Findings) {
         let name = format!("{quantity} {}", comparison.joint);
         let difference = 100.0 * comparison.relative_rms_difference;
@@ -273,7 +273,7 @@ impl ImportReport {
             && lag.matters()
             && lag.samples.abs() > 0.5
         {
-            findings.add(Level::Info, &name, format!("comes {:.4} s after the position's derivative", lag.seconds));
+            findings.add(Level::Info, &name, format!("is {:.4} s behind the position's derivative", lag.seconds));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Gap, Steps};
 
-/// Gaps that are listed one by one.
+/// Maximum number of listed gaps.
 const LISTED_GAPS: usize = 100;
 
 #[derive(Clone, Debug, Default)]
@@ -25,7 +25,7 @@ impl TimeCheck {
         Self { median_s, min: f64::INFINITY, max: f64::NEG_INFINITY, ..Self::default() }
     }
 
-    /// Takes the next row; whether there is a gap before it.
+    /// Adds the next row; returns whether there is a gap before it.
     pub(crate) fn see(&mut self, row: u64, time_s: f64) -> bool {
         let mut is_gap = false;
         if let Some((before, last_s)) = self.last {
@@ -41,7 +41,7 @@ impl TimeCheck {
             }
             self.min = self.min.min(step);
             self.max = self.max.max(step);
-            // Welford's recursion: no loss of digits for steps that hardly vary.
+            // Welford's recursion keeps precision for nearly constant steps.
             self.count += 1.0;
             let difference = step - self.mean;
             self.mean += difference / self.count;

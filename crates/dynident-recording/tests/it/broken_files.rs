@@ -1,9 +1,9 @@
-//! Broken logs: each gives an error that names the file, the place and the fix, and never a panic.
+//! Broken logs: each causes an error that names the file, the place and the fix, and never a panic.
 use dynident_recording::{ImportReport, LogFormat, MotionBlock, MotionSettings, MotionStream, RecordingError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// File in `tests/broken`, and what the message has to contain.
+/// File in `tests/broken`, and a part of its message.
 const BROKEN: &[(&str, &str)] = &[
     ("empty.csv", "no data rows"),
     ("only_newlines.csv", "no data rows"),
@@ -33,8 +33,8 @@ const BROKEN: &[(&str, &str)] = &[
     ("fortran_exponent.csv", "`1.5D-3` is not a number"),
     ("thousands_separator.csv", "decimal points instead"),
     ("clock_time.csv", ":2, column `t` (0): `12:00:01`"),
-    ("duplicate_names.csv", "stands at columns 1 and 2"),
-    ("duplicate_time.csv", "stands at columns 0 and 1"),
+    ("duplicate_names.csv", "duplicate column name `q1` (columns 1 and 2)"),
+    ("duplicate_time.csv", "duplicate column name `t` (columns 0 and 1)"),
     ("missing_column.csv", "no column `q2`"),
     ("other_case.csv", "no column `t`"),
     ("misspelt.csv", "did you mean `tau_2`"),
@@ -49,13 +49,13 @@ const BROKEN: &[(&str, &str)] = &[
     ("pipes.csv", "is `delimiter` right"),
     ("decimal_commas.csv", "decimal points instead"),
     ("decimal_commas_and_commas.csv", "decimal commas?"),
-    ("one_row.csv", "no sampling rate"),
+    ("one_row.csv", "does not determine a sampling rate"),
     ("two_rows.csv", "filter needs 16"),
-    ("standing_clock.csv", "no sampling rate"),
-    ("backward_clock.csv", "no sampling rate"),
-    ("clock_of_infinitesimal_steps.csv", "no sampling rate"),
+    ("standing_clock.csv", "does not determine a sampling rate"),
+    ("backward_clock.csv", "does not determine a sampling rate"),
+    ("clock_of_infinitesimal_steps.csv", "does not determine a sampling rate"),
     ("huge_positions.csv", "beyond 1e60 or not finite after scaling"),
-    ("huge_time.csv", "no sampling rate"),
+    ("huge_time.csv", "does not determine a sampling rate"),
     ("gaps_everywhere.csv", "filter needs 16"),
     ("html.csv", "no column `t`"),
     ("json.csv", "no column"),
@@ -94,7 +94,7 @@ fn every_broken_file_has_its_message() {
         let message = import(&folder().join(name), FORMAT).expect_err(name).to_string();
         assert!(message.contains(words), "{name}: {message}");
         assert!(message.contains(name), "{name}: {message}");
-        // The fix stands behind a semicolon or in brackets.
+        // The fix follows a semicolon or is in brackets.
         assert!(message.contains(';') || message.contains('('), "{name}: {message}");
     }
 }
@@ -173,7 +173,7 @@ fn a_cut_off_last_line_is_left_out_and_reported() {
         assert_eq!((samples, report.rows), (50, 50), "{tail:?}");
         assert!(report.dropped.truncated.unwrap().ends_with(":52"), "{tail:?}");
     }
-    // A missing last newline alone is no damage.
+    // A missing newline at the end is valid.
     let (samples, report) = import(written(rows(50).trim_end()).path(), FORMAT).unwrap();
     assert_eq!((samples, report.dropped.truncated), (50, None));
 }
@@ -185,7 +185,7 @@ fn rows_with_missing_values_can_be_dropped() {
     let file = written(&cut);
     assert!(import(file.path(), FORMAT).unwrap_err().to_string().contains("set missing = \"drop\""));
     let (samples, report) = import(file.path(), &format!("missing = \"drop\"\n{FORMAT}")).unwrap();
-    // The two holes are bridged by interpolation.
+    // The two holes are interpolated.
     assert_eq!((samples, report.rows, report.dropped.missing), (50, 48, 2));
 }
 
@@ -218,7 +218,7 @@ fn selections_pick_rows_and_refuse_nothing() {
 }
 
 #[test]
-fn paired_files_must_hold_the_same_rows() {
+fn paired_files_must_contain_the_same_rows() {
     let folder = tempfile::tempdir().unwrap();
     let format = r#"
         rate_hz = 100.0
@@ -232,7 +232,7 @@ fn paired_files_must_hold_the_same_rows() {
         let result = import(&main, format);
         assert_eq!(result.is_ok(), fits, "{result:?}");
         if let Err(error) = result {
-            assert!(error.to_string().contains("must hold the same samples"), "{error}");
+            assert!(error.to_string().contains("must contain the same samples"), "{error}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The integration tests of this crate, linked once.
+//! Integration tests of this crate in one binary.
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 mod broken_files;
