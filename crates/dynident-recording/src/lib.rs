@@ -77,12 +77,12 @@ mod quantisation;
 pub mod reference;
 pub mod report;
 
-pub use cleaning::{Reason, SetAside};
+pub use cleaning::{CleaningSettings, Reason, SetAside};
 pub use derivative::{Derivatives, Differentiator, DifferentiatorSettings, Place, SampleRanges};
 pub use error::{FilterError, FormatError, RecordingError};
 pub use filter::{AveragedPeriods, DecimationSettings, Decimator, averaged_periods, cutoff, position_noise};
 pub use log::{FileLog, JointSamples, Log, LogFormat, LogReader, LogSource, LogTable, MemoryLog, RawBlock};
-pub use motion::{MotionBlock, MotionSettings, MotionStream};
+pub use motion::{ImportLimits, MotionBlock, MotionSettings, MotionStream};
 pub use place::LogPlace;
 pub use reference::{LogisticPath, Reference, ReferenceSettings};
 pub use report::{Finding, ImportReport, Level, best_lag};

@@ -3,11 +3,11 @@
 use crate::clock::timeline::Places;
 use crate::log::RawBlock;
 
-/// Degree of the polynomials across holes.
+/// Degree of the polynomials fill_hole holes.
 const DEGREE: usize = 5;
 /// Minimum and maximum number of rows on either side from which a hole is filled.
-const FEWEST: usize = 6;
-pub(super) const MOST: usize = 64;
+const MIN_SIDE_ROWS: usize = 6;
+pub(super) const MAX_SIDE_ROWS: usize = 64;
 
 /// Values at `places` of the least-squares polynomial of degree 5 through `values` at `known`.
 ///
@@ -46,7 +46,7 @@ fn polynomial(known: &[f64], values: &[f64], places: &[f64]) -> Vec<f64> {
 
 /// Last rows before a block, for holes at its start.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Before {
+pub(super) struct PastRows {
     pub(super) raw: RawBlock,
     pub(super) places: Places,
 }
@@ -83,24 +83,24 @@ fn empty_like(block: &RawBlock) -> RawBlock {
     }
 }
 
-/// A block with its holes filled; `invented` are the indices of the rows that were not measured.
+/// A block with its holes filled; `filled` are the indices of the rows that were not measured.
 pub(super) struct Filled {
     pub(super) raw: RawBlock,
     pub(super) places: Places,
-    pub(super) invented: Vec<usize>,
+    pub(super) filled: Vec<usize>,
     /// For each row of the original block, its index in this block.
-    pub(super) moved: Vec<usize>,
+    pub(super) new_index: Vec<usize>,
 }
 
 /// Fills the holes of a block: positions by one polynomial of degree 5 through the rows on either side (twice the
 /// number of missing rows, 6 to 64), other channels by straight lines. A hole with too few rows next to it starts a new
 /// piece instead.
-pub(super) fn fill(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawBlock>) -> Filled {
+pub(super) fn fill(before: &PastRows, block: &RawBlock, places: &Places, next: Option<&RawBlock>) -> Filled {
     let mut out = Filled {
         raw: empty_like(block),
         places: Places::default(),
-        invented: Vec::new(),
-        moved: Vec::with_capacity(block.rows()),
+        filled: Vec::new(),
+        new_index: Vec::with_capacity(block.rows()),
     };
     let mut done = 0;
     let take = |out: &mut Filled, from: usize, to: usize| {
@@ -108,17 +108,17 @@ pub(super) fn fill(before: &Before, block: &RawBlock, places: &Places, next: Opt
         append(&mut out.raw, block, from..to);
         out.places.steps.extend_from_slice(&places.steps[from..to]);
         out.places.begins.extend_from_slice(&places.begins[from..to]);
-        out.moved.extend(shift..shift + to - from);
+        out.new_index.extend(shift..shift + to - from);
     };
     for &hole in &places.holes {
         take(&mut out, done, hole);
         let shift = out.raw.rows();
-        if let Some(rows) = across(before, block, places, next, hole) {
+        if let Some(rows) = fill_hole(before, block, places, next, hole) {
             let count = rows.raw.rows();
             append(&mut out.raw, &rows.raw, 0..count);
             out.places.steps.extend_from_slice(&rows.places.steps);
             out.places.begins.extend_from_slice(&rows.places.begins);
-            out.invented.extend(shift..shift + count);
+            out.filled.extend(shift..shift + count);
             take(&mut out, hole, hole + 1);
         } else {
             take(&mut out, hole, hole + 1);
@@ -131,7 +131,13 @@ pub(super) fn fill(before: &Before, block: &RawBlock, places: &Places, next: Opt
 }
 
 /// The rows of one hole; `None` if too few rows are next to it.
-fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawBlock>, hole: usize) -> Option<Before> {
+fn fill_hole(
+    before: &PastRows,
+    block: &RawBlock,
+    places: &Places,
+    next: Option<&RawBlock>,
+    hole: usize,
+) -> Option<PastRows> {
     let earlier = before.raw.rows();
     let joined = |k: usize| if k < earlier { (&before.raw, &before.places, k) } else { (block, places, k - earlier) };
     let step_of = |k: usize| {
@@ -142,7 +148,7 @@ fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawB
     let (from, to) = (step_of(at.checked_sub(1)?), step_of(at));
     let missing = (to - from).round() as usize;
     let missing = missing.checked_sub(1).filter(|missing| *missing > 0)?;
-    let wanted = (2 * missing).clamp(FEWEST, MOST);
+    let wanted = (2 * missing).clamp(MIN_SIDE_ROWS, MAX_SIDE_ROWS);
     // Uninterrupted rows on either side, nearest first; after the block's end, rows of the next block, evenly spaced.
     let is_seam = |k: usize| {
         let (_, places, k) = joined(k);
@@ -158,13 +164,13 @@ fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawB
         last += 1;
     }
     let beyond = if last == total { (wanted - (last - at)).min(next.map_or(0, RawBlock::rows)) } else { 0 };
-    if at - first < FEWEST || last - at + beyond < FEWEST {
+    if at - first < MIN_SIDE_ROWS || last - at + beyond < MIN_SIDE_ROWS {
         return None;
     }
     let end = step_of(total - 1);
     let known: Vec<f64> = (first..last).map(step_of).chain((1..=beyond).map(|k| end + k as f64)).collect();
     let steps: Vec<f64> = (1..=missing).map(|k| from + (to - from) * k as f64 / (missing + 1) as f64).collect();
-    let mut rows = Before { raw: empty_like(block), ..Before::default() };
+    let mut rows = PastRows { raw: empty_like(block), ..PastRows::default() };
     let line = |a: f64, b: f64, k: usize| a + (b - a) * (k + 1) as f64 / (missing + 1) as f64;
     let (row_before, time_before) = {
         let (raw, _, k) = joined(at - 1);
@@ -192,13 +198,13 @@ fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawB
 }
 
 /// The last rows of a block, for holes at the start of the next.
-pub(super) fn last_rows(block: &RawBlock, places: &Places) -> Before {
-    let from = block.rows().saturating_sub(MOST);
+pub(super) fn last_rows(block: &RawBlock, places: &Places) -> PastRows {
+    let from = block.rows().saturating_sub(MAX_SIDE_ROWS);
     let mut raw = empty_like(block);
     append(&mut raw, block, from..block.rows());
     let places =
         Places { steps: places.steps[from..].to_vec(), begins: places.begins[from..].to_vec(), holes: Vec::new() };
-    Before { raw, places }
+    PastRows { raw, places }
 }
 
 #[cfg(test)]

@@ -9,15 +9,17 @@ mod held;
 mod holes;
 mod outliers;
 mod set_aside;
+mod settings;
 mod spikes;
 
 pub use set_aside::{Reason, SetAside};
+pub use settings::CleaningSettings;
 pub(crate) use spikes::replace_spikes;
 
 use crate::clock::timeline::{Places, Timeline};
 use crate::error::RecordingError;
 use crate::log::{LogReader, RawBlock, RawBlocks};
-use holes::{Before, Filled, fill, last_rows};
+use holes::{Filled, PastRows, fill, last_rows};
 use set_aside::Tally;
 use std::collections::VecDeque;
 
@@ -35,7 +37,8 @@ pub(crate) struct CleanBlock {
 pub(crate) struct CleanRows {
     reader: RawBlocks,
     timeline: Timeline,
-    keep_outliers: bool,
+    /// `None` keeps all samples.
+    limits: Option<CleaningSettings>,
     joints: usize,
     /// Read, not cleaned.
     waiting: Option<RawBlock>,
@@ -47,17 +50,22 @@ pub(crate) struct CleanRows {
     /// Smallest and largest torque of each joint, and its spread.
     extremes: Vec<[f64; 2]>,
     spread: Vec<f64>,
-    before: Before,
+    before: PastRows,
     tally: Tally,
     bridged: [u64; 2],
 }
 
 impl CleanRows {
-    pub(crate) fn new(reader: LogReader, timeline: Timeline, joints: &[String], keep_outliers: bool) -> Self {
+    pub(crate) fn new(
+        reader: LogReader,
+        timeline: Timeline,
+        joints: &[String],
+        limits: Option<CleaningSettings>,
+    ) -> Self {
         Self {
             reader: RawBlocks::new(reader),
             timeline,
-            keep_outliers,
+            limits,
             joints: joints.len(),
             waiting: None,
             cleaned: VecDeque::new(),
@@ -65,15 +73,15 @@ impl CleanRows {
             tail: [vec![Vec::new(); joints.len()], vec![Vec::new(); joints.len()]],
             extremes: vec![[f64::INFINITY, f64::NEG_INFINITY]; joints.len()],
             spread: vec![0.0; joints.len()],
-            before: Before::default(),
+            before: PastRows::default(),
             tally: Tally::new(joints),
             bridged: [0; 2],
         }
     }
 
     /// Reads rows ahead in a separate thread from now on.
-    pub(crate) fn read_beside(self) -> Self {
-        Self { reader: self.reader.beside(), ..self }
+    pub(crate) fn read_in_thread(self) -> Self {
+        Self { reader: self.reader.in_thread(), ..self }
     }
 
     pub(crate) fn reader(&self) -> &RawBlocks {
@@ -105,12 +113,12 @@ impl CleanRows {
             CleanBlock { raw, places, marked }
         } else {
             let holes = places.holes.len() as u64;
-            let Filled { raw, places, invented, moved } = fill(&self.before, &raw, &places, next);
+            let Filled { raw, places, filled, new_index } = fill(&self.before, &raw, &places, next);
             // A hole that could not be filled starts a new piece.
-            self.bridged[0] += if invented.is_empty() { 0 } else { holes };
-            self.bridged[1] += invented.len() as u64;
+            self.bridged[0] += if filled.is_empty() { 0 } else { holes };
+            self.bridged[1] += filled.len() as u64;
             let marked = marked.into_iter().map(|marked| {
-                let mut rows: Vec<usize> = marked.into_iter().map(|row| moved[row]).chain(invented.clone()).collect();
+                let mut rows: Vec<usize> = marked.into_iter().map(|row| new_index[row]).chain(filled.clone()).collect();
                 rows.sort_unstable();
                 rows
             });
@@ -139,9 +147,7 @@ impl CleanRows {
         let rows = block.rows();
         self.tally.rows += rows as u64;
         let mut marked = vec![Vec::new(); self.joints];
-        if self.keep_outliers {
-            return (block, marked);
-        }
+        let Some(limits) = &self.limits else { return (block, marked) };
         let next = self.waiting.as_ref();
         for (joint, marked) in marked.iter_mut().enumerate() {
             // Positions first: the test for held torque uses them.
@@ -153,8 +159,8 @@ impl CleanRows {
             let next_q = next.map(|next| &next.q[joint][..]);
             let mut q = joined(&q_tail[joint], &block.q[joint], next_q, usize::MAX);
             let own = q_tail[joint].len()..q_tail[joint].len() + rows;
-            let seen = own.end + held::AROUND.min(q.len() - own.end);
-            let spikes = replace_spikes(&mut q[..seen], own.clone());
+            let seen = own.end + held::MAX_WINDOW.min(q.len() - own.end);
+            let spikes = replace_spikes(&mut q[..seen], own.clone(), limits);
             for &at in &spikes {
                 let index = at - own.start;
                 let old = core::mem::replace(&mut block.q[joint][index], q[at]);
@@ -163,14 +169,14 @@ impl CleanRows {
 
             let next_tau = next.map(|next| &next.tau[joint][..]);
             let tau = joined(&tau_tail[joint], &block.tau[joint], next_tau, usize::MAX);
-            let spread = spread(tau[own.start.saturating_sub(held::AROUND)..own.end].to_vec());
+            let spread = spread(tau[own.start.saturating_sub(held::MAX_WINDOW)..own.end].to_vec());
             self.spread[joint] = self.spread[joint].max(spread);
-            let held_runs = held::held_runs(&tau, &q, self.extremes[joint]);
-            let single = outliers::outliers(&tau[..seen], own.clone(), self.spread[joint]);
+            let held_runs = held::held_runs(&tau, &q, self.extremes[joint], limits);
+            let single = outliers::outliers(&tau[..seen], own.clone(), self.spread[joint], limits);
             marked.extend(single.iter().map(|at| at - own.start));
             for run in &held_runs {
-                let invented = run.invented();
-                let repeated = invented.start.max(own.start)..run.to.min(own.end);
+                let unmeasured = run.unmeasured();
+                let repeated = unmeasured.start.max(own.start)..run.to.min(own.end);
                 marked.extend(repeated.clone().map(|at| at - own.start));
             }
             marked.sort_unstable();
@@ -183,7 +189,7 @@ impl CleanRows {
             let mut repaired = tau[own.start.saturating_sub(1)..seen].to_vec();
             let shift = own.start - own.start.saturating_sub(1);
             let places: Vec<usize> = marked.iter().map(|index| index + shift).collect();
-            outliers::bridged(&mut repaired, &places);
+            outliers::interpolate_marked(&mut repaired, &places);
             block.tau[joint].copy_from_slice(&repaired[shift..shift + rows]);
             for &at in &single {
                 let index = at - own.start;
@@ -191,10 +197,10 @@ impl CleanRows {
                 self.tally.add((joint, Reason::Outlier), &block, index, values, 1);
             }
             for run in &held_runs {
-                let invented = run.invented();
-                let repeated = invented.start.max(own.start)..run.to.min(own.end);
+                let unmeasured = run.unmeasured();
+                let repeated = unmeasured.start.max(own.start)..run.to.min(own.end);
                 if !repeated.is_empty() {
-                    let begins = u64::from(invented.start >= own.start);
+                    let begins = u64::from(unmeasured.start >= own.start);
                     let index = repeated.start - own.start;
                     let values = [tau[repeated.start]; 2];
                     let reason = if run.saturated { Reason::Saturated } else { Reason::Held };
@@ -220,6 +226,6 @@ fn spread(mut values: Vec<f64>) -> f64 {
 /// Keeps the last samples for the next block.
 fn keep_last(tail: &mut Vec<f64>, own: &[f64]) {
     tail.extend_from_slice(own);
-    let unneeded = tail.len().saturating_sub(held::AROUND);
+    let unneeded = tail.len().saturating_sub(held::MAX_WINDOW);
     tail.drain(..unneeded);
 }

@@ -1,42 +1,32 @@
 //! Finds single torque samples far from their neighbours.
 
+use super::CleaningSettings;
 use crate::quantisation::quantisation_step;
 
 /// Samples per median.
 const GROUP: usize = 5;
 /// Samples needed on either side of a tested sample: two groups.
-pub(super) const REACH: usize = 2 * GROUP;
+const REACH: usize = 2 * GROUP;
 /// Window over which the noise is taken as stationary, samples.
-const NOISE_SPAN: usize = 512;
-/// Minimum distance of an outlier in robust standard deviations. Normal noise exceeds it once in 10¹⁵ samples.
-const TIMES_NOISE: f64 = 8.0;
-/// Minimum distance as a share of the spread of the torque; smaller outliers have no effect on a fit.
-const SHARE_OF_SPREAD: f64 = 0.005;
-/// Minimum distance in steps of a quantised channel.
-const QUANTA: f64 = 3.5;
-/// Minimum ratio to the usual distance of the nearest neighbours: in a peak over several samples they deviate as well.
-const TIMES_NEIGHBOURS: f64 = 5.0;
+pub(super) const NOISE_WINDOW: usize = 512;
 /// Factor on the minimum distance near an end of the log, where a line through ten samples is extrapolated.
-const TIMES_AT_ENDS: f64 = 4.0;
+const END_FACTOR: f64 = 4.0;
 /// Near an end, minimum ratio to the usual change between samples nearby (a settling controller oscillates).
-const TIMES_CHANGES: f64 = 2.0;
+const END_CHANGE_RATIO: f64 = 2.0;
 /// Nearest neighbours to either side.
 const NEIGHBOURS: usize = 3;
-/// Maximum share of outliers; above it the deviations belong to the signal.
-const LARGEST_SHARE: f64 = 0.15;
 /// Maximum share of outliers that directly follow another one; above it they are pulses of the torque. The share is
 /// used only with at least the given number of outliers.
-const LARGEST_BESIDE: f64 = 0.2;
-const FEWEST_PULSES: usize = 10;
+const MAX_ADJACENT_SHARE: f64 = 0.2;
+const MIN_OUTLIERS_FOR_PULSES: usize = 10;
 /// Number of adjacent samples that form a pulse of the torque (a contact, a drive that catches up) if each deviates in
 /// the same direction by at least the given share of the tested sample.
-const SIDE_BY_SIDE: usize = 3;
-const SHARE_OF_PULSE: f64 = 0.25;
+const PULSE_SAMPLES: usize = 3;
+const MIN_PULSE_SHARE: f64 = 0.25;
 /// Minimum number of samples for the test.
-const FEWEST: usize = 64;
-
+pub(super) const MIN_SAMPLES: usize = 64;
 /// Ratio of the standard deviation to the median absolute deviation of normal noise.
-const NORMAL: f64 = 1.4826;
+pub(super) const SIGMA_PER_MAD: f64 = 1.4826;
 
 /// Indices of outliers in `own`, a range of `x`; the rest of `x` are its neighbours.
 ///
@@ -47,24 +37,24 @@ const NORMAL: f64 = 1.4826;
 /// torque's spread, and 3.5 steps of a quantised channel. Source of the median rule: Hampel, J. Am. Stat. Assoc. 69
 /// (1974) 383; Davies and Gather, J. Am. Stat. Assoc. 88 (1993) 782. The groups and the test for steps are this
 /// project's extensions.
-pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> Vec<usize> {
-    if x.len() < FEWEST {
+pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64, limits: &CleaningSettings) -> Vec<usize> {
+    if x.len() < MIN_SAMPLES {
         return Vec::new();
     }
     let around = Surroundings::of(x);
-    let apart = around.apart(own.clone(), spread);
-    let limit = limit_of(apart.iter().map(|apart| apart.times));
-    let mut found: Vec<usize> = apart.iter().filter(|apart| apart.times > limit).map(|apart| apart.sample).collect();
-    if found.is_empty() || found.len() as f64 > LARGEST_SHARE * own.len() as f64 {
+    let far = around.far_samples(own.clone(), spread, limits);
+    let limit = gap_limit(far.iter().map(|sample| sample.times));
+    let mut found: Vec<usize> = far.iter().filter(|far| far.times > limit).map(|far| far.sample).collect();
+    if found.is_empty() || found.len() as f64 > limits.max_outlier_share * own.len() as f64 {
         return Vec::new();
     }
     // Recorder errors are isolated; repeated deviations over several samples are torque.
     let beside = (1..found.len()).filter(|&k| found[k] == found[k - 1] + 1).count();
-    if found.len() >= FEWEST_PULSES && beside as f64 > LARGEST_BESIDE * found.len() as f64 {
+    if found.len() >= MIN_OUTLIERS_FOR_PULSES && beside as f64 > MAX_ADJACENT_SHARE * found.len() as f64 {
         return Vec::new();
     }
     if let Some(step) = quantisation_step(x) {
-        found.retain(|&i| around.outside(i) > QUANTA * step);
+        found.retain(|&i| around.outside(i) > limits.outlier_steps * step);
     }
     found.retain(|&i| !around.is_pulse(i));
     found
@@ -80,7 +70,7 @@ struct Surroundings<'a> {
 }
 
 /// A sample far from its cubic.
-struct Apart {
+struct FarSample {
     sample: usize,
     /// Ratio of the distance to the minimum distance of an outlier.
     times: f64,
@@ -135,51 +125,51 @@ impl<'a> Surroundings<'a> {
         }
         let nearby = i.saturating_sub(GROUP)..(i + GROUP).min(n - 1);
         let nearby = nearby.filter(|k| *k != i && k + 1 != i);
-        let changes = middle_size(nearby.map(|k| self.x[k + 1] - self.x[k]));
-        f64::max(TIMES_AT_ENDS * least, TIMES_CHANGES * changes)
+        let changes = median_size(nearby.map(|k| self.x[k + 1] - self.x[k]));
+        f64::max(END_FACTOR * least, END_CHANGE_RATIO * changes)
     }
 
     /// Samples of `own` that are far from their cubics.
-    fn apart(&self, own: core::ops::Range<usize>, spread: f64) -> Vec<Apart> {
+    fn far_samples(&self, own: core::ops::Range<usize>, spread: f64, limits: &CleaningSettings) -> Vec<FarSample> {
         let (x, off, n) = (self.x, &self.off, self.x.len());
-        let overall = NORMAL * middle_size(off.iter().copied());
+        let overall = SIGMA_PER_MAD * median_size(off.iter().copied());
         let mostly_repeats = 2 * x.windows(2).filter(|pair| pair[0] == pair[1]).count() > n;
-        let mut apart = Vec::new();
-        let half = NOISE_SPAN / 2;
+        let mut far = Vec::new();
+        let half = NOISE_WINDOW / 2;
         let mut from = own.start;
         while from < own.end {
             let to = (from + half).min(own.end);
             let (low, high) = (from.saturating_sub(half / 2), (to + half / 2).min(n));
-            let noise = f64::max(NORMAL * middle_size(off[low..high].iter().copied()), 0.5 * overall);
+            let noise = f64::max(SIGMA_PER_MAD * median_size(off[low..high].iter().copied()), 0.5 * overall);
             // If most samples lie on a line, the noise estimate is invalid; use the spread.
-            let share = if noise > 0.0 && !mostly_repeats { SHARE_OF_SPREAD } else { 2.0 };
-            let least = f64::max(TIMES_NOISE * noise, share * spread).max(f64::MIN_POSITIVE);
+            let share = if noise > 0.0 && !mostly_repeats { limits.outlier_spread_share } else { 2.0 };
+            let least = f64::max(limits.outlier_noise_ratio * noise, share * spread).max(f64::MIN_POSITIVE);
             for i in from..to {
                 if off[i].abs() > 0.5 * least {
                     let nearby = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n);
-                    let usual = TIMES_NEIGHBOURS * middle_size(nearby.map(|k| self.outside(k)));
+                    let usual = limits.outlier_neighbour_ratio * median_size(nearby.map(|k| self.outside(k)));
                     let usual = usual.max(self.least_at_an_end(i, least));
-                    apart.push(Apart { sample: i, times: self.outside(i) / least.max(usual) });
+                    far.push(FarSample { sample: i, times: self.outside(i) / least.max(usual) });
                 }
             }
             from = to;
         }
-        apart
+        far
     }
 
     /// Whether sample `i` and its neighbours are a pulse of the torque.
     fn is_pulse(&self, i: usize) -> bool {
-        let beside = |k: &usize| self.signed(i, *k) / self.signed(i, i) > SHARE_OF_PULSE;
-        let before = (0..i).rev().take(SIDE_BY_SIDE).take_while(beside).count();
-        let behind = (i + 1..self.x.len()).take(SIDE_BY_SIDE).take_while(beside).count();
-        before + 1 + behind >= SIDE_BY_SIDE
+        let beside = |k: &usize| self.signed(i, *k) / self.signed(i, i) > MIN_PULSE_SHARE;
+        let before = (0..i).rev().take(PULSE_SAMPLES).take_while(beside).count();
+        let behind = (i + 1..self.x.len()).take(PULSE_SAMPLES).take_while(beside).count();
+        before + 1 + behind >= PULSE_SAMPLES
     }
 }
 
 /// Smallest power of two (at least 1) with more `distances` above it than between its half and itself. Distances are
 /// in units of the minimum distance of an outlier. Recorder errors are separated from the noise by a gap; noise with
 /// long tails has none.
-pub(super) fn limit_of(distances: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn gap_limit(distances: impl Iterator<Item = f64>) -> f64 {
     let distances: Vec<f64> = distances.collect();
     let mut limit = 1.0;
     loop {
@@ -202,7 +192,7 @@ fn usual_range(values: [f64; 4], smooth: f64) -> core::ops::Range<f64> {
 }
 
 /// Replaces the marked samples by the line between the nearest samples that are not marked.
-pub(super) fn bridged(x: &mut [f64], marked: &[usize]) {
+pub(super) fn interpolate_marked(x: &mut [f64], marked: &[usize]) {
     let mut at = 0;
     while at < marked.len() {
         let mut last = at;
@@ -222,7 +212,7 @@ pub(super) fn bridged(x: &mut [f64], marked: &[usize]) {
 }
 
 /// Median of the absolute values; zero without values.
-pub(super) fn middle_size(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn median_size(values: impl Iterator<Item = f64>) -> f64 {
     // The bits of nonnegative floats have the order of the floats and compare faster.
     let mut sizes: Vec<u64> = values.map(|value| value.abs().to_bits()).collect();
     if sizes.is_empty() {
@@ -249,7 +239,7 @@ mod tests {
         let mut sorted = x.to_vec();
         sorted.sort_by(f64::total_cmp);
         let spread = sorted[19 * x.len() / 20] - sorted[x.len() / 20];
-        outliers(x, 0..x.len(), spread)
+        outliers(x, 0..x.len(), spread, &CleaningSettings::default())
     }
 
     /// Torque with gravity, inertia and dry friction.

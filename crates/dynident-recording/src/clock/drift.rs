@@ -1,20 +1,18 @@
 //! Time stamps that jitter about a slowly varying rate: local lines through them, and their drift from an even grid.
 
+use super::settings::ClockSettings;
+
 /// Half widths of the windows that are tried, rows.
-const HALVES: [usize; 10] = [4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048];
+const HALF_WIDTHS: [usize; 10] = [4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048];
 /// A longer window is accepted while its error for left-out stamps is within this factor of the minimum.
-const NEARLY_BEST: f64 = 1.05;
-/// Minimum drift from an even grid, steps; less is within one step.
-const LEAST_DRIFT: f64 = 1.0;
-/// Minimum relative variation of the rate (RMS). It is the relative error of velocities, and half that of inertias.
-const LEAST_VARIATION: f64 = 1e-3;
+const MAX_ERROR_RATIO: f64 = 1.05;
 /// Rows on either side of a jump that must show that it lasts.
-const AGREEING: usize = 8;
+const JUMP_ROWS: usize = 8;
 /// Minimum jump that indicates missing rows, steps.
-const LEAST_JUMP: f64 = 0.6;
+const MIN_JUMP_STEPS: f64 = 0.6;
 
 /// Rows needed on either side of a block to smooth the block's stamps.
-pub(crate) const MARGIN: usize = HALVES[HALVES.len() - 1] + 2 * AGREEING;
+pub(crate) const CONTEXT_ROWS: usize = HALF_WIDTHS[HALF_WIDTHS.len() - 1] + 2 * JUMP_ROWS;
 
 /// Drift of stamps from an even grid.
 #[derive(Clone, Copy, Debug)]
@@ -34,11 +32,11 @@ pub(crate) fn windows(place: &[f64], stamp: &[f64], begins: &[bool]) -> &'static
         return &[];
     }
     let begins = with_jumps(place, stamp, begins);
-    let errors: Vec<f64> = HALVES.iter().map(|half| left_out_error(place, stamp, &begins, *half)).collect();
+    let errors: Vec<f64> = HALF_WIDTHS.iter().map(|half| left_out_error(place, stamp, &begins, *half)).collect();
     let least = errors.iter().fold(f64::INFINITY, |least, error| least.min(*error));
     // Exact stamps have zero error for any window, hence the floor of a millionth of a step.
-    let allowed = (NEARLY_BEST * least).max(1e-6);
-    &HALVES[errors.iter().rposition(|error| *error <= allowed).unwrap_or(HALVES.len())..]
+    let allowed = (MAX_ERROR_RATIO * least).max(1e-6);
+    &HALF_WIDTHS[errors.iter().rposition(|error| *error <= allowed).unwrap_or(HALF_WIDTHS.len())..]
 }
 
 impl Drift {
@@ -64,14 +62,14 @@ impl Drift {
         // Jumps within a piece are missing rows, where the rate of an even grid is wrong by the whole step.
         let jumps =
             (1..place.len()).filter(|&i| begins[i]).map(|i| stamp[i] - stamp[i - 1] - (place[i] - place[i - 1]));
-        let jumps: f64 = jumps.filter(|jump| jump.abs() < AGREEING as f64).map(|jump| jump * jump).sum();
+        let jumps: f64 = jumps.filter(|jump| jump.abs() < JUMP_ROWS as f64).map(|jump| jump * jump).sum();
         let variation = (square / f64::max(count, 1.0) + jumps / place.len() as f64).sqrt();
         Self { half, steps: high - low, variation }
     }
 
-    /// Whether an even grid would be wrong.
-    pub(crate) fn matters(&self) -> bool {
-        self.steps > LEAST_DRIFT && self.variation > LEAST_VARIATION
+    /// Whether the drift is too large for an even grid.
+    pub(crate) fn exceeds(&self, limits: &ClockSettings) -> bool {
+        self.steps > limits.min_drift_steps && self.variation > limits.min_rate_variation
     }
 }
 
@@ -87,7 +85,7 @@ fn off_grid(place: &[f64], stamp: &[f64], begins: &[bool]) -> Vec<f64> {
     let mut off: Vec<f64> = place.iter().zip(stamp).map(|(place, stamp)| stamp - place).collect();
     let mut shift = 0.0;
     for i in 0..off.len() {
-        if i > 0 && begins[i] && (off[i] - shift - off[i - 1]).abs() >= AGREEING as f64 {
+        if i > 0 && begins[i] && (off[i] - shift - off[i - 1]).abs() >= JUMP_ROWS as f64 {
             shift = off[i] - off[i - 1];
         }
         off[i] -= shift;
@@ -103,13 +101,13 @@ fn with_jumps(place: &[f64], stamp: &[f64], begins: &[bool]) -> Vec<bool> {
     for i in 1..n {
         let jump = off[i] - off[i - 1];
         // A backward jump is not a missing row.
-        if cut[i] || jump < LEAST_JUMP {
+        if cut[i] || jump < MIN_JUMP_STEPS {
             continue;
         }
-        let from = (i.saturating_sub(AGREEING)..i).rev().find(|k| begins[*k]).unwrap_or(i.saturating_sub(AGREEING));
-        let to = (i + 1..n.min(i + AGREEING)).find(|k| begins[*k]).unwrap_or(n.min(i + AGREEING));
+        let from = (i.saturating_sub(JUMP_ROWS)..i).rev().find(|k| begins[*k]).unwrap_or(i.saturating_sub(JUMP_ROWS));
+        let to = (i + 1..n.min(i + JUMP_ROWS)).find(|k| begins[*k]).unwrap_or(n.min(i + JUMP_ROWS));
         let lasting = median(&off[i..to]) - median(&off[from..i]);
-        cut[i] = lasting > f64::max(LEAST_JUMP, 0.7 * jump);
+        cut[i] = lasting > f64::max(MIN_JUMP_STEPS, 0.7 * jump);
     }
     cut
 }
@@ -202,7 +200,7 @@ mod tests {
         let wander = |x: f64| 40.0 * (x / 900.0).sin();
         let stamp: Vec<f64> = place.iter().map(|x| x + wander(*x) + noise(*x as usize)).collect();
         let drift = Drift::of(&place, &stamp, &begins, windows(&place, &stamp, &begins)[0]);
-        assert!(drift.matters() && (70.0..90.0).contains(&drift.steps), "{drift:?}");
+        assert!(drift.exceeds(&ClockSettings::default()) && (70.0..90.0).contains(&drift.steps), "{drift:?}");
         let smooth = smoothed(&place, &stamp, &begins, drift.half);
         let worst = (200..5800).map(|i| (smooth[i] - place[i] - wander(place[i])).abs()).fold(0.0, f64::max);
         // Jitter of 0.17 steps RMS averaged over tens of rows, and the curvature of the drift over them.
@@ -217,10 +215,10 @@ mod tests {
             Drift::of(&place, stamp, &begins, half)
         };
         let stamp: Vec<f64> = place.iter().map(|x| x + noise(*x as usize)).collect();
-        assert!(!best(&stamp).matters());
+        assert!(!best(&stamp).exceeds(&ClockSettings::default()));
         let stamp: Vec<f64> = place.iter().map(|x| x + (x / 300.0).floor() + 0.3 * noise(*x as usize)).collect();
         let drift = best(&stamp);
-        assert!(drift.matters(), "{drift:?}");
+        assert!(drift.exceeds(&ClockSettings::default()), "{drift:?}");
         let smooth = smoothed(&place, &stamp, &begins, drift.half);
         for i in (299..5900).step_by(300) {
             assert!((smooth[i + 1] - smooth[i] - 2.0).abs() < 0.15, "{i}: {} {}", smooth[i], smooth[i + 1]);

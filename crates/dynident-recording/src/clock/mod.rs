@@ -7,26 +7,19 @@
 mod drift;
 mod resampler;
 pub(crate) mod segments;
+mod settings;
 pub(crate) mod timeline;
+
+pub use settings::ClockSettings;
 
 use drift::{Drift, smoothed, windows};
 
 use crate::log::ClockRule;
 use serde::{Deserialize, Serialize};
 
-/// Jitter below which spacing is even: standard deviation of the steps over their mean. At 0.1 % of a step the position
-/// error of a wrong decision is a thousandth of the motion within one step.
-pub(crate) const NEGLIGIBLE_JITTER: f64 = 1e-3;
-
 /// Minimum distance of two stamps, as a share of the mean step. The second of two closer stamps is mostly noise and is
 /// ignored in the interpolation.
-pub(crate) const SHORTEST_STEP: f64 = 0.1;
-
-/// Minimum relative improvement of the position prediction for choosing one spacing over another.
-const CLEARLY: f64 = 0.1;
-
-/// Minimum share of rows with equal stamps that also repeat the position, for rows to be treated as repeated.
-const MOST_REPEAT: f64 = 0.9;
+pub(crate) const MIN_STEP_RATIO: f64 = 0.1;
 
 /// Properties of the clock, estimated from the first rows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -80,7 +73,7 @@ impl Clock {
 
 /// Decides on the clock from the stamps `time_s` and positions `q` (one slice for each joint) of the first rows.
 ///
-/// With a jitter below [`NEGLIGIBLE_JITTER`] spacing is even. Otherwise:
+/// With a jitter below [`negligible_jitter`](ClockSettings::negligible_jitter) spacing is even. Otherwise:
 ///
 /// 1. Does each stamp show when its sample was taken? Every sample is predicted from its four neighbours by the cubic
 ///    through them, at even spacing and at the stamps. If only the stamps jitter (a time taken after transmission),
@@ -100,8 +93,9 @@ pub(crate) fn clock(
     row: &[u64],
     q: &[Vec<f64>],
     max_gap_steps: f64,
+    limits: &ClockSettings,
 ) -> Result<Clock, String> {
-    let steps = MeanStep::of(time_s, row, q, max_gap_steps)?;
+    let steps = MeanStep::of(time_s, row, q, max_gap_steps, limits.min_repeat_share)?;
     let MeanStep { mean_s, median_s, rounded, repeats_rows, .. } = steps;
     let rate_hz = mean_s.recip();
     let mut result = Clock {
@@ -115,31 +109,32 @@ pub(crate) fn clock(
         smoothing_rows: 0,
         evidence: String::new(),
     };
-    let share = steps.jitter_in_words(row.len());
-    if rule == ClockRule::Auto && steps.jitter < NEGLIGIBLE_JITTER {
+    let share = steps.describe_jitter(row.len());
+    if rule == ClockRule::Auto && steps.jitter < limits.negligible_jitter {
         result.evidence = format!("even spacing: {share} is negligible");
         return Ok(result);
     }
     let (uniform, stamps) = misfits(time_s, q, mean_s, max_gap_steps * median_s);
-    let drift = drift(time_s, row, q, rate_hz, max_gap_steps * median_s);
+    let drift = drift(time_s, row, q, rate_hz, max_gap_steps * median_s, limits);
     result.misfit_uniform = Some(uniform);
     result.misfit_stamps = Some(stamps);
     result.drift_steps = drift.map(|drift| drift.steps);
     let smoothing_rows = drift.map_or(0, |drift| 2 * drift.half + 1);
     // Rounded stamps deviate by the rounding step in either direction.
     let by_rounding = if rounded > 0 { 2.0 * median_s / mean_s } else { 0.0 };
-    let stamps_predict_better = stamps.partial_cmp(&((1.0 - CLEARLY) * uniform)) == Some(core::cmp::Ordering::Less);
+    let stamps_predict_better =
+        stamps.partial_cmp(&((1.0 - limits.min_improvement) * uniform)) == Some(core::cmp::Ordering::Less);
     (result.uniform, result.smoothing_rows) = match rule {
         ClockRule::Stamps => (false, 0),
         ClockRule::Smoothed => (false, smoothing_rows),
         ClockRule::Auto if stamps_predict_better => (false, 0),
-        ClockRule::Auto if drift.is_some_and(|drift| drift.matters() && drift.steps > by_rounding) => {
+        ClockRule::Auto if drift.is_some_and(|drift| drift.exceeds(limits) && drift.steps > by_rounding) => {
             (false, smoothing_rows)
         }
         ClockRule::Uniform | ClockRule::Auto => (true, 0),
     };
     let misfit = format!("misfit of a local cubic: {uniform:.3e} evenly spaced, {stamps:.3e} at the stamps ({share})");
-    result.evidence = decision_in_words(rule, &result, &misfit, drift);
+    result.evidence = describe_decision(rule, &result, &misfit, drift);
     Ok(result)
 }
 
@@ -157,7 +152,13 @@ struct MeanStep {
 }
 
 impl MeanStep {
-    fn of(time_s: &[f64], row: &[u64], q: &[Vec<f64>], max_gap_steps: f64) -> Result<Self, String> {
+    fn of(
+        time_s: &[f64],
+        row: &[u64],
+        q: &[Vec<f64>],
+        max_gap_steps: f64,
+        min_repeat_share: f64,
+    ) -> Result<Self, String> {
         let successive = || (1..time_s.len()).filter(|i| row[*i] == row[i - 1] + 1);
         let all = successive().map(|i| time_s[i] - time_s[i - 1]);
         let mut steps: Vec<f64> = all.filter(|step| *step > 0.0 && step.is_finite()).collect();
@@ -168,7 +169,7 @@ impl MeanStep {
         let median_s = steps[steps.len() / 2];
         let usual = &steps[..steps.partition_point(|step| *step <= max_gap_steps * median_s)];
         let equal: Vec<usize> = successive().filter(|i| time_s[*i] == time_s[i - 1]).collect();
-        let repeats_rows = !equal.is_empty() && repeat_the_one_before(q, &equal, successive());
+        let repeats_rows = !equal.is_empty() && repeats_rows(q, &equal, successive(), min_repeat_share);
         let rounded = if repeats_rows { 0 } else { equal.len() };
         let usual = [&vec![0.0; rounded], usual].concat();
         let count = usual.len() as f64;
@@ -182,7 +183,7 @@ impl MeanStep {
     }
 
     /// Describes the jitter and the number of rounded stamps.
-    fn jitter_in_words(&self, stamps: usize) -> String {
+    fn describe_jitter(&self, stamps: usize) -> String {
         let by_rows = match self.rounded {
             0 => String::new(),
             rounded => {
@@ -194,7 +195,7 @@ impl MeanStep {
 }
 
 /// Describes the decision in one sentence.
-fn decision_in_words(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option<Drift>) -> String {
+fn describe_decision(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option<Drift>) -> String {
     let spacing = match clock.spacing() {
         Spacing::Even => "even spacing".to_owned(),
         Spacing::Stamps => "stamps".to_owned(),
@@ -216,20 +217,27 @@ fn decision_in_words(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option
 }
 
 /// Whether the rows `equal` have the positions of the previous row, while most of `all` rows do not.
-fn repeat_the_one_before(q: &[Vec<f64>], equal: &[usize], all: impl Iterator<Item = usize>) -> bool {
+fn repeats_rows(q: &[Vec<f64>], equal: &[usize], all: impl Iterator<Item = usize>, min_share: f64) -> bool {
     let is_same = |i: usize| q.iter().all(|q| q[i] == q[i - 1]);
     let share = |rows: &mut dyn Iterator<Item = usize>| {
         let (same, count) = rows.fold((0_u32, 0_u32), |(same, count), i| (same + u32::from(is_same(i)), count + 1));
         f64::from(same) / f64::from(count.max(1_u32))
     };
     let others = &mut all.filter(|i| equal.binary_search(i).is_err());
-    share(&mut equal.iter().copied()) > MOST_REPEAT && share(others) < 1.0 - MOST_REPEAT
+    share(&mut equal.iter().copied()) > min_share && share(others) < 1.0 - min_share
 }
 
 /// Drift of the stamps from an even grid. The smoothing window minimises the error for left-out stamps. It is enlarged
 /// while positions are predicted clearly worse than at even spacing, because jitter over several rows (packets that
 /// arrive late together) is not a change of the rate.
-fn drift(time_s: &[f64], row: &[u64], q: &[Vec<f64>], rate_hz: f64, longest_step_s: f64) -> Option<Drift> {
+fn drift(
+    time_s: &[f64],
+    row: &[u64],
+    q: &[Vec<f64>],
+    rate_hz: f64,
+    longest_step_s: f64,
+    limits: &ClockSettings,
+) -> Option<Drift> {
     let place: Vec<f64> = row.iter().map(|row| *row as f64).collect();
     let stamp: Vec<f64> = time_s.iter().map(|time_s| time_s * rate_hz).collect();
     let is_gap = |i: usize| {
@@ -242,7 +250,7 @@ fn drift(time_s: &[f64], row: &[u64], q: &[Vec<f64>], rate_hz: f64, longest_step
         found = Some(Drift::of(&place, &stamp, &begins, half));
         let smooth = smoothed(&place, &stamp, &begins, half);
         let (uniform, stamps) = misfits(&smooth, q, 1.0, longest_step_s * rate_hz);
-        if stamps <= (1.0 + CLEARLY) * uniform {
+        if stamps <= (1.0 + limits.min_improvement) * uniform {
             break;
         }
     }
@@ -259,7 +267,7 @@ fn misfits(time_s: &[f64], q: &[Vec<f64>], mean: f64, max_gap: f64) -> (f64, f64
         let times = [nodes[0], nodes[1], 0.0, nodes[2], nodes[3]];
         let usual = times.windows(2).all(|pair| {
             let step = pair[1] - pair[0];
-            step > SHORTEST_STEP * mean && step < max_gap
+            step > MIN_STEP_RATIO * mean && step < max_gap
         });
         if !usual {
             continue;
@@ -302,6 +310,10 @@ pub(crate) fn lagrange(at: f64, nodes: [f64; 4]) -> [f64; 4] {
 mod tests {
     use super::*;
 
+    fn auto_clock(time_s: &[f64], row: &[u64], q: &[Vec<f64>]) -> Result<Clock, String> {
+        clock(ClockRule::Auto, time_s, row, q, 5.0, &ClockSettings::default())
+    }
+
     /// Stamps with two decimals of a recorder at 125 Hz and 200 Hz: four steps of 10 ms for five rows, or one for two.
     #[test]
     fn rounded_stamps_keep_the_rate_of_the_rows() {
@@ -309,7 +321,7 @@ mod tests {
             let time: Vec<f64> = (0..2000).map(|i| (f64::from(i) / rate_hz * 100.0).round() / 100.0).collect();
             let q: Vec<f64> = (0..2000).map(|i| (f64::from(i) / rate_hz * 4.0).sin()).collect();
             let row: Vec<u64> = (0..2000).collect();
-            let found = clock(ClockRule::Auto, &time, &row, &[q], 5.0).unwrap();
+            let found = auto_clock(&time, &row, &[q]).unwrap();
             assert!((found.rate_hz / rate_hz - 1.0).abs() < 2e-3, "{rate_hz}: {found:?}");
             assert!(found.uniform && !found.repeats_rows, "{found:?}");
         }
@@ -323,10 +335,10 @@ mod tests {
         let row: Vec<u64> = (0..2000).collect();
         let time: Vec<f64> = (0..2000).map(twice).collect();
         let q: Vec<f64> = time.iter().map(|t| (4.0 * t).sin()).collect();
-        let found = clock(ClockRule::Auto, &time, &row, &[q], 5.0).unwrap();
+        let found = auto_clock(&time, &row, &[q]).unwrap();
         assert!(found.repeats_rows && (found.rate_hz - 125.0).abs() < 1e-6, "{found:?}");
         let time: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.8).round() / 100.0).collect();
-        let found = clock(ClockRule::Auto, &time, &row, &[vec![0.7; 2000]], 5.0).unwrap();
+        let found = auto_clock(&time, &row, &[vec![0.7; 2000]]).unwrap();
         assert!(!found.repeats_rows && (found.rate_hz / 125.0 - 1.0).abs() < 2e-3, "{found:?}");
     }
 
@@ -343,7 +355,7 @@ mod tests {
         let at = |i: usize| if sampled_at_stamps { stamp(i) } else { even(i) };
         let q = vec![(0..n).map(|i| (at(i) * 4.0).sin()).collect::<Vec<f64>>()];
         let row: Vec<u64> = (0..n as u64).collect();
-        clock(ClockRule::Auto, &time, &row, &q, 5.0).unwrap()
+        auto_clock(&time, &row, &q).unwrap()
     }
 
     #[test]
@@ -361,7 +373,7 @@ mod tests {
         let q: Vec<f64> = (0..n).map(|i| (taken(i) * 0.002).sin() + sigma * noise[i]).collect();
         let time: Vec<f64> = (0..n).map(|i| stamp(i) * 0.001 * unit).collect();
         let row: Vec<u64> = (0..n as u64).collect();
-        clock(ClockRule::Auto, &time, &row, &[q], 5.0).unwrap()
+        auto_clock(&time, &row, &[q]).unwrap()
     }
 
     #[test]
@@ -396,7 +408,7 @@ mod tests {
 
     #[test]
     fn a_stopped_clock_has_no_rate() {
-        assert!(clock(ClockRule::Auto, &[0.0; 5], &[0, 1, 2, 3, 4], &[], 5.0).is_err());
-        assert!(clock(ClockRule::Auto, &[0.0], &[0], &[], 5.0).is_err());
+        assert!(auto_clock(&[0.0; 5], &[0, 1, 2, 3, 4], &[]).is_err());
+        assert!(auto_clock(&[0.0], &[0], &[]).is_err());
     }
 }

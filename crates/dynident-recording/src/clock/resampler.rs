@@ -1,6 +1,6 @@
 //! Interpolates channels to a uniform grid: samples on the grid are copied, others interpolated by local cubics.
 
-use super::{SHORTEST_STEP, lagrange};
+use super::{MIN_STEP_RATIO, lagrange};
 
 /// Streams one uninterrupted segment of channels onto the grid `first + k`, time in steps.
 ///
@@ -34,7 +34,7 @@ impl Resampler {
         for stamp in stamps {
             match self.stamps.last() {
                 None => self.next = stamp,
-                Some(last) if stamp - last >= SHORTEST_STEP => {}
+                Some(last) if stamp - last >= MIN_STEP_RATIO => {}
                 Some(_) => break,
             }
             self.stamps.push(stamp);

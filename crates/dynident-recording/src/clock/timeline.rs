@@ -1,18 +1,15 @@
 //! Places rows on the time axis, in steps of the even grid, and finds where a piece of the log ends.
 
-use super::drift::{MARGIN, smoothed};
+use super::drift::{CONTEXT_ROWS, smoothed};
 use super::{Clock, Spacing};
 use crate::log::RawBlock;
 
-/// Rows before and after a block on which its places depend.
-const AROUND: usize = MARGIN;
-
 /// Maximum gap that is kept in the places, steps (eleven days at 1 kHz). A longer one is a wrong stamp, and places
 /// after it would lose precision.
-const LONGEST_GAP: f64 = 1e9;
+const MAX_GAP_STEPS: f64 = 1e9;
 
 /// Number of rows within which the stamps after a late packet are on time again.
-const LATE_ROWS: usize = 32;
+const MAX_LATE_ROWS: usize = 32;
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Places {
@@ -67,7 +64,7 @@ impl Timeline {
                     } else if is_gap {
                         places.holes.push(index);
                     }
-                    let even = match (is_gap && hole < LONGEST_GAP, self.clock.repeats_rows && time == 0.0) {
+                    let even = match (is_gap && hole < MAX_GAP_STEPS, self.clock.repeats_rows && time == 0.0) {
                         // A copy of the previous row has the same place and is left out.
                         (_, true) => 0.0,
                         (true, false) => hole.round().max(rows),
@@ -87,17 +84,17 @@ impl Timeline {
         places
     }
 
-    /// Whether a late stamp is caused by a late packet, not by a gap: later stamps are on time again within `LATE_ROWS`
-    /// rows.
+    /// Whether a late stamp is caused by a late packet, not by a gap: later stamps are on time again within
+    /// `MAX_LATE_ROWS` rows.
     fn catches_up(&self, last_row: u64, last_s: f64, block: &RawBlock, index: usize, next: Option<&RawBlock>) -> bool {
         let late = (block.time_s[index] - last_s) * self.clock.rate_hz;
         // Repeated rows come at twice the rate and would compensate any gap.
-        if self.clock.spacing() == Spacing::Stamps || self.clock.repeats_rows || late > LATE_ROWS as f64 {
+        if self.clock.spacing() == Spacing::Stamps || self.clock.repeats_rows || late > MAX_LATE_ROWS as f64 {
             return false;
         }
         let own = block.row[index..].iter().zip(&block.time_s[index..]);
         let further = next.into_iter().flat_map(|next| next.row.iter().zip(&next.time_s));
-        own.chain(further).skip(1).take(LATE_ROWS).any(|(&row, &time_s)| {
+        own.chain(further).skip(1).take(MAX_LATE_ROWS).any(|(&row, &time_s)| {
             let late = (time_s - last_s) * self.clock.rate_hz - (row - last_row) as f64;
             time_s >= last_s && late < 1.0
         })
@@ -111,7 +108,7 @@ impl Timeline {
         rows.extend_from_slice(&own);
         if let Some(next) = next {
             let mut last = own.last().map(|(row, time_s, _)| (*row, *time_s));
-            for (&row, &time_s) in next.row.iter().zip(&next.time_s).take(AROUND) {
+            for (&row, &time_s) in next.row.iter().zip(&next.time_s).take(CONTEXT_ROWS) {
                 let begins = last.is_some_and(|(last_row, last_s)| {
                     let hole = f64::max((row - last_row) as f64, (time_s - last_s) * rate);
                     time_s < last_s || hole > f64::max(self.bridged_steps, self.longest_step_s * rate)
@@ -126,7 +123,7 @@ impl Timeline {
         let smooth = smoothed(&numbers, &stamps, &begins, self.clock.smoothing_rows / 2);
         places.steps.copy_from_slice(&smooth[self.past.len()..self.past.len() + own.len()]);
         self.past.extend(own);
-        let unneeded = self.past.len().saturating_sub(AROUND);
+        let unneeded = self.past.len().saturating_sub(CONTEXT_ROWS);
         self.past.drain(..unneeded);
     }
 }
@@ -134,7 +131,7 @@ impl Timeline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clock::clock;
+    use crate::clock::{ClockSettings, clock};
     use crate::log::ClockRule;
 
     /// A hole of ten samples in a log with repeated rows is a gap; the repeated rows after it are not a late packet.
@@ -144,7 +141,7 @@ mod tests {
         let time_s: Vec<f64> = (0..800).map(|row| sample(row) as f64 * 0.008).collect();
         let row: Vec<u64> = (0..800).collect();
         let q: Vec<f64> = time_s.iter().map(|t| (3.0 * t).sin()).collect();
-        let clock = clock(ClockRule::Auto, &time_s, &row, &[q], 5.0).unwrap();
+        let clock = clock(ClockRule::Auto, &time_s, &row, &[q], 5.0, &ClockSettings::default()).unwrap();
         assert!(clock.repeats_rows, "{clock:?}");
         let block = RawBlock { row, time_s, ..RawBlock::default() };
         let places = Timeline::new(&clock, 5.0, 0.0).places(&block, None);

@@ -5,7 +5,7 @@ use crate::error::FilterError;
 use crate::filter::sections::{Section, Triple, butterworth_low_pass, pole_radius, run};
 
 /// Share of the signal below which transients at the end of a window fall inside [`Differentiator::context_samples`].
-const TRANSIENT: f64 = 1e-15;
+const MAX_TRANSIENT_SHARE: f64 = 1e-15;
 
 /// The one-way filter of both types.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +34,7 @@ impl Cascade {
     fn context_samples(&self, rate_hz: f64) -> usize {
         let Ok(sections) = self.sections(rate_hz) else { return 0 };
         // The factor covers the amplification of transients by the cascade.
-        let decay = (TRANSIENT.ln() / pole_radius(&sections).ln()).abs();
+        let decay = (MAX_TRANSIENT_SHARE.ln() / pole_radius(&sections).ln()).abs();
         (1.3 * decay).ceil() as usize + self.padding()
     }
 }

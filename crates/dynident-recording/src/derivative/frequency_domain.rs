@@ -2,7 +2,7 @@
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::{FilterError, require};
-use crate::filter::bridge::{LEAST_SAMPLES, bridge};
+use crate::filter::bridge::{MIN_END_SAMPLES, bridge};
 use core::f64::consts::{PI, TAU};
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 const BRIDGE_PERIODS: f64 = 8.0;
 
 /// End of the tapered band, in cut-offs.
-const TAPER: f64 = 2.0;
+const TAPER_END_RATIO: f64 = 2.0;
 
 /// Extension of a piece beyond its ends (the transform assumes a periodic signal).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,11 +59,11 @@ impl FrequencyDomain {
 
     /// Samples in one period of the cut-off: the length of the polynomial fit at tapered ends, and of the ignored ends.
     fn edge(&self, rate_hz: f64) -> usize {
-        ((rate_hz / self.cutoff_hz).ceil() as usize).max(LEAST_SAMPLES)
+        ((rate_hz / self.cutoff_hz).ceil() as usize).max(MIN_END_SAMPLES)
     }
 
     fn gain(&self, hz: f64) -> f64 {
-        let beyond = (hz / self.cutoff_hz - 1.0) / (TAPER - 1.0);
+        let beyond = (hz / self.cutoff_hz - 1.0) / (TAPER_END_RATIO - 1.0);
         match self.ends {
             _ if beyond <= 0.0 => 1.0,
             Ends::Tapered if beyond < 1.0 => 0.5 * (1.0 + (PI * beyond).cos()),

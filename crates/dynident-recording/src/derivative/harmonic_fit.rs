@@ -4,10 +4,10 @@ use crate::error::{FilterError, require};
 use core::f64::consts::TAU;
 
 /// Number of rows collected before a reduction to a triangle.
-const BLOCK: usize = 512;
+const BLOCK_ROWS: usize = 512;
 /// Minimum ratio of the pivot to the norm of a column. Below it a column is linearly dependent: six digits of the fit
 /// would remain.
-const DEPENDENT: f64 = 1e-10;
+const MIN_PIVOT_RATIO: f64 = 1e-10;
 
 /// `x(t) = c + d s + Σ_k a_k sin(2π k f t) + b_k cos(2π k f t)`, k = 1 .. K, with the time s scaled to ±1 over the
 /// samples.
@@ -131,7 +131,7 @@ impl Triangle {
     fn push(&mut self, row: &[f64]) {
         self.rows.push(row.to_vec());
         self.squares.iter_mut().zip(row).for_each(|(sum, x)| *sum += x * x);
-        if self.rows.len() >= self.width + BLOCK {
+        if self.rows.len() >= self.width + BLOCK_ROWS {
             self.reduce();
         }
     }
@@ -180,7 +180,9 @@ impl Triangle {
         for k in (0..columns).rev() {
             let row = &self.rows[k];
             let pivot = row[k];
-            if pivot.abs().partial_cmp(&(DEPENDENT * self.squares[k].sqrt())) != Some(core::cmp::Ordering::Greater) {
+            if pivot.abs().partial_cmp(&(MIN_PIVOT_RATIO * self.squares[k].sqrt()))
+                != Some(core::cmp::Ordering::Greater)
+            {
                 return None;
             }
             let rest: f64 = (k + 1..columns).map(|j| row[j] * solution[j]).sum();

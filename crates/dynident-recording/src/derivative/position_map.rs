@@ -7,7 +7,7 @@ use crate::reference::Reference;
 use std::sync::Arc;
 
 /// Number of bisections: reduces the bracket of any stroke below the resolution of its time.
-const HALVINGS: usize = 60;
+const BISECTIONS: usize = 60;
 
 /// On a monotone stroke the position determines velocity and acceleration, `dq = g(q)`, `ddq = g'(q) g(q)`. For the
 /// paper's logistic strokes in closed form, its Eqs. 15 and 16 ([`LogisticPath::rates`](crate::LogisticPath::rates));
@@ -39,7 +39,7 @@ impl PositionMap {
     }
 
     /// Velocity and acceleration at `q` on the stroke of a sampled reference between two times.
-    fn inverted(&self, joint: usize, q: f64, from_s: f64, to_s: f64) -> Option<[f64; 2]> {
+    fn rates_at_position(&self, joint: usize, q: f64, from_s: f64, to_s: f64) -> Option<[f64; 2]> {
         let [start, end] = [from_s, to_s].map(|t| self.reference.at(joint, t)[0]);
         let upward = end > start;
         let below = |x: f64| if upward { x < q } else { x > q };
@@ -47,7 +47,7 @@ impl PositionMap {
             return None;
         }
         let (mut low, mut high) = (from_s, to_s);
-        for _ in 0..HALVINGS {
+        for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
             if below(self.reference.at(joint, middle)[0]) {
                 low = middle;
@@ -92,7 +92,7 @@ impl Differentiator for PositionMap {
                 } else if let Some(path) = reference.logistic_path(joint) {
                     path.rates(q[i], reference.goes_there(joint, time_s))
                 } else {
-                    self.inverted(joint, q[i], stroke.from_s, stroke.to_s)
+                    self.rates_at_position(joint, q[i], stroke.from_s, stroke.to_s)
                 };
                 match rates {
                     Some(rates) => [out.dq[i], out.ddq[i]] = rates,

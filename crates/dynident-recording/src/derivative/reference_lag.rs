@@ -6,11 +6,11 @@ use crate::reference::Reference;
 use crate::reference::Stroke;
 
 /// Maximum number of samples of a stroke in the coarse search.
-const COARSE_SAMPLES: usize = 400;
+const MAX_COARSE_SAMPLES: usize = 400;
 /// Number of lags on either side of zero in the coarse search.
 const COARSE_LAGS: i32 = 50;
 /// Maximum number of Gauss-Newton steps; each step at least halves the change.
-const MOST_STEPS: usize = 30;
+const MAX_ITERATIONS: usize = 30;
 
 /// The lag of one stroke.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,7 +90,7 @@ fn best(
 ) -> (f64, bool) {
     let [least, most] = range_s;
     let joint = place.joint;
-    let step = (samples.len() / COARSE_SAMPLES).max(1);
+    let step = (samples.len() / MAX_COARSE_SAMPLES).max(1);
     // Samples at which the shifted reference is known.
     let known = |i: usize, lag_s: f64| reference.covers(joint, place.time_s(i) - lag_s);
     let mean_square = |lag_s: f64, step: usize| {
@@ -106,7 +106,7 @@ fn best(
         .map(|lag_s| (mean_square(lag_s, step), lag_s))
         .fold((f64::INFINITY, 0.0), |best, tried| if tried.0 < best.0 { tried } else { best })
         .1;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_ITERATIONS {
         let (mut gradient, mut curvature) = (0.0, 0.0);
         for i in samples.clone().filter(|&i| known(i, lag_s)) {
             let [q_d, dq_d, _] = reference.at(joint, place.time_s(i) - lag_s);

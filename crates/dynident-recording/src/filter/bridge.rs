@@ -6,7 +6,7 @@ use super::orthonormal::{half, orthonormal_polynomials};
 const DEGREE: usize = 4;
 
 /// Minimum number of samples for the polynomial fit at an end.
-pub(crate) const LEAST_SAMPLES: usize = 2 * (DEGREE + 1);
+pub(crate) const MIN_END_SAMPLES: usize = 2 * (DEGREE + 1);
 
 /// Value, first and second derivative per sample, at sample `place` of the polynomial fitted to `signal`.
 fn state(signal: &[f64], basis: &[[Vec<f64>; 3]], place: usize) -> [f64; 3] {

@@ -1,21 +1,49 @@
 //! Estimates the cut-off: the frequency above which position noise exceeds the motion's acceleration.
 
+use crate::error::{FilterError, require};
 use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of samples that are used.
-pub(crate) const CUTOFF_SAMPLES: usize = 1 << 16;
+pub(crate) const MAX_CUTOFF_SAMPLES: usize = 1 << 16;
 
-/// Share of the acceleration's power (noise subtracted) in the pass band.
-const POWER_SHARE: f64 = 0.9999;
-/// Ratio of the cut-off to the maximum frequency of the motion. Two-way Butterworth filters of order 4 pass 99.6 % of
-/// the amplitude at half their cut-off and 86 % at 0.8 of it. Attenuation of positions but not of torque biases the
-/// fit; this ratio limits it to 0.4 %.
-const MARGIN: f64 = 2.0;
-/// Minimum ratio of the spectrum to the noise floor for motion.
-const ABOVE_NOISE: f64 = 10.0;
-/// Maximum ratio of the cut-off to the sampling rate.
-const HIGHEST: f64 = 0.4;
+/// Limits of the choice of a cut-off. They are not part of a study file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CutoffSettings {
+    /// Share of the acceleration's power (noise subtracted) below the maximum frequency of the motion, 0.9999 by
+    /// default.
+    pub power_share: f64,
+    /// Ratio of the cut-off to the maximum frequency of the motion, 2 by default. Two-way Butterworth filters of order
+    /// 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it. Attenuation of positions but not of
+    /// torque biases the fit; the default limits it to 0.4 %.
+    pub margin: f64,
+    /// Minimum ratio of the spectrum to the noise floor for motion, 10 by default.
+    pub min_noise_ratio: f64,
+    /// Maximum ratio of the cut-off to the sampling rate, 0.4 by default.
+    pub max_rate_share: f64,
+}
+
+impl Default for CutoffSettings {
+    fn default() -> Self {
+        Self { power_share: 0.9999, margin: 2.0, min_noise_ratio: 10.0, max_rate_share: 0.4 }
+    }
+}
+
+impl CutoffSettings {
+    /// Checks the limits.
+    ///
+    /// # Errors
+    /// A [`FilterError`] that names the setting.
+    pub fn validate(&self) -> Result<(), FilterError> {
+        let Self { power_share, margin, min_noise_ratio, max_rate_share } = *self;
+        require(power_share > 0.0 && power_share < 1.0, "power_share", power_share, "give a number between 0 and 1")?;
+        require(margin.is_finite() && margin >= 1.0, "margin", margin, "give a finite number, 1 or more")?;
+        let fix = "give a finite number, 1 or more";
+        require(min_noise_ratio.is_finite() && min_noise_ratio >= 1.0, "min_noise_ratio", min_noise_ratio, fix)?;
+        let is_share = max_rate_share > 0.0 && max_rate_share < 0.5;
+        require(is_share, "max_rate_share", max_rate_share, "give a number between 0 and 0.5")
+    }
+}
 
 /// A cut-off with its evidence.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -47,14 +75,22 @@ pub struct CutoffChoice {
 /// The joint needs twice the lower of the two; the cut-off of the log is the maximum over the joints, at most 0.4 of
 /// the rate. A joint is ignored if its spectrum never exceeds ten times its median over the upper half of the band.
 pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
+    cutoff_within(q, rate_hz, &CutoffSettings::default())
+}
+
+/// [`cutoff`] with other limits than the defaults.
+pub fn cutoff_within<S: AsRef<[f64]>>(q: &[S], rate_hz: f64, limits: &CutoffSettings) -> CutoffChoice {
+    let CutoffSettings { margin, max_rate_share, .. } = *limits;
     let spectra: Vec<Option<Spectrum>> = q.iter().map(|q| spectrum(q.as_ref())).collect();
-    let joints: Vec<Option<Content>> =
-        spectra.iter().map(|spectrum| spectrum.as_ref().and_then(|spectrum| content(spectrum, rate_hz))).collect();
-    let highest = HIGHEST * rate_hz;
-    let asked = |content: &Content| (MARGIN * content.power_hz).min(highest);
+    let joints: Vec<Option<Content>> = spectra
+        .iter()
+        .map(|spectrum| spectrum.as_ref().and_then(|spectrum| content(spectrum, rate_hz, limits)))
+        .collect();
+    let highest = max_rate_share * rate_hz;
+    let joint_cutoff_hz = |content: &Content| (margin * content.power_hz).min(highest);
     let leading = joints.iter().enumerate().filter_map(|(joint, content)| content.as_ref().map(|c| (joint, c)));
     let leading = leading.max_by(|a, b| a.1.power_hz.total_cmp(&b.1.power_hz));
-    let joints_hz = joints.iter().map(|content| content.as_ref().map(asked)).collect();
+    let joints_hz = joints.iter().map(|content| content.as_ref().map(joint_cutoff_hz)).collect();
     let faded_hz = joints.iter().map(|content| content.as_ref().map(|content| content.valley_hz)).collect();
     match leading {
         None => CutoffChoice {
@@ -64,13 +100,13 @@ pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
             evidence: "no joint moves above its noise: the cut-off is a tenth of the sampling rate".to_owned(),
         },
         Some((joint, content)) => CutoffChoice {
-            cutoff_hz: asked(content),
+            cutoff_hz: joint_cutoff_hz(content),
             joints_hz,
             faded_hz,
             evidence: format!(
                 "joint {} (0-based) needs the highest cut-off: its acceleration falls below the noise ({:.1e} per \
                  sample of position) at {:.3} Hz, and 99.99 % of its power below that lies below {:.3} Hz; times \
-                 {MARGIN}, at most {HIGHEST} of the rate",
+                 {margin}, at most {max_rate_share} of the rate",
                 joint, content.noise, content.valley_hz, content.power_hz,
             ),
         },
@@ -102,7 +138,7 @@ fn response(k: usize, length: usize) -> f64 {
 }
 
 fn spectrum(q: &[f64]) -> Option<Spectrum> {
-    let q = &q[..q.len().min(CUTOFF_SAMPLES)];
+    let q = &q[..q.len().min(MAX_CUTOFF_SAMPLES)];
     let (first, rest) = q.split_first()?;
     if q.len() < 64 || rest.iter().all(|x| x == first) || q.iter().any(|x| !x.is_finite()) {
         return None;
@@ -117,19 +153,19 @@ fn spectrum(q: &[f64]) -> Option<Spectrum> {
     Some(Spectrum { acceleration: power[1..].to_vec(), position, floor, length })
 }
 
-fn content(spectrum: &Spectrum, rate_hz: f64) -> Option<Content> {
+fn content(spectrum: &Spectrum, rate_hz: f64, limits: &CutoffSettings) -> Option<Content> {
     let Spectrum { acceleration, position, floor, length } = spectrum;
     let valley = valley(acceleration);
-    let end = position.iter().rposition(|power| *power > ABOVE_NOISE * floor)?.min(valley);
+    let end = position.iter().rposition(|power| *power > limits.min_noise_ratio * floor)?.min(valley);
     let power: Vec<f64> = (0..=end).map(|k| ((position[k] - floor) * response(k + 1, *length)).max(0.0)).collect();
     let total: f64 = power.iter().sum();
-    if position[0] <= ABOVE_NOISE * floor || total <= 0.0 {
+    if position[0] <= limits.min_noise_ratio * floor || total <= 0.0 {
         return None;
     }
     let mut sum = 0.0;
     let last = power.iter().position(|power| {
         sum += power;
-        sum >= POWER_SHARE * total
+        sum >= limits.power_share * total
     });
     let hertz = |k: usize| (k + 1) as f64 * rate_hz / *length as f64;
     Some(Content { power_hz: hertz(last.unwrap_or(end)), valley_hz: hertz(valley), noise: floor.sqrt() })

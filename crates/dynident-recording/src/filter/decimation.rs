@@ -138,7 +138,7 @@ pub struct Decimator {
 const BLOCK: usize = 8;
 
 /// Rows that are processed together: with eight columns they and the coefficients fit into the first-level cache.
-const PIECE: usize = 512;
+const PIECE_ROWS: usize = 512;
 
 /// One cache line of numbers.
 #[derive(Clone, Copy, Debug)]
@@ -216,8 +216,8 @@ impl Decimator {
         let complete = if end >= length { (end - length) / factor + 1 } else { 0 };
         let (before, produced) = (self.outputs, complete - self.outputs);
         out.resize(produced * self.columns, 0.0);
-        for from in (0..rows).step_by(PIECE) {
-            let taken = PIECE.min(rows - from);
+        for from in (0..rows).step_by(PIECE_ROWS) {
+            let taken = PIECE_ROWS.min(rows - from);
             dispatch(
                 self.level,
                 Convolution {

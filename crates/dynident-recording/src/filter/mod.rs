@@ -14,7 +14,7 @@ mod periods;
 mod position_noise;
 pub(crate) mod sections;
 
-pub use cutoff::{CutoffChoice, cutoff};
+pub use cutoff::{CutoffChoice, CutoffSettings, cutoff, cutoff_within};
 pub use decimation::{DecimationSettings, Decimator};
 pub use periods::{AveragedPeriods, averaged_periods};
 pub(crate) use position_noise::NoiseSpectra;

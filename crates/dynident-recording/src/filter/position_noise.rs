@@ -1,9 +1,9 @@
 //! Position noise in the pass band, estimated from its density just above the cut-off.
 
-use super::cutoff::{CUTOFF_SAMPLES, welch};
+use super::cutoff::{MAX_CUTOFF_SAMPLES, welch};
 
 /// Maximum samples per piece of a spectrum: enough bins between the cut-off and four times the cut-off for a quartile.
-const PIECE_SAMPLES: usize = 1 << 12;
+const MAX_PIECE_SAMPLES: usize = 1 << 12;
 
 /// Standard deviation of white position noise per sample, for every joint. Its density is the lower quartile of the
 /// spectrum of the uniformly sampled positions `q` between the cut-off and four times the cut-off: the noise that is
@@ -40,13 +40,13 @@ impl NoiseSpectra {
 }
 
 fn spectrum(q: &[f64]) -> Option<Vec<f64>> {
-    let q = &q[..q.len().min(CUTOFF_SAMPLES)];
+    let q = &q[..q.len().min(MAX_CUTOFF_SAMPLES)];
     let first = q.first()?;
     if q.len() < 64 || q.iter().all(|x| x == first) || q.iter().any(|x| !x.is_finite()) {
         return None;
     }
     let second: Vec<f64> = q.windows(3).map(|x| (x[2] - x[1]) - (x[1] - x[0])).collect();
-    welch(&second, PIECE_SAMPLES.min(1 << (second.len() / 2).checked_ilog2()?))
+    welch(&second, MAX_PIECE_SAMPLES.min(1 << (second.len() / 2).checked_ilog2()?))
 }
 
 fn noise_beyond(spectrum: &[f64], rate_hz: f64, cutoff_hz: f64) -> Option<f64> {

@@ -13,7 +13,7 @@ pub(crate) struct Section {
 }
 
 /// Minimum ratio of the cut-off to the sampling rate: there the gain at zero frequency is accurate to seven digits.
-const LOWEST: f64 = 1e-5;
+const MIN_CUTOFF_RATIO: f64 = 1e-5;
 
 /// Digital Butterworth low-pass of `order`: analogue prototype poles `exp(iπ(2k + n + 1) / 2n)`, cut-off pre-warped,
 /// bilinear transform; each section has unit gain at zero frequency. Equals `scipy.signal.butter(order, cutoff_hz,
@@ -29,7 +29,7 @@ pub(crate) fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -
         return Err(FilterError::AboveNyquist { cutoff_hz, rate_hz });
     }
     let fix = "raise it: below 1e-5 of the sampling rate the recursion loses all precision";
-    require(cutoff_hz >= LOWEST * rate_hz, "cutoff_hz", cutoff_hz, fix)?;
+    require(cutoff_hz >= MIN_CUTOFF_RATIO * rate_hz, "cutoff_hz", cutoff_hz, fix)?;
     let warped = (PI * cutoff_hz / rate_hz).tan();
     let mut sections: Vec<Section> = (0..order / 2)
         .map(|k| {

@@ -6,12 +6,12 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
 /// Capacity of the queue: enough that neither side waits for a slow block of the other.
-const WAITING: usize = 4;
+const QUEUE_BLOCKS: usize = 4;
 
 #[derive(Debug)]
 enum Source {
-    Here(Box<LogReader>),
-    Beside { blocks: Receiver<Read>, thread: Option<JoinHandle<()>> },
+    Inline(Box<LogReader>),
+    Thread { blocks: Receiver<Read>, thread: Option<JoinHandle<()>> },
 }
 
 /// A block or the end, and the rows left out so far.
@@ -28,13 +28,13 @@ pub(crate) struct RawBlocks {
 impl RawBlocks {
     pub(crate) fn new(reader: LogReader) -> Self {
         let label = reader.label().to_owned();
-        Self { label, source: Source::Here(Box::new(reader)), dropped: LinesDropped::default() }
+        Self { label, source: Source::Inline(Box::new(reader)), dropped: LinesDropped::default() }
     }
 
     /// Reads ahead in a separate thread from now on.
-    pub(crate) fn beside(self) -> Self {
-        let Source::Here(mut reader) = self.source else { return self };
-        let (give, blocks) = sync_channel(WAITING);
+    pub(crate) fn in_thread(self) -> Self {
+        let Source::Inline(mut reader) = self.source else { return self };
+        let (give, blocks) = sync_channel(QUEUE_BLOCKS);
         let thread = std::thread::spawn(move || {
             loop {
                 let read = next_of(&mut reader);
@@ -45,7 +45,7 @@ impl RawBlocks {
                 }
             }
         });
-        Self { source: Source::Beside { blocks, thread: Some(thread) }, ..self }
+        Self { source: Source::Thread { blocks, thread: Some(thread) }, ..self }
     }
 
     /// The next rows; `None` at the end.
@@ -54,8 +54,8 @@ impl RawBlocks {
     /// Errors of [`LogReader::next_block`].
     pub(crate) fn next_block(&mut self) -> Result<Option<RawBlock>, RecordingError> {
         let (read, dropped) = match &mut self.source {
-            Source::Here(reader) => (next_of(reader), reader.dropped().clone()),
-            Source::Beside { blocks, thread } => {
+            Source::Inline(reader) => (next_of(reader), reader.dropped().clone()),
+            Source::Thread { blocks, thread } => {
                 let Ok(read) = blocks.recv() else {
                     if let Some(Err(panic)) = thread.take().map(JoinHandle::join) {
                         std::panic::resume_unwind(panic);
@@ -98,17 +98,17 @@ mod tests {
         let mut log = samples.into_log("log", &["elbow".to_owned()]).unwrap();
         log.format.missing = crate::log::Missing::Drop;
         let blocks = || RawBlocks::new(LogReader::open(&log).unwrap());
-        let (mut here, mut beside) = (blocks(), blocks().beside());
+        let (mut here, mut in_thread) = (blocks(), blocks().in_thread());
         loop {
-            let (one, other) = (here.next_block().unwrap(), beside.next_block().unwrap());
+            let (one, other) = (here.next_block().unwrap(), in_thread.next_block().unwrap());
             assert_eq!(one, other);
             if one.is_none() {
                 break;
             }
         }
-        assert_eq!((here.dropped(), here.dropped().missing), (beside.dropped(), 1));
-        assert_eq!(beside.next_block().unwrap(), None);
+        assert_eq!((here.dropped(), here.dropped().missing), (in_thread.dropped(), 1));
+        assert_eq!(in_thread.next_block().unwrap(), None);
         // A pass that ends before the log does not leave a waiting thread.
-        drop(blocks().beside());
+        drop(blocks().in_thread());
     }
 }

@@ -1,6 +1,6 @@
 //! The columns of one quantity of all joints, with unit, sign, scale and matrix.
 
-use super::column_pattern::expanded;
+use super::column_pattern::expand_pattern;
 use super::units::{Quantity, si_factor, unit_names};
 use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
@@ -128,7 +128,7 @@ impl ChannelGroup {
         }
     }
 
-    /// The columns with ranges expanded.
+    /// The columns with ranges expand_pattern.
     ///
     /// # Errors
     /// If a range is malformed or too long.
@@ -136,12 +136,14 @@ impl ChannelGroup {
         let key = format!("{key}.columns");
         let mut list = Vec::new();
         match &self.columns {
-            Columns::Pattern(pattern) => list.extend(expanded(&key, pattern)?.into_iter().map(ColumnRef::Name)),
+            Columns::Pattern(pattern) => list.extend(expand_pattern(&key, pattern)?.into_iter().map(ColumnRef::Name)),
             Columns::List(columns) => {
                 for column in columns {
                     match column {
                         ColumnRef::Index(index) => list.push(ColumnRef::Index(*index)),
-                        ColumnRef::Name(name) => list.extend(expanded(&key, name)?.into_iter().map(ColumnRef::Name)),
+                        ColumnRef::Name(name) => {
+                            list.extend(expand_pattern(&key, name)?.into_iter().map(ColumnRef::Name))
+                        }
                     }
                 }
             }

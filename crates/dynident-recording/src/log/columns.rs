@@ -25,9 +25,9 @@ impl ColumnSelection {
     }
 
     /// Requests `column`; returns the slot of its values in every row.
-    pub(super) fn want(&mut self, key: &str, column: &ColumnRef) -> Result<usize, RecordingError> {
+    pub(super) fn request(&mut self, key: &str, column: &ColumnRef) -> Result<usize, RecordingError> {
         let field = self.field(key, column)?;
-        if let Some(known) = self.fields.iter().position(|wanted| *wanted == field) {
+        if let Some(known) = self.fields.iter().position(|requested| *requested == field) {
             return Ok(known);
         }
         self.fields.push(field);
@@ -48,16 +48,16 @@ impl ColumnSelection {
     }
 
     /// Completes the selection.
-    pub(super) fn ready(&mut self) {
+    pub(super) fn finish_selection(&mut self) {
         self.table.select(&self.fields);
         self.values = vec![0.0; self.fields.len()];
     }
 
     fn field(&self, key: &str, column: &ColumnRef) -> Result<usize, RecordingError> {
-        let unknown = |wanted: String, hint: String| RecordingError::UnknownColumn {
+        let unknown = |requested: String, hint: String| RecordingError::UnknownColumn {
             place: self.table.place(),
             key: key.to_owned(),
-            wanted,
+            wanted: requested,
             hint,
         };
         let width = self.table.width();
@@ -137,14 +137,15 @@ pub(super) fn column_label(names: Option<&[String]>, field: usize) -> String {
     }
 }
 
-fn existing_names(wanted: &str, names: &[String]) -> String {
-    const SHOWN: usize = 40;
+fn existing_names(requested: &str, names: &[String]) -> String {
+    const MAX_SHOWN: usize = 40;
     // Bounded, because a line of a megabyte may contain half a million names.
-    const COMPARED: usize = 1000;
-    let nearest = names.iter().take(COMPARED).min_by_key(|name| edit_distance(wanted, name)).map_or("", String::as_str);
+    const MAX_COMPARED: usize = 1000;
+    let nearest =
+        names.iter().take(MAX_COMPARED).min_by_key(|name| edit_distance(requested, name)).map_or("", String::as_str);
     let cut = |name: &str| name.chars().take(60).flat_map(char::escape_debug).collect::<String>();
-    let list = names.iter().take(SHOWN).map(|name| cut(name)).collect::<Vec<_>>().join(", ");
-    let more = if names.len() > SHOWN { format!(", and {} more", names.len() - SHOWN) } else { String::new() };
+    let list = names.iter().take(MAX_SHOWN).map(|name| cut(name)).collect::<Vec<_>>().join(", ");
+    let more = if names.len() > MAX_SHOWN { format!(", and {} more", names.len() - MAX_SHOWN) } else { String::new() };
     let delimiter = if names.len() == 1 { " (only one column: is `delimiter` right?)" } else { "" };
     format!("did you mean `{}`? There are: {list}{more}{delimiter}", cut(nearest))
 }

@@ -5,8 +5,8 @@
 use memchr::memchr2;
 
 /// Maximum number of digits that is always exact as a double.
-const MOST_DIGITS: usize = 15;
-const POWERS: [f64; MOST_DIGITS + 1] =
+const MAX_DIGITS: usize = 15;
+const POWERS: [f64; MAX_DIGITS + 1] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
 /// Reads the fields of `line` that have an index into `values` in `places` (one entry per field); false if the number
@@ -52,19 +52,19 @@ pub(super) fn plain_decimal(text: &[u8]) -> Option<(f64, usize)> {
     let digits = &text[sign..];
     let digit = |at: usize| digits.get(at).map(|byte| byte.wrapping_sub(b'0')).filter(|digit| *digit < 10);
     let (mut integer, mut count) = (0_u64, 0);
-    while let Some(next) = digit(count).filter(|_| count < MOST_DIGITS) {
+    while let Some(next) = digit(count).filter(|_| count < MAX_DIGITS) {
         integer = 10 * integer + u64::from(next);
         count += 1;
     }
     let whole = count;
     let mut length = whole;
     if digits.get(whole) == Some(&b'.') {
-        let eight = digits[whole + 1..].first_chunk().copied().filter(|_| whole + 8 <= MOST_DIGITS);
+        let eight = digits[whole + 1..].first_chunk().copied().filter(|_| whole + 8 <= MAX_DIGITS);
         if let Some(eight) = eight.and_then(eight_digits) {
             integer = 100_000_000 * integer + eight;
             count += 8;
         }
-        while let Some(next) = digit(count + 1).filter(|_| count < MOST_DIGITS) {
+        while let Some(next) = digit(count + 1).filter(|_| count < MAX_DIGITS) {
             integer = 10 * integer + u64::from(next);
             count += 1;
         }
@@ -119,7 +119,7 @@ mod tests {
             assert_eq!(row(&text, &[Some(0)]), Some(vec![expected]), "{text}");
             assert_eq!(row(&format!("x,{text},1"), &[None, Some(0), None]), Some(vec![expected]), "{text}");
             let digits = text.bytes().filter(u8::is_ascii_digit).count();
-            if digits <= MOST_DIGITS && !text.contains('e') {
+            if digits <= MAX_DIGITS && !text.contains('e') {
                 let plain = plain_decimal(text.as_bytes()).map(|(value, length)| (value.to_bits(), length));
                 assert_eq!(plain, Some((expected, text.len())), "{text}");
             }

@@ -11,10 +11,10 @@ use crate::error::RecordingError;
 use std::path::Path;
 
 /// Maximum position or torque: its squares and its second differences per second squared are finite.
-const LARGEST: f64 = 1e60;
+const MAX_VALUE: f64 = 1e60;
 
 /// Maximum number of rows in a [`RawBlock`].
-const BLOCK_ROWS: usize = 4096;
+const MAX_BLOCK_ROWS: usize = 4096;
 
 /// Successive rows of a log in joint values (SI), as logged: no filter, no resampling.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -97,12 +97,12 @@ impl LogReader {
         let main = log.source();
         let mut tables = vec![ColumnSelection::new(main.label(), main.open()?)];
         let time = match &format.time {
-            Some(time) => Some((tables[0].want("time.column", &time.column)?, time.unit.seconds() * time.scale)),
+            Some(time) => Some((tables[0].request("time.column", &time.column)?, time.unit.seconds() * time.scale)),
             None => None,
         };
-        let rules = FoundRules::new(format, |key, column| tables[0].want(key, column))?;
+        let rules = FoundRules::new(format, |key, column| tables[0].request(key, column))?;
         let groups = channel_groups(log, &mut tables)?;
-        tables.iter_mut().for_each(ColumnSelection::ready);
+        tables.iter_mut().for_each(ColumnSelection::finish_selection);
         let rows = match (format.rows, format.fraction) {
             (Some(rows), _) => rows,
             (None, Some([from, to])) => {
@@ -122,7 +122,7 @@ impl LogReader {
             rows,
             time_range_s: format.time_range_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
             rules,
-            selection: selection_in_words(format),
+            selection: describe_selection(format),
             missing: format.missing,
             next_row: 0,
             delivered: 0,
@@ -156,7 +156,7 @@ impl LogReader {
         for group in &mut self.groups {
             group.columns.iter_mut().for_each(Vec::clear);
         }
-        while !self.finished && block.row.len() < BLOCK_ROWS {
+        while !self.finished && block.row.len() < MAX_BLOCK_ROWS {
             self.next_row_into(block)?;
         }
         for quantity in Quantity::ALL {
@@ -174,7 +174,7 @@ impl LogReader {
             out.resize(self.joints.len(), Vec::new());
             group.mapping.apply(&group.columns, out);
             for (joint, values) in out.iter().enumerate() {
-                if let Some(at) = values.iter().position(|value| !(-LARGEST..=LARGEST).contains(value)) {
+                if let Some(at) = values.iter().position(|value| !(-MAX_VALUE..=MAX_VALUE).contains(value)) {
                     return Err(RecordingError::Overflow {
                         log: self.label.clone(),
                         row: block.row[at],
@@ -293,10 +293,10 @@ impl LogReader {
             }
         }
         let (rows, log) = (self.tables[ended].rows, self.tables[ended].label.clone());
-        let forgiven = u64::from(self.dropped.truncated.is_some());
+        let tolerated = u64::from(self.dropped.truncated.is_some());
         for table in &mut self.tables {
             let longer = table.rows > rows;
-            if longer && (table.rows > rows + forgiven || table.skip_row()?) {
+            if longer && (table.rows > rows + tolerated || table.skip_row()?) {
                 return Err(RecordingError::UnequalFiles { log, rows, other: table.label.clone() });
             }
         }
@@ -325,7 +325,7 @@ fn channel_groups(log: &Log, tables: &mut Vec<ColumnSelection>) -> Result<Vec<Gr
             paths.push(Some(path.clone()));
         }
         let list = group.column_list(key)?;
-        let slots = list.iter().map(|column| tables[table].want(&format!("{key}.columns"), column));
+        let slots = list.iter().map(|column| tables[table].request(&format!("{key}.columns"), column));
         let slots = slots.collect::<Result<Vec<_>, _>>()?;
         let mapping = Mapping::new(group, quantity, log.joints.len())?;
         groups.push(Group { quantity, table, columns: vec![Vec::new(); slots.len()], slots, mapping });
@@ -334,7 +334,7 @@ fn channel_groups(log: &Log, tables: &mut Vec<ColumnSelection>) -> Result<Vec<Gr
 }
 
 /// The keys of a format that leave out rows, for messages.
-fn selection_in_words(format: &LogFormat) -> String {
+fn describe_selection(format: &LogFormat) -> String {
     let mut selection = Vec::new();
     match (format.rows, format.fraction) {
         (Some(rows), _) => selection.push(format!("rows = {rows:?}")),

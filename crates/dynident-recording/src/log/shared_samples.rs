@@ -8,18 +8,18 @@ use super::{Log, LogReader, RawBlock};
 use crate::error::RecordingError;
 
 /// Maximum number of rows of a log for the comparison.
-const MOST_ROWS: usize = 400_000;
+const MAX_ROWS: usize = 400_000;
 /// Number of places in the second log that are searched in the first.
-const PLACES: usize = 12;
+const SEARCHED_PLACES: usize = 12;
 /// Number of successive rows that must agree, and the minimum for short logs.
-const ROWS: usize = 100;
-const LEAST_ROWS: usize = 20;
+const MATCHED_ROWS: usize = 100;
+const MIN_MATCHED_ROWS: usize = 20;
 /// Tested ratios of the rows of both logs.
 const STRIDES: [usize; 5] = [1, 2, 4, 5, 10];
 /// Tolerance in steps of the coarser log: half a step, and a margin for rounded numbers.
-const HALF_STEP: f64 = 0.51;
+const STEP_TOLERANCE: f64 = 0.51;
 /// Tolerance for single precision, as a share of a channel's range.
-const SINGLE_PRECISION: f64 = 1e-6;
+const RANGE_TOLERANCE: f64 = 1e-6;
 
 /// A row in each of two logs from which on both contain the same samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +45,7 @@ impl LogSamples {
     /// # Errors
     /// If the log cannot be read.
     pub fn read(log: &Log) -> Result<Option<Self>, RecordingError> {
-        if log.source().estimated_rows().is_some_and(|rows| rows > 2 * MOST_ROWS as u64) {
+        if log.source().estimated_rows().is_some_and(|rows| rows > 2 * MAX_ROWS as u64) {
             return Ok(None);
         }
         let values = vec![Vec::new(); 2 * log.joints.len()];
@@ -56,7 +56,7 @@ impl LogSamples {
             for (to, from) in all.values.iter_mut().zip(block.q.iter().chain(&block.tau)) {
                 to.extend_from_slice(from);
             }
-            if all.row.len() > MOST_ROWS {
+            if all.row.len() > MAX_ROWS {
                 return Ok(None);
             }
         }
@@ -73,19 +73,19 @@ impl LogSamples {
     /// A row of each log from which on both contain the same samples.
     fn rows_shared_with(&self, other: &Self) -> Option<[usize; 2]> {
         let tolerance: Vec<f64> = self.values.iter().zip(&other.values).map(|(a, b)| agreement(a, b)).collect();
-        let mut places = (0..PLACES).map(|place| place * other.row.len() / PLACES);
+        let mut places = (0..SEARCHED_PLACES).map(|place| place * other.row.len() / SEARCHED_PLACES);
         let of_place = |from: usize| {
             // Start where the robot moves.
             let moving =
-                (from..other.row.len().saturating_sub(LEAST_ROWS)).find(|&row| other.moves(row, &tolerance))?;
+                (from..other.row.len().saturating_sub(MIN_MATCHED_ROWS)).find(|&row| other.moves(row, &tolerance))?;
             let agrees = |row: usize, at: usize| {
                 let mut channels = self.values.iter().zip(&other.values).zip(&tolerance);
                 channels.all(|((a, b), tolerance)| (a[row] - b[at]).abs() <= *tolerance)
             };
             let follows = |row: usize, [step, other_step]: [usize; 2]| {
                 let rows = (self.row.len() - row).div_ceil(step);
-                let rows = rows.min((other.row.len() - moving).div_ceil(other_step)).min(ROWS);
-                rows >= LEAST_ROWS && (1..rows).all(|k| agrees(row + k * step, moving + k * other_step))
+                let rows = rows.min((other.row.len() - moving).div_ceil(other_step)).min(MATCHED_ROWS);
+                rows >= MIN_MATCHED_ROWS && (1..rows).all(|k| agrees(row + k * step, moving + k * other_step))
             };
             let steps = || STRIDES.into_iter().flat_map(|stride| [[stride, 1], [1, stride]]);
             let found =
@@ -97,7 +97,7 @@ impl LogSamples {
 
     /// Whether a joint moves after a row by more than ten times the tolerance.
     fn moves(&self, row: usize, tolerance: &[f64]) -> bool {
-        let to = row + LEAST_ROWS;
+        let to = row + MIN_MATCHED_ROWS;
         (0..self.joints.len()).any(|joint| {
             let q = &self.values[joint][row..=to];
             let [low, high] = range(q);
@@ -109,7 +109,7 @@ impl LogSamples {
 /// Maximum difference of the same sample in both logs: half a step of the coarser log.
 fn agreement(a: &[f64], b: &[f64]) -> f64 {
     let [low, high] = range(a);
-    HALF_STEP * step(a).max(step(b)) + SINGLE_PRECISION * (high - low)
+    STEP_TOLERANCE * step(a).max(step(b)) + RANGE_TOLERANCE * (high - low)
 }
 
 /// Minimum step between rows: the resolution of the channel, or less if it has more digits than its noise needs.

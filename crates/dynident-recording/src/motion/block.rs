@@ -1,8 +1,11 @@
 //! Blocks of a motion, and the settings for converting a log to a motion.
 
 use super::torque_lag::TorqueShift;
+use crate::cleaning::CleaningSettings;
+use crate::clock::ClockSettings;
 use crate::derivative::DifferentiatorSettings;
 use crate::error::{FilterError, require};
+use crate::filter::CutoffSettings;
 use crate::log::OneOrMany;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
@@ -26,12 +29,26 @@ pub struct MotionSettings {
     /// Delay of the torque relative to the motion, s, one value for all joints or one for each; the torque is shifted
     /// by it. Negative if the torque is early. `identify` allows 2.5 times the time scale of the robot (2.5 s for an
     /// arm of 1.2 m). Without a value the torque is not shifted here, and `identify` estimates the delay.
-#[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_lag_s: Option<OneOrMany<f64>>,
+    /// Limits of the decisions on samples, clock and cut-off; not part of a study file.
+    #[serde(skip)]
+    pub limits: ImportLimits,
+}
+
+/// Limits of the decisions that are made while a log is read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImportLimits {
+    /// Detection of invalid samples.
+    pub cleaning: CleaningSettings,
+    /// Times of the samples.
+    pub clock: ClockSettings,
+    /// Cut-off.
+    pub cutoff: CutoffSettings,
 }
 
 /// Maximum delay for any robot, s.
-const LONGEST_LAG_S: f64 = 1e4;
+const MAX_LAG_S: f64 = 1e4;
 
 impl MotionSettings {
     /// Checks the settings.
@@ -42,8 +59,11 @@ impl MotionSettings {
         require((0.0..=1e6).contains(&self.trim_s), "trim_s", self.trim_s, "give seconds, 0 to 1000000")?;
         for lag_s in self.torque_lag_s.iter().flat_map(OneOrMany::values) {
             let fix = "give seconds, -10000 to 10000";
-            require((-LONGEST_LAG_S..=LONGEST_LAG_S).contains(lag_s), "torque_lag_s", *lag_s, fix)?;
+            require((-MAX_LAG_S..=MAX_LAG_S).contains(lag_s), "torque_lag_s", *lag_s, fix)?;
         }
+        self.limits.cleaning.validate()?;
+        self.limits.clock.validate()?;
+        self.limits.cutoff.validate()?;
         self.differentiator.validate()
     }
 

@@ -1,12 +1,13 @@
 //! Properties of a log that are estimated from its first rows: clock, cut-off, position noise.
 
+use super::block::{ImportLimits, MotionSettings};
 use crate::cleaning::replace_spikes;
 use crate::clock::segments::{PlacedRows, Segmenter};
 use crate::clock::timeline::Timeline;
 use crate::clock::{Clock, clock};
 use crate::error::RecordingError;
 use crate::filter::NoiseSpectra;
-use crate::filter::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
+use crate::filter::cutoff::{CutoffChoice, MAX_CUTOFF_SAMPLES, cutoff_within};
 use crate::log::{Log, LogReader, RawBlock};
 use crate::quantisation::quantisation_step;
 use crate::report::rows_to_a_value;
@@ -30,18 +31,19 @@ impl Opening {
     ///
     /// # Errors
     /// If the rows cannot be read, or do not determine a rate.
-    pub(super) fn of(log: &Log, keep_outliers: bool) -> Result<Arc<Self>, RecordingError> {
-        log.found_once(keep_outliers, || Self::read(log, keep_outliers))
+    pub(super) fn of(log: &Log, settings: &MotionSettings) -> Result<Arc<Self>, RecordingError> {
+        let MotionSettings { keep_outliers, limits, .. } = settings;
+        log.found_once(&(*keep_outliers, limits.clone()), || Self::read(log, *keep_outliers, limits))
     }
 
-    fn read(log: &Log, keep_outliers: bool) -> Result<Self, RecordingError> {
+    fn read(log: &Log, keep_outliers: bool, limits: &ImportLimits) -> Result<Self, RecordingError> {
         let format = &log.format;
         let (mut first, time_label) = FirstRows::of(log)?;
         let rows_to_a_value = [&first.q, &first.tau].map(|channels| rows_to_a_value(channels));
         if !keep_outliers {
             for q in &mut first.q {
                 let rows = 0..q.len();
-                replace_spikes(q, rows);
+                replace_spikes(q, rows, &limits.cleaning);
             }
         }
         let clock = match format.rate_hz {
@@ -56,13 +58,13 @@ impl Opening {
                 smoothing_rows: 0,
                 evidence: "even spacing: the rate is given, the log has no stamps".to_owned(),
             },
-            None => clock(format.clock, &first.time_s, &first.row, &first.q, format.max_gap_steps)
+            None => clock(format.clock, &first.time_s, &first.row, &first.q, format.max_gap_steps, &limits.clock)
                 .map_err(|reason| RecordingError::NoRate { log: log.source().label(), column: time_label, reason })?,
         };
         let longest = first.longest_segment(Timeline::new(&clock, format.max_gap_steps, 0.0));
         let steps = |columns: &[Vec<f64>]| columns.iter().map(|values| quantisation_step(values)).collect();
         Ok(Self {
-            cutoff: cutoff(&longest, clock.rate_hz),
+            cutoff: cutoff_within(&longest, clock.rate_hz, &limits.cutoff),
             noise: NoiseSpectra::of(&longest, clock.rate_hz),
             position_steps: steps(&first.q),
             torque_steps: steps(&first.tau),
@@ -72,7 +74,7 @@ impl Opening {
     }
 }
 
-/// The first [`CUTOFF_SAMPLES`] rows of a log, or a few more.
+/// The first [`MAX_CUTOFF_SAMPLES`] rows of a log, or a few more.
 struct FirstRows {
     row: Vec<u64>,
     time_s: Vec<f64>,
@@ -87,7 +89,7 @@ impl FirstRows {
         let columns = || vec![Vec::new(); log.joints.len()];
         let mut first = Self { row: Vec::new(), time_s: Vec::new(), q: columns(), tau: columns() };
         let mut raw = RawBlock::default();
-        while first.row.len() < CUTOFF_SAMPLES && reader.next_block(&mut raw)? {
+        while first.row.len() < MAX_CUTOFF_SAMPLES && reader.next_block(&mut raw)? {
             first.row.extend_from_slice(&raw.row);
             first.time_s.extend_from_slice(&raw.time_s);
             for (all, block) in first.q.iter_mut().zip(&raw.q).chain(first.tau.iter_mut().zip(&raw.tau)) {

@@ -25,14 +25,11 @@ use std::sync::Arc;
 /// Length of the ends of a piece that depend on extrapolated samples, in periods of the cut-off: there the transients
 /// of a Butterworth filter of order 4 have decayed to 3 %.
 const UNSETTLED_PERIODS: f64 = 1.5;
-/// Maximum filled hole as a share of the cut-off's period: a tenth of the period of the motion's highest frequency. A
-/// polynomial of degree 5 through both sides has an error below 1e-4 for a sinusoid of that frequency.
-const BRIDGED_PERIODS: f64 = 0.2;
 /// Minimum number of rows of a [`MotionBlock`], except the last of a segment.
-const CHUNK_ROWS: usize = 8192;
+const MIN_CHUNK_ROWS: usize = 8192;
 /// Number of rows per backward step below which a log without an uninterrupted piece is reported as not ordered by
 /// time.
-const ROWS_TO_A_STEP_BACK: u64 = 10;
+const MIN_ROWS_PER_BACKWARD_STEP: u64 = 10;
 
 /// Conversion of a log to a motion. Memory does not grow with the log's length, unless the differentiator needs the
 /// whole log.
@@ -48,7 +45,7 @@ pub struct MotionStream {
     clock: Clock,
     cutoff: CutoffChoice,
     /// Cut-off of the differentiator, Hz.
-    in_force_hz: f64,
+    cutoff_in_use_hz: f64,
     position_noise: Vec<f64>,
     differentiator: Box<dyn Differentiator>,
     smooth_torque: bool,
@@ -147,7 +144,7 @@ impl MotionStream {
         settings: &MotionSettings,
         build: impl FnOnce(&CutoffChoice) -> Result<Box<dyn Differentiator>, FilterError>,
     ) -> Result<Self, RecordingError> {
-        let opening = Opening::of(log, settings.keep_outliers)?;
+        let opening = Opening::of(log, settings)?;
         let differentiator = build(&opening.cutoff)?;
         Self::opened(log, settings, &opening, differentiator)
     }
@@ -161,8 +158,9 @@ impl MotionStream {
     ) -> Result<Self, RecordingError> {
         let Log { format, joints, .. } = log;
         let (clock, cutoff) = (opening.clock.clone(), opening.cutoff.clone());
-        let in_force_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
-        let bridged = if format.bridge_gaps { BRIDGED_PERIODS * clock.rate_hz / cutoff.cutoff_hz } else { 0.0 };
+        let cutoff_in_use_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
+        let limits = &settings.limits.cleaning;
+        let bridged = if format.bridge_gaps { limits.hole_periods * clock.rate_hz / cutoff.cutoff_hz } else { 0.0 };
         let timeline = Timeline::new(&clock, format.max_gap_steps, bridged);
         let comparisons = |group: bool| -> Vec<Comparison> {
             joints.iter().filter(|_| group).map(|joint| Comparison::new(joint)).collect()
@@ -172,10 +170,15 @@ impl MotionStream {
         let temperature = if format.temperature.is_some() { joints.len() } else { 0 };
         let torque_shift = TorqueShift::new(settings.torque_lags_s(joints.len())?.into_iter(), clock.rate_hz);
         let context = differentiator.context_samples(clock.rate_hz);
-        let unsettled = ((UNSETTLED_PERIODS * clock.rate_hz / in_force_hz) as usize).min(context.unwrap_or(0));
+        let unsettled = ((UNSETTLED_PERIODS * clock.rate_hz / cutoff_in_use_hz) as usize).min(context.unwrap_or(0));
         let channels = 2 * joints.len() + velocity.len() + acceleration.len() + temperature;
         Ok(Self {
-            rows_in: CleanRows::new(LogReader::open(log)?, timeline, joints, settings.keep_outliers),
+            rows_in: CleanRows::new(
+                LogReader::open(log)?,
+                timeline,
+                joints,
+                (!settings.keep_outliers).then(|| limits.clone()),
+            ),
             clean: CleanBlock::default(),
             clean_at: 0,
             joints: joints.clone(),
@@ -183,9 +186,9 @@ impl MotionStream {
             context: context.map(|samples| samples.max(torque_shift.reach())),
             unsettled,
             segmenter: Segmenter::new(channels),
-            in_force_hz,
+            cutoff_in_use_hz,
             time_check: TimeCheck::new(clock.median_step_s),
-            position_noise: opening.noise.beyond(in_force_hz),
+            position_noise: opening.noise.beyond(cutoff_in_use_hz),
             // Copied rows are left out, so the remaining rows do not repeat values.
             rows_to_a_value: if clock.repeats_rows { [None; 2] } else { opening.rows_to_a_value },
             clock,
@@ -217,7 +220,7 @@ impl MotionStream {
     /// Reads rows ahead in a separate thread; the result is bit-identical.
     #[must_use]
     pub fn read_beside(self) -> Self {
-        Self { rows_in: self.rows_in.read_beside(), ..self }
+        Self { rows_in: self.rows_in.read_in_thread(), ..self }
     }
 
     /// Omits the channels from the [`report`](Self::report), for passes that do not use them.
@@ -279,7 +282,7 @@ impl MotionStream {
     fn finish(&self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
         *block = MotionBlock { rate_hz: self.clock.rate_hz, joints: self.joints.len(), ..MotionBlock::default() };
         let backward = self.time_check.backward;
-        if self.segments == 0 && ROWS_TO_A_STEP_BACK * backward > self.rows {
+        if self.segments == 0 && MIN_ROWS_PER_BACKWARD_STEP * backward > self.rows {
             let log = self.rows_in.reader().label().to_owned();
             return Err(RecordingError::Unordered { log, backward, rows: self.rows });
         }
@@ -307,7 +310,7 @@ impl MotionStream {
     }
 
     fn chunk(&self) -> usize {
-        CHUNK_ROWS.max(3 * self.context.unwrap_or(0))
+        MIN_CHUNK_ROWS.max(3 * self.context.unwrap_or(0))
     }
 
     /// Moves raw rows to the uniform clock until the raw block or the segment ends.
@@ -319,7 +322,7 @@ impl MotionStream {
                 *rows += raw.rows() as u64;
                 let mut gaps = Vec::new();
                 for (place, (row, time_s)) in raw.row.iter().zip(&raw.time_s).enumerate() {
-                    if time_check.see(*row, *time_s) {
+                    if time_check.add(*row, *time_s) {
                         gaps.push(place);
                     }
                 }
@@ -328,11 +331,11 @@ impl MotionStream {
                 for (check, values) in checks.iter_mut().zip(logged) {
                     let mut from = 0;
                     for &gap in &gaps {
-                        check.see(&values[from..gap]);
+                        check.add(&values[from..gap]);
                         check.begin_piece();
                         from = gap;
                     }
-                    check.see(&values[from..]);
+                    check.add(&values[from..]);
                 }
             };
             let next = rows_in.next_block(&mut read)?;
@@ -393,7 +396,7 @@ impl MotionStream {
 
     /// The findings so far; complete once [`next_block`](Self::next_block) has returned false.
     pub fn report(&self) -> ImportReport {
-        let cutoff_hz = self.in_force_hz;
+        let cutoff_hz = self.cutoff_in_use_hz;
         let mut report = ImportReport {
             file: self.rows_in.reader().label().to_owned(),
             rows: self.rows,

@@ -19,9 +19,9 @@ use std::path::Path;
 use stroke::{between, share_rests, strokes_of};
 
 /// Maximum number of samples of a sampled reference.
-const MOST_SAMPLES: usize = 10_000_000;
+const MAX_SAMPLES: usize = 10_000_000;
 /// Maximum velocity and acceleration of a joint at rest, as shares of their peaks.
-const RESTING: [f64; 2] = [1e-3, 1e-2];
+const MAX_REST_SHARES: [f64; 2] = [1e-3, 1e-2];
 
 /// Position, velocity and acceleration of every joint as commanded, at any time: from samples (the `trajectory.csv` of
 /// `design`), or from the closed form of the paper's logistic strokes.
@@ -65,7 +65,7 @@ impl Reference {
     /// values that are not finite.
     pub fn sampled(times_s: &[f64], joints: &[[Vec<f64>; 3]]) -> Result<Self, FilterError> {
         let wrong = |problem: String| FilterError::Reference { problem };
-        if times_s.len() < 2 || times_s.len() > MOST_SAMPLES || joints.is_empty() {
+        if times_s.len() < 2 || times_s.len() > MAX_SAMPLES || joints.is_empty() {
             return Err(wrong(format!(
                 "{} samples of {} joints: give two samples or more",
                 times_s.len(),
@@ -81,7 +81,9 @@ impl Reference {
             .enumerate()
             .map(|(joint, columns)| {
                 if columns.iter().any(|column| column.len() != times.len() || column.iter().any(|x| !x.is_finite())) {
-                    return Err(wrong(format!("joint {joint} (0-based): q, dq and ddq need one finite number per time")));
+                    return Err(wrong(format!(
+                        "joint {joint} (0-based): q, dq and ddq need one finite number per time"
+                    )));
                 }
                 let [q, dq, ddq] = columns;
                 let values: Vec<[f64; 3]> = (0..times.len()).map(|i| [q[i], dq[i], ddq[i]]).collect();
@@ -146,7 +148,7 @@ impl Reference {
                     column.extend_from_slice(&values[joint]);
                 }
             }
-            if times.len() > MOST_SAMPLES {
+            if times.len() > MAX_SAMPLES {
                 break;
             }
         }
@@ -284,7 +286,7 @@ pub(crate) fn check_boundaries(boundaries_s: &[f64]) -> Result<(), FilterError> 
 }
 
 fn rests(value: &[f64; 3], peak: [f64; 2]) -> bool {
-    value[1].abs() <= RESTING[0] * peak[0] && value[2].abs() <= RESTING[1] * peak[1]
+    value[1].abs() <= MAX_REST_SHARES[0] * peak[0] && value[2].abs() <= MAX_REST_SHARES[1] * peak[1]
 }
 
 impl ReferenceTable {

@@ -62,14 +62,15 @@ pub(crate) fn strokes_of(times_s: &[f64], values: &[[f64; 3]], resting: &[bool])
 }
 
 /// Number of samples of a stroke that are tested for reversals.
-const LOOKS: u32 = 500;
+const TESTED_SAMPLES: u32 = 500;
 
 /// The stroke between two given times; `motion` returns the velocity and whether the joint rests at a time.
 pub(crate) fn between(from_s: f64, to_s: f64, motion: impl Fn(f64) -> (f64, bool)) -> Stroke {
-    let looks = (0..LOOKS).map(|k| motion(from_s + (to_s - from_s) * (f64::from(k) + 0.5) / f64::from(LOOKS)));
-    let speeds: Vec<f64> = looks.filter(|(_, rests)| !rests).map(|(speed, _)| speed).collect();
-    let sign = speeds.iter().sum::<f64>().signum();
-    let monotone = speeds.iter().all(|speed| speed * sign > 0.0);
+    let samples = (0..TESTED_SAMPLES)
+        .map(|k| motion(from_s + (to_s - from_s) * (f64::from(k) + 0.5) / f64::from(TESTED_SAMPLES)));
+    let velocities: Vec<f64> = samples.filter(|(_, rests)| !rests).map(|(speed, _)| speed).collect();
+    let sign = velocities.iter().sum::<f64>().signum();
+    let monotone = velocities.iter().all(|speed| speed * sign > 0.0);
     Stroke { owns_from_s: f64::NEG_INFINITY, owns_to_s: f64::INFINITY, from_s, to_s, monotone }
 }
 
@@ -89,9 +90,9 @@ mod tests {
     fn rests_separate_strokes_and_reversals_do_not() {
         let times: Vec<f64> = (0..10).map(f64::from).collect();
         // Rest, forward, rest, forward and back with a turn, rest.
-        let speeds = [0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0];
-        let values = speeds.map(|dq| [0.0, dq, 0.0]);
-        let strokes = strokes_of(&times, &values, &speeds.map(|dq| dq == 0.0));
+        let velocities = [0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0];
+        let values = velocities.map(|dq| [0.0, dq, 0.0]);
+        let strokes = strokes_of(&times, &values, &velocities.map(|dq| dq == 0.0));
         assert_eq!(strokes.len(), 2);
         assert_eq!((strokes[0].from_s, strokes[0].to_s, strokes[0].monotone), (0.0, 3.0, true));
         assert_eq!((strokes[1].from_s, strokes[1].to_s, strokes[1].monotone), (4.0, 8.0, false));

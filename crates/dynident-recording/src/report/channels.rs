@@ -1,11 +1,11 @@
 //! Statistics of a channel: range, dead, quantised, saturated. Accumulated block by block.
 
-use super::jumps::{Jump, JumpCheck, LoneSample, RUN};
+use super::jumps::{BATCH, Jump, JumpCheck, LoneSample};
 use crate::log::Quantity;
 use serde::{Deserialize, Serialize};
 
 /// Minimum number of successive samples at an extreme value for a saturated torque.
-const SATURATED_RUN: u64 = 20;
+const MIN_SATURATED_RUN: u64 = 20;
 
 /// Statistics of one channel of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,7 +51,7 @@ impl ChannelReport {
 
     /// Whether the torque is at a limit for many samples.
     pub fn saturated(&self) -> bool {
-        self.channel == Quantity::Torque && !self.constant() && self.longest_run_at_extreme >= SATURATED_RUN
+        self.channel == Quantity::Torque && !self.constant() && self.longest_run_at_extreme >= MIN_SATURATED_RUN
     }
 }
 
@@ -82,16 +82,16 @@ impl Extreme {
 
     /// Adds values with the maximum `largest`.
     #[inline]
-    fn see_all(&mut self, largest: f64, values: impl Iterator<Item = f64>) {
+    fn add_all(&mut self, largest: f64, values: impl Iterator<Item = f64>) {
         if largest < self.value {
             self.run = 0;
         } else {
-            values.for_each(|value| self.see(value));
+            values.for_each(|value| self.add(value));
         }
     }
 
     #[inline]
-    fn see(&mut self, value: f64) {
+    fn add(&mut self, value: f64) {
         if value < self.value {
             self.run = 0;
         } else {
@@ -118,20 +118,20 @@ impl ChannelCheck {
         }
     }
 
-    pub(crate) fn see(&mut self, values: &[f64]) {
+    pub(crate) fn add(&mut self, values: &[f64]) {
         // If no value of a run is an extreme, one comparison replaces many.
-        for run in values.chunks(RUN) {
+        for run in values.chunks(BATCH) {
             let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
             for &value in run {
                 low = if value < low { value } else { low };
                 high = if value > high { value } else { high };
             }
-            self.high.see_all(high, run.iter().copied());
-            self.low.see_all(-low, run.iter().map(|value| -value));
+            self.high.add_all(high, run.iter().copied());
+            self.low.add_all(-low, run.iter().map(|value| -value));
             if low <= 0.0 && high >= 0.0 {
                 self.zeros += run.iter().filter(|value| **value == 0.0).count() as u64;
             }
-            self.jumps.see_all(run);
+            self.jumps.add_all(run);
         }
         self.samples += values.len() as u64;
     }
@@ -175,12 +175,12 @@ mod tests {
     fn clipped_and_dead_channels_are_detected_across_blocks() {
         let mut check = ChannelCheck::new(Quantity::Torque, "elbow");
         let clipped: Vec<f64> = (0..200).map(|i| (f64::from(i) * 0.05).sin().clamp(-0.5, 0.8)).collect();
-        clipped.chunks(7).for_each(|block| check.see(block));
+        clipped.chunks(7).for_each(|block| check.add(block));
         let report = check.report();
         assert!(report.saturated() && !report.constant(), "{report:?}");
         assert_eq!((report.min, report.max), (-0.5, 0.8));
         let mut dead = ChannelCheck::new(Quantity::Torque, "wrist");
-        dead.see(&[0.0; 50]);
+        dead.add(&[0.0; 50]);
         assert!(dead.report().constant() && dead.report().zero_share == 1.0);
     }
 }

@@ -5,7 +5,7 @@ use crate::log::{Quantity, si_factor};
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of samples for the lag.
-const KEPT: usize = 1 << 13;
+const MAX_LAG_SAMPLES: usize = 1 << 13;
 
 /// Comparison of a logged velocity (or acceleration) with the derivative of the position, both filtered alike.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,33 +24,34 @@ pub struct DerivativeComparison {
     /// a dead position.
     #[serde(default)]
     pub ratio: Option<f64>,
-    /// Lag of the logged signal behind the derivative, in the piece where the derivative varies most.
+    /// Lag of the logged signal behind the derivative, in the piece where the derivative variation most.
     pub lag: Option<Lag>,
 }
 
 /// Minimum correlation for a logged signal that is proportional to the derivative.
-const PROPORTIONAL: f64 = 0.98;
+const MIN_PROPORTIONAL_CORRELATION: f64 = 0.98;
 /// Minimum difference of the logarithm of the factor from 0 for another unit or another sample rate.
-const OTHER: f64 = 0.05;
+const MIN_LOG_RATIO: f64 = 0.05;
 /// Maximum share of the logged signal's power for a negligible derivative.
-const NOTHING: f64 = 1e-12;
+const NEGLIGIBLE_POWER_SHARE: f64 = 1e-12;
 /// Units of velocity that are often mistaken for rad/s.
-const UNITS: [&str; 2] = ["deg/s", "rpm"];
+const COMMON_UNITS: [&str; 2] = ["deg/s", "rpm"];
 /// Maximum relative difference of the factor from that of a unit.
-const UNIT_SHARE: f64 = 0.02;
+const UNIT_TOLERANCE: f64 = 0.02;
 
 impl DerivativeComparison {
     /// Factor from the derivative to the logged signal, if they are proportional and it differs from 1.
     pub(crate) fn times(&self) -> Option<f64> {
-        let is_other = |ratio: &f64| *ratio > 0.0 && ratio.ln().abs() > OTHER;
-        self.ratio.filter(is_other).filter(|_| self.correlation > PROPORTIONAL)
+        let is_other = |ratio: &f64| *ratio > 0.0 && ratio.ln().abs() > MIN_LOG_RATIO;
+        self.ratio.filter(is_other).filter(|_| self.correlation > MIN_PROPORTIONAL_CORRELATION)
     }
 
     /// Explains a velocity that is `times` the derivative, in a log at `rate_hz`.
-    pub(crate) fn velocity_in_words(times: f64, rate_hz: f64) -> String {
-        let is_it =
-            |unit: &&str| si_factor(unit, Quantity::Velocity).is_some_and(|si| (times * si - 1.0).abs() < UNIT_SHARE);
-        match UNITS.into_iter().find(is_it) {
+    pub(crate) fn describe_velocity(times: f64, rate_hz: f64) -> String {
+        let is_it = |unit: &&str| {
+            si_factor(unit, Quantity::Velocity).is_some_and(|si| (times * si - 1.0).abs() < UNIT_TOLERANCE)
+        };
+        match COMMON_UNITS.into_iter().find(is_it) {
             Some(unit) => format!(
                 "is {times:.4} times the position's derivative throughout: set `unit = \"{unit}\"` under velocity"
             ),
@@ -72,7 +73,7 @@ pub(crate) struct Comparison {
     logged_power: f64,
     product: f64,
     /// Sum of the squared deviations of the derivative over the kept samples.
-    varies: f64,
+    variation: f64,
     derived: Vec<f64>,
     logged: Vec<f64>,
 }
@@ -85,14 +86,14 @@ impl Comparison {
             power: 0.0,
             logged_power: 0.0,
             product: 0.0,
-            varies: 0.0,
+            variation: 0.0,
             derived: Vec::new(),
             logged: Vec::new(),
         }
     }
 
     /// Adds the samples of one piece.
-    pub(crate) fn see(&mut self, derived: &[f64], logged: &[f64]) {
+    pub(crate) fn add(&mut self, derived: &[f64], logged: &[f64]) {
         for (derived, logged) in derived.iter().zip(logged) {
             self.difference += (derived - logged).powi(2);
             self.power += derived * derived;
@@ -100,11 +101,11 @@ impl Comparison {
             self.product += derived * logged;
         }
         // Use a single piece, because a lag across a gap is undefined: the piece with the largest variation.
-        let some = &derived[..derived.len().min(KEPT)];
+        let some = &derived[..derived.len().min(MAX_LAG_SAMPLES)];
         let mean = some.iter().sum::<f64>() / some.len().max(1) as f64;
-        let varies: f64 = some.iter().map(|x| (x - mean).powi(2)).sum();
-        if self.derived.is_empty() || varies > self.varies {
-            self.varies = varies;
+        let variation: f64 = some.iter().map(|x| (x - mean).powi(2)).sum();
+        if self.derived.is_empty() || variation > self.variation {
+            self.variation = variation;
             self.derived = some.to_vec();
             self.logged = logged[..some.len()].to_vec();
         }
@@ -112,7 +113,7 @@ impl Comparison {
 
     /// The lag is searched within one period of the cut-off; a longer lag belongs to another motion.
     pub(crate) fn report(&self, rate_hz: f64, cutoff_hz: f64) -> DerivativeComparison {
-        let is_valid = self.power > NOTHING * self.logged_power;
+        let is_valid = self.power > NEGLIGIBLE_POWER_SHARE * self.logged_power;
         let difference = if is_valid { (self.difference / self.power).sqrt() } else { 0.0 };
         let reach = ((rate_hz / cutoff_hz).ceil() as usize).clamp(3, 100).min(self.derived.len() / 4);
         DerivativeComparison {
@@ -135,7 +136,7 @@ mod tests {
     fn compared(pieces: &[(Vec<f64>, Vec<f64>)]) -> DerivativeComparison {
         let mut comparison = Comparison::new("arm");
         for (derived, logged) in pieces {
-            comparison.see(derived, logged);
+            comparison.add(derived, logged);
         }
         comparison.report(1000.0, 10.0)
     }
@@ -152,7 +153,7 @@ mod tests {
         {
             let found = compared(&[swing(times)]).times().unwrap();
             assert!((found / times - 1.0).abs() < 1e-9);
-            let message = DerivativeComparison::velocity_in_words(found, 100.0);
+            let message = DerivativeComparison::describe_velocity(found, 100.0);
             assert!(message.contains(words), "{message}");
         }
         assert_eq!(compared(&[swing(1.02)]).times(), None);

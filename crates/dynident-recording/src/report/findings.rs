@@ -5,7 +5,7 @@ use crate::cleaning::{Reason, SetAside};
 use crate::log::Quantity;
 
 /// Maximum share of rejected samples for the level [`Level::Info`].
-const FEW: f64 = 5e-3;
+const MAX_INFO_SHARE: f64 = 5e-3;
 
 /// `2nd`, `3rd`, `4th`, ..
 fn ordinal(number: u64) -> String {
@@ -46,21 +46,21 @@ impl ImportReport {
     /// Derives the findings from the other fields, most severe first.
     pub(crate) fn find(&mut self) {
         let mut findings = Findings::default();
-        self.find_in_clock(&mut findings);
-        self.find_in_pieces(&mut findings);
-        self.find_in_stamps(&mut findings);
-        self.find_repeated_values(&mut findings);
-        self.find_left_out(&mut findings);
+        self.check_clock(&mut findings);
+        self.check_pieces(&mut findings);
+        self.check_stamps(&mut findings);
+        self.check_repeated_values(&mut findings);
+        self.check_left_out(&mut findings);
         for channel in &self.channels {
-            self.find_dead_or_saturated(channel, &mut findings);
-            self.find_jumps(channel, &mut findings);
+            self.check_dead_or_saturated(channel, &mut findings);
+            self.check_jumps(channel, &mut findings);
         }
         if let Some((joints, message)) = self.position_jumps() {
             findings.add(Level::Problem, &format!("position {joints}"), message);
         }
         for (quantity, comparisons) in [("velocity", &self.velocity), ("acceleration", &self.acceleration)] {
             for comparison in comparisons {
-                self.find_difference(quantity, comparison, &mut findings);
+                self.check_difference(quantity, comparison, &mut findings);
             }
         }
         findings.0.sort_by_key(|finding| core::cmp::Reverse(finding.level));
@@ -68,7 +68,7 @@ impl ImportReport {
     }
 
     /// Sample rate and gaps.
-    fn find_in_clock(&self, findings: &mut Findings) {
+    fn check_clock(&self, findings: &mut Findings) {
         findings.add(
             Level::Info,
             "time",
@@ -84,15 +84,13 @@ impl ImportReport {
     }
 
     /// Pieces between gaps, and samples left out of them.
-    fn find_in_pieces(&self, findings: &mut Findings) {
+    fn check_pieces(&self, findings: &mut Findings) {
         if self.segments > 1 {
             findings.add(Level::Info, "time", format!("split at gaps into {} pieces", self.segments));
         }
         if self.bridged[0] > 0 {
             let [gaps, samples] = self.bridged;
-            let message = format!(
-                "{gaps} gaps, short against the motion, were bridged; the {samples} samples in them are not used as rows"
-            );
+            let message = format!("{gaps} short gaps were filled; the {samples} samples in them are not used as rows");
             findings.add(Level::Info, "time", message);
         }
         if self.short_segments[0] > 0 {
@@ -110,7 +108,7 @@ impl ImportReport {
     }
 
     /// Stamps that are equal, go backwards or are too close.
-    fn find_in_stamps(&self, findings: &mut Findings) {
+    fn check_stamps(&self, findings: &mut Findings) {
         if self.duplicate_stamps > 0 {
             let what = if self.clock.repeats_rows {
                 "rows repeat the one before, stamp and positions; they are left out, and the rate is that of the others"
@@ -128,14 +126,13 @@ impl ImportReport {
             );
         }
         if self.crowded_samples > 0 {
-            let message =
-                format!("{} samples are too close to the one before and were left out", self.crowded_samples);
+            let message = format!("{} samples are too close to the one before and were left out", self.crowded_samples);
             findings.add(Level::Info, "time", message);
         }
     }
 
     /// Values that the recorder repeats over several rows.
-    fn find_repeated_values(&self, findings: &mut Findings) {
+    fn check_repeated_values(&self, findings: &mut Findings) {
         for (quantity, every) in [("position", self.rows_to_a_position), ("torque", self.rows_to_a_torque)] {
             let Some(every) = every else { continue };
             let message = format!(
@@ -149,7 +146,7 @@ impl ImportReport {
     }
 
     /// Rows and samples that were left out.
-    fn find_left_out(&self, findings: &mut Findings) {
+    fn check_left_out(&self, findings: &mut Findings) {
         if self.dropped.missing > 0 {
             findings.add(
                 Level::Warning,
@@ -165,13 +162,13 @@ impl ImportReport {
         }
         for found in &self.set_aside {
             let name = format!("{} {}", found.channel.key(), found.joint);
-            let few = found.share < FEW && matches!(found.reason, Reason::Outlier | Reason::Spike);
+            let few = found.share < MAX_INFO_SHARE && matches!(found.reason, Reason::Outlier | Reason::Spike);
             findings.add(if few { Level::Info } else { Level::Warning }, &name, found.sentence());
         }
     }
 
     /// A dead or saturated channel.
-    fn find_dead_or_saturated(&self, channel: &ChannelReport, findings: &mut Findings) {
+    fn check_dead_or_saturated(&self, channel: &ChannelReport, findings: &mut Findings) {
         let Channel { name, measured } = Channel::of(channel);
         if channel.constant() {
             let level = if measured { Level::Problem } else { Level::Warning };
@@ -194,7 +191,7 @@ impl ImportReport {
     }
 
     /// Whole turns, outliers and quantisation of a channel.
-    fn find_jumps(&self, channel: &ChannelReport, findings: &mut Findings) {
+    fn check_jumps(&self, channel: &ChannelReport, findings: &mut Findings) {
         let Channel { name, measured } = Channel::of(channel);
         if channel.turns > 0 {
             let message = format!(
@@ -254,14 +251,14 @@ impl ImportReport {
     }
 
     /// A logged derivative that differs from that of the position.
-    fn find_difference(&self, quantity: &str, comparison: &DerivativeComparison, findings: &mut Findings) {
+    fn check_difference(&self, quantity: &str, comparison: &DerivativeComparison, findings: &mut Findings) {
         let name = format!("{quantity} {}", comparison.joint);
         let difference = 100.0 * comparison.relative_rms_difference;
         if comparison.correlation < -0.5 {
             let message = "the logged signal has the opposite sign of the position's derivative";
             findings.add(Level::Problem, &name, message.to_owned());
         } else if let Some(times) = comparison.times().filter(|_| quantity == "velocity") {
-            let message = DerivativeComparison::velocity_in_words(times, self.rate_hz);
+            let message = DerivativeComparison::describe_velocity(times, self.rate_hz);
             findings.add(Level::Warning, &name, message);
         } else if difference > 20.0 && comparison.lag.is_some() {
             let message = format!(

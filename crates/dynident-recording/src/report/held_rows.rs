@@ -1,11 +1,11 @@
 //! Detects channels that a recorder repeats, with new values at every few rows only.
 
 /// Minimum number of changes of a moving channel.
-const LEAST_CHANGES: usize = 40;
+const MIN_CHANGES: usize = 40;
 /// Minimum share of changes at the usual distance, rows.
-const EVEN: f64 = 0.8;
+const MIN_EVEN_SHARE: f64 = 0.8;
 /// Minimum share of the rows with a change in which most moving channels change.
-const TOGETHER: f64 = 0.8;
+const MIN_COMMON_SHARE: f64 = 0.8;
 
 /// Number of rows per new set of values, if the `channels` (one vector for each joint) change together, at even
 /// distances, and not at every row; otherwise `None`. Quantised slow channels also repeat, but each joint changes at
@@ -13,7 +13,7 @@ const TOGETHER: f64 = 0.8;
 pub(crate) fn rows_to_a_value(channels: &[Vec<f64>]) -> Option<u64> {
     let rows = channels.first()?.len();
     let moving: Vec<&Vec<f64>> =
-        channels.iter().filter(|values| changes(values).take(LEAST_CHANGES).count() == LEAST_CHANGES).collect();
+        channels.iter().filter(|values| changes(values).take(MIN_CHANGES).count() == MIN_CHANGES).collect();
     // A single channel may be quantised.
     if moving.len() < 2 {
         return None;
@@ -25,13 +25,13 @@ pub(crate) fn rows_to_a_value(channels: &[Vec<f64>]) -> Option<u64> {
     let at: Vec<usize> = (0..rows).filter(|&row| changing[row] > 0).collect();
     let together = at.iter().filter(|&&row| 2 * changing[row] > moving.len()).count();
     let mut steps: Vec<usize> = at.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if steps.is_empty() || (together as f64) < TOGETHER * at.len() as f64 {
+    if steps.is_empty() || (together as f64) < MIN_COMMON_SHARE * at.len() as f64 {
         return None;
     }
     let middle = steps.len() / 2;
     let usual = *steps.select_nth_unstable(middle).1;
     let even = steps.iter().filter(|&&step| step == usual).count();
-    (usual > 1 && even as f64 >= EVEN * steps.len() as f64).then_some(usual as u64)
+    (usual > 1 && even as f64 >= MIN_EVEN_SHARE * steps.len() as f64).then_some(usual as u64)
 }
 
 /// The rows at which a channel differs from the previous row.

@@ -6,24 +6,24 @@ use serde::{Deserialize, Serialize};
 /// Maximum difference of a wrapped step from a whole turn, as a share of the turn; it covers the motion of one sample.
 const TURN_TOLERANCE: f64 = 0.1;
 /// Minimum ratio of an isolated sample's steps, before and after it, to the largest step nearby.
-const TIMES_NEARBY: f64 = 20.0;
+const MIN_NEARBY_RATIO: f64 = 20.0;
 /// Decay of the largest step nearby per sample: it is negligible after some hundred samples.
-const MEMORY: f64 = 0.99;
+const DECAY: f64 = 0.99;
 /// Minimum deviation of an isolated sample, as a share of the range of all others.
-const SHARE_OF_RANGE: f64 = 0.25;
+const MIN_ISOLATED_RANGE_SHARE: f64 = 0.25;
 /// Number of steps before the detection starts.
-const LEARN: u64 = 20;
+const MIN_SAMPLES: u64 = 20;
 /// Number of largest steps that are kept. If all of them were jumps, they would belong to the signal.
-const LARGEST: usize = 8;
+const KEPT_STEPS: usize = 8;
 /// Minimum ratio of a jump to the largest step of the motion.
-const TIMES_OTHERS: f64 = 5.0;
+const MIN_JUMP_RATIO: f64 = 5.0;
 /// Minimum size of a jump as a share of the channel's range, because encoders flicker at rest.
-const JUMP_SHARE_OF_RANGE: f64 = 0.01;
+const MIN_JUMP_RANGE_SHARE: f64 = 0.01;
 
 /// Number of samples that are processed together.
-pub(super) const RUN: usize = 64;
-/// Less than `DECAY` to the power of `RUN`: minimum remaining share of the largest step nearby at the end of a run.
-const LEFT_AFTER_RUN: f64 = 0.5;
+pub(super) const BATCH: usize = 64;
+/// Less than `DECAY` to the power of `BATCH`: minimum remaining share of the largest step nearby at the end of a run.
+const MIN_DECAY_PER_BATCH: f64 = 0.5;
 
 /// A sample far from both of its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,26 +98,26 @@ impl JumpCheck {
         self.since_gap = 0;
     }
 
-    /// Adds the next samples, at most [`RUN`], with the same result as [`see`](Self::see) for each.
-    pub(super) fn see_all(&mut self, values: &[f64]) {
+    /// Adds the next samples, at most [`BATCH`], with the same result as [`add`](Self::add) for each.
+    pub(super) fn add_all(&mut self, values: &[f64]) {
         let [before, middle] = self.last;
-        let [first, .., next_to_last, last] = *values else { return values.iter().for_each(|value| self.see(*value)) };
+        let [first, .., next_to_last, last] = *values else { return values.iter().for_each(|value| self.add(*value)) };
         let step = |pair: &[f64]| (pair[1] - pair[0]).abs();
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let begun = [(middle - before).abs(), (first - middle).abs()];
         let largest = values.windows(2).map(step).fold(larger(begun[0], begun[1]), larger);
         // Fast path: no sample is isolated, wraps, or has one of the largest steps.
         let is_usual = self.since_gap >= 2
-            && largest < TIMES_NEARBY * LEFT_AFTER_RUN * self.nearby
+            && largest < MIN_NEARBY_RATIO * MIN_DECAY_PER_BATCH * self.nearby
             && self.turn.is_none_or(|turn| largest < 0.5 * turn)
-            && self.largest.len() == LARGEST
-            && self.largest[LARGEST - 1].0 >= largest;
+            && self.largest.len() == KEPT_STEPS
+            && self.largest[KEPT_STEPS - 1].0 >= largest;
         if !is_usual {
-            return values.iter().for_each(|value| self.see(*value));
+            return values.iter().for_each(|value| self.add(*value));
         }
         let passed = &values[..values.len() - 1];
         let steps = begun.into_iter().chain(passed.windows(2).map(step));
-        self.nearby = steps.fold(self.nearby, |nearby, step| larger(MEMORY * nearby, step));
+        self.nearby = steps.fold(self.nearby, |nearby, step| larger(DECAY * nearby, step));
         self.low = passed.iter().fold(self.low.min(middle), |low, value| if *value < low { *value } else { low });
         self.high = passed.iter().fold(self.high.max(middle), |high, value| larger(high, *value));
         self.last = [next_to_last, last];
@@ -126,13 +126,17 @@ impl JumpCheck {
     }
 
     #[inline]
-    pub(super) fn see(&mut self, value: f64) {
+    pub(super) fn add(&mut self, value: f64) {
         let [before, middle] = self.last;
         if self.since_gap >= 2 {
             let (to, from) = (middle - before, value - middle);
             let least = to.abs().min(from.abs());
             // The next sample shows whether the previous one was isolated.
-            if to * from < 0.0 && least > TIMES_NEARBY * self.nearby && self.samples > LEARN && self.nearby > 0.0 {
+            if to * from < 0.0
+                && least > MIN_NEARBY_RATIO * self.nearby
+                && self.samples > MIN_SAMPLES
+                && self.nearby > 0.0
+            {
                 self.alone += 1;
                 if least > self.worst_by {
                     self.worst_by = least;
@@ -150,7 +154,7 @@ impl JumpCheck {
             {
                 self.wraps += 1;
             } else {
-                self.nearby = (MEMORY * self.nearby).max(to.abs());
+                self.nearby = (DECAY * self.nearby).max(to.abs());
                 self.keep(to.abs(), [before, middle]);
             }
             self.low = self.low.min(middle);
@@ -163,12 +167,12 @@ impl JumpCheck {
 
     #[inline]
     fn keep(&mut self, size: f64, values: [f64; 2]) {
-        if self.largest.len() == LARGEST && self.largest[LARGEST - 1].0 >= size {
+        if self.largest.len() == KEPT_STEPS && self.largest[KEPT_STEPS - 1].0 >= size {
             return;
         }
         let place = self.largest.partition_point(|kept| kept.0 >= size);
         self.largest.insert(place, (size, self.samples - 1, values));
-        self.largest.truncate(LARGEST);
+        self.largest.truncate(KEPT_STEPS);
     }
 
     /// Number of steps far larger than all others, and the largest of them.
@@ -176,9 +180,9 @@ impl JumpCheck {
         let range = self.high - self.low;
         let is_apart = |pair: &[(f64, u64, [f64; 2])]| {
             let [larger, smaller] = [pair[0].0, pair[1].0];
-            smaller > 0.0 && larger > TIMES_OTHERS * smaller && larger > JUMP_SHARE_OF_RANGE * range
+            smaller > 0.0 && larger > MIN_JUMP_RATIO * smaller && larger > MIN_JUMP_RANGE_SHARE * range
         };
-        let apart = self.largest.windows(2).rposition(is_apart).filter(|_| self.largest.len() == LARGEST);
+        let apart = self.largest.windows(2).rposition(is_apart).filter(|_| self.largest.len() == KEPT_STEPS);
         let Some(last) = apart else { return (0, None) };
         let (_, row, [before, after]) = self.largest[0];
         let largest_other = self.largest[last + 1].0;
@@ -197,7 +201,7 @@ impl JumpCheck {
     pub(super) fn lone(&self) -> (u64, Option<LoneSample>) {
         let range = self.high - self.low;
         match self.worst {
-            Some(worst) if self.worst_by > SHARE_OF_RANGE * range => (self.alone, Some(worst)),
+            Some(worst) if self.worst_by > MIN_ISOLATED_RANGE_SHARE * range => (self.alone, Some(worst)),
             _ => (0, None),
         }
     }
@@ -209,7 +213,7 @@ mod tests {
 
     fn seen(turn: Option<f64>, values: impl IntoIterator<Item = f64>) -> JumpCheck {
         let mut check = JumpCheck::new(turn);
-        values.into_iter().for_each(|value| check.see(value));
+        values.into_iter().for_each(|value| check.add(value));
         check
     }
 
@@ -236,9 +240,9 @@ mod tests {
         let jump = jump.unwrap();
         assert_eq!((count, jump.row, jump.before, jump.after), (1, 700, angle(699), angle(900)));
         let mut paused = JumpCheck::new(None);
-        (0..700).for_each(|i| paused.see(angle(i)));
+        (0..700).for_each(|i| paused.add(angle(i)));
         paused.begin_piece();
-        (900..2000).for_each(|i| paused.see(angle(i)));
+        (900..2000).for_each(|i| paused.add(angle(i)));
         assert_eq!(paused.jumps(), (0, None));
         // An encoder that is stuck for a while.
         let frozen = |i: usize| angle(if (700..900).contains(&i) { 700 } else { i });
@@ -257,10 +261,10 @@ mod tests {
         let wrapped = |i: usize| if moving(i) > pi { moving(i) - 2.0 * pi } else { moving(i) };
         let spoilt = |i: usize| wrapped(i) + if i % 517 == 3 { 0.7 } else { 0.0 } + if i > 1500 { 0.2 } else { 0.0 };
         for turn in [None, Some(2.0 * pi)] {
-            for run in [1, 2, 3, 7, RUN] {
+            for run in [1, 2, 3, 7, BATCH] {
                 let samples: Vec<f64> = (0..3000).map(spoilt).collect();
                 let mut together = JumpCheck::new(turn);
-                samples.chunks(run).for_each(|run| together.see_all(run));
+                samples.chunks(run).for_each(|run| together.add_all(run));
                 assert_eq!(format!("{together:?}"), format!("{:?}", seen(turn, samples)), "{turn:?} {run}");
             }
         }

@@ -30,9 +30,9 @@ pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> O
     let limit = max_lag_samples as isize;
     let still = &a[max_lag_samples..n - max_lag_samples];
     let mut correlations = Vec::with_capacity(2 * max_lag_samples + 1);
-    for first in (0..=2 * max_lag_samples).step_by(SIDE_BY_SIDE) {
-        let lags = SIDE_BY_SIDE.min(2 * max_lag_samples + 1 - first);
-        correlations.extend_from_slice(&side_by_side(still, &b[first..n])[..lags]);
+    for first in (0..=2 * max_lag_samples).step_by(PARALLEL_LAGS) {
+        let lags = PARALLEL_LAGS.min(2 * max_lag_samples + 1 - first);
+        correlations.extend_from_slice(&correlations_from(still, &b[first..n])[..lags]);
     }
     if !correlations.iter().all(|correlation| correlation.is_finite()) {
         return None;
@@ -66,28 +66,28 @@ impl Lag {
 }
 
 /// Number of lags that are computed together.
-const SIDE_BY_SIDE: usize = 8;
+const PARALLEL_LAGS: usize = 8;
 
 /// Pearson's correlation of `a` with `b` from its samples 0, 1, ... on; not finite if a signal is constant or not
 /// finite, meaningless if `b` is too short. The compiler vectorises the loops over lags; the sums of each lag keep
 /// their order.
-fn side_by_side(a: &[f64], b: &[f64]) -> [f64; SIDE_BY_SIDE] {
+fn correlations_from(a: &[f64], b: &[f64]) -> [f64; PARALLEL_LAGS] {
     let n = a.len() as f64;
     let mut padded = b.to_vec();
-    padded.resize(a.len() + SIDE_BY_SIDE - 1, 0.0);
+    padded.resize(a.len() + PARALLEL_LAGS - 1, 0.0);
     let mean_a = a.iter().sum::<f64>() / n;
-    let mut mean_b = [0.0; SIDE_BY_SIDE];
-    for b in padded.windows(SIDE_BY_SIDE) {
-        for k in 0..SIDE_BY_SIDE {
+    let mut mean_b = [0.0; PARALLEL_LAGS];
+    for b in padded.windows(PARALLEL_LAGS) {
+        for k in 0..PARALLEL_LAGS {
             mean_b[k] += b[k];
         }
     }
     let mean_b = mean_b.map(|sum| sum / n);
-    let (mut aa, mut bb, mut ab) = (0.0, [0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
-    for (a, b) in a.iter().zip(padded.windows(SIDE_BY_SIDE)) {
+    let (mut aa, mut bb, mut ab) = (0.0, [0.0; PARALLEL_LAGS], [0.0; PARALLEL_LAGS]);
+    for (a, b) in a.iter().zip(padded.windows(PARALLEL_LAGS)) {
         let a = a - mean_a;
         aa += a * a;
-        for k in 0..SIDE_BY_SIDE {
+        for k in 0..PARALLEL_LAGS {
             let b = b[k] - mean_b[k];
             bb[k] += b * b;
             ab[k] += a * b;

@@ -3,7 +3,7 @@
 use super::{Gap, Steps};
 
 /// Maximum number of listed gaps.
-const LISTED_GAPS: usize = 100;
+const MAX_LISTED_GAPS: usize = 100;
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TimeCheck {
@@ -26,7 +26,7 @@ impl TimeCheck {
     }
 
     /// Adds the next row; returns whether there is a gap before it.
-    pub(crate) fn see(&mut self, row: u64, time_s: f64) -> bool {
+    pub(crate) fn add(&mut self, row: u64, time_s: f64) -> bool {
         let mut is_gap = false;
         if let Some((before, last_s)) = self.last {
             let step = time_s - last_s;
@@ -35,7 +35,7 @@ impl TimeCheck {
             is_gap = step > 3.0 * self.median_s;
             if is_gap {
                 self.gap_count += 1;
-                if self.gaps.len() < LISTED_GAPS {
+                if self.gaps.len() < MAX_LISTED_GAPS {
                     self.gaps.push(Gap { row: before, time_s: last_s, length_s: step });
                 }
             }

@@ -143,12 +143,12 @@ impl MotionStream {
         let channel = 2 * self.joints.len() + joint;
         if let Some(comparison) = self.velocity.get_mut(joint) {
             self.differentiator.smooth(rate, &self.uniform[channel][span.window.clone()], other)?;
-            comparison.see(&dq[span.in_window()], &other[span.in_window()]);
+            comparison.add(&dq[span.in_window()], &other[span.in_window()]);
         }
         if let Some(comparison) = self.acceleration.get_mut(joint) {
             let channel = channel + self.velocity.len();
             self.differentiator.smooth(rate, &self.uniform[channel][span.window.clone()], other)?;
-            comparison.see(&ddq[span.in_window()], &other[span.in_window()]);
+            comparison.add(&ddq[span.in_window()], &other[span.in_window()]);
         }
         Ok(())
     }
