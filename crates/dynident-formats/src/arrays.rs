@@ -1,15 +1,15 @@
-//! Arrays of one file as a table: those that share their longest length are its columns.
+//! Arrays of one file as a table: arrays that share the longest length are the columns.
 
 use crate::error::FileError;
 use crate::table::Table;
 
-/// Columns of all arrays together, at most.
+/// Maximum number of columns of all arrays.
 pub(crate) const MOST_COLUMNS: usize = 1 << 14;
 
-/// Entries of a list that are columns.
+/// Maximum number of entries of a list that become columns.
 pub(crate) const LONGEST_LIST: usize = 1024;
 
-/// An array of numbers with one or two sides.
+/// An array of numbers with one or two dimensions.
 #[derive(Clone, Debug)]
 pub(crate) struct Array {
     pub(crate) name: String,
@@ -21,17 +21,17 @@ pub(crate) struct Array {
 }
 
 impl Array {
-    /// Entries row after row.
+    /// Array in row-major order.
     pub(crate) fn row_major(name: String, shape: [usize; 2], values: Vec<f64>) -> Self {
         Self { name, shape, values, strides: [shape[1], 1] }
     }
 
-    /// Entries column after column.
+    /// Array in column-major order.
     pub(crate) fn column_major(name: String, shape: [usize; 2], values: Vec<f64>) -> Self {
         Self { name, shape, values, strides: [1, shape[0]] }
     }
 
-    /// Two sides of an array with any number of them, those of length one left out; `None` if more remain.
+    /// Dimensions of an array without those of length one; `None` if more than two remain.
     pub(crate) fn two_sides(sides: &[usize]) -> Option<[usize; 2]> {
         match sides.iter().copied().filter(|side| *side != 1).collect::<Vec<_>>()[..] {
             [] => Some([1, 1]),
@@ -42,7 +42,7 @@ impl Array {
     }
 }
 
-/// The samples' length: the longest side that arrays with half of all numbers share.
+/// Number of samples: the longest dimension that is shared by arrays with half of all numbers.
 fn length(arrays: &[Array]) -> usize {
     let numbers = |length: usize| -> usize {
         arrays.iter().filter(|array| array.shape.contains(&length)).map(|array| array.values.len()).sum()
@@ -53,8 +53,8 @@ fn length(arrays: &[Array]) -> usize {
     shared.or_else(|| sides().max_by_key(|side| (numbers(*side), *side))).unwrap_or(0)
 }
 
-/// Arrays as columns: a vector by its name, a matrix by name and 0-based index, `q[0]`, whichever of its sides the
-/// samples lie along (its rows, if both fit). Arrays of another length are left out.
+/// Arrays as columns: a vector by its name, a matrix by name and 0-based index, `q[0]`. The samples may be along either
+/// dimension of a matrix (its rows, if both fit). Arrays of another length are left out.
 #[derive(Debug)]
 pub(crate) struct ArrayTable {
     arrays: Vec<Array>,
@@ -68,7 +68,7 @@ pub(crate) struct ArrayTable {
 }
 
 impl ArrayTable {
-    /// The table of `arrays`; `None` if none of them has numbers.
+    /// The table of `arrays`; `None` if all are empty.
     pub(crate) fn new(arrays: Vec<Array>) -> Option<Self> {
         let rows = length(&arrays);
         let (mut names, mut columns) = (Vec::new(), Vec::new());
@@ -96,13 +96,13 @@ impl ArrayTable {
         (!columns.is_empty()).then_some(Self { arrays, names: Some(names), columns, wanted, rows, next: 0, notes })
     }
 
-    /// The same, with notes on what else the file holds.
+    /// Adds notes on other contents of the file.
     pub(crate) fn with_notes(mut self, notes: Vec<String>) -> Self {
         self.notes.extend(notes);
         self
     }
 
-    /// The same with columns that have indices only.
+    /// Removes the names of the columns.
     pub(crate) fn nameless(mut self) -> Self {
         self.names = None;
         self
@@ -153,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn arrays_of_one_length_are_columns_either_way_up() {
+    fn arrays_of_one_length_are_columns_in_either_order() {
         let q = Array::row_major("q".to_owned(), [2, 3], vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         let tau = Array::column_major("tau".to_owned(), [3, 2], vec![-1.0, -2.0, -3.0, -4.0, -5.0, -6.0]);
         let other = Array::row_major("gain".to_owned(), [2, 1], vec![7.0, 8.0]);

@@ -1,4 +1,4 @@
-//! HDF5, and MATLAB's `save -v7.3`: data sets of one length.
+//! HDF5, and MATLAB's `save -v7.3`: data sets of equal length.
 
 use crate::error::FileError;
 use crate::table::Table;
@@ -21,9 +21,9 @@ mod reading {
     use crate::limits::{Budget, SPLIT};
     use hdf5_pure::{DType, Dataset, File, Group};
 
-    /// Groups in groups.
+    /// Maximum nesting of groups.
     const DEEPEST: usize = 8;
-    /// Data sets at most.
+    /// Maximum number of data sets.
     const MOST_SETS: usize = 10_000;
 
     pub(crate) fn open(path: &Path, budget: Budget) -> Result<Box<dyn Table>, FileError> {
@@ -34,7 +34,7 @@ mod reading {
         let file = File::open_streaming(path).map_err(error)?;
         let mut found = Found { path, arrays: Vec::new(), others: Vec::new(), sets: 0, budget, too_large: false };
         found.group(&file.root(), "", 0)?;
-        // A table without its largest columns would be taken for the recording.
+        // Without its largest columns, the table could be mistaken for the whole recording.
         if let (true, Some(problem)) = (found.too_large, found.others.last()) {
             return Err(FileError::broken(path, FileFormat::Hdf5, "its data sets", problem.as_str(), SPLIT));
         }
@@ -52,7 +52,7 @@ mod reading {
         others: Vec<String>,
         sets: usize,
         budget: Budget,
-        /// Whether a data set was larger than the memory allows; it is the last of `others`.
+        /// Whether a data set exceeds the memory limit; it is the last of `others`.
         too_large: bool,
     }
 
@@ -65,13 +65,13 @@ mod reading {
         fn group(&mut self, group: &Group, at: &str, depth: usize) -> Result<(), FileError> {
             let name = |own: &str| if at.is_empty() { own.to_owned() } else { format!("{at}.{own}") };
             for own in group.datasets().map_err(|error| self.broken(at, &error))? {
-                // MATLAB keeps what its references point to in #refs#.
+                // MATLAB stores the targets of references in #refs#.
                 if self.sets >= MOST_SETS || own.starts_with('#') {
                     continue;
                 }
                 self.sets += 1;
                 let place = name(&own);
-                // One that cannot be read leaves the others readable.
+                // An unreadable data set does not prevent reading the others.
                 let read = group.dataset(&own).map_err(|error| error.to_string());
                 match read.and_then(|set| array(&set, &place, &mut self.budget)) {
                     Ok(array) => self.arrays.push(array),
@@ -118,16 +118,16 @@ mod reading {
                 | DType::U32
                 | DType::U64
         ) {
-            return Err("no numbers".to_owned());
+            return Err("not numeric".to_owned());
         }
         let shape = set.shape().map_err(text)?;
         let sides: Option<Vec<usize>> = shape.iter().map(|side| usize::try_from(*side).ok()).collect();
-        let sides = sides.and_then(|sides| Array::two_sides(&sides)).ok_or("more than two sides")?;
+        let sides = sides.and_then(|sides| Array::two_sides(&sides)).ok_or("more than two dimensions")?;
         let numbers = shape.iter().try_fold(1_u64, |all, side| all.checked_mul(*side));
         budget.take(numbers.and_then(|numbers| numbers.checked_mul(8)))?;
         let values = set.read_f64().map_err(text)?;
         if values.len() != sides[0] * sides[1] {
-            return Err("another count of numbers than its sides say".to_owned());
+            return Err("the number of values does not match the dimensions".to_owned());
         }
         Ok(Array::row_major(place.to_owned(), sides, values))
     }

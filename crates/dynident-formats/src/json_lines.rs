@@ -1,4 +1,4 @@
-//! JSON lines: one object a line, its numbers columns by their path.
+//! JSON lines: one object per line; columns are its numbers, named by their path.
 
 use crate::error::FileError;
 use crate::table::Table;
@@ -27,12 +27,12 @@ mod json {
     use std::io::Read;
     use std::path::PathBuf;
 
-    /// A line with more bytes is none.
+    /// Maximum line length, bytes. Longer lines are rejected.
     const LONGEST_LINE: u64 = 1 << 22;
-    /// Lines that are searched for columns.
+    /// Number of lines that are searched for columns.
     const SEARCHED: usize = 64;
 
-    /// The numbers of `value` by their path; true and false are 1 and 0, null is a number that is missing.
+    /// Calls `found` for each number of `value` with its path; true and false are 1 and 0, null is a missing number.
     pub(crate) fn flattened(value: &Value, path: &mut String, found: &mut impl FnMut(&str, f64)) {
         let length = path.len();
         match value {
@@ -64,14 +64,14 @@ mod json {
         path: PathBuf,
         reader: Box<dyn BufRead + Send>,
         line: u64,
-        /// The bytes of a line, and the path of a number in it: kept for the next one.
+        /// Buffers for the bytes of a line and for the path of a number.
         bytes: Vec<u8>,
         number_path: String,
         names: Vec<String>,
         column_of: HashMap<String, usize>,
-        /// Lines that were read in search of columns.
+        /// Lines that were read to find the columns.
         waiting: VecDeque<(u64, Value)>,
-        /// Place of each column among those that are wanted.
+        /// Index of each column among the selected ones.
         slot_of: Vec<Option<usize>>,
         truncated: bool,
     }
@@ -82,7 +82,7 @@ mod json {
         }
     }
 
-    /// The table of `reader`. Its columns are those of its first lines.
+    /// The table of `reader`. Its columns are those of the first lines.
     pub(crate) fn open(path: &Path, reader: Box<dyn BufRead + Send>) -> Result<Box<dyn Table>, FileError> {
         let mut table = JsonLines {
             path: path.to_owned(),
@@ -116,7 +116,7 @@ mod json {
 
     impl JsonLines {
         fn broken(&self, problem: impl Into<String>) -> FileError {
-            let fix = "write one whole object a line";
+            let fix = "write one complete object per line";
             FileError::broken(&self.path, FileFormat::JsonLines, format!("line {}", self.line), problem, fix)
         }
 
@@ -146,7 +146,7 @@ mod json {
                 }
                 return match serde_json::from_slice(text) {
                     Ok(value @ Value::Object(_)) => Ok(Some(value)),
-                    // A last line without its end was cut off while it was written.
+                    // A last line without a newline was truncated.
                     Err(_) if !line.ends_with(b"\n") && self.line > 1 => {
                         self.truncated = true;
                         Ok(None)
@@ -182,7 +182,7 @@ mod json {
             let Some(value) = self.next()? else { return Ok(false) };
             values.fill(f64::NAN);
             let mut path = core::mem::take(&mut self.number_path);
-            // Lines mostly hold the same numbers in the same order, so that names need not be looked up.
+            // Most lines have the same numbers in the same order, so try the expected name first.
             let mut next = 0;
             flattened(&value, &mut path, &mut |name, number| {
                 let is_next = self.names.get(next).is_some_and(|expected| expected == name);

@@ -1,15 +1,15 @@
-//! LeRobot data sets: a folder with `meta/info.json` and Parquet files below `data`, one for each episode (version 2)
-//! or for several (version 3). Layout: <https://huggingface.co/docs/lerobot/lerobot-dataset-v3>.
+//! LeRobot data sets: a folder with `meta/info.json` and Parquet files in `data`, one for each episode (version 2) or
+//! for several episodes (version 3). Layout: <https://huggingface.co/docs/lerobot/lerobot-dataset-v3>.
 
 use crate::error::FileError;
 use crate::kind::FileFormat;
 use std::path::{Path, PathBuf};
 
-/// The description of a data set, within its folder.
+/// Metadata of a data set, within its folder.
 const INFO: &str = "meta/info.json";
-const FETCH: &str = "fetch the data set whole (`hf download`, or `git lfs pull`)";
+const FETCH: &str = "download the complete data set (`hf download`, or `git lfs pull`)";
 
-/// The folder of the data set that `path` names: itself, or that of its `meta/info.json`.
+/// The folder of the data set at `path`: itself, or that of its `meta/info.json`.
 pub(crate) fn folder(path: &Path) -> Option<&Path> {
     if path.ends_with(INFO) && path.is_file() {
         return path.parent()?.parent();
@@ -17,13 +17,13 @@ pub(crate) fn folder(path: &Path) -> Option<&Path> {
     path.join(INFO).is_file().then_some(path)
 }
 
-/// Its description, then its tables in the order of their rows.
+/// The metadata, then the tables in row order.
 pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let listed = |folder: &Path| -> Result<Vec<PathBuf>, FileError> {
         let io = |source| FileError::Io { file: folder.to_owned(), source };
         let names = dynident_system::names(folder).map_err(io)?;
         let mut found: Vec<PathBuf> = names.into_iter().map(|name| folder.join(name)).collect();
-        // Numbers in names have as many digits as they need beyond three or six.
+        // Numbers in names have at least three or six digits, and more if needed.
         found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
         Ok(found)
     };
@@ -35,7 +35,7 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     if files.len() > 1 {
         return Ok(files);
     }
-    Err(FileError::broken(folder, FileFormat::LeRobot, "data", "no chunk in it holds a Parquet file", FETCH))
+    Err(FileError::broken(folder, FileFormat::LeRobot, "data", "it contains no Parquet file", FETCH))
 }
 
 #[cfg(not(all(feature = "json", feature = "parquet")))]
@@ -55,38 +55,38 @@ mod reading {
     use serde_json::Value;
     use std::io::{BufReader, Read};
 
-    /// A description of thousands of features is shorter.
+    /// Maximum length of the metadata, bytes.
     const LONGEST_INFO: u64 = 1 << 24;
-    /// Between episodes: no filter reaches across, and nobody takes it for a late sample.
+    /// Time between episodes, s: long enough to be treated as a gap, not as a late sample.
     const BETWEEN_EPISODES_S: f64 = 10.0;
     const TIME: &str = "time";
 
-    /// The tables of a data set as one.
+    /// The tables of a data set as one table.
     #[derive(Debug)]
     struct DataSet {
         folder: PathBuf,
         parts: Vec<PathBuf>,
-        /// Number of the part under way, and the part.
+        /// Index of the current part, and the part.
         current: usize,
         part: Box<dyn Table>,
-        /// Columns as the parts call them, and as this table does; behind them stands the time.
+        /// Names of the columns in the parts, and in this table, which has the time in addition.
         own_names: Vec<String>,
         names: Vec<String>,
         notes: Vec<String>,
         wanted: Vec<usize>,
         clock: Option<Clock>,
-        /// What is read of each part, and one row of it.
+        /// Columns that are read from each part, and one row of them.
         read: Vec<usize>,
         row: Vec<f64>,
         total_rows: Option<u64>,
     }
 
-    /// Time that goes on from episode to episode.
+    /// Time that continues from episode to episode.
     #[derive(Debug, Default)]
     struct Clock {
         stamp: usize,
         episode: usize,
-        /// Added to the stamps of the episode under way.
+        /// Added to the stamps of the current episode, s.
         offset_s: f64,
         /// Episode and time of the last row.
         last: Option<(f64, f64)>,
@@ -125,7 +125,7 @@ mod reading {
             && path.contains("episode_index")
             && episodes > parts.len() as u64
         {
-            notes.push(format!("{} of {episodes} episodes, whose files are not there", episodes - parts.len() as u64));
+            notes.push(format!("the files of {} of {episodes} episodes are missing", episodes - parts.len() as u64));
         }
         let wanted = (0..names.len()).collect::<Vec<_>>();
         let mut table = DataSet {
@@ -164,15 +164,15 @@ mod reading {
     fn open_part(folder: &Path, path: &Path) -> Result<Box<dyn Table>, FileError> {
         let io = |source| FileError::Io { file: path.to_owned(), source };
         let head = recognition::head(&mut BufReader::new(dynident_files::open(path).map_err(io)?)).map_err(io)?;
-        // What stands for a file that was not fetched is text.
+        // The pointer to a file that was not downloaded is text.
         if !head.starts_with(b"PAR1") {
             let place = path.strip_prefix(folder).unwrap_or(path).display().to_string();
-            return Err(FileError::broken(folder, FileFormat::LeRobot, place, "it is no Parquet file", FETCH));
+            return Err(FileError::broken(folder, FileFormat::LeRobot, place, "it is not a Parquet file", FETCH));
         }
         parquet::open(path)
     }
 
-    /// Columns with the entries of lists by the names that `features` gives them: `action[elbow]` for `action[1]`.
+    /// Columns with list entries named by `features`: `action[elbow]` for `action[1]`.
     fn with_entries_named(columns: &[String], features: &Value) -> Vec<String> {
         let named = |column: &String| {
             let (feature, entry) = column.strip_suffix(']')?.rsplit_once('[')?;
@@ -191,7 +191,7 @@ mod reading {
         column.strip_prefix(feature).is_some_and(|rest| rest.starts_with('[') && !rest.contains('.'))
     }
 
-    /// A list of texts, or the one list in a group: `{"motors": [..]}`.
+    /// A list of names, or the only list in a group: `{"motors": [..]}`.
     fn entry_names(names: &Value) -> Option<Vec<&str>> {
         let list = match names {
             Value::Object(group) if group.len() == 1 => group.values().next()?,
@@ -208,8 +208,8 @@ mod reading {
                 let mut part = open_part(&self.folder, path)?;
                 if part.names() != Some(&self.own_names) {
                     let place = path.strip_prefix(&self.folder).unwrap_or(path).display().to_string();
-                    let problem = "its columns, or the lengths of its lists, are not those of the first file";
-                    let fix = "name the files of one kind each by itself";
+                    let problem = "its columns, or the lengths of its lists, differ from those of the first file";
+                    let fix = "use the files with equal columns as separate logs";
                     return Err(FileError::broken(&self.folder, FileFormat::LeRobot, place, problem, fix));
                 }
                 part.select(&self.read);

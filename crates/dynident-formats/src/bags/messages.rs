@@ -1,4 +1,4 @@
-//! Messages one after the other, whatever file they lie in.
+//! Messages of all parts of a recording in sequence.
 
 use super::part::{Channel, Part};
 use super::{database, mcap_file};
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub(super) struct Messages {
     parts: Vec<(PathBuf, FileFormat)>,
-    /// Number of the part under way, and the part.
+    /// Index of the current part, and the part.
     current: usize,
     part: Option<Box<dyn Part>>,
     truncated: bool,
@@ -19,9 +19,9 @@ pub(super) struct Messages {
 /// A message without its bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
-    /// Number of the part, and of the channel in it.
+    /// Index of the part, and of the channel in it.
     pub(super) channel: (usize, usize),
-    /// When it was recorded, ns.
+    /// Recording time, ns.
     pub(super) log_ns: i64,
 }
 
@@ -40,7 +40,7 @@ impl Messages {
                 return Ok(Some(Header { channel: (self.current, channel), log_ns }));
             }
             self.truncated |= part.truncated();
-            // The last part stays: its channels are still asked for.
+            // Keep the last part, because its channels are still needed.
             if self.current + 1 == self.parts.len() {
                 return Ok(None);
             }
@@ -50,7 +50,7 @@ impl Messages {
         Ok(None)
     }
 
-    /// The channel of the message last read.
+    /// The channel of the current message.
     pub(super) fn channel(&self, header: Header) -> Option<&Channel> {
         self.part.as_ref()?.channel(header.channel.1)
     }

@@ -1,20 +1,20 @@
-//! One part of a recording: its messages and the channels that they belong to.
+//! One part of a recording: its messages and channels.
 
 use crate::error::FileError;
 use core::fmt;
 
-/// How messages of a channel are written.
+/// Encoding of a channel's messages.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
-    /// CDR; the texts of a definition that may explain it.
+    /// CDR, with the texts of possible message definitions.
     Cdr(Vec<String>),
     /// JSON.
     Json,
-    /// Any other, and what it is.
+    /// Another encoding, described.
     Other(String),
 }
 
-/// One stream of messages in a part of a recording.
+/// A channel of messages in a part of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Channel {
     pub(super) topic: String,
@@ -22,14 +22,14 @@ pub(super) struct Channel {
     pub(super) encoding: Encoding,
 }
 
-/// One part of a recording, read from its beginning.
+/// One part of a recording, read sequentially.
 pub(super) trait Part: fmt::Debug + Send {
-    /// The next message: its channel, the time at which it was recorded (ns), its bytes; `None` at the end.
+    /// The next message: its channel, its recording time (ns), its bytes; `None` at the end.
     fn next(&mut self, message: &mut Vec<u8>) -> Result<Option<(usize, i64)>, FileError>;
 
-    /// A channel that was already read, by its number.
+    /// A channel by its index.
     fn channel(&self, index: usize) -> Option<&Channel>;
 
-    /// Whether the part ended too early.
+    /// Whether the part is truncated.
     fn truncated(&self) -> bool;
 }
