@@ -249,8 +249,7 @@ fn numbers(header: &Header, channel: &Channel, count: usize) -> Result<Vec<f64>,
     let bytes = last.and_then(|last| last.checked_mul(kind.size()));
     let size = std::fs::metadata(&path).map_err(|source| FileError::Io { file: path.clone(), source })?.len();
     if bytes.is_none_or(|bytes| bytes as u64 > size) {
-        let problem =
-            format!("`{}` ends before {count} values", path.file_name().unwrap_or_default().display());
+        let problem = format!("`{}` ends before {count} values", path.file_name().unwrap_or_default().display());
         return Err(broken(problem));
     }
     let data = dynident_files::read(&path, size).map_err(|source| FileError::Io { file: path.clone(), source })?;

@@ -61,10 +61,7 @@ impl Budget {
 
     /// The message of the problem.
     pub(crate) fn problem(&self) -> String {
-        format!(
-            "its numbers need more than {} MiB of memory, the limit for a file of this length",
-            self.all >> 20
-        )
+        format!("its numbers need more than {} MiB of memory, the limit for a file of this length", self.all >> 20)
     }
 }
 

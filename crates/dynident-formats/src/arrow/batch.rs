@@ -189,7 +189,10 @@ impl Batch {
         left.take(wanted.map(|wanted| wanted as u64))?;
         let wanted = wanted.unwrap_or_default();
         let [offset, length] = *self.buffers.get(self.number(place, which)).ok_or("a buffer is missing")?;
-        let (offset, length) = u64::try_from(offset).ok().zip(u64::try_from(length).ok()).ok_or("a buffer has a negative offset or length")?;
+        let (offset, length) = u64::try_from(offset)
+            .ok()
+            .zip(u64::try_from(length).ok())
+            .ok_or("a buffer has a negative offset or length")?;
         if offset.checked_add(length).is_none_or(|end| end > self.bytes) {
             return Err("its buffer ends after the batch".to_owned());
         }

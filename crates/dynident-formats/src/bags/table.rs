@@ -242,7 +242,13 @@ impl BagTable {
                 let name = self.plan.topics.get(silent + 1).map_or("", |(topic, _)| self.topics[*topic].name.as_str());
                 let problem = format!("it has no messages during a million messages of {}", self.topics[index].name);
                 let place = format!("topic {name}");
-                return Err(FileError::broken(&self.path, self.format, place, problem, "do not use its columns in a log"));
+                return Err(FileError::broken(
+                    &self.path,
+                    self.format,
+                    place,
+                    problem,
+                    "do not use its columns in a log",
+                ));
             }
         }
     }

@@ -1,14 +1,14 @@
-//! Message definitions as bags carry them: `.msg` texts, the types that they use behind lines of `=`.
+//! Parses message definitions in bags: `.msg` texts, followed by the types that they use, separated by lines of `=`.
 //! Format: <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>.
 
 use std::collections::HashMap;
 
-/// Longest text of a definition; those of large messages have some ten thousand bytes.
+/// Maximum length of a definition, bytes; large messages need some ten thousand.
 const LONGEST: usize = 1 << 20;
-/// Types inside of types.
+/// Maximum nesting of types.
 const DEEPEST: usize = 16;
 
-/// What one element of a field is.
+/// Type of one element of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Bool,
@@ -32,12 +32,12 @@ pub(crate) enum Kind {
     Message(usize),
 }
 
-/// How many elements a field has.
+/// Number of elements of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Count {
     One,
     Exactly(usize),
-    /// Written before the elements.
+    /// Stored before the elements.
     Any,
 }
 
@@ -48,17 +48,17 @@ pub(crate) struct Field {
     pub(crate) count: Count,
 }
 
-/// A message type and those that it uses; the first is the message itself.
+/// A message type and the types that it uses; the first one is the message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Definition {
     pub(crate) messages: Vec<Vec<Field>>,
 }
 
 impl Definition {
-    /// The definition of `name` (`sensor_msgs/msg/JointState`) from its text.
+    /// Parses the definition of `name` (`sensor_msgs/msg/JointState`).
     ///
     /// # Errors
-    /// What is wrong with the text.
+    /// The problem of the text.
     pub(crate) fn parse(name: &str, text: &str) -> Result<Self, String> {
         if text.len() > LONGEST {
             return Err("its definition is longer than a megabyte".to_owned());
@@ -94,7 +94,7 @@ impl Definition {
         depth: usize,
     ) -> Result<usize, String> {
         if let Some(index) = known.get(name) {
-            return if *index == usize::MAX { Err(format!("type `{name}` holds itself")) } else { Ok(*index) };
+            return if *index == usize::MAX { Err(format!("type `{name}` contains itself")) } else { Ok(*index) };
         }
         if depth > DEEPEST {
             return Err(format!("its types are nested more than {DEEPEST} deep"));
@@ -125,7 +125,6 @@ impl Definition {
     }
 }
 
-/// Parts of a text between lines of `=`.
 fn sections(text: &str) -> Vec<&str> {
     let (mut parts, mut begin, mut at) = (Vec::new(), 0, 0);
     for line in text.split_inclusive('\n') {
@@ -140,7 +139,7 @@ fn sections(text: &str) -> Vec<&str> {
     parts
 }
 
-/// `sensor_msgs/msg/JointState` as `sensor_msgs/JointState`.
+/// `sensor_msgs/JointState` from `sensor_msgs/msg/JointState`.
 fn short(name: &str) -> String {
     let name = name.trim();
     match (name.split('/').next(), name.rsplit('/').next()) {
@@ -149,12 +148,12 @@ fn short(name: &str) -> String {
     }
 }
 
-/// Type, count and name of a line that declares a field; `None` for constants, comments and blank lines.
+/// Type, count and name of a field declaration; `None` for constants, comments and blank lines.
 fn declaration(line: &str) -> Result<Option<(&str, Count, &str)>, String> {
     let mut words = line.split('#').next().unwrap_or_default().split_whitespace();
     let (Some(kind), Some(name)) = (words.next(), words.next()) else { return Ok(None) };
-    let wrong = || format!("`{}` declares no field", line.trim());
-    // Constants: `TYPE NAME=value`, blanks around the sign or not; a field's default follows without a sign.
+    let wrong = || format!("`{}` is not a field declaration", line.trim());
+    // Constants: `TYPE NAME=value`, possibly with blanks around the sign; the default of a field has no sign.
     if name.contains('=') || words.next().is_some_and(|word| word.starts_with('=')) {
         return Ok(None);
     }
@@ -200,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn definitions_are_read_with_what_they_use() {
+    fn definitions_are_parsed_with_their_types() {
         let text = format!(
             "# comment\nuint8 A=1\nstring B = \"x # y\"\nHeader header # stamp\nPart[<=3] parts\nfloat64[2] pair\nint32 n 5\n{0}\n\
              MSG: pkg/Header\nbuiltin_interfaces/Time stamp\nstring<=8 frame_id\n{0}\nMSG: pkg/Part\nbool[] flags\n",
@@ -216,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_definition_is_refused() {
+    fn invalid_definitions_are_rejected() {
         let itself = format!("B b\n{0}\nMSG: p/B\nA a\n", "=".repeat(80));
         for text in ["Unknown x", "int32[0] x", "int32] x", "int32[x] y", "float64 ,", &itself] {
             assert!(Definition::parse("p/A", text).is_err(), "{text}");
