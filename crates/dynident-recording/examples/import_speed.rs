@@ -45,7 +45,7 @@ fn main() {
     }
     let bytes = std::fs::metadata(&file).unwrap().len();
     println!(
-        "{samples} samples, {} MB: {:.2} s, of which {opened:.2} s for decisions",
+        "{samples} samples, {} MB: {:.2} s, {opened:.2} s of this for opening",
         bytes >> 20,
         start.elapsed().as_secs_f64()
     );
