@@ -33,16 +33,16 @@ pub fn open(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// Reads a whole regular file of at most `most_bytes`.
+/// Reads a whole regular file of at most `max_bytes`.
 ///
 /// # Errors
-/// As [`open`], and [`io::ErrorKind::FileTooLarge`] for a longer file, of which at most `most_bytes` are read.
-pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+/// As [`open`], and [`io::ErrorKind::FileTooLarge`] for a longer file. At most `max_bytes` are read.
+pub fn read(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     // The length that the system reports may be wrong.
-    open(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most_bytes {
-        let problem = format!("it is larger than {} MiB", most_bytes >> 20);
+    open(path)?.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max_bytes {
+        let problem = format!("it is larger than {} MiB", max_bytes >> 20);
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, problem));
     }
     Ok(bytes)
@@ -52,8 +52,8 @@ pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// As [`read`], and [`io::ErrorKind::InvalidData`] for bytes that are not UTF-8.
-pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
-    String::from_utf8(read(path, most_bytes)?)
+pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<String> {
+    String::from_utf8(read(path, max_bytes)?)
         .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
 }
 
@@ -87,15 +87,14 @@ fn kind(_: &Metadata) -> &'static str {
     "a device or a pipe"
 }
 
-/// Maximum number of characters in a quoted text.
-const MOST_QUOTED: usize = 60;
+const MAX_QUOTED_CHARS: usize = 60;
 
 /// Quotes a text from an input for a message: control characters are escaped, and a long text is cut and followed by
 /// its length.
 pub fn quoted(text: &str) -> String {
-    let shown: String = text.chars().take(MOST_QUOTED).flat_map(char::escape_debug).collect();
+    let shown: String = text.chars().take(MAX_QUOTED_CHARS).flat_map(char::escape_debug).collect();
     match text.chars().count() {
-        all if all > MOST_QUOTED => format!("{shown}.. ({all} characters)"),
+        all if all > MAX_QUOTED_CHARS => format!("{shown}.. ({all} characters)"),
         _ => shown,
     }
 }

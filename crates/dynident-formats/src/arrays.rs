@@ -3,13 +3,11 @@
 use crate::error::FileError;
 use crate::table::Table;
 
-/// Maximum number of columns of all arrays.
-pub(crate) const MOST_COLUMNS: usize = 1 << 14;
+pub(crate) const MAX_COLUMNS: usize = 1 << 14;
 
 /// Maximum number of entries of a list that become columns.
-pub(crate) const LONGEST_LIST: usize = 1024;
+pub(crate) const MAX_LIST_COLUMNS: usize = 1024;
 
-/// An array of numbers with one or two dimensions.
 #[derive(Clone, Debug)]
 pub(crate) struct Array {
     pub(crate) name: String,
@@ -21,12 +19,10 @@ pub(crate) struct Array {
 }
 
 impl Array {
-    /// Array in row-major order.
     pub(crate) fn row_major(name: String, shape: [usize; 2], values: Vec<f64>) -> Self {
         Self { name, shape, values, strides: [shape[1], 1] }
     }
 
-    /// Array in column-major order.
     pub(crate) fn column_major(name: String, shape: [usize; 2], values: Vec<f64>) -> Self {
         Self { name, shape, values, strides: [1, shape[0]] }
     }
@@ -79,7 +75,7 @@ impl ArrayTable {
                 [first, second] if second == rows => (first, down, across),
                 _ => continue,
             };
-            if array.values.is_empty() || columns.len() + count > MOST_COLUMNS {
+            if array.values.is_empty() || columns.len() + count > MAX_COLUMNS {
                 continue;
             }
             for k in 0..count {
@@ -96,13 +92,11 @@ impl ArrayTable {
         (!columns.is_empty()).then_some(Self { arrays, names: Some(names), columns, wanted, rows, next: 0, notes })
     }
 
-    /// Adds notes on other contents of the file.
     pub(crate) fn with_notes(mut self, notes: Vec<String>) -> Self {
         self.notes.extend(notes);
         self
     }
 
-    /// Removes the names of the columns.
     pub(crate) fn nameless(mut self) -> Self {
         self.names = None;
         self

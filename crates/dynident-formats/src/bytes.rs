@@ -47,7 +47,6 @@ impl<'a> Bytes<'a> {
         u64 u64, 8;
     }
 
-    /// A number of this type, as `f64`.
     pub(crate) fn number(&mut self, kind: Number) -> Option<f64> {
         Some(match kind {
             Number::U8 => f64::from(self.u8()?),
@@ -65,7 +64,6 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// Type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Number {
     U8,

@@ -5,21 +5,19 @@
 //! `value = number · (241) + (240)`. In a block, the numbers of all channels of a file are interleaved row by row;
 //! `221` is the 1-based index of a channel's first number (0-based if it is 0 for any channel).
 
-use crate::arrays::{Array, ArrayTable, MOST_COLUMNS};
+use crate::arrays::{Array, ArrayTable, MAX_COLUMNS};
 use crate::bytes::{Bytes, Number};
 use crate::error::FileError;
 use crate::kind::FileFormat;
-use crate::limits::{Budget, ReadLimits, SPLIT};
+use crate::limits::{Budget, ReadLimits, SPLIT_FIX};
 use crate::table::Table;
 use std::collections::HashMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// First bytes of a header.
-pub(crate) const BEGIN: &[u8] = b"DIAEXTENDED";
-/// Maximum length of a header, bytes.
-const LONGEST_HEADER: u64 = 1 << 24;
-const COPY: &str = "copy the whole trace again, all files with its name";
+pub(crate) const MAGIC: &[u8] = b"DIAEXTENDED";
+const MAX_HEADER_BYTES: u64 = 1 << 24;
+const COPY_FIX: &str = "copy the whole trace again, all files with its name";
 
 struct Header {
     path: PathBuf,
@@ -29,7 +27,6 @@ struct Header {
     channels: Vec<Channel>,
 }
 
-/// Keys and values of one channel.
 struct Channel(HashMap<u16, String>);
 
 impl Channel {
@@ -77,14 +74,14 @@ impl Channel {
 }
 
 fn broken(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> FileError {
-    FileError::broken(path, FileFormat::Diadem, place, problem, COPY)
+    FileError::broken(path, FileFormat::Diadem, place, problem, COPY_FIX)
 }
 
 impl Header {
     fn read(path: &Path) -> Result<Self, FileError> {
         let mut bytes = Vec::new();
         dynident_files::open(path)
-            .and_then(|file| file.take(LONGEST_HEADER).read_to_end(&mut bytes))
+            .and_then(|file| file.take(MAX_HEADER_BYTES).read_to_end(&mut bytes))
             .map_err(|source| FileError::Io { file: path.to_owned(), source })?;
         // Controllers write Latin-1, in which every byte is valid.
         let text = String::from_utf8(bytes)
@@ -150,9 +147,9 @@ fn headers(path: &Path) -> Vec<PathBuf> {
 }
 
 pub(crate) fn is_header(path: &Path) -> bool {
-    let mut begin = [0; BEGIN.len()];
+    let mut begin = [0; MAGIC.len()];
     let read = dynident_files::open(path).and_then(|mut file| file.read_exact(&mut begin));
-    read.is_ok() && begin == BEGIN
+    read.is_ok() && begin == MAGIC
 }
 
 /// The headers of the trace of `path`, each followed by its files of numbers.
@@ -199,12 +196,12 @@ pub(crate) fn open(path: &Path, limits: &ReadLimits) -> Result<Box<dyn Table>, F
             let count = channel.whole(220);
             let count = count.ok_or_else(|| broken(own, format!("channel `{name}`"), "its length (220) is missing"))?;
             let place = || format!("channel `{name}`");
-            if arrays.len() >= MOST_COLUMNS {
-                return Err(broken(own, place(), format!("there are more than {MOST_COLUMNS} channels")));
+            if arrays.len() >= MAX_COLUMNS {
+                return Err(broken(own, place(), format!("there are more than {MAX_COLUMNS} channels")));
             }
             budget
                 .take((count as u64).checked_mul(8))
-                .map_err(|problem| FileError::broken(own, FileFormat::Diadem, place(), problem, SPLIT))?;
+                .map_err(|problem| FileError::broken(own, FileFormat::Diadem, place(), problem, SPLIT_FIX))?;
             if !is_time && channel.kind().is_none() {
                 notes.push(format!("{name}: numbers of type `{}` are not supported", channel.text(214)));
                 continue;

@@ -85,11 +85,11 @@ impl FileError {
 
 /// Escapes and shortens a text from a file for a message.
 pub(crate) fn visible(text: &str) -> String {
-    const LONGEST: usize = 200;
+    const MAX_SHOWN: usize = 200;
     let shown: String = text
         .chars()
-        .take(LONGEST)
+        .take(MAX_SHOWN)
         .flat_map(|c| if c.is_control() { c.escape_default().collect::<Vec<_>>() } else { vec![c] })
         .collect();
-    if text.chars().nth(LONGEST).is_some() { shown + ".." } else { shown }
+    if text.chars().nth(MAX_SHOWN).is_some() { shown + ".." } else { shown }
 }

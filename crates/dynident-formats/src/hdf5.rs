@@ -18,13 +18,11 @@ mod reading {
     use crate::arrays::{Array, ArrayTable};
     use crate::error::visible;
     use crate::kind::FileFormat;
-    use crate::limits::{Budget, SPLIT};
+    use crate::limits::{Budget, SPLIT_FIX};
     use hdf5_pure::{DType, Dataset, File, Group};
 
-    /// Maximum nesting of groups.
-    const DEEPEST: usize = 8;
-    /// Maximum number of data sets.
-    const MOST_SETS: usize = 10_000;
+    const MAX_NESTING: usize = 8;
+    const MAX_DATA_SETS: usize = 10_000;
 
     pub(crate) fn open(path: &Path, budget: Budget) -> Result<Box<dyn Table>, FileError> {
         let error = |error: hdf5_pure::Error| {
@@ -36,7 +34,7 @@ mod reading {
         found.group(&file.root(), "", 0)?;
         // Without its largest columns, the table could be mistaken for the whole recording.
         if let (true, Some(problem)) = (found.too_large, found.others.last()) {
-            return Err(FileError::broken(path, FileFormat::Hdf5, "its data sets", problem.as_str(), SPLIT));
+            return Err(FileError::broken(path, FileFormat::Hdf5, "its data sets", problem.as_str(), SPLIT_FIX));
         }
         let others = if found.others.is_empty() { "no data sets".to_owned() } else { found.others.join(", ") };
         let table = ArrayTable::new(found.arrays).ok_or_else(|| {
@@ -66,7 +64,7 @@ mod reading {
             let name = |own: &str| if at.is_empty() { own.to_owned() } else { format!("{at}.{own}") };
             for own in group.datasets().map_err(|error| self.broken(at, &error))? {
                 // MATLAB stores the targets of references in #refs#.
-                if self.sets >= MOST_SETS || own.starts_with('#') {
+                if self.sets >= MAX_DATA_SETS || own.starts_with('#') {
                     continue;
                 }
                 self.sets += 1;
@@ -84,7 +82,7 @@ mod reading {
                     }
                 }
             }
-            if depth < DEEPEST {
+            if depth < MAX_NESTING {
                 for own in group.groups().map_err(|error| self.broken(at, &error))? {
                     if own.starts_with('#') {
                         continue;
@@ -101,7 +99,6 @@ mod reading {
         }
     }
 
-    /// The numbers of a data set.
     fn array(set: &Dataset, place: &str, budget: &mut Budget) -> Result<Array, String> {
         let text = |error: hdf5_pure::Error| error.to_string();
         let kind = set.dtype().map_err(text)?;

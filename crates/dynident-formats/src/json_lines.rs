@@ -18,7 +18,7 @@ pub(crate) use json::open;
 #[cfg(feature = "json")]
 mod json {
     use super::{BufRead, FileError, Path, Table};
-    use crate::arrays::MOST_COLUMNS;
+    use crate::arrays::MAX_COLUMNS;
     use crate::kind::FileFormat;
     use crate::table::slots;
     use core::fmt::Write;
@@ -27,10 +27,8 @@ mod json {
     use std::io::Read;
     use std::path::PathBuf;
 
-    /// Maximum line length, bytes. Longer lines are rejected.
-    const LONGEST_LINE: u64 = 1 << 22;
-    /// Number of lines that are searched for columns.
-    const SEARCHED: usize = 64;
+    const MAX_LINE_BYTES: u64 = 1 << 22;
+    const SEARCHED_LINES: usize = 64;
 
     /// Calls `found` for each number of `value` with its path; true and false are 1 and 0, null is a missing number.
     pub(crate) fn flattened(value: &Value, path: &mut String, found: &mut impl FnMut(&str, f64)) {
@@ -69,7 +67,6 @@ mod json {
         number_path: String,
         names: Vec<String>,
         column_of: HashMap<String, usize>,
-        /// Lines that were read to find the columns.
         waiting: VecDeque<(u64, Value)>,
         /// Index of each column among the selected ones.
         slot_of: Vec<Option<usize>>,
@@ -82,7 +79,6 @@ mod json {
         }
     }
 
-    /// The table of `reader`. Its columns are those of the first lines.
     pub(crate) fn open(path: &Path, reader: Box<dyn BufRead + Send>) -> Result<Box<dyn Table>, FileError> {
         let mut table = JsonLines {
             path: path.to_owned(),
@@ -96,10 +92,10 @@ mod json {
             slot_of: Vec::new(),
             truncated: false,
         };
-        while table.waiting.len() < SEARCHED {
+        while table.waiting.len() < SEARCHED_LINES {
             let Some(value) = table.read()? else { break };
             flattened(&value, &mut String::new(), &mut |name, _| {
-                if !table.column_of.contains_key(name) && table.names.len() < MOST_COLUMNS {
+                if !table.column_of.contains_key(name) && table.names.len() < MAX_COLUMNS {
                     table.column_of.insert(name.to_owned(), table.names.len());
                     table.names.push(name.to_owned());
                 }
@@ -120,7 +116,6 @@ mod json {
             FileError::broken(&self.path, FileFormat::JsonLines, format!("line {}", self.line), problem, fix)
         }
 
-        /// The next line that is not blank.
         fn read(&mut self) -> Result<Option<Value>, FileError> {
             let mut line = core::mem::take(&mut self.bytes);
             let value = self.read_into(&mut line);
@@ -131,13 +126,13 @@ mod json {
         fn read_into(&mut self, line: &mut Vec<u8>) -> Result<Option<Value>, FileError> {
             loop {
                 line.clear();
-                let read = self.reader.by_ref().take(LONGEST_LINE).read_until(b'\n', line);
+                let read = self.reader.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', line);
                 let read = read.map_err(|source| FileError::Io { file: self.path.clone(), source })?;
                 if read == 0 {
                     return Ok(None);
                 }
                 self.line += 1;
-                if read as u64 == LONGEST_LINE {
+                if read as u64 == MAX_LINE_BYTES {
                     return Err(self.broken("it is longer than 4 MiB"));
                 }
                 let text = if self.line == 1 { line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line) } else { &line[..] };

@@ -5,19 +5,17 @@ use crate::error::FileError;
 use crate::kind::FileFormat;
 use std::path::{Path, PathBuf};
 
-/// Metadata of a data set, within its folder.
-const INFO: &str = "meta/info.json";
-const FETCH: &str = "download the complete data set (`hf download`, or `git lfs pull`)";
+const INFO_FILE: &str = "meta/info.json";
+const DOWNLOAD_FIX: &str = "download the complete data set (`hf download`, or `git lfs pull`)";
 
 /// The folder of the data set at `path`: itself, or that of its `meta/info.json`.
 pub(crate) fn folder(path: &Path) -> Option<&Path> {
-    if path.ends_with(INFO) && path.is_file() {
+    if path.ends_with(INFO_FILE) && path.is_file() {
         return path.parent()?.parent();
     }
-    path.join(INFO).is_file().then_some(path)
+    path.join(INFO_FILE).is_file().then_some(path)
 }
 
-/// The metadata, then the tables in row order.
 pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let listed = |folder: &Path| -> Result<Vec<PathBuf>, FileError> {
         let io = |source| FileError::Io { file: folder.to_owned(), source };
@@ -27,7 +25,7 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
         found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
         Ok(found)
     };
-    let mut files = vec![folder.join(INFO)];
+    let mut files = vec![folder.join(INFO_FILE)];
     for chunk in listed(&folder.join("data"))?.iter().filter(|chunk| chunk.is_dir()) {
         let tables = listed(chunk)?.into_iter().filter(|path| path.extension().is_some_and(|kind| kind == "parquet"));
         files.extend(tables);
@@ -35,7 +33,7 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     if files.len() > 1 {
         return Ok(files);
     }
-    Err(FileError::broken(folder, FileFormat::LeRobot, "data", "it contains no Parquet file", FETCH))
+    Err(FileError::broken(folder, FileFormat::LeRobot, "data", "it contains no Parquet file", DOWNLOAD_FIX))
 }
 
 #[cfg(not(all(feature = "json", feature = "parquet")))]
@@ -48,25 +46,22 @@ pub(crate) use reading::open;
 
 #[cfg(all(feature = "json", feature = "parquet"))]
 mod reading {
-    use super::{FETCH, FileError, FileFormat, INFO, Path, PathBuf, files};
+    use super::{DOWNLOAD_FIX, FileError, FileFormat, INFO_FILE, Path, PathBuf, files};
     use crate::parquet;
     use crate::recognition;
     use crate::table::{ColumnGroup, Table};
     use serde_json::Value;
     use std::io::{BufReader, Read};
 
-    /// Maximum length of the metadata, bytes.
-    const LONGEST_INFO: u64 = 1 << 24;
+    const MAX_INFO_BYTES: u64 = 1 << 24;
     /// Time between episodes, s: long enough to be treated as a gap, not as a late sample.
-    const BETWEEN_EPISODES_S: f64 = 10.0;
+    const EPISODE_GAP_S: f64 = 10.0;
     const TIME: &str = "time";
 
-    /// The tables of a data set as one table.
     #[derive(Debug)]
     struct DataSet {
         folder: PathBuf,
         parts: Vec<PathBuf>,
-        /// Index of the current part, and the part.
         current: usize,
         part: Box<dyn Table>,
         /// Names of the columns in the parts, and in this table, which has the time in addition.
@@ -88,14 +83,13 @@ mod reading {
         episode: usize,
         /// Added to the stamps of the current episode, s.
         offset_s: f64,
-        /// Episode and time of the last row.
         last: Option<(f64, f64)>,
     }
 
     impl Clock {
         fn time(&mut self, stamp: f64, episode: f64) -> f64 {
             match self.last {
-                Some((under_way, last)) if under_way != episode => self.offset_s = last + BETWEEN_EPISODES_S - stamp,
+                Some((under_way, last)) if under_way != episode => self.offset_s = last + EPISODE_GAP_S - stamp,
                 _ => {}
             }
             let time = stamp + self.offset_s;
@@ -147,10 +141,10 @@ mod reading {
     }
 
     fn read_info(folder: &Path) -> Result<Value, FileError> {
-        let path = folder.join(INFO);
+        let path = folder.join(INFO_FILE);
         let mut text = Vec::new();
         dynident_files::open(&path)
-            .and_then(|file| file.take(LONGEST_INFO).read_to_end(&mut text))
+            .and_then(|file| file.take(MAX_INFO_BYTES).read_to_end(&mut text))
             .map_err(|source| FileError::Io { file: path.clone(), source })?;
         let info: Result<Value, _> = serde_json::from_slice(&text);
         let problem = match info {
@@ -158,7 +152,7 @@ mod reading {
             Ok(_) => "it has no `features`".to_owned(),
             Err(error) => format!("it is not JSON ({error})"),
         };
-        Err(FileError::broken(folder, FileFormat::LeRobot, INFO, problem, FETCH))
+        Err(FileError::broken(folder, FileFormat::LeRobot, INFO_FILE, problem, DOWNLOAD_FIX))
     }
 
     fn open_part(folder: &Path, path: &Path) -> Result<Box<dyn Table>, FileError> {
@@ -167,7 +161,13 @@ mod reading {
         // The pointer to a file that was not downloaded is text.
         if !head.starts_with(b"PAR1") {
             let place = path.strip_prefix(folder).unwrap_or(path).display().to_string();
-            return Err(FileError::broken(folder, FileFormat::LeRobot, place, "it is not a Parquet file", FETCH));
+            return Err(FileError::broken(
+                folder,
+                FileFormat::LeRobot,
+                place,
+                "it is not a Parquet file",
+                DOWNLOAD_FIX,
+            ));
         }
         parquet::open(path)
     }

@@ -43,7 +43,12 @@
         feature = "arrow",
         feature = "hdf5"
     )),
-    allow(dead_code, unused_variables, clippy::needless_pass_by_value, reason = "some shared code is unused without all formats")
+    allow(
+        dead_code,
+        unused_variables,
+        clippy::needless_pass_by_value,
+        reason = "some shared code is unused without all formats"
+    )
 )]
 
 mod arrays;

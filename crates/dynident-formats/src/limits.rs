@@ -22,25 +22,21 @@ impl Default for ReadLimits {
     }
 }
 
-/// Remaining memory for the numbers of one file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Budget {
     all: u64,
     left: u64,
 }
 
-/// Fix for a file that needs too much memory.
-pub(crate) const SPLIT: &str = "split the recording, or save it as text or Parquet, which are read in pieces (from Rust, `ReadLimits` is the limit)";
+pub(crate) const SPLIT_FIX: &str = "split the recording, or save it as text or Parquet, which are read in pieces (from Rust, `ReadLimits` is the limit)";
 
 impl Budget {
-    /// The memory for a file of `file_bytes`.
     pub(crate) fn new(limits: &ReadLimits, file_bytes: u64) -> Self {
         let own = file_bytes.saturating_mul(limits.expansion).max(limits.always_bytes);
         let all = own.min(limits.memory_bytes);
         Self { all, left: all }
     }
 
-    /// Whether `bytes` more are available.
     pub(crate) fn allows(&self, bytes: Option<u64>) -> bool {
         bytes.is_some_and(|bytes| bytes <= self.left)
     }
@@ -59,7 +55,6 @@ impl Budget {
         }
     }
 
-    /// The message of the problem.
     pub(crate) fn problem(&self) -> String {
         format!("its numbers need more than {} MiB of memory, the limit for a file of this length", self.all >> 20)
     }

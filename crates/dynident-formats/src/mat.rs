@@ -20,20 +20,17 @@ mod reading {
     use crate::arrays::{Array, ArrayTable};
     use crate::bytes::{Bytes, Number};
     use crate::kind::FileFormat;
-    use crate::limits::{Budget, SPLIT};
+    use crate::limits::{Budget, SPLIT_FIX};
     use std::io::Read;
 
-    /// Maximum nesting of structs.
-    const DEEPEST: usize = 8;
+    const MAX_NESTING: usize = 8;
     /// Maximum length of a name, of the dimensions of an array, or of the list of a struct's fields, bytes.
-    const LONGEST_HEAD: usize = 1 << 20;
-    /// Number of bytes that are converted at once.
-    const BLOCK: usize = 1 << 16;
+    const MAX_HEAD_BYTES: usize = 1 << 20;
+    const BLOCK_BYTES: usize = 1 << 16;
 
     const MATRIX: u32 = 14;
     const PACKED: u32 = 15;
 
-    /// Reason why a variable cannot be read.
     enum Problem {
         Cut,
         Misfit,
@@ -53,14 +50,13 @@ mod reading {
             let (problem, fix) = match self {
                 Self::Cut => ("it is truncated".to_owned(), copy),
                 Self::Misfit => ("its parts are inconsistent".to_owned(), copy),
-                Self::TooLarge(problem) => (problem, SPLIT),
+                Self::TooLarge(problem) => (problem, SPLIT_FIX),
                 Self::Unreadable(error) => (format!("it cannot be decompressed ({error})"), copy),
             };
             FileError::broken(path, FileFormat::Mat5, format!("variable {variable}"), problem, fix)
         }
     }
 
-    /// Reader state: byte order, remaining memory, and the arrays of all variables.
     struct Found {
         big_endian: bool,
         budget: Budget,
@@ -105,7 +101,6 @@ mod reading {
         })
     }
 
-    /// Header of an element.
     struct Tag {
         kind: u32,
         size: usize,
@@ -120,7 +115,6 @@ mod reading {
     }
 
     impl Found {
-        /// Reads the next variable of the file; false at the end.
         fn variable(&mut self, reader: &mut impl BufRead) -> Result<bool, Problem> {
             if reader.fill_buf()?.is_empty() {
                 return Ok(false);
@@ -175,7 +169,7 @@ mod reading {
             if let Some(short) = tag.short {
                 return Ok(short[..tag.size].to_vec());
             }
-            if tag.size > LONGEST_HEAD {
+            if tag.size > MAX_HEAD_BYTES {
                 return Err(Problem::Misfit);
             }
             let mut bytes = vec![0; tag.size];
@@ -184,7 +178,6 @@ mod reading {
             Ok(bytes)
         }
 
-        /// Reads the numbers of an array with `count` entries.
         fn numbers(&mut self, reader: &mut dyn Read, count: Option<usize>) -> Result<Vec<f64>, Problem> {
             let tag = self.tag(reader)?;
             let number = number(tag.kind).ok_or(Problem::Misfit)?;
@@ -202,9 +195,9 @@ mod reading {
                 return Ok(values);
             }
             // Grow with the available bytes, not with the length in the tag.
-            let (mut block, mut left) = (vec![0; BLOCK.min(tag.size)], tag.size);
+            let (mut block, mut left) = (vec![0; BLOCK_BYTES.min(tag.size)], tag.size);
             while left > 0 {
-                let part = &mut block[..left.min(BLOCK)];
+                let part = &mut block[..left.min(BLOCK_BYTES)];
                 reader.read_exact(part)?;
                 convert(part);
                 left -= part.len();
@@ -249,7 +242,7 @@ mod reading {
                     }
                 }
                 // struct
-                2 if depth < DEEPEST && sides.iter().all(|side| *side == 1) => {
+                2 if depth < MAX_NESTING && sides.iter().all(|side| *side == 1) => {
                     let length = self.head(reader)?;
                     let length = Bytes::new(&length, self.big_endian).u32().ok_or(Problem::Misfit)? as usize;
                     let names = self.head(reader)?;

@@ -1,20 +1,18 @@
 //! NumPy: one array (`.npy`) or several of one length (`.npz`). Format:
 //! <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
 
-use crate::arrays::{Array, ArrayTable, MOST_COLUMNS};
+use crate::arrays::{Array, ArrayTable, MAX_COLUMNS};
 use crate::bytes::{Bytes, Number};
 use crate::error::FileError;
 use crate::kind::FileFormat;
-use crate::limits::{Budget, SPLIT};
+use crate::limits::{Budget, SPLIT_FIX};
 use crate::table::Table;
 use crate::zip;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-/// Maximum length of a header, bytes.
-const LONGEST_HEADER: usize = 1 << 20;
+const MAX_HEADER_BYTES: usize = 1 << 20;
 
-/// Header of an array.
 struct Header {
     /// Name (only in structured arrays), offset in an item, number of entries, and number type.
     fields: Vec<Field>,
@@ -31,7 +29,6 @@ struct Field {
     count: usize,
 }
 
-/// Opens the array in `reader`.
 pub(crate) fn open(path: &Path, mut reader: impl Read, mut budget: Budget) -> Result<Box<dyn Table>, FileError> {
     let arrays = arrays(path, FileFormat::Npy, "", &mut reader, &mut budget)?;
     let named = arrays.iter().all(|array| !array.name.is_empty());
@@ -39,7 +36,6 @@ pub(crate) fn open(path: &Path, mut reader: impl Read, mut budget: Budget) -> Re
     Ok(Box::new(if named { table } else { table.nameless() }))
 }
 
-/// Opens the arrays of an archive; their names are those of its members.
 pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Table>, FileError> {
     let io = |source| FileError::Io { file: path.to_owned(), source };
     let mut file = dynident_files::open(path).map_err(io)?;
@@ -53,7 +49,7 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
         // Check the checksum first, because it explains other errors; an array that is too large is not read to its
         // end.
         match arrays {
-            Err(error @ FileError::Broken { fix: SPLIT, .. }) => return Err(error),
+            Err(error @ FileError::Broken { fix: SPLIT_FIX, .. }) => return Err(error),
             arrays => {
                 contents.into_inner().verify(path)?;
                 all.extend(arrays?);
@@ -88,7 +84,7 @@ fn arrays(
     let header = header(reader).map_err(&broken)?;
     let items = header.shape.iter().try_fold(1_usize, |all, side| all.checked_mul(*side));
     let bytes = items.and_then(|items| items.checked_mul(header.item));
-    let too_large = || FileError::broken(path, format, place.clone(), budget.problem(), SPLIT);
+    let too_large = || FileError::broken(path, format, place.clone(), budget.problem(), SPLIT_FIX);
     let (Some(items), Some(bytes)) = (items, bytes.filter(|bytes| budget.allows(Some(*bytes as u64)))) else {
         return Err(too_large());
     };
@@ -99,8 +95,8 @@ fn arrays(
         return Err(too_large());
     }
     budget.take(numbers).map_err(&broken)?;
-    if header.fields.iter().map(|field| field.count).sum::<usize>() > MOST_COLUMNS {
-        return Err(broken(format!("it has more than {MOST_COLUMNS} columns")));
+    if header.fields.iter().map(|field| field.count).sum::<usize>() > MAX_COLUMNS {
+        return Err(broken(format!("it has more than {MAX_COLUMNS} columns")));
     }
     // Grow with the available bytes, not with the length in the header.
     let mut data = Vec::new();
@@ -146,7 +142,7 @@ fn header(reader: &mut impl Read) -> Result<Header, String> {
     let wide = begin[6] >= 2;
     reader.read_exact(&mut length[..if wide { 4 } else { 2 }]).map_err(cut)?;
     let length = u32::from_le_bytes(length) as usize;
-    if length > LONGEST_HEADER {
+    if length > MAX_HEADER_BYTES {
         return Err(format!("its header of {length} bytes is too long"));
     }
     let mut text = vec![0; length];
@@ -226,7 +222,6 @@ fn scalar(kind: &str) -> Option<(Option<(Number, bool)>, usize)> {
     (bytes > 0 && bytes <= 1 << 20).then_some((number.map(|number| (number, order == ">")), bytes))
 }
 
-/// A Python literal as used in headers.
 enum Value<'a> {
     Dict(Vec<(String, Value<'a>)>),
     List(Vec<Value<'a>>),

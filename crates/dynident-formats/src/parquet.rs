@@ -15,7 +15,7 @@ pub(crate) use reading::open;
 #[cfg(feature = "parquet")]
 mod reading {
     use super::{FileError, Path, Table};
-    use crate::arrays::{LONGEST_LIST, MOST_COLUMNS};
+    use crate::arrays::{MAX_COLUMNS, MAX_LIST_COLUMNS};
     use crate::kind::FileFormat;
     use crate::parquet_pages::CheckedPages;
     use crate::table::slots;
@@ -28,8 +28,7 @@ mod reading {
     use std::panic::{AssertUnwindSafe, catch_unwind};
     use std::path::PathBuf;
 
-    /// Number of rows that are decoded at once.
-    const BLOCK: usize = 4096;
+    const BLOCK_ROWS: usize = 4096;
 
     /// One column of the file; a list is several columns of the table.
     #[derive(Debug)]
@@ -172,8 +171,8 @@ mod reading {
                 if list || ticks_per_s.is_some() {
                     self.look_at_first(&mut leaf)?;
                 }
-                if self.names.len() + leaf.count > MOST_COLUMNS {
-                    self.notes.push(format!("column {name}: more than {MOST_COLUMNS} columns"));
+                if self.names.len() + leaf.count > MAX_COLUMNS {
+                    self.notes.push(format!("column {name}: more than {MAX_COLUMNS} columns"));
                     continue;
                 }
                 if list {
@@ -197,13 +196,12 @@ mod reading {
             let mut reader = checked_reader(&*group, leaf.index).map_err(error)?;
             let read = guarded(|| read_block(&mut reader, 1)).map_err(error)?;
             if leaf.list {
-                leaf.count = read.levels.len().min(LONGEST_LIST);
+                leaf.count = read.levels.len().min(MAX_LIST_COLUMNS);
             }
             leaf.origin = read.integers.first().copied();
             Ok(())
         }
 
-        /// Starts the next row group; false at the end.
         fn next_group(&mut self) -> Result<bool, FileError> {
             if self.group >= self.file.num_row_groups() {
                 return Ok(false);
@@ -222,14 +220,13 @@ mod reading {
             Ok(true)
         }
 
-        /// Decodes more rows; false at the end.
         fn next_block(&mut self) -> Result<bool, FileError> {
             while self.left_in_group == 0 {
                 if !self.next_group()? {
                     return Ok(false);
                 }
             }
-            let rows = self.left_in_group.min(BLOCK);
+            let rows = self.left_in_group.min(BLOCK_ROWS);
             let width = self.wanted;
             self.block.clear();
             self.block.resize(rows * width, f64::NAN);
@@ -286,7 +283,6 @@ mod reading {
         })
     }
 
-    /// Decoded rows of a column.
     #[derive(Default)]
     struct Read {
         rows: usize,

@@ -8,14 +8,12 @@ use parquet::schema::types::ColumnDescriptor;
 
 /// Maximum number of values of one page. Usual pages have about 20,000; a corrupt page of repeated levels may declare
 /// 2^31 in a few bytes.
-const MOST_VALUES: u32 = 1 << 26;
+const MAX_PAGE_VALUES: u32 = 1 << 26;
 
-/// The pages of `inner` with checks.
 pub(crate) struct CheckedPages {
     inner: Box<dyn PageReader>,
     /// Maximum repetition and definition level of the column.
     highest: [i16; 2],
-    /// Whether a dictionary page was read.
     has_dictionary: bool,
 }
 
@@ -39,8 +37,8 @@ impl CheckedPages {
                 return Ok(());
             }
         };
-        if page.num_values() > MOST_VALUES {
-            return Err(ParquetError::General(format!("a page has more than {MOST_VALUES} values")));
+        if page.num_values() > MAX_PAGE_VALUES {
+            return Err(ParquetError::General(format!("a page has more than {MAX_PAGE_VALUES} values")));
         }
         let needs_dictionary = matches!(encoding, Encoding::PLAIN_DICTIONARY | Encoding::RLE_DICTIONARY);
         if !fits {

@@ -7,7 +7,6 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Place and compression of a member.
 #[derive(Clone, Debug)]
 pub(crate) struct Member {
     pub(crate) name: String,
@@ -19,22 +18,20 @@ pub(crate) struct Member {
 }
 
 /// Maximum length of the end record with its comment, bytes.
-const END: u64 = 22 + 65535;
-/// Maximum length of the list of members, bytes (half a million arrays).
-const MOST_LIST: u64 = 1 << 26;
+const MAX_END_BYTES: u64 = 22 + 65535;
+const MAX_LIST_BYTES: u64 = 1 << 26;
 
 fn broken(path: &Path, place: &str, problem: &str) -> FileError {
     FileError::broken(path, FileFormat::Npz, place, problem, "copy or write it again")
 }
 
-/// The members in the archive's list.
 pub(crate) fn members(path: &Path, file: &mut File) -> Result<Vec<Member>, FileError> {
     let io = |source| FileError::Io { file: path.to_owned(), source };
     let size = file.seek(SeekFrom::End(0)).map_err(io)?;
-    let begin = size.saturating_sub(END + 20);
+    let begin = size.saturating_sub(MAX_END_BYTES + 20);
     file.seek(SeekFrom::Start(begin)).map_err(io)?;
     let mut tail = Vec::new();
-    file.by_ref().take(END + 20).read_to_end(&mut tail).map_err(io)?;
+    file.by_ref().take(MAX_END_BYTES + 20).read_to_end(&mut tail).map_err(io)?;
     let cut = || broken(path, "its end", "the list of members is missing: the archive is truncated");
     let end = tail.windows(4).rposition(|word| word == b"PK\x05\x06").ok_or_else(cut)?;
     let field = |from: usize, at: usize| {
@@ -56,7 +53,7 @@ pub(crate) fn members(path: &Path, file: &mut File) -> Result<Vec<Member>, FileE
         }
         (length, start) = (bytes.u64().ok_or_else(cut)?, bytes.u64().ok_or_else(cut)?);
     }
-    if start.checked_add(length).is_none_or(|end| end > size) || length > MOST_LIST {
+    if start.checked_add(length).is_none_or(|end| end > size) || length > MAX_LIST_BYTES {
         return Err(cut());
     }
     file.seek(SeekFrom::Start(start)).map_err(io)?;
@@ -143,7 +140,6 @@ impl Contents<'_> {
     }
 }
 
-/// The contents of a member as a stream.
 pub(crate) fn contents<'a>(path: &Path, file: &'a mut File, member: &Member) -> Result<Contents<'a>, FileError> {
     let io = |source| FileError::Io { file: path.to_owned(), source };
     let place = format!("member `{}`", member.name);

@@ -19,7 +19,6 @@ const DURATION_S: f64 = 40.0;
 /// Time left out at both ends, s.
 const TRIM_S: f64 = 1.0;
 
-/// Tracking errors of the joint.
 const TRACKING: [(&str, Tracking); 6] = [
     ("none", Tracking { delay_s: 0.0, shape: 0.0, vibration: 0.0 }),
     ("10 ms late", Tracking { delay_s: 0.01, shape: 0.0, vibration: 0.0 }),
@@ -57,7 +56,6 @@ struct Tracking {
     vibration: f64,
 }
 
-/// The commanded motion.
 #[derive(Clone, Copy)]
 enum CommandKind {
     /// The paper's joint 2 (Table 3), there and back.

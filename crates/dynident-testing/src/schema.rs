@@ -22,7 +22,6 @@ struct Checker<'a> {
 }
 
 impl Checker<'_> {
-    /// Compares a value with its schema.
     fn value(&self, schema: &Value, value: &Value, at: &str, found: &mut Vec<String>) {
         // `true` allows any value.
         let Some(rules) = schema.as_object().filter(|rules| !rules.is_empty()) else { return };
@@ -127,7 +126,6 @@ impl Checker<'_> {
     }
 }
 
-/// Whether a value has a JSON schema type.
 fn is_of(value: &Value, name: &Value) -> bool {
     match value {
         Value::Null => name == "null",

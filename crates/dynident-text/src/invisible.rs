@@ -4,7 +4,7 @@ use core::fmt::Write;
 use std::borrow::Cow;
 
 /// Ranges of the class Cf (format) of Unicode 16.0, without the characters covered by [`char::is_control`].
-const FORMAT: [(char, char); 21] = [
+const FORMAT_RANGES: [(char, char); 21] = [
     ('\u{ad}', '\u{ad}'),
     ('\u{600}', '\u{605}'),
     ('\u{61c}', '\u{61c}'),
@@ -38,7 +38,7 @@ pub fn is_invisible(c: char) -> bool {
     }
     c.is_control()
         || matches!(c, '\u{2028}' | '\u{2029}' | '\u{fffe}' | '\u{ffff}')
-        || FORMAT.iter().any(|(first, last)| (*first..=*last).contains(&c))
+        || FORMAT_RANGES.iter().any(|(first, last)| (*first..=*last).contains(&c))
 }
 
 /// `text` with each invisible character except the newline as `\u202e`, the escape sequence of JSON (two sequences
@@ -56,7 +56,6 @@ pub fn one_line(text: &str) -> Cow<'_, str> {
     replaced(text, is_invisible, escape)
 }
 
-/// Appends the JSON escape sequence of a character.
 pub(crate) fn escape(out: &mut String, c: char) {
     for unit in c.encode_utf16(&mut [0; 2]) {
         // Writing to a string cannot fail.

@@ -31,7 +31,6 @@ pub(crate) fn push_quoted(out: &mut String, text: &str) {
     }
 }
 
-/// Appends the YAML and TOML escape sequence of a character.
 pub(crate) fn push_escape(out: &mut String, c: char) {
     // Writing to a string cannot fail.
     let _ = match u32::from(c) {

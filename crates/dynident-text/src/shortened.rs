@@ -32,8 +32,8 @@ pub fn shortened_lines(text: &str) -> Cow<'_, str> {
 }
 
 /// Maximum number of characters between two backquotes, and in the whole message.
-const MOST_BETWEEN_QUOTES: usize = 200;
-const MOST_IN_MESSAGE: usize = 20_000;
+const MAX_CHARS_BETWEEN_QUOTES: usize = 200;
+const MAX_MESSAGE_CHARS: usize = 20_000;
 
 /// A message with every text between backquotes shortened to 200 characters, and with at most 20,000 characters. Names,
 /// expressions and lines from files are between backquotes; a file may contain a name of megabytes.
@@ -48,8 +48,8 @@ pub fn shortened_message(message: &str) -> String {
     };
     let parts = message.split('`').enumerate();
     let parts: Vec<String> =
-        parts.map(|(k, part)| cut(part, if k % 2 == 1 { MOST_BETWEEN_QUOTES } else { usize::MAX })).collect();
-    cut(&parts.join("`"), MOST_IN_MESSAGE)
+        parts.map(|(k, part)| cut(part, if k % 2 == 1 { MAX_CHARS_BETWEEN_QUOTES } else { usize::MAX })).collect();
+    cut(&parts.join("`"), MAX_MESSAGE_CHARS)
 }
 
 #[cfg(test)]

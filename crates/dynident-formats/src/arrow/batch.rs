@@ -8,9 +8,8 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 
 /// Maximum number of padding bytes after a buffer; the format aligns buffers to 64 bytes.
-const MOST_FILL: u64 = 128;
+const MAX_PADDING_BYTES: u64 = 128;
 
-/// Compression of buffers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Packing {
     Plain,
@@ -18,7 +17,6 @@ enum Packing {
     Zstd,
 }
 
-/// Places of the columns of a batch.
 #[derive(Debug)]
 pub(super) struct Batch {
     pub(super) rows: usize,
@@ -33,7 +31,6 @@ pub(super) struct Batch {
     bytes: u64,
 }
 
-/// One column of a batch, in memory.
 #[derive(Debug)]
 pub(super) struct Loaded {
     cell: Cell,
@@ -70,7 +67,6 @@ fn bit(bytes: &[u8], at: usize) -> bool {
 }
 
 impl Batch {
-    /// The batch of a message with `bytes` of buffers at `begin`.
     pub(super) fn read(message: Flat, begin: u64, bytes: u64) -> Result<Self, String> {
         let batch = message.table(2).ok_or("the description of its columns is missing")?;
         let rows = usize::try_from(batch.i64(0)).map_err(|_| "its number of rows is negative")?;
@@ -115,7 +111,6 @@ impl Batch {
         Ok(Loaded { cell: leaf.cell, around, list, flags, data })
     }
 
-    /// Reads the requested columns of `leaves`.
     pub(super) fn loaded(
         &self,
         leaves: &[Leaf],
@@ -219,7 +214,7 @@ impl Batch {
         unpacked.by_ref().take(wanted as u64).read_to_end(&mut data).map_err(problem)?;
         // The checksum of a compressed buffer follows its last byte, possibly after padding.
         if self.packing != Packing::Plain {
-            std::io::copy(&mut unpacked.by_ref().take(MOST_FILL), &mut std::io::sink()).map_err(problem)?;
+            std::io::copy(&mut unpacked.by_ref().take(MAX_PADDING_BYTES), &mut std::io::sink()).map_err(problem)?;
         }
         drop(unpacked);
         if data.len() < wanted {
@@ -268,12 +263,10 @@ impl Loaded {
         if wide { bytes.u64().map(|bits| bits as i64) } else { bytes.u32().map(|bits| i64::from(bits as i32)) }
     }
 
-    /// The first valid time stamp in the first `rows` rows.
     pub(super) fn first_ticks(&self, rows: usize) -> Option<i64> {
         (0..rows).find_map(|row| self.ticks(self.place(row, 0)?))
     }
 
-    /// Number of entries of the list in a row.
     pub(super) fn length(&self, row: usize) -> usize {
         let Some((_, offsets)) = &self.list else { return 1 };
         offsets.range(row).map_or(0, |(begin, end)| end - begin)

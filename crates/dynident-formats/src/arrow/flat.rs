@@ -11,7 +11,6 @@ pub(super) struct Flat<'a> {
 }
 
 impl<'a> Flat<'a> {
-    /// The root table of `bytes`.
     pub(super) fn root(bytes: &'a [u8]) -> Option<Self> {
         Self { bytes, at: 0 }.followed(0)
     }
@@ -31,7 +30,6 @@ impl<'a> Flat<'a> {
         at.checked_add(offset as usize).filter(|place| *place < self.bytes.len())
     }
 
-    /// The position of a field; `None` if it is absent.
     fn place(&self, slot: usize) -> Option<usize> {
         let back = i64::from(self.read(self.at)?.u32()? as i32);
         let list = usize::try_from(self.at as i64 - back).ok()?;
@@ -73,7 +71,6 @@ impl<'a> Flat<'a> {
         Some(String::from_utf8_lossy(bytes.take(length)?).into_owned())
     }
 
-    /// The tables of a list; empty if it is absent.
     pub(super) fn tables(&self, slot: usize) -> impl Iterator<Item = Self> + use<'a> {
         let place = self.place(slot).and_then(|at| self.pointed(at));
         let count = place.and_then(|at| self.read(at)?.u32()).unwrap_or(0) as usize;

@@ -14,7 +14,6 @@ mod schema;
 #[cfg(feature = "arrow")]
 pub(crate) use reading::open;
 
-/// Magic bytes at the start and at the end of the file format.
 pub(crate) const MAGIC: &[u8] = b"ARROW1";
 
 /// Whether `head` is the start of a stream: a message marker, its length, and a small offset of its first table.

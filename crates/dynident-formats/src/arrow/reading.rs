@@ -4,7 +4,7 @@ use super::MAGIC;
 use super::batch::{Batch, Loaded, move_to};
 use super::flat::Flat;
 use super::schema::{Cell, Leaf, List, Schema};
-use crate::arrays::{LONGEST_LIST, MOST_COLUMNS};
+use crate::arrays::{MAX_COLUMNS, MAX_LIST_COLUMNS};
 use crate::error::FileError;
 use crate::kind::FileFormat;
 use crate::limits::Budget;
@@ -13,11 +13,9 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Message types.
 const SCHEMA: u8 = 1;
 const BATCH: u8 = 3;
 
-/// A message without its buffers.
 struct Message {
     head: Vec<u8>,
     /// Start and length of its buffers in the file.
@@ -29,9 +27,7 @@ struct Message {
 struct ArrowTable {
     path: PathBuf,
     reader: BufReader<File>,
-    /// Memory for the columns of one batch.
     budget: Budget,
-    /// Start of the next message, and end of the last one.
     next_message: u64,
     end: u64,
     /// Whether it is a stream, which may end at any byte.
@@ -39,7 +35,6 @@ struct ArrowTable {
     truncated: bool,
     batches: usize,
     leaves: Vec<Leaf>,
-    /// First time stamp of each leaf.
     first: Vec<i64>,
     names: Vec<String>,
     notes: Vec<String>,
@@ -115,7 +110,6 @@ impl ArrowTable {
         format!("message at byte {}", self.next_message)
     }
 
-    /// The next message; `None` at the end.
     fn message(&mut self) -> Result<Option<Message>, FileError> {
         let io = |source| FileError::Io { file: self.path.clone(), source };
         let left = self.end.saturating_sub(self.next_message);
@@ -210,9 +204,9 @@ impl ArrowTable {
                     (Some(_), loaded) => loaded.map_or(0, |loaded| loaded.length(0)),
                 },
             );
-            let count = count.min(LONGEST_LIST);
-            if self.names.len() + count > MOST_COLUMNS {
-                self.notes.push(format!("column {name}: more than {MOST_COLUMNS} columns"));
+            let count = count.min(MAX_LIST_COLUMNS);
+            if self.names.len() + count > MAX_COLUMNS {
+                self.notes.push(format!("column {name}: more than {MAX_COLUMNS} columns"));
                 continue;
             }
             for entry in 0..count {

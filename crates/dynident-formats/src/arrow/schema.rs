@@ -3,12 +3,10 @@
 use super::flat::Flat;
 use crate::bytes::Number;
 
-/// Maximum nesting of fields.
-const DEEPEST: usize = 32;
+const MAX_NESTING: usize = 32;
 /// Maximum number of fields, including nested ones; a corrupt schema may refer to one field many times.
-const MOST_FIELDS: usize = 1 << 16;
+const MAX_FIELDS: usize = 1 << 16;
 
-/// Place of a field in each batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Place {
     /// Index of its node, and of its first buffer, the validity bitmap.
@@ -18,15 +16,16 @@ pub(super) struct Place {
     pub(super) views: usize,
 }
 
-/// Encoding of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Cell {
-    /// One bit.
     Flag,
-    /// A number.
     Number(Number),
     /// Integers with `per_s` units per second; time stamps are relative to the first one.
-    Ticks { wide: bool, per_s: f64, from_first: bool },
+    Ticks {
+        wide: bool,
+        per_s: f64,
+        from_first: bool,
+    },
 }
 
 impl Cell {
@@ -40,7 +39,6 @@ impl Cell {
     }
 }
 
-/// Encoding of a list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum List {
     /// By the offset of its first entry and that of the next list, of 8 or 4 bytes.
@@ -49,26 +47,21 @@ pub(super) enum List {
     Fixed(usize),
 }
 
-/// One field of numbers, or of lists of numbers.
 #[derive(Clone, Debug)]
 pub(super) struct Leaf {
     pub(super) name: String,
     pub(super) cell: Cell,
-    /// Enclosing groups.
     pub(super) around: Vec<Place>,
     pub(super) list: Option<(Place, List)>,
     pub(super) value: Place,
 }
 
-/// The fields of a schema.
 #[derive(Debug, Default)]
 pub(super) struct Schema {
     pub(super) leaves: Vec<Leaf>,
-    /// Fields that are not columns, with the reason.
     pub(super) notes: Vec<String>,
 }
 
-/// Type of a field.
 enum Kind {
     Cell(Cell),
     List(List),
@@ -156,7 +149,6 @@ struct Walk {
 }
 
 impl Schema {
-    /// The columns of a schema; `None` if it contains an unknown type.
     pub(super) fn read(schema: Flat, version: i16) -> Option<Self> {
         let mut walk = Walk { schema: Self::default(), next: Place::default(), fields: 0, version };
         for field in schema.tables(1) {
@@ -169,7 +161,7 @@ impl Schema {
 impl Walk {
     fn field(&mut self, field: Flat, before: &str, around: &[Place], depth: usize) -> Option<()> {
         self.fields += 1;
-        if self.fields > MOST_FIELDS || depth > DEEPEST {
+        if self.fields > MAX_FIELDS || depth > MAX_NESTING {
             return None;
         }
         let name = before.to_owned() + &field.text(0).unwrap_or_default();
@@ -211,10 +203,9 @@ impl Walk {
         Some(())
     }
 
-    /// Skips a field and its children.
     fn passed(&mut self, field: Flat, depth: usize) -> Option<()> {
         self.fields += 1;
-        if self.fields > MOST_FIELDS || depth > DEEPEST {
+        if self.fields > MAX_FIELDS || depth > MAX_NESTING {
             return None;
         }
         self.next.node += 1;

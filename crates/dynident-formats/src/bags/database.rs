@@ -8,8 +8,7 @@ use std::collections::HashMap;
 use std::io::Read;
 use std::path::Path;
 
-/// Maximum length of a message after decompression, bytes.
-const LONGEST_MESSAGE: u64 = 1 << 28;
+const MAX_MESSAGE_BYTES: u64 = 1 << 28;
 
 #[derive(Debug)]
 pub(super) struct Database {
@@ -107,9 +106,9 @@ impl Part for Database {
         if message.starts_with(b"\x28\xB5\x2F\xFD") {
             let mut unpacked = Vec::new();
             let read = zstd::stream::read::Decoder::new(&message[..])
-                .and_then(|decoder| decoder.take(LONGEST_MESSAGE + 1).read_to_end(&mut unpacked));
+                .and_then(|decoder| decoder.take(MAX_MESSAGE_BYTES + 1).read_to_end(&mut unpacked));
             read.map_err(|error| self.file.broken(place(), format!("it cannot be unpacked ({error})")))?;
-            if unpacked.len() as u64 > LONGEST_MESSAGE {
+            if unpacked.len() as u64 > MAX_MESSAGE_BYTES {
                 return Err(self.file.broken(place(), "it is larger than 256 MiB"));
             }
             *message = unpacked;

@@ -2,12 +2,10 @@
 
 use std::collections::VecDeque;
 
-/// Maximum number of rows that wait for another topic.
-const MOST_WAITING: usize = 1 << 20;
+const MAX_WAITING_ROWS: usize = 1 << 20;
 /// Minimum length of a gap, mean steps.
-const HOLE: f64 = 5.0;
-/// Minimum number of steps for a mean.
-const FEW_STEPS: u64 = 8;
+const MIN_GAP_STEPS: f64 = 5.0;
+const MIN_STEPS_FOR_MEAN: u64 = 8;
 
 /// Values of one topic with their time, ns.
 type Stamped = (i64, Vec<f64>);
@@ -23,7 +21,6 @@ struct Side {
     holes: VecDeque<i64>,
 }
 
-/// Result of the interpolation of a row.
 enum Outcome {
     Ready(Vec<f64>),
     Early,
@@ -39,7 +36,6 @@ pub(super) struct Joined {
 }
 
 impl Joined {
-    /// Joins `sides` topics with the first one.
     pub(super) fn new(sides: usize) -> Self {
         let sides = (0..sides).map(|_| Side::default()).collect();
         Self { rows: VecDeque::new(), sides, ended: false }
@@ -51,7 +47,7 @@ impl Joined {
     /// The index of the topic without messages for too long.
     pub(super) fn push_row(&mut self, at_ns: i64, values: Vec<f64>) -> Result<(), usize> {
         self.rows.push_back((at_ns, values));
-        if self.rows.len() <= MOST_WAITING {
+        if self.rows.len() <= MAX_WAITING_ROWS {
             return Ok(());
         }
         let silent = self.sides.iter().position(|side| side.last_ns < at_ns);
@@ -68,7 +64,7 @@ impl Joined {
                 return;
             }
             let mean = (side.last_ns - side.first_ns) as f64 / side.steps.max(1) as f64;
-            if side.steps >= FEW_STEPS && (at_ns - side.last_ns) as f64 > HOLE * mean {
+            if side.steps >= MIN_STEPS_FOR_MEAN && (at_ns - side.last_ns) as f64 > MIN_GAP_STEPS * mean {
                 side.holes.push_back(at_ns);
             }
             side.steps += 1;
@@ -77,7 +73,6 @@ impl Joined {
         side.samples.push_back((at_ns, values));
     }
 
-    /// Marks the end of the input.
     pub(super) fn end(&mut self) {
         self.ended = true;
     }

@@ -13,9 +13,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Maximum length of a record, and of a decompressed chunk, bytes.
-const LONGEST_RECORD: usize = 1 << 28;
-/// Length of the type and length fields of a record, bytes.
-const RECORD_HEAD: usize = 9;
+const MAX_RECORD_BYTES: usize = 1 << 28;
+const RECORD_HEAD_BYTES: usize = 9;
 
 pub(super) struct McapFile {
     path: PathBuf,
@@ -42,7 +41,7 @@ impl McapFile {
         let file = dynident_files::open(path).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
         // Decompress chunks here, because the lengths inside may be wrong.
         let options = LinearReaderOptions::default()
-            .with_record_length_limit(LONGEST_RECORD)
+            .with_record_length_limit(MAX_RECORD_BYTES)
             .with_emit_chunks(true)
             .with_validate_data_section_crc(true);
         Ok(Self {
@@ -64,10 +63,9 @@ impl McapFile {
         FileError::broken(&self.path, FileFormat::Mcap, format!("record {}", self.records), error.to_string(), fix)
     }
 
-    /// Decompresses a chunk and checks the result.
     fn unpack(&mut self, header: &ChunkHeader, packed: &[u8]) -> Result<(), FileError> {
         let size = header.uncompressed_size;
-        if size > LONGEST_RECORD as u64 {
+        if size > MAX_RECORD_BYTES as u64 {
             return Err(self.broken(&McapError::ChunkTooLarge(size)));
         }
         let mut unpacked = Vec::new();
@@ -92,7 +90,6 @@ impl McapFile {
         Ok(())
     }
 
-    /// The next record of the current chunk; `None` at its end.
     fn next_in_chunk(&mut self) -> Result<Option<Record<'static>>, FileError> {
         let rest = &self.chunk[self.at..];
         if rest.is_empty() {
@@ -105,7 +102,7 @@ impl McapFile {
         });
         let Some((opcode, body)) = body else { return Err(self.broken(&McapError::UnexpectedEoc)) };
         let (length, record) = (body.len(), mcap::parse_record(opcode, body).map(Record::into_owned));
-        self.at += RECORD_HEAD + length;
+        self.at += RECORD_HEAD_BYTES + length;
         self.records += 1;
         record.map(Some).map_err(|error| self.broken(&error))
     }

@@ -6,22 +6,18 @@ use crate::error::FileError;
 use crate::kind::FileFormat;
 use std::path::{Path, PathBuf};
 
-/// The messages of all parts.
 #[derive(Debug)]
 pub(super) struct Messages {
     parts: Vec<(PathBuf, FileFormat)>,
-    /// Index of the current part, and the part.
     current: usize,
     part: Option<Box<dyn Part>>,
     truncated: bool,
 }
 
-/// A message without its bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     /// Index of the part, and of the channel in it.
     pub(super) channel: (usize, usize),
-    /// Recording time, ns.
     pub(super) log_ns: i64,
 }
 
@@ -50,7 +46,6 @@ impl Messages {
         Ok(None)
     }
 
-    /// The channel of the current message.
     pub(super) fn channel(&self, header: Header) -> Option<&Channel> {
         self.part.as_ref()?.channel(header.channel.1)
     }

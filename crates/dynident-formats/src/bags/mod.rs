@@ -25,16 +25,14 @@ mod topic;
 pub(crate) use table::{open_database, open_folder, open_mcap};
 
 pub(crate) const METADATA: &str = "metadata.yaml";
-/// Maximum length of the list of parts, bytes.
-const LONGEST_METADATA: u64 = 1 << 24;
+const MAX_METADATA_BYTES: u64 = 1 << 24;
 
-/// The parts in the list of a rosbag2 folder, in order.
 pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     use std::io::Read;
     let path = folder.join(METADATA);
     let mut text = String::new();
     dynident_files::open(&path)
-        .and_then(|file| file.take(LONGEST_METADATA).read_to_string(&mut text))
+        .and_then(|file| file.take(MAX_METADATA_BYTES).read_to_string(&mut text))
         .map_err(|source| FileError::Io { file: path.clone(), source })?;
     let broken = |problem: String| {
         let fix = "recreate it by `ros2 bag reindex`, or specify the part";

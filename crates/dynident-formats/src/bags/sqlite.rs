@@ -6,12 +6,10 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Maximum length of a record, bytes.
-const LARGEST: u64 = 1 << 28;
+const MAX_RECORD_BYTES: u64 = 1 << 28;
 /// Maximum depth of a table's B-tree; 2^64 rows need less.
-const DEEPEST: usize = 20;
+const MAX_TREE_DEPTH: usize = 20;
 
-/// A field of a row.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     Null,
@@ -21,7 +19,6 @@ pub(super) enum Value {
     Blob(Vec<u8>),
 }
 
-/// An SQLite file, read only.
 #[derive(Debug)]
 pub(super) struct Sqlite {
     path: PathBuf,
@@ -45,7 +42,6 @@ fn number(bytes: &[u8], at: usize, count: usize) -> Option<u64> {
     Some(bytes.get(at..at.checked_add(count)?)?.iter().fold(0, |all, byte| all << 8 | u64::from(*byte)))
 }
 
-/// A varint and its end.
 fn varint(bytes: &[u8], at: usize) -> Option<(u64, usize)> {
     let mut value = 0_u64;
     for k in 0..9 {
@@ -135,12 +131,10 @@ impl Sqlite {
         Ok(tables)
     }
 
-    /// The rows of the table with its B-tree root at `page`.
     pub(super) fn rows(&mut self, page: u64) -> Result<Rows, FileError> {
         Ok(Rows { way: vec![(self.page(page)?, page, 0)], read: 1 })
     }
 
-    /// The next row and its number.
     pub(super) fn next(&mut self, rows: &mut Rows) -> Result<Option<(i64, Vec<Value>)>, FileError> {
         while let Some((page, index, cell)) = rows.way.last_mut() {
             let index = *index;
@@ -175,7 +169,7 @@ impl Sqlite {
             };
             let child = child.ok_or_else(|| self.broken(place(), "a cell is truncated"))?;
             rows.read += 1;
-            if rows.way.len() >= DEEPEST || rows.read > self.pages {
+            if rows.way.len() >= MAX_TREE_DEPTH || rows.read > self.pages {
                 return Err(self.broken(place(), "its pages refer to each other in a circle"));
             }
             let page = self.page(child)?;
@@ -184,11 +178,10 @@ impl Sqlite {
         Ok(None)
     }
 
-    /// The row in the cell at `at` of a leaf page.
     fn row(&mut self, page: &[u8], at: usize) -> Result<Option<(i64, Vec<Value>)>, FileError> {
         let Some((length, at)) = varint(page, at) else { return Ok(None) };
         let Some((id, at)) = varint(page, at) else { return Ok(None) };
-        if length > LARGEST || length > self.pages * self.page_size as u64 {
+        if length > MAX_RECORD_BYTES || length > self.pages * self.page_size as u64 {
             return Ok(None);
         }
         let length = length as usize;
@@ -216,7 +209,6 @@ impl Sqlite {
     }
 }
 
-/// The fields of a record.
 fn record(payload: &[u8]) -> Option<Vec<Value>> {
     let (head, mut at) = varint(payload, 0)?;
     let head = usize::try_from(head).ok()?;

@@ -14,22 +14,19 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// Maximum number of messages, and of their bytes, that are searched for topics and columns.
-const MOST_SEARCHED: u64 = 20_000;
-const MOST_SEARCHED_BYTES: usize = 1 << 26;
+const MAX_SEARCHED_MESSAGES: u64 = 20_000;
+const MAX_SEARCHED_BYTES: usize = 1 << 26;
 /// Number of messages per topic that are searched for columns; several publishers may alternate.
-const SEARCHED_OF_TOPIC: u64 = 64;
+const MAX_SEARCHED_PER_TOPIC: u64 = 64;
 
-/// Opens one MCAP file.
 pub(crate) fn open_mcap(path: &Path) -> Result<Contents, FileError> {
     BagTable::open(path, &[(path.to_owned(), FileFormat::Mcap)])
 }
 
-/// Opens one SQLite file.
 pub(crate) fn open_database(path: &Path) -> Result<Contents, FileError> {
     BagTable::open(path, &[(path.to_owned(), FileFormat::Rosbag2)])
 }
 
-/// Opens the parts in a rosbag2 folder.
 pub(crate) fn open_folder(path: &Path) -> Result<Contents, FileError> {
     let mut found = Vec::new();
     for part in parts(path)? {
@@ -65,13 +62,11 @@ struct BagTable {
     names: Vec<String>,
     groups: Vec<ColumnGroup>,
     notes: Vec<String>,
-    /// Selected columns.
     plan: Plan,
     buffer: Vec<u8>,
     sample: Sample,
 }
 
-/// The selected topics and columns.
 #[derive(Debug)]
 struct Plan {
     /// The topics, starting with the one that provides the clock, and the columns of each.
@@ -117,10 +112,9 @@ impl BagTable {
         Ok(Contents::Table(Box::new(table)))
     }
 
-    /// Finds topics and columns in the first messages.
     fn search(&mut self) -> Result<(), FileError> {
         let (mut searched, mut bytes) = (0, 0);
-        while searched < MOST_SEARCHED && bytes < MOST_SEARCHED_BYTES {
+        while searched < MAX_SEARCHED_MESSAGES && bytes < MAX_SEARCHED_BYTES {
             let header = match self.messages.next(&mut self.buffer) {
                 Ok(Some(header)) => header,
                 Ok(None) => break,
@@ -132,7 +126,7 @@ impl BagTable {
             bytes += self.buffer.len();
             let Some(index) = self.topic(header) else { continue };
             let topic = &mut self.topics[index];
-            if topic.messages < SEARCHED_OF_TOPIC {
+            if topic.messages < MAX_SEARCHED_PER_TOPIC {
                 topic.messages += 1;
                 if let Err(problem) = topic.explore(header.log_ns, &self.buffer) {
                     let note = format!("{} ({}): {problem}", topic.name, topic.kind);
@@ -194,7 +188,6 @@ impl BagTable {
         found
     }
 
-    /// Reads the current message, of topic `index`, into the sample.
     fn read(&mut self, index: usize, header: Header) -> Result<(), FileError> {
         let topic = &mut self.topics[index];
         topic.read(header.log_ns, &self.buffer, &mut self.sample).map_err(|problem| {
@@ -212,7 +205,6 @@ impl BagTable {
         only_clocks || columns.iter().zip(values).any(has_value)
     }
 
-    /// Reads messages until a row is complete.
     fn advance(&mut self) -> Result<Option<Vec<f64>>, FileError> {
         loop {
             if let Some(row) = self.plan.joined.next() {
@@ -311,7 +303,6 @@ impl Table for BagTable {
         Ok(self.advance()?.is_some())
     }
 
-    /// Returns every message once, for all topics.
     fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), FileError> {
         let columns: Vec<Vec<usize>> = self.topics.iter().map(|topic| (0..topic.columns.len()).collect()).collect();
         while let Some(header) = self.messages.next(&mut self.buffer)? {

@@ -1,15 +1,13 @@
 //! One topic: finds its columns in the first messages and reads the numbers of each message.
 
 use super::part::{Channel, Encoding};
-use crate::arrays::MOST_COLUMNS;
+use crate::arrays::MAX_COLUMNS;
 use crate::json_lines::flattened;
 use crate::ros::{Decoder, Definition, Leaves};
 use std::collections::HashMap;
 
-/// Path of the time stamp in ROS messages.
 const STAMP: &str = "header.stamp";
 
-/// Decoder of a topic's messages.
 #[derive(Debug)]
 enum Reader {
     /// Possible definitions of the messages; the first one that fits is kept.
@@ -36,7 +34,6 @@ pub(super) struct Topic {
     pub(super) messages: u64,
 }
 
-/// Recording time, stamp and numbers of a message.
 #[derive(Debug, Default)]
 pub(super) struct Sample {
     pub(super) log_ns: i64,
@@ -75,7 +72,6 @@ impl Topic {
         })
     }
 
-    /// Whether messages of `channel` belong to this topic.
     pub(super) fn is_of(&self, channel: &Channel) -> bool {
         self.name == channel.topic && self.kind == channel.kind
     }
@@ -105,7 +101,7 @@ impl Topic {
             }
         }
         for name in names {
-            if !self.column_of.contains_key(&name) && self.columns.len() < MOST_COLUMNS {
+            if !self.column_of.contains_key(&name) && self.columns.len() < MAX_COLUMNS {
                 self.column_of.insert(name.clone(), self.columns.len());
                 self.columns.push(name);
             }
@@ -121,7 +117,6 @@ impl Topic {
         Ok(())
     }
 
-    /// The column of the message's stamp.
     pub(super) fn stamp_column(&self) -> Option<usize> {
         self.column_of.get(STAMP).copied().filter(|_| self.stamped)
     }

@@ -5,11 +5,9 @@ use super::definition::{Count, Definition, Field, Kind};
 use crate::bytes::Bytes;
 
 /// Maximum length of an array that becomes columns; longer ones are images, point clouds or maps.
-const LONGEST_ARRAY: usize = 1024;
-/// Maximum number of numbers in a message.
-const MOST_LEAVES: usize = 1 << 14;
+const MAX_ARRAY_COLUMNS: usize = 1024;
+const MAX_LEAVES: usize = 1 << 14;
 
-/// The numbers of one message, in the order of its definition.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Leaves {
     pub(crate) values: Vec<f64>,
@@ -21,13 +19,11 @@ pub(crate) struct Leaves {
     pub(crate) paths: Vec<String>,
 }
 
-/// Decoder of messages of one definition.
 #[derive(Clone, Debug)]
 pub(crate) struct Decoder {
     definition: Definition,
 }
 
-/// State of the decoding of one message.
 struct Pass<'a, 'l> {
     messages: &'a [Vec<Field>],
     bytes: Bytes<'a>,
@@ -90,8 +86,8 @@ impl<'a> Pass<'a, '_> {
     }
 
     fn leaf(&mut self, value: f64) -> Result<(), String> {
-        if self.leaves.values.len() >= MOST_LEAVES {
-            return Err(format!("it has more than {MOST_LEAVES} numbers"));
+        if self.leaves.values.len() >= MAX_LEAVES {
+            return Err(format!("it has more than {MAX_LEAVES} numbers"));
         }
         self.leaves.values.push(value);
         if let Some(path) = &self.path {
@@ -145,7 +141,7 @@ impl<'a> Pass<'a, '_> {
     /// Reads the elements of an array; returns its texts if they are names.
     fn array(&mut self, field: &Field, count: usize, labels: &[&'a [u8]]) -> Result<Option<Vec<&'a [u8]>>, String> {
         if field.kind == Kind::Text {
-            let named = names_entries(&field.name) && count <= LONGEST_ARRAY;
+            let named = names_entries(&field.name) && count <= MAX_ARRAY_COLUMNS;
             let mut names = Vec::new();
             for _ in 0..count {
                 let name = self.text()?;
@@ -158,13 +154,13 @@ impl<'a> Pass<'a, '_> {
             return Ok(named.then_some(names));
         }
         let size = size(field.kind);
-        if count > LONGEST_ARRAY && size > 0 {
+        if count > MAX_ARRAY_COLUMNS && size > 0 {
             self.align(size)?;
             self.bytes.take(count.checked_mul(size).ok_or_else(cut)?).ok_or_else(cut)?;
             return Ok(None);
         }
-        if count > LONGEST_ARRAY {
-            return Err(format!("`{}` has more than {LONGEST_ARRAY} entries", field.name));
+        if count > MAX_ARRAY_COLUMNS {
+            return Err(format!("`{}` has more than {MAX_ARRAY_COLUMNS} entries", field.name));
         }
         let labelled = labels.len() == count;
         let length = self.path.as_ref().map_or(0, String::len);

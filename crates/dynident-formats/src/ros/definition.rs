@@ -3,12 +3,9 @@
 
 use std::collections::HashMap;
 
-/// Maximum length of a definition, bytes; large messages need some ten thousand.
-const LONGEST: usize = 1 << 20;
-/// Maximum nesting of types.
-const DEEPEST: usize = 16;
+const MAX_DEFINITION_BYTES: usize = 1 << 20;
+const MAX_NESTING: usize = 16;
 
-/// Type of one element of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Bool,
@@ -28,11 +25,9 @@ pub(crate) enum Kind {
     Time,
     /// `builtin_interfaces/Duration`: one number, s.
     Duration,
-    /// Index of another message.
     Message(usize),
 }
 
-/// Number of elements of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Count {
     One,
@@ -60,7 +55,7 @@ impl Definition {
     /// # Errors
     /// The problem of the text.
     pub(crate) fn parse(name: &str, text: &str) -> Result<Self, String> {
-        if text.len() > LONGEST {
+        if text.len() > MAX_DEFINITION_BYTES {
             return Err("its definition is longer than a megabyte".to_owned());
         }
         // The texts of all types, by package/Type.
@@ -96,8 +91,8 @@ impl Definition {
         if let Some(index) = known.get(name) {
             return if *index == usize::MAX { Err(format!("type `{name}` contains itself")) } else { Ok(*index) };
         }
-        if depth > DEEPEST {
-            return Err(format!("its types are nested more than {DEEPEST} deep"));
+        if depth > MAX_NESTING {
+            return Err(format!("its types are nested more than {MAX_NESTING} deep"));
         }
         let text = texts.get(name).ok_or_else(|| format!("it uses type `{name}`, which is not defined"))?;
         known.insert(name.to_owned(), usize::MAX);

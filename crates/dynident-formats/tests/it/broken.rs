@@ -6,7 +6,6 @@ use dynident_formats::{Contents, FileError, open};
 use std::io::{Read, Write};
 use std::path::Path;
 
-/// Reads all rows; returns their number or the error.
 fn drain(path: &Path) -> Result<usize, FileError> {
     let mut rows = 0;
     match open(path)?.contents {

@@ -24,7 +24,6 @@ fn hexadecimal(text: &str) -> f64 {
     sign * digits as f64 * 2f64.powi(exponent / 2) * 2f64.powi(exponent - exponent / 2)
 }
 
-/// All rows of the given columns, by name or index.
 pub(crate) fn columns(table: &mut dyn Table, names: &[&str]) -> Vec<Vec<f64>> {
     let place = |name: &&str| match table.names() {
         Some(names) => names.iter().position(|known| known == name).unwrap_or_else(|| panic!("no {name}: {names:?}")),
@@ -106,7 +105,6 @@ fn every_file_gives_its_original_numbers() {
                         same(&format!("{file}: {name}"), found, values);
                     }
                 }
-                // All expected columns exist, and no others.
                 if let Some(known) = table.names() {
                     assert!(names.iter().all(|name| known.iter().any(|one| one == name)), "{file}: {known:?}");
                     let bag = known.iter().any(|name| name.ends_with("log_time"));

@@ -132,7 +132,6 @@ mod tests {
         let t = |i: usize| i as f64 * 0.01;
         let mut tau: Vec<f64> = (0..6000).map(|i| 20.0 * (1.5 * t(i)).sin() + 0.05 * noise[i]).collect();
         let q: Vec<f64> = (0..6000).map(|i| (1.5 * t(i)).cos()).collect();
-        // One period of the motion.
         tau[2000..2419].fill(0.0);
         let found = held(&tau, &q, [-20.5, 20.5]);
         assert_eq!(found, [Run { from: 2000, to: 2419, saturated: false }]);

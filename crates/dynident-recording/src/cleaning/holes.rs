@@ -3,7 +3,6 @@
 use crate::clock::timeline::Places;
 use crate::log::RawBlock;
 
-/// Degree of the polynomials fill_hole holes.
 const DEGREE: usize = 5;
 /// Minimum and maximum number of rows on either side from which a hole is filled.
 const MIN_SIDE_ROWS: usize = 6;
@@ -44,7 +43,6 @@ fn polynomial(known: &[f64], values: &[f64], places: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Last rows before a block, for holes at its start.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PastRows {
     pub(super) raw: RawBlock,
@@ -69,7 +67,6 @@ fn append(to: &mut RawBlock, from: &RawBlock, rows: core::ops::Range<usize>) {
     }
 }
 
-/// A block with the same channels and no rows.
 fn empty_like(block: &RawBlock) -> RawBlock {
     let none = |channels: &[Vec<f64>]| vec![Vec::new(); channels.len()];
     RawBlock {
@@ -197,7 +194,6 @@ fn fill_hole(
     Some(rows)
 }
 
-/// The last rows of a block, for holes at the start of the next.
 pub(super) fn last_rows(block: &RawBlock, places: &Places) -> PastRows {
     let from = block.rows().saturating_sub(MAX_SIDE_ROWS);
     let mut raw = empty_like(block);

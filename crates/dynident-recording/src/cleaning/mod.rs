@@ -23,7 +23,6 @@ use holes::{Filled, PastRows, fill, last_rows};
 use set_aside::Tally;
 use std::collections::VecDeque;
 
-/// Rows that are ready for the grid.
 #[derive(Debug, Default)]
 pub(crate) struct CleanBlock {
     pub(crate) raw: RawBlock,
@@ -32,7 +31,6 @@ pub(crate) struct CleanBlock {
     pub(crate) marked: Vec<Vec<usize>>,
 }
 
-/// Reads the rows of a log ahead and cleans them.
 #[derive(Debug)]
 pub(crate) struct CleanRows {
     reader: RawBlocks,
@@ -142,7 +140,6 @@ impl CleanRows {
         Ok(Some(block))
     }
 
-    /// Finds invalid samples and replaces them.
     fn clean(&mut self, mut block: RawBlock) -> (RawBlock, Vec<Vec<usize>>) {
         let rows = block.rows();
         self.tally.rows += rows as u64;
@@ -223,7 +220,6 @@ fn spread(mut values: Vec<f64>) -> f64 {
     largest - smallest
 }
 
-/// Keeps the last samples for the next block.
 fn keep_last(tail: &mut Vec<f64>, own: &[f64]) {
     tail.extend_from_slice(own);
     let unneeded = tail.len().saturating_sub(held::MAX_WINDOW);

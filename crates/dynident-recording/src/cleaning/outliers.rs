@@ -13,7 +13,6 @@ pub(super) const NOISE_WINDOW: usize = 512;
 const END_FACTOR: f64 = 4.0;
 /// Near an end, minimum ratio to the usual change between samples nearby (a settling controller oscillates).
 const END_CHANGE_RATIO: f64 = 2.0;
-/// Nearest neighbours to either side.
 const NEIGHBOURS: usize = 3;
 /// Maximum share of outliers that directly follow another one; above it they are pulses of the torque. The share is
 /// used only with at least the given number of outliers.
@@ -23,7 +22,6 @@ const MIN_OUTLIERS_FOR_PULSES: usize = 10;
 /// the same direction by at least the given share of the tested sample.
 const PULSE_SAMPLES: usize = 3;
 const MIN_PULSE_SHARE: f64 = 0.25;
-/// Minimum number of samples for the test.
 pub(super) const MIN_SAMPLES: usize = 64;
 /// Ratio of the standard deviation to the median absolute deviation of normal noise.
 pub(super) const SIGMA_PER_MAD: f64 = 1.4826;
@@ -69,7 +67,6 @@ struct Surroundings<'a> {
     off: Vec<f64>,
 }
 
-/// A sample far from its cubic.
 struct FarSample {
     sample: usize,
     /// Ratio of the distance to the minimum distance of an outlier.
@@ -129,7 +126,6 @@ impl<'a> Surroundings<'a> {
         f64::max(END_FACTOR * least, END_CHANGE_RATIO * changes)
     }
 
-    /// Samples of `own` that are far from their cubics.
     fn far_samples(&self, own: core::ops::Range<usize>, spread: f64, limits: &CleaningSettings) -> Vec<FarSample> {
         let (x, off, n) = (self.x, &self.off, self.x.len());
         let overall = SIGMA_PER_MAD * median_size(off.iter().copied());
@@ -157,7 +153,6 @@ impl<'a> Surroundings<'a> {
         far
     }
 
-    /// Whether sample `i` and its neighbours are a pulse of the torque.
     fn is_pulse(&self, i: usize) -> bool {
         let beside = |k: &usize| self.signed(i, *k) / self.signed(i, i) > MIN_PULSE_SHARE;
         let before = (0..i).rev().take(PULSE_SAMPLES).take_while(beside).count();

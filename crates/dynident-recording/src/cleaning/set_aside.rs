@@ -57,7 +57,6 @@ pub struct SetAside {
 }
 
 impl SetAside {
-    /// Describes the finding in one sentence.
     pub(crate) fn sentence(&self) -> String {
         let Self { samples, places, row, time_s, value, expected, .. } = self;
         let share = 100.0 * self.share;
@@ -83,7 +82,6 @@ impl SetAside {
     }
 }
 
-/// Accumulates rejected samples.
 #[derive(Clone, Debug)]
 pub(super) struct Tally {
     joints: Vec<String>,
@@ -134,7 +132,6 @@ impl Tally {
         }
     }
 
-    /// All rejected samples, by joint.
     pub(super) fn all(&self) -> Vec<SetAside> {
         let mut all = self.found.clone();
         all.sort_by_key(|(joint, found)| (*joint, found.reason as u8));

@@ -4,7 +4,6 @@ use super::CleaningSettings;
 use super::outliers::{MIN_SAMPLES, NOISE_WINDOW, SIGMA_PER_MAD, gap_limit, median_size};
 use crate::quantisation::{quantisation_step, usual_change};
 
-/// Samples needed on either side of a tested sample.
 const REACH: usize = 4;
 /// Maximum RMS deviation of the fourth differences around a spike from the pattern of a spike, as a share of the
 /// largest; for a kink it is a sixth.

@@ -14,7 +14,6 @@ const MIN_JUMP_STEPS: f64 = 0.6;
 /// Rows needed on either side of a block to smooth the block's stamps.
 pub(crate) const CONTEXT_ROWS: usize = HALF_WIDTHS[HALF_WIDTHS.len() - 1] + 2 * JUMP_ROWS;
 
-/// Drift of stamps from an even grid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drift {
     /// Half width of the local lines, rows.
@@ -67,7 +66,6 @@ impl Drift {
         Self { half, steps: high - low, variation }
     }
 
-    /// Whether the drift is too large for an even grid.
     pub(crate) fn exceeds(&self, limits: &ClockSettings) -> bool {
         self.steps > limits.min_drift_steps && self.variation > limits.min_rate_variation
     }

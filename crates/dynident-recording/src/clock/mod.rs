@@ -50,14 +50,10 @@ pub struct Clock {
     pub evidence: String,
 }
 
-/// Times of the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Spacing {
-    /// At equal steps.
     Even,
-    /// At the stamps.
     Stamps,
-    /// At the stamps smoothed by local lines.
     Smoothed,
 }
 
@@ -182,7 +178,6 @@ impl MeanStep {
         Ok(Self { mean_s, median_s, jitter: deviation / mean_s, rounded, repeats_rows })
     }
 
-    /// Describes the jitter and the number of rounded stamps.
     fn describe_jitter(&self, stamps: usize) -> String {
         let by_rows = match self.rounded {
             0 => String::new(),
@@ -194,7 +189,6 @@ impl MeanStep {
     }
 }
 
-/// Describes the decision in one sentence.
 fn describe_decision(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option<Drift>) -> String {
     let spacing = match clock.spacing() {
         Spacing::Even => "even spacing".to_owned(),

@@ -12,7 +12,6 @@ pub(crate) struct Segmenter {
     crowded: u64,
 }
 
-/// Rows with their places on the grid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlacedRows<'a> {
     /// Stamps, s.
@@ -33,7 +32,6 @@ impl Segmenter {
         self.closed
     }
 
-    /// Time of the piece's first sample.
     pub(crate) fn first_time_s(&self) -> f64 {
         self.first.map_or(0.0, |(_, time_s)| time_s)
     }
@@ -76,7 +74,6 @@ impl Segmenter {
         rows.steps.len()
     }
 
-    /// Ends the piece and appends its remaining grid points to `out`.
     pub(crate) fn close(&mut self, out: &mut [Vec<f64>]) {
         if !self.closed {
             self.resampler.drain(true, out);

@@ -21,7 +21,6 @@ pub(crate) struct Places {
     pub(crate) holes: Vec<usize>,
 }
 
-/// Assigns places to rows, block by block.
 #[derive(Clone, Debug)]
 pub(crate) struct Timeline {
     clock: Clock,
@@ -47,7 +46,6 @@ impl Timeline {
         }
     }
 
-    /// The places of the rows of `block`, which is followed by `next`.
     pub(crate) fn places(&mut self, block: &RawBlock, next: Option<&RawBlock>) -> Places {
         let (rate, n) = (self.clock.rate_hz, block.rows());
         let mut places = Places { steps: Vec::with_capacity(n), begins: vec![false; n], holes: Vec::new() };

@@ -7,7 +7,6 @@ use crate::filter::sections::{Section, Triple, butterworth_low_pass, pole_radius
 /// Share of the signal below which transients at the end of a window fall inside [`Differentiator::context_samples`].
 const MAX_TRANSIENT_SHARE: f64 = 1e-15;
 
-/// The one-way filter of both types.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Cascade {
     order: usize,
@@ -58,7 +57,6 @@ fn run_forwards(sections: &[Section], signal: &mut [Triple]) {
     run(sections, signal, [start, 0.0, 0.0], false);
 }
 
-/// Runs the cascade backwards from the steady state of the last value.
 fn run_backwards(sections: &[Section], signal: &mut [Triple]) {
     let end = signal[signal.len() - 1][0];
     run(sections, signal, [end, 0.0, 0.0], true);

@@ -40,7 +40,6 @@ impl Place {
 /// Sample indices as ascending ranges.
 pub type SampleRanges = Vec<Range<usize>>;
 
-/// Appends sample `i` to ascending ranges.
 pub(crate) fn add_sample(ranges: &mut SampleRanges, i: usize) {
     match ranges.last_mut() {
         Some(last) if last.end >= i => last.end = last.end.max(i + 1),

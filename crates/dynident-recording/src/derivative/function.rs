@@ -31,7 +31,6 @@ impl DifferentiatorCode {
     }
 }
 
-/// A shared differentiator.
 #[derive(Debug)]
 struct Shared(Arc<dyn Differentiator>);
 

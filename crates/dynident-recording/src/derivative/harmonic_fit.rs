@@ -3,7 +3,6 @@
 use crate::error::{FilterError, require};
 use core::f64::consts::TAU;
 
-/// Number of rows collected before a reduction to a triangle.
 const BLOCK_ROWS: usize = 512;
 /// Minimum ratio of the pivot to the norm of a column. Below it a column is linearly dependent: six digits of the fit
 /// would remain.

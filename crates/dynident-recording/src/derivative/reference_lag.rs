@@ -5,14 +5,12 @@ use crate::error::{FilterError, require};
 use crate::reference::Reference;
 use crate::reference::Stroke;
 
-/// Maximum number of samples of a stroke in the coarse search.
 const MAX_COARSE_SAMPLES: usize = 400;
 /// Number of lags on either side of zero in the coarse search.
 const COARSE_LAGS: i32 = 50;
 /// Maximum number of Gauss-Newton steps; each step at least halves the change.
 const MAX_ITERATIONS: usize = 30;
 
-/// The lag of one stroke.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StrokeLag {
     pub(super) stroke: Stroke,
@@ -91,7 +89,6 @@ fn best(
     let [least, most] = range_s;
     let joint = place.joint;
     let step = (samples.len() / MAX_COARSE_SAMPLES).max(1);
-    // Samples at which the shifted reference is known.
     let known = |i: usize, lag_s: f64| reference.covers(joint, place.time_s(i) - lag_s);
     let mean_square = |lag_s: f64, step: usize| {
         let (mut squares, mut count) = (0.0, 0);

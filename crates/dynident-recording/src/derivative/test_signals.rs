@@ -22,7 +22,6 @@ pub(crate) fn differentiated(differentiator: &dyn Differentiator, rate_hz: f64, 
     out
 }
 
-/// Root mean square.
 pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }

@@ -84,7 +84,6 @@ mod tests {
         let (sigma, n, lag) = (1e-3, 1800_usize, 0.07);
         let exact: Vec<[f64; 3]> = (0..n).map(|i| PATH.at(i as f64 / 100.0 - lag)).collect();
         let power: f64 = exact.iter().map(|x| x[1] * x[1]).sum();
-        // The sample with the largest acceleration.
         let at = (0..n).max_by(|a, b| exact[*a][2].total_cmp(&exact[*b][2])).unwrap();
         let errors: Vec<f64> = (0..100)
             .map(|run| {

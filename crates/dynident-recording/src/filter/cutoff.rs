@@ -4,7 +4,6 @@ use crate::error::{FilterError, require};
 use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
 
-/// Maximum number of samples that are used.
 pub(crate) const MAX_CUTOFF_SAMPLES: usize = 1 << 16;
 
 /// Limits of the choice of a cut-off. They are not part of a study file.
@@ -120,7 +119,6 @@ struct Content {
     noise: f64,
 }
 
-/// The spectrum of a joint's position and acceleration.
 struct Spectrum {
     /// Spectrum of the second difference, from the second bin on.
     acceleration: Vec<f64>,

@@ -149,7 +149,6 @@ impl Block {
     const ZERO: Self = Self([0.0; BLOCK]);
 }
 
-/// Filter shared by all decimators with the same settings.
 #[derive(Debug)]
 struct Filter {
     /// The coefficients, shifted by 0, 1, .. and padded with zeros: for outputs whose support starts at this row of a
@@ -313,7 +312,6 @@ impl Convolution<'_> {
             }
         }
         let places = self.begun.len() / self.columns;
-        // Outputs whose support has started.
         for output in self.outputs..end.div_ceil(factor) {
             let support = output * factor;
             let (phase, base) = (support % BLOCK, support / BLOCK);
@@ -450,7 +448,6 @@ mod tests {
                     .map(|(k, tap)| tap * (2.0 * PI * f / rate * (k as f64 - middle)).cos())
                     .sum::<f64>()
             };
-            // The documented figures.
             let ripple = 10_f64.powf(-db / 20.0);
             for i in 0..=100 {
                 let share = f64::from(i) / 100.0;

@@ -27,12 +27,10 @@ pub(crate) struct NoiseSpectra {
 }
 
 impl NoiseSpectra {
-    /// Spectra of the uniformly sampled positions `q`.
     pub(crate) fn of<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> Self {
         Self { joints: q.iter().map(|q| spectrum(q.as_ref())).collect(), rate_hz }
     }
 
-    /// [`position_noise`] for one cut-off.
     pub(crate) fn beyond(&self, cutoff_hz: f64) -> Vec<f64> {
         let of_joint = |spectrum: &Vec<f64>| noise_beyond(spectrum, self.rate_hz, cutoff_hz);
         self.joints.iter().map(|spectrum| spectrum.as_ref().and_then(of_joint).unwrap_or(0.0)).collect()

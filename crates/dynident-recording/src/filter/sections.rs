@@ -6,9 +6,7 @@ use core::f64::consts::PI;
 /// `H(z) = (b0 + b1 z⁻¹ + b2 z⁻²) / (1 + a1 z⁻¹ + a2 z⁻²)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Section {
-    /// Numerator.
     pub(crate) b: [f64; 3],
-    /// Denominator after the leading one.
     pub(crate) a: [f64; 2],
 }
 

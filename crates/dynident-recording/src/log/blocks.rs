@@ -17,7 +17,6 @@ enum Source {
 /// A block or the end, and the rows left out so far.
 type Read = (Result<Option<RawBlock>, RecordingError>, LinesDropped);
 
-/// The blocks of one pass over a log.
 #[derive(Debug)]
 pub(crate) struct RawBlocks {
     label: String,
@@ -69,12 +68,10 @@ impl RawBlocks {
         read
     }
 
-    /// Name of the log in messages.
     pub(crate) fn label(&self) -> &str {
         &self.label
     }
 
-    /// Rows and lines left out so far.
     pub(crate) fn dropped(&self) -> &LinesDropped {
         &self.dropped
     }

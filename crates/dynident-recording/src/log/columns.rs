@@ -6,14 +6,11 @@ use super::source::{LogSource, LogTable};
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 
-/// A table that is being read, and its requested columns.
 #[derive(Debug)]
 pub(super) struct ColumnSelection {
     pub(super) label: String,
     pub(super) table: Box<dyn LogTable>,
-    /// Column of each slot.
     fields: Vec<usize>,
-    /// The current row, one value for each slot.
     pub(super) values: Vec<f64>,
     /// Number of rows read or skipped so far.
     pub(super) rows: u64,
@@ -47,7 +44,6 @@ impl ColumnSelection {
         })
     }
 
-    /// Completes the selection.
     pub(super) fn finish_selection(&mut self) {
         self.table.select(&self.fields);
         self.values = vec![0.0; self.fields.len()];
@@ -93,14 +89,12 @@ impl ColumnSelection {
         }
     }
 
-    /// Reads one row into `values`; false at the end.
     pub(super) fn next_row(&mut self) -> Result<bool, RecordingError> {
         let found = self.table.next_row(&mut self.values)?;
         self.rows += u64::from(found);
         Ok(found)
     }
 
-    /// Skips one row; false at the end.
     pub(super) fn skip_row(&mut self) -> Result<bool, RecordingError> {
         let found = self.table.skip_row()?;
         self.rows += u64::from(found);
@@ -112,7 +106,6 @@ impl ColumnSelection {
         !self.values.iter().all(|value| value.is_finite())
     }
 
-    /// The error for a missing value in the current row.
     pub(super) fn missing_error(&self) -> RecordingError {
         let slot = self.values.iter().position(|value| !value.is_finite()).unwrap_or(0);
         let field = self.fields[slot];
@@ -123,13 +116,11 @@ impl ColumnSelection {
         }
     }
 
-    /// Name and index of a requested column, for messages.
     pub(super) fn label_of_slot(&self, slot: usize) -> String {
         column_label(self.table.names(), self.fields[slot])
     }
 }
 
-/// Name and index of a column, for messages.
 pub(super) fn column_label(names: Option<&[String]>, field: usize) -> String {
     match names.and_then(|names| names.get(field)) {
         Some(name) => format!("`{}` ({field})", name.escape_debug()),

@@ -83,7 +83,6 @@ impl LogSource for FileLog {
     }
 }
 
-/// A table read by dynident-formats.
 #[derive(Debug)]
 struct FileTable {
     label: String,

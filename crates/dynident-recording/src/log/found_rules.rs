@@ -4,7 +4,6 @@ use super::channels::ColumnRef;
 use super::format::LogFormat;
 use super::row_rules::RowRule;
 
-/// Rules of a log, each with the slot of its column in a row.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FoundRules {
     rows: Vec<[u64; 2]>,
@@ -31,7 +30,6 @@ impl FoundRules {
         })
     }
 
-    /// Whether the data row with this number, time and values is left out.
     pub(super) fn drops(&self, row: u64, time_s: f64, values: &[f64]) -> bool {
         self.rows.iter().any(|[first, end]| (*first..*end).contains(&row))
             || self.time_s.iter().any(|[from, to]| (*from..*to).contains(&time_s))

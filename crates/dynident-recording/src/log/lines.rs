@@ -11,7 +11,6 @@ const MAX_LINE_BYTES: usize = 1 << 20;
 /// Initial buffer size, bytes: reads of this size bypass the buffer of an underlying reader.
 const BUFFER_BYTES: usize = 1 << 19;
 
-/// The data lines of one file.
 pub(super) struct Lines {
     path: PathBuf,
     text: Box<dyn Read + Send>,
@@ -34,7 +33,6 @@ impl core::fmt::Debug for Lines {
 }
 
 impl Lines {
-    /// The lines of `text`, the contents of the file at `path`.
     pub(super) fn new(path: &Path, text: Box<dyn Read + Send>) -> Self {
         Self {
             path: path.to_owned(),
@@ -56,7 +54,6 @@ impl Lines {
         self.complete
     }
 
-    /// Whether the current line is the last.
     pub(super) fn at_end(&mut self) -> Result<bool, RecordingError> {
         while self.line.end == self.filled && !self.ended {
             self.read_on()?;

@@ -137,7 +137,6 @@ pub struct MemoryLog {
 enum Values {
     /// Entry `row * width + column`.
     RowMajor(Vec<f64>),
-    /// One array for each column.
     Columns(Vec<Vec<f64>>),
 }
 
@@ -213,7 +212,6 @@ impl MemoryLog {
     }
 }
 
-/// Omits the numbers.
 impl core::fmt::Debug for MemoryLog {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let mut shown = f.debug_struct("MemoryLog");

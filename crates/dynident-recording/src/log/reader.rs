@@ -13,7 +13,6 @@ use std::path::Path;
 /// Maximum position or torque: its squares and its second differences per second squared are finite.
 const MAX_VALUE: f64 = 1e60;
 
-/// Maximum number of rows in a [`RawBlock`].
 const MAX_BLOCK_ROWS: usize = 4096;
 
 /// Successive rows of a log in joint values (SI), as logged: no filter, no resampling.
@@ -333,7 +332,6 @@ fn channel_groups(log: &Log, tables: &mut Vec<ColumnSelection>) -> Result<Vec<Gr
     Ok(groups)
 }
 
-/// The keys of a format that leave out rows, for messages.
 fn describe_selection(format: &LogFormat) -> String {
     let mut selection = Vec::new();
     match (format.rows, format.fraction) {

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
-/// The last row count and its validity.
 #[derive(Debug, Default)]
 pub(super) struct RowCount(Mutex<Option<(Counted, u64)>>);
 

@@ -54,7 +54,6 @@ impl RowRule {
     }
 }
 
-/// Checks the ranges of rows and times that are left out.
 pub(super) fn checked_ranges(drop_rows: &[[u64; 2]], drop_time_s: &[[f64; 2]]) -> Result<(), FormatError> {
     for [first, end] in drop_rows {
         if first >= end {

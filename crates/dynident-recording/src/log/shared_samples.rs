@@ -7,7 +7,6 @@
 use super::{Log, LogReader, RawBlock};
 use crate::error::RecordingError;
 
-/// Maximum number of rows of a log for the comparison.
 const MAX_ROWS: usize = 400_000;
 /// Number of places in the second log that are searched in the first.
 const SEARCHED_PLACES: usize = 12;

@@ -27,7 +27,6 @@ pub(super) struct TextTable {
 }
 
 impl TextTable {
-    /// The table in `text`, the contents of the file at `path`.
     pub(super) fn open(
         path: &Path,
         text: Box<dyn Read + Send>,

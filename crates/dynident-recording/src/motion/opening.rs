@@ -13,7 +13,6 @@ use crate::quantisation::quantisation_step;
 use crate::report::rows_to_a_value;
 use std::sync::Arc;
 
-/// Estimates from the first rows.
 #[derive(Debug)]
 pub(super) struct Opening {
     pub(super) clock: Clock,

@@ -44,7 +44,6 @@ pub struct MotionStream {
     joints: Vec<String>,
     clock: Clock,
     cutoff: CutoffChoice,
-    /// Cut-off of the differentiator, Hz.
     cutoff_in_use_hz: f64,
     position_noise: Vec<f64>,
     differentiator: Box<dyn Differentiator>,
@@ -149,7 +148,6 @@ impl MotionStream {
         Self::opened(log, settings, &opening, differentiator)
     }
 
-    /// The stream of an opened log, before its first row.
     fn opened(
         log: &Log,
         settings: &MotionSettings,
@@ -369,7 +367,6 @@ impl MotionStream {
         Ok(())
     }
 
-    /// Returns the remaining samples of the segment and starts the next one.
     fn close_segment(&mut self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
         let available = self.uniform[0].len();
         let total = self.passed + available as u64;
@@ -428,7 +425,6 @@ impl MotionStream {
     }
 }
 
-/// A check for each channel, in the order of [`LogFormat::groups`].
 fn channel_checks(log: &Log, opening: &Opening) -> Vec<ChannelCheck> {
     let mut checks = Vec::new();
     for (quantity, _) in log.format.groups() {

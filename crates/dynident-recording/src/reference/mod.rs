@@ -18,7 +18,6 @@ use crate::log::{
 use std::path::Path;
 use stroke::{between, share_rests, strokes_of};
 
-/// Maximum number of samples of a sampled reference.
 const MAX_SAMPLES: usize = 10_000_000;
 /// Maximum velocity and acceleration of a joint at rest, as shares of their peaks.
 const MAX_REST_SHARES: [f64; 2] = [1e-3, 1e-2];
@@ -276,7 +275,6 @@ impl Reference {
     }
 }
 
-/// Checks for two or more increasing times.
 pub(crate) fn check_boundaries(boundaries_s: &[f64]) -> Result<(), FilterError> {
     let finite = boundaries_s.iter().all(|t| t.is_finite());
     if boundaries_s.len() >= 2 && finite && boundaries_s.windows(2).all(|pair| pair[1] > pair[0]) {

@@ -80,7 +80,6 @@ impl Extreme {
         Self { value: f64::NEG_INFINITY, run: 0, longest: 0 }
     }
 
-    /// Adds values with the maximum `largest`.
     #[inline]
     fn add_all(&mut self, largest: f64, values: impl Iterator<Item = f64>) {
         if largest < self.value {
@@ -136,7 +135,6 @@ impl ChannelCheck {
         self.samples += values.len() as u64;
     }
 
-    /// Marks a gap of the stamps before the next sample.
     pub(crate) fn begin_piece(&mut self) {
         self.jumps.begin_piece();
     }

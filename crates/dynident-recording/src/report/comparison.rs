@@ -4,7 +4,6 @@ use super::lag::{Lag, best_lag};
 use crate::log::{Quantity, si_factor};
 use serde::{Deserialize, Serialize};
 
-/// Maximum number of samples for the lag.
 const MAX_LAG_SAMPLES: usize = 1 << 13;
 
 /// Comparison of a logged velocity (or acceleration) with the derivative of the position, both filtered alike.
@@ -24,7 +23,7 @@ pub struct DerivativeComparison {
     /// a dead position.
     #[serde(default)]
     pub ratio: Option<f64>,
-    /// Lag of the logged signal behind the derivative, in the piece where the derivative variation most.
+    /// Lag of the logged signal behind the derivative, in the piece where the derivative varies most.
     pub lag: Option<Lag>,
 }
 
@@ -64,7 +63,6 @@ impl DerivativeComparison {
     }
 }
 
-/// Accumulates a [`DerivativeComparison`].
 #[derive(Clone, Debug)]
 pub(crate) struct Comparison {
     joint: String,
@@ -92,7 +90,6 @@ impl Comparison {
         }
     }
 
-    /// Adds the samples of one piece.
     pub(crate) fn add(&mut self, derived: &[f64], logged: &[f64]) {
         for (derived, logged) in derived.iter().zip(logged) {
             self.difference += (derived - logged).powi(2);

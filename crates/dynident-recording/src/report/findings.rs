@@ -19,7 +19,6 @@ fn ordinal(number: u64) -> String {
     format!("{number}{ending}")
 }
 
-/// Findings in the order of the checks.
 #[derive(Default)]
 struct Findings(Vec<Finding>);
 
@@ -67,7 +66,6 @@ impl ImportReport {
         self.findings = findings.0;
     }
 
-    /// Sample rate and gaps.
     fn check_clock(&self, findings: &mut Findings) {
         findings.add(
             Level::Info,
@@ -83,7 +81,6 @@ impl ImportReport {
         }
     }
 
-    /// Pieces between gaps, and samples left out of them.
     fn check_pieces(&self, findings: &mut Findings) {
         if self.segments > 1 {
             findings.add(Level::Info, "time", format!("split at gaps into {} pieces", self.segments));
@@ -107,7 +104,6 @@ impl ImportReport {
         }
     }
 
-    /// Stamps that are equal, go backwards or are too close.
     fn check_stamps(&self, findings: &mut Findings) {
         if self.duplicate_stamps > 0 {
             let what = if self.clock.repeats_rows {
@@ -131,7 +127,6 @@ impl ImportReport {
         }
     }
 
-    /// Values that the recorder repeats over several rows.
     fn check_repeated_values(&self, findings: &mut Findings) {
         for (quantity, every) in [("position", self.rows_to_a_position), ("torque", self.rows_to_a_torque)] {
             let Some(every) = every else { continue };
@@ -145,7 +140,6 @@ impl ImportReport {
         }
     }
 
-    /// Rows and samples that were left out.
     fn check_left_out(&self, findings: &mut Findings) {
         if self.dropped.missing > 0 {
             findings.add(
@@ -167,7 +161,6 @@ impl ImportReport {
         }
     }
 
-    /// A dead or saturated channel.
     fn check_dead_or_saturated(&self, channel: &ChannelReport, findings: &mut Findings) {
         let Channel { name, measured } = Channel::of(channel);
         if channel.constant() {
@@ -190,7 +183,6 @@ impl ImportReport {
         }
     }
 
-    /// Whole turns, outliers and quantisation of a channel.
     fn check_jumps(&self, channel: &ChannelReport, findings: &mut Findings) {
         let Channel { name, measured } = Channel::of(channel);
         if channel.turns > 0 {
@@ -250,7 +242,6 @@ impl ImportReport {
         Some((joints, message))
     }
 
-    /// A logged derivative that differs from that of the position.
     fn check_difference(&self, quantity: &str, comparison: &DerivativeComparison, findings: &mut Findings) {
         let name = format!("{quantity} {}", comparison.joint);
         let difference = 100.0 * comparison.relative_rms_difference;

@@ -34,7 +34,6 @@ pub(crate) fn rows_to_a_value(channels: &[Vec<f64>]) -> Option<u64> {
     (usual > 1 && even as f64 >= MIN_EVEN_SHARE * steps.len() as f64).then_some(usual as u64)
 }
 
-/// The rows at which a channel differs from the previous row.
 fn changes(values: &[f64]) -> impl Iterator<Item = usize> {
     (1..values.len()).filter(|&row| values[row] != values[row - 1])
 }

@@ -20,7 +20,6 @@ const MIN_JUMP_RATIO: f64 = 5.0;
 /// Minimum size of a jump as a share of the channel's range, because encoders flicker at rest.
 const MIN_JUMP_RANGE_SHARE: f64 = 0.01;
 
-/// Number of samples that are processed together.
 pub(super) const BATCH: usize = 64;
 /// Less than `DECAY` to the power of `BATCH`: minimum remaining share of the largest step nearby at the end of a run.
 const MIN_DECAY_PER_BATCH: f64 = 0.5;
@@ -55,7 +54,6 @@ pub struct Jump {
     pub period: Option<f64>,
 }
 
-/// Statistics of the steps of one channel.
 #[derive(Clone, Debug)]
 pub(super) struct JumpCheck {
     turn: Option<f64>,
@@ -192,7 +190,6 @@ impl JumpCheck {
         (last as u64 + 1, Some(Jump { row, before, after, largest_other, period }))
     }
 
-    /// Number of steps of a whole turn.
     pub(super) fn wraps(&self) -> u64 {
         self.wraps
     }

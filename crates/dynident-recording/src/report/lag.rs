@@ -65,7 +65,6 @@ impl Lag {
     }
 }
 
-/// Number of lags that are computed together.
 const PARALLEL_LAGS: usize = 8;
 
 /// Pearson's correlation of `a` with `b` from its samples 0, 1, ... on; not finite if a signal is constant or not

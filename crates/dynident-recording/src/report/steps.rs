@@ -2,7 +2,6 @@
 
 use super::{Gap, Steps};
 
-/// Maximum number of listed gaps.
 const MAX_LISTED_GAPS: usize = 100;
 
 #[derive(Clone, Debug, Default)]

@@ -2,7 +2,6 @@
 
 use dynident_recording::{JointSamples, Level, Log, MotionBlock, MotionSettings, MotionStream, Reason};
 
-/// Linear congruential generator.
 struct Random(u64);
 
 impl Random {

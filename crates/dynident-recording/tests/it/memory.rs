@@ -9,7 +9,6 @@ fn joints() -> Vec<String> {
     vec!["shoulder".to_owned(), "elbow".to_owned()]
 }
 
-/// All blocks of a log, and its report.
 fn motion(log: &Log, settings: &MotionSettings) -> Result<(Vec<MotionBlock>, ImportReport), RecordingError> {
     let mut stream = MotionStream::new(log, settings)?;
     let (mut block, mut blocks) = (MotionBlock::default(), Vec::new());
@@ -155,7 +154,6 @@ proptest! {
     }
 }
 
-/// A report is stored as JSON in a result and read back.
 #[test]
 fn a_report_survives_json() {
     let rows = rows(3000);

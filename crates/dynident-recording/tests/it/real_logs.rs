@@ -11,7 +11,6 @@ fn joints(n: usize) -> Vec<String> {
 struct Import {
     report: ImportReport,
     rows: usize,
-    /// Maximum velocity and acceleration.
     dq: f64,
     ddq: f64,
 }

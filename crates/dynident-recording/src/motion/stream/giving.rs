@@ -20,12 +20,10 @@ impl Span {
         self.given.len()
     }
 
-    /// Index of the first sample of the block in the window.
     fn first_in_window(&self) -> usize {
         self.given.start - self.window.start
     }
 
-    /// Indices of the block's samples in the window.
     fn in_window(&self) -> Range<usize> {
         self.first_in_window()..self.given.end - self.window.start
     }
@@ -62,7 +60,6 @@ impl MotionStream {
         Ok(false)
     }
 
-    /// Empties a block and sets its time, piece and size.
     fn begin_block(&self, block: &mut MotionBlock, span: &Span) {
         let (from, rows) = (span.given.start, span.rows());
         let rate = self.clock.rate_hz;
@@ -86,7 +83,6 @@ impl MotionStream {
         }
     }
 
-    /// Marks the samples of a block whose torque is ignored.
     fn set_torques_aside(&mut self, block: &mut MotionBlock, span: &Span) {
         let (joints, rows) = (self.joints.len(), span.rows());
         let first = self.passed + span.given.start as u64;
@@ -136,7 +132,6 @@ impl MotionStream {
         Ok(marked)
     }
 
-    /// Compares a joint's logged velocity and acceleration with the derivatives in the window.
     fn compare(&mut self, span: &Span, joint: usize) -> Result<(), RecordingError> {
         let rate = self.clock.rate_hz;
         let [_, dq, ddq, other] = &mut self.window;
@@ -153,7 +148,6 @@ impl MotionStream {
         Ok(())
     }
 
-    /// Drops the samples before the context of the next block.
     fn forget(&mut self, context: usize) {
         let unneeded = self.done.saturating_sub(context);
         if unneeded > 0 {
