@@ -25,3 +25,13 @@ pub(crate) fn differentiated(differentiator: &dyn Differentiator, rate_hz: f64, 
 pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }
+
+/// White noise of unit variance: sums of twelve uniform numbers from a linear congruential generator.
+pub(crate) fn sums_of_uniforms(seed: u64, n: usize) -> Vec<f64> {
+    let mut state = seed;
+    let mut uniform = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..n).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+}

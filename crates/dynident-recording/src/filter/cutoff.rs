@@ -226,22 +226,13 @@ pub(crate) fn welch(signal: &[f64], length: usize) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::derivative::test_signals::sums_of_uniforms;
     use core::f64::consts::TAU;
-
-    /// White noise of unit variance from a linear congruential generator, twelve uniform numbers per sample.
-    fn noise(n: usize) -> Vec<f64> {
-        let mut state = 12345_u64;
-        let mut uniform = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..n).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
-    }
 
     #[test]
     fn the_cutoff_lies_between_the_highest_harmonic_and_the_noise() {
         let (rate, n) = (500.0, 20_000);
-        let noise = noise(n);
+        let noise = sums_of_uniforms(12345, n);
         for sigma in [0.0, 1e-6, 1e-4] {
             let q: Vec<f64> = (0..n)
                 .map(|i| {
@@ -258,7 +249,7 @@ mod tests {
 
     #[test]
     fn joints_at_rest_are_ignored() {
-        let q = [noise(5000), vec![1.0; 5000]];
+        let q = [sums_of_uniforms(12345, 5000), vec![1.0; 5000]];
         let choice = cutoff(&q, 100.0);
         assert_eq!(choice.joints_hz, [None, None], "{choice:?}");
         assert_eq!(choice.cutoff_hz, 10.0);

@@ -63,27 +63,18 @@ fn noise_beyond(spectrum: &[f64], rate_hz: f64, cutoff_hz: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::derivative::test_signals::sums_of_uniforms;
     use core::f64::consts::TAU;
-
-    /// Gaussian noise from a linear congruential generator, twelve uniform numbers per sample.
-    fn noise(n: usize, seed: u64) -> Vec<f64> {
-        let mut state = seed;
-        let mut uniform = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..n).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
-    }
 
     #[test]
     fn noise_is_found_below_a_motion_and_at_rest() {
         let (rate, n, sigma) = (500.0, 10_000, 2.0e-5);
-        let moving: Vec<f64> = noise(n, 1)
+        let moving: Vec<f64> = sums_of_uniforms(1, n)
             .iter()
             .enumerate()
             .map(|(i, noise)| (TAU * 0.8 * i as f64 / rate).sin() + sigma * noise)
             .collect();
-        let resting: Vec<f64> = noise(n, 2).iter().map(|noise| 0.3 + sigma * noise).collect();
+        let resting: Vec<f64> = sums_of_uniforms(2, n).iter().map(|noise| 0.3 + sigma * noise).collect();
         let found = position_noise(&[moving, resting, vec![0.3; n]], rate, 5.0);
         // Bins of 4 pieces each: their lower quartile is a third below the mean, so the root is about 18 % low.
         for noise in &found[..2] {
@@ -95,7 +86,7 @@ mod tests {
     #[test]
     fn positions_filtered_before_they_were_logged_keep_their_noise() {
         // A moving mean of eleven samples: gain 0.92 at 10 Hz, nearly zero at half the rate.
-        let raw = noise(20_010, 3);
+        let raw = sums_of_uniforms(3, 20_010);
         let q: Vec<f64> = raw.windows(11).map(|x| x.iter().sum::<f64>() / 11.0).collect();
         let found = position_noise(&[q], 500.0, 8.0)[0];
         assert!((0.5..1.0).contains(&found), "{found}");
@@ -104,7 +95,7 @@ mod tests {
     #[test]
     fn short_and_invalid_series_have_no_noise() {
         assert_eq!(position_noise(&[vec![], vec![1.0; 10], vec![f64::NAN; 100]], 100.0, 10.0), [0.0; 3]);
-        assert!(position_noise(&[noise(64, 4)], 100.0, 1000.0)[0] > 0.0);
-        assert!(position_noise(&[noise(64, 4)], 100.0, 0.0)[0] > 0.0);
+        assert!(position_noise(&[sums_of_uniforms(4, 64)], 100.0, 1000.0)[0] > 0.0);
+        assert!(position_noise(&[sums_of_uniforms(4, 64)], 100.0, 0.0)[0] > 0.0);
     }
 }

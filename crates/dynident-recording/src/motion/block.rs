@@ -7,6 +7,7 @@ use crate::derivative::DifferentiatorSettings;
 use crate::error::{FilterError, require};
 use crate::filter::CutoffSettings;
 use crate::log::OneOrMany;
+use crate::report::ReportSettings;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +46,8 @@ pub struct ImportLimits {
     pub clock: ClockSettings,
     /// Cut-off.
     pub cutoff: CutoffSettings,
+    /// Findings in the report.
+    pub report: ReportSettings,
 }
 
 /// Maximum delay for any robot, s.
@@ -64,6 +67,7 @@ impl MotionSettings {
         self.limits.cleaning.validate()?;
         self.limits.clock.validate()?;
         self.limits.cutoff.validate()?;
+        self.limits.report.validate()?;
         self.differentiator.validate()
     }
 

@@ -14,10 +14,10 @@ use crate::error::{FilterError, RecordingError};
 use crate::filter::CutoffChoice;
 use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
 use crate::reference::Reference;
-use crate::report::ImportReport;
 use crate::report::channels::ChannelCheck;
 use crate::report::comparison::Comparison;
 use crate::report::steps::TimeCheck;
+use crate::report::{ImportReport, ReportSettings};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
@@ -71,6 +71,7 @@ pub struct MotionStream {
     /// For positions and for torques.
     rows_to_a_value: [Option<u64>; 2],
     time_check: TimeCheck,
+    report_limits: ReportSettings,
     checks: Vec<ChannelCheck>,
     velocity: Vec<Comparison>,
     acceleration: Vec<Comparison>,
@@ -203,7 +204,8 @@ impl MotionStream {
             short_segments: [0; 2],
             longest_short: 0,
             rows: 0,
-            checks: channel_checks(log, opening),
+            report_limits: settings.limits.report,
+            checks: channel_checks(log, opening, settings.limits.report),
             velocity,
             acceleration,
             window: Default::default(),
@@ -420,16 +422,16 @@ impl MotionStream {
             position_noise: self.position_noise.clone(),
             findings: Vec::new(),
         };
-        report.find();
+        report.find(&self.report_limits);
         report
     }
 }
 
-fn channel_checks(log: &Log, opening: &Opening) -> Vec<ChannelCheck> {
+fn channel_checks(log: &Log, opening: &Opening, limits: ReportSettings) -> Vec<ChannelCheck> {
     let mut checks = Vec::new();
     for (quantity, _) in log.format.groups() {
         for (index, joint) in log.joints.iter().enumerate() {
-            let mut check = ChannelCheck::new(quantity, joint);
+            let mut check = ChannelCheck::new(quantity, joint, limits);
             check.quantisation_step = match quantity {
                 Quantity::Position => opening.position_steps[index],
                 Quantity::Torque => opening.torque_steps[index],

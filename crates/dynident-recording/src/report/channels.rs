@@ -1,6 +1,7 @@
 //! Statistics of a channel: range, dead, quantised, saturated. Accumulated block by block.
 
 use super::jumps::{BATCH, Jump, JumpCheck, LoneSample};
+use super::settings::ReportSettings;
 use crate::log::Quantity;
 use serde::{Deserialize, Serialize};
 
@@ -104,7 +105,7 @@ impl Extreme {
 }
 
 impl ChannelCheck {
-    pub(crate) fn new(quantity: Quantity, joint: &str) -> Self {
+    pub(crate) fn new(quantity: Quantity, joint: &str, limits: ReportSettings) -> Self {
         Self {
             quantity,
             joint: joint.to_owned(),
@@ -112,7 +113,7 @@ impl ChannelCheck {
             high: Extreme::new(),
             zeros: 0,
             samples: 0,
-            jumps: JumpCheck::new((quantity == Quantity::Position).then_some(core::f64::consts::TAU)),
+            jumps: JumpCheck::new((quantity == Quantity::Position).then_some(core::f64::consts::TAU), limits),
             quantisation_step: None,
         }
     }
@@ -171,13 +172,13 @@ mod tests {
 
     #[test]
     fn clipped_and_dead_channels_are_detected_across_blocks() {
-        let mut check = ChannelCheck::new(Quantity::Torque, "elbow");
+        let mut check = ChannelCheck::new(Quantity::Torque, "elbow", ReportSettings::default());
         let clipped: Vec<f64> = (0..200).map(|i| (f64::from(i) * 0.05).sin().clamp(-0.5, 0.8)).collect();
         clipped.chunks(7).for_each(|block| check.add(block));
         let report = check.report();
         assert!(report.saturated() && !report.constant(), "{report:?}");
         assert_eq!((report.min, report.max), (-0.5, 0.8));
-        let mut dead = ChannelCheck::new(Quantity::Torque, "wrist");
+        let mut dead = ChannelCheck::new(Quantity::Torque, "wrist", ReportSettings::default());
         dead.add(&[0.0; 50]);
         assert!(dead.report().constant() && dead.report().zero_share == 1.0);
     }

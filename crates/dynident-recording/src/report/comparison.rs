@@ -1,6 +1,7 @@
 //! Compares a logged derivative with the derivative of the position.
 
 use super::lag::{Lag, best_lag};
+use super::settings::ReportSettings;
 use crate::log::{Quantity, si_factor};
 use serde::{Deserialize, Serialize};
 
@@ -27,28 +28,22 @@ pub struct DerivativeComparison {
     pub lag: Option<Lag>,
 }
 
-/// Minimum correlation for a logged signal that is proportional to the derivative.
-const MIN_PROPORTIONAL_CORRELATION: f64 = 0.98;
-/// Minimum difference of the logarithm of the factor from 0 for another unit or another sample rate.
-const MIN_LOG_RATIO: f64 = 0.05;
 /// Maximum share of the logged signal's power for a negligible derivative.
 const NEGLIGIBLE_POWER_SHARE: f64 = 1e-12;
 /// Units of velocity that are often mistaken for rad/s.
 const COMMON_UNITS: [&str; 2] = ["deg/s", "rpm"];
-/// Maximum relative difference of the factor from that of a unit.
-const UNIT_TOLERANCE: f64 = 0.02;
 
 impl DerivativeComparison {
     /// Factor from the derivative to the logged signal, if they are proportional and it differs from 1.
-    pub(crate) fn times(&self) -> Option<f64> {
-        let is_other = |ratio: &f64| *ratio > 0.0 && ratio.ln().abs() > MIN_LOG_RATIO;
-        self.ratio.filter(is_other).filter(|_| self.correlation > MIN_PROPORTIONAL_CORRELATION)
+    pub(crate) fn times(&self, limits: &ReportSettings) -> Option<f64> {
+        let is_other = |ratio: &f64| *ratio > 0.0 && ratio.ln().abs() > limits.min_log_factor;
+        self.ratio.filter(is_other).filter(|_| self.correlation > limits.proportional_correlation)
     }
 
     /// Explains a velocity that is `times` the derivative, in a log at `rate_hz`.
-    pub(crate) fn describe_velocity(times: f64, rate_hz: f64) -> String {
+    pub(crate) fn describe_velocity(times: f64, rate_hz: f64, limits: &ReportSettings) -> String {
         let is_it = |unit: &&str| {
-            si_factor(unit, Quantity::Velocity).is_some_and(|si| (times * si - 1.0).abs() < UNIT_TOLERANCE)
+            si_factor(unit, Quantity::Velocity).is_some_and(|si| (times * si - 1.0).abs() < limits.unit_tolerance)
         };
         match COMMON_UNITS.into_iter().find(is_it) {
             Some(unit) => format!(
@@ -148,14 +143,14 @@ mod tests {
         for (times, words) in
             [(9.5493, "unit = \"rpm\""), (57.3, "unit = \"deg/s\""), (1.25, "the rate is 125.0000 Hz")]
         {
-            let found = compared(&[swing(times)]).times().unwrap();
+            let found = compared(&[swing(times)]).times(&ReportSettings::default()).unwrap();
             assert!((found / times - 1.0).abs() < 1e-9);
-            let message = DerivativeComparison::describe_velocity(found, 100.0);
+            let message = DerivativeComparison::describe_velocity(found, 100.0, &ReportSettings::default());
             assert!(message.contains(words), "{message}");
         }
-        assert_eq!(compared(&[swing(1.02)]).times(), None);
+        assert_eq!(compared(&[swing(1.02)]).times(&ReportSettings::default()), None);
         let noisy: Vec<f64> = (0..2000).map(|i| (f64::from(i) * f64::from(i) * 0.37).sin()).collect();
-        assert_eq!(compared(&[(swing(1.0).0, noisy.clone())]).times(), None);
+        assert_eq!(compared(&[(swing(1.0).0, noisy.clone())]).times(&ReportSettings::default()), None);
         let dead = compared(&[(vec![1e-17; 2000], noisy)]);
         assert_eq!((dead.ratio, dead.relative_rms_difference), (None, 0.0));
     }

@@ -1,11 +1,8 @@
 //! Writes the findings of an [`ImportReport`] as sentences.
 
-use super::{ChannelReport, DerivativeComparison, Finding, ImportReport, Jump, Level};
+use super::{ChannelReport, DerivativeComparison, Finding, ImportReport, Jump, Level, ReportSettings};
 use crate::cleaning::{Reason, SetAside};
 use crate::log::Quantity;
-
-/// Maximum share of rejected samples for the level [`Level::Info`].
-const MAX_INFO_SHARE: f64 = 5e-3;
 
 /// `2nd`, `3rd`, `4th`, ..
 fn ordinal(number: u64) -> String {
@@ -43,13 +40,13 @@ impl Channel {
 
 impl ImportReport {
     /// Derives the findings from the other fields, most severe first.
-    pub(crate) fn find(&mut self) {
+    pub(crate) fn find(&mut self, limits: &ReportSettings) {
         let mut findings = Findings::default();
         self.check_clock(&mut findings);
         self.check_pieces(&mut findings);
         self.check_stamps(&mut findings);
         self.check_repeated_values(&mut findings);
-        self.check_left_out(&mut findings);
+        self.check_left_out(&mut findings, limits);
         for channel in &self.channels {
             self.check_dead_or_saturated(channel, &mut findings);
             self.check_jumps(channel, &mut findings);
@@ -59,7 +56,7 @@ impl ImportReport {
         }
         for (quantity, comparisons) in [("velocity", &self.velocity), ("acceleration", &self.acceleration)] {
             for comparison in comparisons {
-                self.check_difference(quantity, comparison, &mut findings);
+                self.check_difference(quantity, comparison, &mut findings, limits);
             }
         }
         findings.0.sort_by_key(|finding| core::cmp::Reverse(finding.level));
@@ -140,7 +137,7 @@ impl ImportReport {
         }
     }
 
-    fn check_left_out(&self, findings: &mut Findings) {
+    fn check_left_out(&self, findings: &mut Findings, limits: &ReportSettings) {
         if self.dropped.missing > 0 {
             findings.add(
                 Level::Warning,
@@ -156,7 +153,7 @@ impl ImportReport {
         }
         for found in &self.set_aside {
             let name = format!("{} {}", found.channel.key(), found.joint);
-            let few = found.share < MAX_INFO_SHARE && matches!(found.reason, Reason::Outlier | Reason::Spike);
+            let few = found.share < limits.max_info_share && matches!(found.reason, Reason::Outlier | Reason::Spike);
             findings.add(if few { Level::Info } else { Level::Warning }, &name, found.sentence());
         }
     }
@@ -242,16 +239,22 @@ impl ImportReport {
         Some((joints, message))
     }
 
-    fn check_difference(&self, quantity: &str, comparison: &DerivativeComparison, findings: &mut Findings) {
+    fn check_difference(
+        &self,
+        quantity: &str,
+        comparison: &DerivativeComparison,
+        findings: &mut Findings,
+        limits: &ReportSettings,
+    ) {
         let name = format!("{quantity} {}", comparison.joint);
         let difference = 100.0 * comparison.relative_rms_difference;
-        if comparison.correlation < -0.5 {
+        if comparison.correlation < limits.opposite_correlation {
             let message = "the logged signal has the opposite sign of the position's derivative";
             findings.add(Level::Problem, &name, message.to_owned());
-        } else if let Some(times) = comparison.times().filter(|_| quantity == "velocity") {
-            let message = DerivativeComparison::describe_velocity(times, self.rate_hz);
+        } else if let Some(times) = comparison.times(limits).filter(|_| quantity == "velocity") {
+            let message = DerivativeComparison::describe_velocity(times, self.rate_hz, limits);
             findings.add(Level::Warning, &name, message);
-        } else if difference > 20.0 && comparison.lag.is_some() {
+        } else if difference > limits.min_difference_percent && comparison.lag.is_some() {
             let message = format!(
                 "differs from the position's derivative by {difference:.1} % RMS (correlation {:.3})",
                 comparison.correlation

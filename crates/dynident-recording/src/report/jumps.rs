@@ -1,24 +1,17 @@
 //! Detects samples that no motion causes: angles that wrap after a turn, single values far from their neighbours, and
 //! jumps.
 
+use super::settings::ReportSettings;
 use serde::{Deserialize, Serialize};
 
 /// Maximum difference of a wrapped step from a whole turn, as a share of the turn; it covers the motion of one sample.
 const TURN_TOLERANCE: f64 = 0.1;
-/// Minimum ratio of an isolated sample's steps, before and after it, to the largest step nearby.
-const MIN_NEARBY_RATIO: f64 = 20.0;
 /// Decay of the largest step nearby per sample: it is negligible after some hundred samples.
 const DECAY: f64 = 0.99;
-/// Minimum deviation of an isolated sample, as a share of the range of all others.
-const MIN_ISOLATED_RANGE_SHARE: f64 = 0.25;
 /// Number of steps before the detection starts.
 const MIN_SAMPLES: u64 = 20;
 /// Number of largest steps that are kept. If all of them were jumps, they would belong to the signal.
 const KEPT_STEPS: usize = 8;
-/// Minimum ratio of a jump to the largest step of the motion.
-const MIN_JUMP_RATIO: f64 = 5.0;
-/// Minimum size of a jump as a share of the channel's range, because encoders flicker at rest.
-const MIN_JUMP_RANGE_SHARE: f64 = 0.01;
 
 pub(super) const BATCH: usize = 64;
 /// Less than `DECAY` to the power of `BATCH`: minimum remaining share of the largest step nearby at the end of a run.
@@ -56,6 +49,7 @@ pub struct Jump {
 
 #[derive(Clone, Debug)]
 pub(super) struct JumpCheck {
+    limits: ReportSettings,
     turn: Option<f64>,
     samples: u64,
     /// Samples since the last gap of the stamps.
@@ -74,8 +68,9 @@ pub(super) struct JumpCheck {
 
 impl JumpCheck {
     /// For a channel whose angles may wrap at `turn`.
-    pub(super) fn new(turn: Option<f64>) -> Self {
+    pub(super) fn new(turn: Option<f64>, limits: ReportSettings) -> Self {
         Self {
+            limits,
             turn,
             samples: 0,
             since_gap: 0,
@@ -106,7 +101,7 @@ impl JumpCheck {
         let largest = values.windows(2).map(step).fold(larger(begun[0], begun[1]), larger);
         // Fast path: no sample is isolated, wraps, or has one of the largest steps.
         let is_usual = self.since_gap >= 2
-            && largest < MIN_NEARBY_RATIO * MIN_DECAY_PER_BATCH * self.nearby
+            && largest < self.limits.isolated_step_ratio * MIN_DECAY_PER_BATCH * self.nearby
             && self.turn.is_none_or(|turn| largest < 0.5 * turn)
             && self.largest.len() == KEPT_STEPS
             && self.largest[KEPT_STEPS - 1].0 >= largest;
@@ -131,7 +126,7 @@ impl JumpCheck {
             let least = to.abs().min(from.abs());
             // The next sample shows whether the previous one was isolated.
             if to * from < 0.0
-                && least > MIN_NEARBY_RATIO * self.nearby
+                && least > self.limits.isolated_step_ratio * self.nearby
                 && self.samples > MIN_SAMPLES
                 && self.nearby > 0.0
             {
@@ -178,7 +173,9 @@ impl JumpCheck {
         let range = self.high - self.low;
         let is_apart = |pair: &[(f64, u64, [f64; 2])]| {
             let [larger, smaller] = [pair[0].0, pair[1].0];
-            smaller > 0.0 && larger > MIN_JUMP_RATIO * smaller && larger > MIN_JUMP_RANGE_SHARE * range
+            smaller > 0.0
+                && larger > self.limits.jump_step_ratio * smaller
+                && larger > self.limits.jump_range_share * range
         };
         let apart = self.largest.windows(2).rposition(is_apart).filter(|_| self.largest.len() == KEPT_STEPS);
         let Some(last) = apart else { return (0, None) };
@@ -198,7 +195,7 @@ impl JumpCheck {
     pub(super) fn lone(&self) -> (u64, Option<LoneSample>) {
         let range = self.high - self.low;
         match self.worst {
-            Some(worst) if self.worst_by > MIN_ISOLATED_RANGE_SHARE * range => (self.alone, Some(worst)),
+            Some(worst) if self.worst_by > self.limits.isolated_range_share * range => (self.alone, Some(worst)),
             _ => (0, None),
         }
     }
@@ -208,8 +205,12 @@ impl JumpCheck {
 mod tests {
     use super::*;
 
+    fn check_for(turn: Option<f64>) -> JumpCheck {
+        JumpCheck::new(turn, ReportSettings::default())
+    }
+
     fn seen(turn: Option<f64>, values: impl IntoIterator<Item = f64>) -> JumpCheck {
-        let mut check = JumpCheck::new(turn);
+        let mut check = check_for(turn);
         values.into_iter().for_each(|value| check.add(value));
         check
     }
@@ -236,7 +237,7 @@ mod tests {
         let (count, jump) = seen(None, (0..1500).map(cut)).jumps();
         let jump = jump.unwrap();
         assert_eq!((count, jump.row, jump.before, jump.after), (1, 700, angle(699), angle(900)));
-        let mut paused = JumpCheck::new(None);
+        let mut paused = check_for(None);
         (0..700).for_each(|i| paused.add(angle(i)));
         paused.begin_piece();
         (900..2000).for_each(|i| paused.add(angle(i)));
@@ -260,7 +261,7 @@ mod tests {
         for turn in [None, Some(2.0 * pi)] {
             for run in [1, 2, 3, 7, BATCH] {
                 let samples: Vec<f64> = (0..3000).map(spoilt).collect();
-                let mut together = JumpCheck::new(turn);
+                let mut together = check_for(turn);
                 samples.chunks(run).for_each(|run| together.add_all(run));
                 assert_eq!(format!("{together:?}"), format!("{:?}", seen(turn, samples)), "{turn:?} {run}");
             }

@@ -10,6 +10,7 @@ mod findings;
 mod held_rows;
 mod jumps;
 mod lag;
+mod settings;
 pub(crate) mod steps;
 
 pub use channels::ChannelReport;
@@ -17,6 +18,7 @@ pub use comparison::DerivativeComparison;
 pub(crate) use held_rows::rows_to_a_value;
 pub use jumps::{Jump, LoneSample};
 pub use lag::{Lag, best_lag};
+pub use settings::ReportSettings;
 
 use crate::cleaning::{Reason, SetAside};
 use crate::clock::Clock;

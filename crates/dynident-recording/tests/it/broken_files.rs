@@ -1,6 +1,6 @@
 //! Broken logs: each causes an error that names the file, the place and the fix, and never a panic.
+use super::file_with;
 use dynident_recording::{ImportReport, LogFormat, MotionBlock, MotionSettings, MotionStream, RecordingError};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// File in `tests/broken`, and a part of its message.
@@ -115,16 +115,14 @@ fn missing_files_folders_and_endless_lines_are_named() {
     assert!(message.contains("absent.csv: cannot be read"), "{message}");
     let message = import(&folder(), FORMAT).unwrap_err().to_string();
     assert!(message.contains("cannot be read"), "{message}");
-    let mut file = tempfile::NamedTempFile::new().unwrap();
-    file.write_all(b"t,q1,q2,tau1,tau2\n0,0,0,0,0\n").unwrap();
-    file.write_all(&vec![b'1'; (1 << 20) + 10]).unwrap();
+    let file = file_with([&b"t,q1,q2,tau1,tau2\n0,0,0,0,0\n"[..], &vec![b'1'; (1 << 20) + 10]].concat());
     let message = import(file.path(), FORMAT).unwrap_err().to_string();
     assert!(message.contains(":3: the line is longer than"), "{message}");
 }
 
 #[test]
 fn absurd_filters_and_values_are_refused_and_large_ones_stay_finite() {
-    let file = written(&rows(200));
+    let file = file_with(&rows(200));
     let format: LogFormat = toml::from_str(FORMAT).unwrap();
     for (settings, words) in [
         ("trim_s = -1.0", "trim_s"),
@@ -144,15 +142,9 @@ fn absurd_filters_and_values_are_refused_and_large_ones_stay_finite() {
         assert!(message.contains(words), "{message}");
     }
     let lines = (0..200).map(|i| format!("{},{}e59,-1e60,1e60,1e-300\n", f64::from(i) * 0.01, f64::from(i % 7)));
-    let large = written(&lines.fold("t,q1,q2,tau1,tau2\n".to_owned(), |text, line| text + &line));
+    let large = file_with(&lines.fold("t,q1,q2,tau1,tau2\n".to_owned(), |text, line| text + &line));
     let format = FORMAT.replace("rev", "rad");
     assert!(import(large.path(), &format).is_ok());
-}
-
-fn written(text: &str) -> tempfile::NamedTempFile {
-    let mut file = tempfile::NamedTempFile::new().unwrap();
-    file.write_all(text.as_bytes()).unwrap();
-    file
 }
 
 fn rows(n: usize) -> String {
@@ -168,13 +160,13 @@ fn rows(n: usize) -> String {
 #[test]
 fn a_cut_off_last_line_is_left_out_and_reported() {
     for tail in ["0.50,0.1", "0.50,0.1\n", "0.50,0.1,0.2,0.3,-", "0.50,0.1,0.2,1.2e"] {
-        let file = written(&(rows(50) + tail));
+        let file = file_with(&(rows(50) + tail));
         let (samples, report) = import(file.path(), FORMAT).unwrap();
         assert_eq!((samples, report.rows), (50, 50), "{tail:?}");
         assert!(report.dropped.truncated.unwrap().ends_with(":52"), "{tail:?}");
     }
     // A missing newline at the end is valid.
-    let (samples, report) = import(written(rows(50).trim_end()).path(), FORMAT).unwrap();
+    let (samples, report) = import(file_with(rows(50).trim_end()).path(), FORMAT).unwrap();
     assert_eq!((samples, report.dropped.truncated), (50, None));
 }
 
@@ -182,7 +174,7 @@ fn a_cut_off_last_line_is_left_out_and_reported() {
 fn rows_with_missing_values_can_be_dropped() {
     let text = rows(50).replace("\n0.20,", "\n0.20,nan,").replace("\n0.30,", "\n0.30,,");
     let cut = text.lines().map(|line| line.split(',').take(5).collect::<Vec<_>>().join(",") + "\n").collect::<String>();
-    let file = written(&cut);
+    let file = file_with(&cut);
     assert!(import(file.path(), FORMAT).unwrap_err().to_string().contains("set missing = \"drop\""));
     let (samples, report) = import(file.path(), &format!("missing = \"drop\"\n{FORMAT}")).unwrap();
     // The two holes are interpolated.
@@ -191,7 +183,7 @@ fn rows_with_missing_values_can_be_dropped() {
 
 #[test]
 fn selections_pick_rows_and_refuse_nothing() {
-    let file = written(&rows(100));
+    let file = file_with(&rows(100));
     for (selection, expected, first) in [
         ("rows = [10, 60]", 50, 10),
         ("fraction = [0.0, 0.65]", 65, 0),
@@ -239,7 +231,7 @@ fn paired_files_must_contain_the_same_rows() {
 
 #[test]
 fn formats_are_checked_key_by_key() {
-    let file = written(&rows(50));
+    let file = file_with(&rows(50));
     for (format, key) in [
         ("position = { columns = \"q{1..2}\" }\ntorque = { columns = \"tau{1..2}\" }", "`time`"),
         ("rate_hz = -5.0\nposition = { columns = \"q{1..2}\" }\ntorque = { columns = \"tau{1..2}\" }", "`rate_hz`"),

@@ -1,4 +1,5 @@
 //! Samples in memory give the same motion, bit by bit, as a file with the same numbers.
+use super::file_with;
 use dynident_recording::{
     ImportReport, JointSamples, Log, LogFormat, MemoryLog, MotionBlock, MotionSettings, MotionStream, RecordingError,
 };
@@ -39,9 +40,7 @@ fn file(rows: &[[f64; 8]]) -> tempfile::NamedTempFile {
         // The shortest text that is parsed to the same bits.
         writeln!(text, "{}", row.map(|x| format!("{x:?}")).join(",")).unwrap();
     }
-    let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), text).unwrap();
-    file
+    file_with(text)
 }
 
 const CHANNELS: &str = r#"

@@ -1,4 +1,5 @@
 //! Streams give the same motion as the whole log for any file layout; random files never cause a panic.
+use super::file_with;
 use dynident_recording::{
     Derivatives, DifferentiatorSettings, Log, LogFormat, LogReader, LogisticPath, MotionBlock, MotionSettings,
     MotionStream, RawBlock, ReferenceSettings,
@@ -8,12 +9,6 @@ use std::fmt::Write as _;
 
 fn format(text: &str) -> LogFormat {
     toml::from_str(text).unwrap()
-}
-
-fn file(bytes: &[u8]) -> tempfile::NamedTempFile {
-    let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), bytes).unwrap();
-    file
 }
 
 #[test]
@@ -28,7 +23,7 @@ fn pieces_equal_the_whole_log() {
         q.push(x);
         writeln!(text, "{x},{}", -x).unwrap();
     }
-    let file = file(text.as_bytes());
+    let file = file_with(&text);
     let format = format("rate_hz = 1000.0\nposition = { columns = [0] }\ntorque = { columns = [1] }");
     for differentiator in [
         DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(8.0) },
@@ -77,7 +72,7 @@ fn gaps_split_the_log_and_trimming_cuts_both_ends() {
         let t = f64::from(i) * 0.01 + if i < 150 { 0.0 } else { 3.0 };
         writeln!(text, "{t};{};{}", t.sin(), t).unwrap();
     }
-    let file = file(text.as_bytes());
+    let file = file_with(&text);
     let format = format("time = { column = \"t\" }\nposition = { columns = \"q\" }\ntorque = { columns = \"tau\" }");
     let settings = MotionSettings {
         differentiator: DifferentiatorSettings::SavitzkyGolay { window: 11, degree: 4 },
@@ -111,7 +106,7 @@ fn samples_off_the_stroke_are_cut_out_and_counted() {
         let second = path.offset + 1.1 * (path.at(t)[0] - path.offset);
         writeln!(text, "{t},{},{second},{i},0", path.at(t - 0.05)[0]).unwrap();
     }
-    let file = file(text.as_bytes());
+    let file = file_with(&text);
     let format =
         format("time = { column = \"t\" }\nposition = { columns = \"q{1..2}\" }\ntorque = { columns = \"tau{1..2}\" }");
     let reference = ReferenceSettings { joints: vec![path; 2], ..ReferenceSettings::default() };
@@ -162,7 +157,7 @@ fn a_deviation_is_the_same_in_pieces_as_at_once() {
     for x in &q {
         writeln!(text, "{x},0").unwrap();
     }
-    let file = file(text.as_bytes());
+    let file = file_with(&text);
     let format = format("rate_hz = 500.0\nposition = { columns = [0] }\ntorque = { columns = [1] }");
     let differentiator = DifferentiatorSettings::Deviation {
         reference: ReferenceSettings { joints: vec![path], start_s: 1.0, ..ReferenceSettings::default() },
@@ -196,7 +191,7 @@ fn samples_at_jittered_stamps_are_interpolated() {
         let t = (f64::from(i) + jitter) * 0.005;
         writeln!(text, "{t},{},{}", (3.0 * t).sin(), (5.0 * t).cos()).unwrap();
     }
-    let file = file(text.as_bytes());
+    let file = file_with(&text);
     let format = format("time = { column = \"t\" }\nposition = { columns = \"q\" }\ntorque = { columns = \"tau\" }");
     let mut stream =
         MotionStream::open(&format, file.path(), &["joint".to_owned()], &MotionSettings::default()).unwrap();
@@ -228,7 +223,7 @@ fn absurd_stamps_are_not_bridged() {
             let stamp = if (absurd..absurd + count).contains(&i) { size } else { t };
             writeln!(text, "{stamp:e},{},{}", (3.0 * t).sin(), (5.0 * t).cos()).unwrap();
         }
-        let file = file(text.as_bytes());
+        let file = file_with(&text);
         let format =
             format("time = { column = \"t\" }\nposition = { columns = \"q\" }\ntorque = { columns = \"tau\" }");
         let mut stream =
@@ -273,7 +268,7 @@ proptest! {
         if last_newline {
             text += newline;
         }
-        let file = file(text.as_bytes());
+        let file = file_with(&text);
         let format = format("rate_hz = 10.0\nposition = { columns = [2, 0] }\ntorque = { columns = [1, 1] }");
         let joints = ["x".to_owned(), "y".to_owned()];
         let mut reader = LogReader::open(&Log::file(file.path(), format, &joints)).unwrap();
@@ -297,7 +292,7 @@ proptest! {
         ],
         drop_missing: bool,
     ) {
-        let file = file(&bytes);
+        let file = file_with(&bytes);
         let missing = if drop_missing { "missing = \"drop\"" } else { "" };
         let format = format(&format!(
             "{missing}\ntime = {{ column = 0 }}\nposition = {{ columns = [1] }}\ntorque = {{ columns = [2] }}"
