@@ -70,12 +70,15 @@ impl CleaningSettings {
     /// # Errors
     /// A [`FilterError`] that names the setting.
     pub fn validate(&self) -> Result<(), FilterError> {
+        for (name, value) in
+            [("outlier_noise_ratio", self.outlier_noise_ratio), ("spike_noise_ratio", self.spike_noise_ratio)]
+        {
+            require(value.is_finite() && value > 0.0, name, value, "give a finite number above 0")?;
+        }
         for (name, value) in [
-            ("outlier_noise_ratio", self.outlier_noise_ratio),
             ("outlier_spread_share", self.outlier_spread_share),
             ("outlier_steps", self.outlier_steps),
             ("outlier_neighbour_ratio", self.outlier_neighbour_ratio),
-            ("spike_noise_ratio", self.spike_noise_ratio),
             ("spike_steps", self.spike_steps),
             ("held_motion_share", self.held_motion_share),
             ("held_steps", self.held_steps),

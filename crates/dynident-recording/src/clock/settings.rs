@@ -15,8 +15,8 @@ pub struct ClockSettings {
     pub min_repeat_share: f64,
     /// Minimum drift from an even grid, steps, 1 by default; less is within one step.
     pub min_drift_steps: f64,
-    /// Minimum relative variation of the rate (RMS), 1e-3 by default. It is the relative error of velocities and half
-    /// the relative error of inertias.
+    /// Minimum relative variation of the rate (RMS), 1e-3 by default. With an even grid, velocities have this
+    /// relative error and inertias twice of it.
     pub min_rate_variation: f64,
 }
 
