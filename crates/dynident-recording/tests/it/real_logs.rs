@@ -1,5 +1,5 @@
 //! Every available public recording, from its format in TOML to motion and findings.
-#![allow(clippy::print_stdout, reason = "helpers of tests; what was found is worth reading")]
+#![allow(clippy::print_stdout, reason = "helpers of tests; the findings are printed for inspection")]
 
 use dynident_recording::{ImportReport, Level, LogFormat, MotionBlock, MotionSettings, MotionStream};
 use dynident_testing::recordings;
