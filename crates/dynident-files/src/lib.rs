@@ -1,5 +1,5 @@
-//! **May this input file be read, and is it still the same?** Opens regular files only, reads at most a stated number
-//! of bytes, detects files that change while they are read, and quotes their text in messages.
+//! Safe reading of input files: opens regular files only, reads a limited number of bytes, detects files that change
+//! while they are read, and quotes their text in messages.
 //!
 //! ```
 //! use dynident_files::{SeenFiles, read};
@@ -26,23 +26,23 @@ use std::time::SystemTime;
 /// Opens a regular file for reading.
 ///
 /// # Errors
-/// If the system refuses it, or it is a folder, a named pipe, a device or a socket: those can block for ever or have no
-/// end, and inputs are read more than once.
+/// If the system reports an error, or the path is a folder, a named pipe, a device or a socket: those may block or have
+/// no end, and inputs are read more than once.
 pub fn open(path: &Path) -> io::Result<File> {
     require_regular(&std::fs::metadata(path)?)?;
     File::open(path)
 }
 
-/// Reads a whole regular file of at most `most_bytes`.
+/// Reads a whole regular file of at most `max_bytes`.
 ///
 /// # Errors
-/// As [`open`], and [`io::ErrorKind::FileTooLarge`] for a longer file, of which no more than `most_bytes` are read.
-pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+/// As [`open`], and [`io::ErrorKind::FileTooLarge`] for a longer file. At most `max_bytes` are read.
+pub fn read(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     // The length that the system reports may be wrong.
-    open(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most_bytes {
-        let problem = format!("it is larger than {} MiB", most_bytes >> 20);
+    open(path)?.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max_bytes {
+        let problem = format!("it is larger than {} MiB", max_bytes >> 20);
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, problem));
     }
     Ok(bytes)
@@ -52,8 +52,8 @@ pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// As [`read`], and [`io::ErrorKind::InvalidData`] for bytes that are not UTF-8.
-pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
-    String::from_utf8(read(path, most_bytes)?)
+pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<String> {
+    String::from_utf8(read(path, max_bytes)?)
         .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
 }
 
@@ -87,22 +87,20 @@ fn kind(_: &Metadata) -> &'static str {
     "a device or a pipe"
 }
 
-/// Characters of a quoted text at most.
-const MOST_QUOTED: usize = 60;
+const MAX_QUOTED_CHARS: usize = 60;
 
-/// A text from an input as a message quotes it: control characters escaped; of a longer text the beginning and its
-/// length.
+/// Quotes a text from an input for a message: control characters are escaped, and a long text is cut and followed by
+/// its length.
 pub fn quoted(text: &str) -> String {
-    let shown: String = text.chars().take(MOST_QUOTED).flat_map(char::escape_debug).collect();
+    let shown: String = text.chars().take(MAX_QUOTED_CHARS).flat_map(char::escape_debug).collect();
     match text.chars().count() {
-        all if all > MOST_QUOTED => format!("{shown}.. ({all} characters)"),
+        all if all > MAX_QUOTED_CHARS => format!("{shown}.. ({all} characters)"),
         _ => shown,
     }
 }
 
-/// What distinguishes a file from the one that takes its place: length, time of the last change and, on Unix, device
-/// and inode. Content that is replaced within the resolution of the file system's clock, in place and at the same
-/// length, is not detected.
+/// Identity of a file: length, modification time and, on Unix, device and inode. A file that is overwritten in place
+/// with the same length within the resolution of the file system's clock is not detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileIdentity {
     bytes: u64,
@@ -111,10 +109,10 @@ pub struct FileIdentity {
 }
 
 impl FileIdentity {
-    /// Reads the identity of the file at `path`, links followed.
+    /// Reads the identity of the file at `path`, following links.
     ///
     /// # Errors
-    /// If the system refuses it.
+    /// If the system reports an error.
     pub fn of(path: &Path) -> io::Result<Self> {
         let metadata = std::fs::metadata(path)?;
         Ok(Self { bytes: metadata.len(), modified: metadata.modified().ok(), place: place(&metadata) })
@@ -132,17 +130,17 @@ fn place(_: &Metadata) -> (u64, u64) {
     (0, 0)
 }
 
-/// Files with the identity that each had when it was first seen.
+/// Files with their identity when they were first seen.
 #[derive(Debug, Default)]
 pub struct SeenFiles {
     first: Mutex<BTreeMap<PathBuf, FileIdentity>>,
 }
 
 impl SeenFiles {
-    /// Whether the file at `path` is the one that the first call with this path found; true for the first call.
+    /// Whether the file at `path` is the same as in the first call with this path; true for the first call.
     ///
     /// # Errors
-    /// If the system refuses a file that was not seen before. A file that was seen and is missing has changed.
+    /// If the identity of a new file cannot be read. A seen file that is missing has changed.
     pub fn is_unchanged(&self, path: &Path) -> io::Result<bool> {
         let found = FileIdentity::of(path);
         let mut first = self.first.lock().unwrap_or_else(PoisonError::into_inner);
@@ -153,7 +151,7 @@ impl SeenFiles {
         Ok(true)
     }
 
-    /// The first path, in alphabetical order, whose file is not the one that was first seen.
+    /// The first path in alphabetical order whose file has changed.
     pub fn first_changed(&self) -> Option<PathBuf> {
         let first = self.first.lock().unwrap_or_else(PoisonError::into_inner);
         let changed =
@@ -167,12 +165,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_that_is_replaced_written_to_or_removed_has_changed() {
+    fn replaced_modified_and_removed_files_have_changed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         let change: [&dyn Fn(); 3] = [
             &|| {
-                // Same length and content, another file.
+                // Same length and content, but another file.
                 let other = folder.path().join("b");
                 std::fs::write(&other, "abc").unwrap();
                 std::fs::rename(&other, &path).unwrap();
@@ -186,14 +184,14 @@ mod tests {
             assert!(seen.is_unchanged(&path).unwrap() && seen.is_unchanged(&path).unwrap());
             assert_eq!(seen.first_changed(), None);
             change();
-            // Without inodes only the time of the change distinguishes the first one.
+            // Without inodes, only the modification time distinguishes the first case.
             assert!(cfg!(not(unix)) || seen.first_changed().is_some() && !seen.is_unchanged(&path).unwrap());
         }
         assert!(SeenFiles::default().is_unchanged(&path).is_err());
     }
 
     #[test]
-    fn no_more_is_read_than_allowed() {
+    fn reading_is_limited() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         std::fs::write(&path, vec![b'a'; 3 << 20]).unwrap();

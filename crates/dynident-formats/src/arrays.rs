@@ -1,15 +1,13 @@
-//! Arrays of one file as a table: those that share their longest length are its columns.
+//! Arrays of one file as a table: arrays that share the longest length are the columns.
 
 use crate::error::FileError;
 use crate::table::Table;
 
-/// Columns of all arrays together, at most.
-pub(crate) const MOST_COLUMNS: usize = 1 << 14;
+pub(crate) const MAX_COLUMNS: usize = 1 << 14;
 
-/// Entries of a list that are columns.
-pub(crate) const LONGEST_LIST: usize = 1024;
+/// Maximum number of entries of a list that become columns.
+pub(crate) const MAX_LIST_COLUMNS: usize = 1024;
 
-/// An array of numbers with one or two sides.
 #[derive(Clone, Debug)]
 pub(crate) struct Array {
     pub(crate) name: String,
@@ -21,17 +19,15 @@ pub(crate) struct Array {
 }
 
 impl Array {
-    /// Entries row after row.
     pub(crate) fn row_major(name: String, shape: [usize; 2], values: Vec<f64>) -> Self {
         Self { name, shape, values, strides: [shape[1], 1] }
     }
 
-    /// Entries column after column.
     pub(crate) fn column_major(name: String, shape: [usize; 2], values: Vec<f64>) -> Self {
         Self { name, shape, values, strides: [1, shape[0]] }
     }
 
-    /// Two sides of an array with any number of them, those of length one left out; `None` if more remain.
+    /// Dimensions of an array without those of length one; `None` if more than two remain.
     pub(crate) fn two_sides(sides: &[usize]) -> Option<[usize; 2]> {
         match sides.iter().copied().filter(|side| *side != 1).collect::<Vec<_>>()[..] {
             [] => Some([1, 1]),
@@ -42,7 +38,7 @@ impl Array {
     }
 }
 
-/// The samples' length: the longest side that arrays with half of all numbers share.
+/// Number of samples: the longest dimension that is shared by arrays with half of all numbers.
 fn length(arrays: &[Array]) -> usize {
     let numbers = |length: usize| -> usize {
         arrays.iter().filter(|array| array.shape.contains(&length)).map(|array| array.values.len()).sum()
@@ -53,8 +49,8 @@ fn length(arrays: &[Array]) -> usize {
     shared.or_else(|| sides().max_by_key(|side| (numbers(*side), *side))).unwrap_or(0)
 }
 
-/// Arrays as columns: a vector by its name, a matrix by name and 0-based index, `q[0]`, whichever of its sides the
-/// samples lie along (its rows, if both fit). Arrays of another length are left out.
+/// Arrays as columns: a vector by its name, a matrix by name and 0-based index, `q[0]`. The samples may be along either
+/// dimension of a matrix (its rows, if both fit). Arrays of another length are left out.
 #[derive(Debug)]
 pub(crate) struct ArrayTable {
     arrays: Vec<Array>,
@@ -68,7 +64,7 @@ pub(crate) struct ArrayTable {
 }
 
 impl ArrayTable {
-    /// The table of `arrays`; `None` if none of them has numbers.
+    /// The table of `arrays`; `None` if all are empty.
     pub(crate) fn new(arrays: Vec<Array>) -> Option<Self> {
         let rows = length(&arrays);
         let (mut names, mut columns) = (Vec::new(), Vec::new());
@@ -79,7 +75,7 @@ impl ArrayTable {
                 [first, second] if second == rows => (first, down, across),
                 _ => continue,
             };
-            if array.values.is_empty() || columns.len() + count > MOST_COLUMNS {
+            if array.values.is_empty() || columns.len() + count > MAX_COLUMNS {
                 continue;
             }
             for k in 0..count {
@@ -96,13 +92,11 @@ impl ArrayTable {
         (!columns.is_empty()).then_some(Self { arrays, names: Some(names), columns, wanted, rows, next: 0, notes })
     }
 
-    /// The same, with notes on what else the file holds.
     pub(crate) fn with_notes(mut self, notes: Vec<String>) -> Self {
         self.notes.extend(notes);
         self
     }
 
-    /// The same with columns that have indices only.
     pub(crate) fn nameless(mut self) -> Self {
         self.names = None;
         self
@@ -153,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn arrays_of_one_length_are_columns_either_way_up() {
+    fn arrays_of_one_length_are_columns_in_either_order() {
         let q = Array::row_major("q".to_owned(), [2, 3], vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         let tau = Array::column_major("tau".to_owned(), [3, 2], vec![-1.0, -2.0, -3.0, -4.0, -5.0, -6.0]);
         let other = Array::row_major("gain".to_owned(), [2, 1], vec![7.0, 8.0]);

@@ -1,6 +1,6 @@
-//! Reading numbers out of bytes that may end too early.
+//! Reads numbers from bytes with bounds checks.
 
-/// Bytes in a byte order, read from the front. Every read is `None` where the bytes have ended.
+/// Bytes in a byte order, read from the front. Every read returns `None` at the end of the bytes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bytes<'a> {
     all: &'a [u8],
@@ -34,7 +34,7 @@ impl<'a> Bytes<'a> {
         Some(taken)
     }
 
-    /// Moves on to a multiple of `size`, a power of two, counted from the first byte.
+    /// Moves to a multiple of `size`, a power of two, relative to the first byte.
     pub(crate) fn align(&mut self, size: usize) -> Option<()> {
         let padding = self.at.wrapping_neg() & (size - 1);
         self.take(padding).map(|_| ())
@@ -47,7 +47,6 @@ impl<'a> Bytes<'a> {
         u64 u64, 8;
     }
 
-    /// A number of this kind, as `f64`.
     pub(crate) fn number(&mut self, kind: Number) -> Option<f64> {
         Some(match kind {
             Number::U8 => f64::from(self.u8()?),
@@ -65,7 +64,6 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// How a number is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Number {
     U8,
@@ -109,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn halves_are_those_of_the_standard() {
+    fn half_precision_follows_the_standard() {
         let cases =
             [(0x3C00, 1.0), (0xC000, -2.0), (0x7BFF, 65504.0), (0x0400, 2f64.powi(-14)), (0x0001, 2f64.powi(-24))];
         for (bits, value) in cases {
@@ -119,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_is_not_read() {
+    fn missing_bytes_are_not_read() {
         let mut bytes = Bytes::new(&[1, 0, 0, 0, 2], false);
         assert_eq!((bytes.u32(), bytes.u16(), bytes.align(8)), (Some(1), None, None));
         assert_eq!((bytes.number(Number::I8), bytes.left(), bytes.take(usize::MAX)), (Some(2.0), 0, None));

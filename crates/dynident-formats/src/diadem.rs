@@ -1,35 +1,32 @@
-//! DIAdem data: a header of text (`.dat`) and files of numbers beside it. KUKA's controllers write their traces so, a
-//! header for each drive. Keys of the header: <https://www.ni.com/docs/en-US/bundle/diadem/page/header/header/header_overview.htm>.
+//! DIAdem data: a text header (`.dat`) and separate files of numbers. KUKA controllers write their traces in this
+//! format, with a header for each drive. Keys of the header:
+//! <https://www.ni.com/docs/en-US/bundle/diadem/page/header/header/header_overview.htm>.
 //!
-//! `value = number · (241) + (240)`. In a block, the numbers of all channels of a file stand side by side, row after
-//! row; `221` is the place of a channel's first one, counted from 1 (from 0 where some channel's is 0).
+//! `value = number · (241) + (240)`. In a block, the numbers of all channels of a file are interleaved row by row;
+//! `221` is the 1-based index of a channel's first number (0-based if it is 0 for any channel).
 
-use crate::arrays::{Array, ArrayTable, MOST_COLUMNS};
+use crate::arrays::{Array, ArrayTable, MAX_COLUMNS};
 use crate::bytes::{Bytes, Number};
 use crate::error::FileError;
 use crate::kind::FileFormat;
-use crate::limits::{Budget, ReadLimits, SPLIT};
+use crate::limits::{Budget, ReadLimits, SPLIT_FIX};
 use crate::table::Table;
 use std::collections::HashMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// What a header begins with.
-pub(crate) const BEGIN: &[u8] = b"DIAEXTENDED";
-/// A header of thousands of channels is shorter.
-const LONGEST_HEADER: u64 = 1 << 24;
-const COPY: &str = "copy the whole trace again, all files with its name";
+pub(crate) const MAGIC: &[u8] = b"DIAEXTENDED";
+const MAX_HEADER_BYTES: u64 = 1 << 24;
+const COPY_FIX: &str = "copy the whole trace again, all files with its name";
 
-/// One header.
 struct Header {
     path: PathBuf,
     big_endian: bool,
-    /// The number that stands for none.
+    /// Value of missing numbers.
     missing: Option<f64>,
     channels: Vec<Channel>,
 }
 
-/// Keys and values of one channel.
 struct Channel(HashMap<u16, String>);
 
 impl Channel {
@@ -77,16 +74,16 @@ impl Channel {
 }
 
 fn broken(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> FileError {
-    FileError::broken(path, FileFormat::Diadem, place, problem, COPY)
+    FileError::broken(path, FileFormat::Diadem, place, problem, COPY_FIX)
 }
 
 impl Header {
     fn read(path: &Path) -> Result<Self, FileError> {
         let mut bytes = Vec::new();
         dynident_files::open(path)
-            .and_then(|file| file.take(LONGEST_HEADER).read_to_end(&mut bytes))
+            .and_then(|file| file.take(MAX_HEADER_BYTES).read_to_end(&mut bytes))
             .map_err(|source| FileError::Io { file: path.to_owned(), source })?;
-        // Controllers write Latin-1, in which every byte is a letter.
+        // Controllers write Latin-1, in which every byte is valid.
         let text = String::from_utf8(bytes)
             .unwrap_or_else(|error| error.into_bytes().into_iter().map(char::from).collect::<String>());
         let mut header = Self { path: path.to_owned(), big_endian: false, missing: None, channels: Vec::new() };
@@ -110,33 +107,33 @@ impl Header {
             }
         }
         if header.channels.is_empty() {
-            return Err(broken(path, "its header", "it describes no channel to its end"));
+            return Err(broken(path, "its header", "it contains no complete channel"));
         }
         Ok(header)
     }
 
-    /// The file of a channel's numbers. Traces are renamed, and their headers are not: one with the header's own name
-    /// will do.
+    /// The file of a channel's numbers. If a trace was renamed, its headers contain the old name; a file with the name
+    /// of the header is then used.
     fn data(&self, channel: &Channel) -> Result<PathBuf, FileError> {
-        let told = channel.text(211).rsplit(['/', '\\']).next().unwrap_or_default();
-        let kind = Path::new(told).extension().unwrap_or_default().to_string_lossy().into_owned();
+        let stated = channel.text(211).rsplit(['/', '\\']).next().unwrap_or_default();
+        let kind = Path::new(stated).extension().unwrap_or_default().to_string_lossy().into_owned();
         let own = |kind: &str| self.path.with_extension(kind);
         let candidates =
-            [self.path.with_file_name(told), own(&kind), own(&kind.to_lowercase()), own(&kind.to_uppercase())];
-        let found = candidates.into_iter().find(|path| !told.is_empty() && path.is_file());
+            [self.path.with_file_name(stated), own(&kind), own(&kind.to_lowercase()), own(&kind.to_uppercase())];
+        let found = candidates.into_iter().find(|path| !stated.is_empty() && path.is_file());
         let missing =
-            || broken(&self.path, format!("channel `{}`", channel.name()), format!("there is no file `{told}`"));
+            || broken(&self.path, format!("channel `{}`", channel.name()), format!("file `{stated}` is missing"));
         found.ok_or_else(missing)
     }
 
-    /// The evenly spaced channel, if there is one: its start, its step and its length.
+    /// Start and step of the evenly spaced channel, and its length.
     fn clock(&self) -> Option<([f64; 2], Option<usize>)> {
         let channel = self.channels.iter().find(|channel| channel.is_implicit())?;
         Some((channel.scale(), channel.whole(220)))
     }
 }
 
-/// The headers of one trace: of all drives, `.._NextGenDrive#1.dat` and on, or this one alone.
+/// The headers of one trace: of all drives, `.._NextGenDrive#1.dat` etc., or only this one.
 fn headers(path: &Path) -> Vec<PathBuf> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let kind = path.extension().unwrap_or_default().to_string_lossy().into_owned();
@@ -149,14 +146,13 @@ fn headers(path: &Path) -> Vec<PathBuf> {
     if found.iter().any(|one| one == path) { found } else { vec![path.to_owned()] }
 }
 
-/// Whether `path` is a header.
 pub(crate) fn is_header(path: &Path) -> bool {
-    let mut begin = [0; BEGIN.len()];
+    let mut begin = [0; MAGIC.len()];
     let read = dynident_files::open(path).and_then(|mut file| file.read_exact(&mut begin));
-    read.is_ok() && begin == BEGIN
+    read.is_ok() && begin == MAGIC
 }
 
-/// The headers of the trace that `path` is of, each with its files of numbers behind it.
+/// The headers of the trace of `path`, each followed by its files of numbers.
 pub(crate) fn files(path: &Path) -> Result<Vec<PathBuf>, FileError> {
     let mut files = Vec::new();
     for path in headers(path) {
@@ -187,7 +183,7 @@ pub(crate) fn open(path: &Path, limits: &ReadLimits) -> Result<Box<dyn Table>, F
             let problem = "its time differs from that of the first drive";
             return Err(broken(own, "its header", problem));
         }
-        // `[A3]` of drive 3.
+        // `[A3]` for drive 3.
         let number = own.file_stem().unwrap_or_default().to_string_lossy();
         let number = number.rsplit_once('#').map_or("", |(_, number)| number).to_owned();
         for channel in &header.channels {
@@ -198,16 +194,16 @@ pub(crate) fn open(path: &Path, limits: &ReadLimits) -> Result<Box<dyn Table>, F
             let name =
                 if several && !is_time { format!("{}[A{number}]", channel.name()) } else { channel.name().to_owned() };
             let count = channel.whole(220);
-            let count = count.ok_or_else(|| broken(own, format!("channel `{name}`"), "it has no length (220)"))?;
+            let count = count.ok_or_else(|| broken(own, format!("channel `{name}`"), "its length (220) is missing"))?;
             let place = || format!("channel `{name}`");
-            if arrays.len() >= MOST_COLUMNS {
-                return Err(broken(own, place(), format!("there are more than {MOST_COLUMNS} channels")));
+            if arrays.len() >= MAX_COLUMNS {
+                return Err(broken(own, place(), format!("there are more than {MAX_COLUMNS} channels")));
             }
             budget
                 .take((count as u64).checked_mul(8))
-                .map_err(|problem| FileError::broken(own, FileFormat::Diadem, place(), problem, SPLIT))?;
+                .map_err(|problem| FileError::broken(own, FileFormat::Diadem, place(), problem, SPLIT_FIX))?;
             if !is_time && channel.kind().is_none() {
-                notes.push(format!("{name}: numbers of the type `{}` are not read", channel.text(214)));
+                notes.push(format!("{name}: numbers of type `{}` are not supported", channel.text(214)));
                 continue;
             }
             let column = if is_time { Ok(even(channel, count)) } else { numbers(&header, channel, count) };
@@ -226,7 +222,7 @@ fn even(channel: &Channel, count: usize) -> Vec<f64> {
     (0..count).map(|row| start + step * row as f64).collect()
 }
 
-/// The values of a channel of numbers in a file.
+/// The values of a channel from its file.
 fn numbers(header: &Header, channel: &Channel, count: usize) -> Result<Vec<f64>, FileError> {
     let broken = |problem: String| broken(&header.path, format!("channel `{}`", channel.name()), problem);
     let (Some(kind), path) = (channel.kind(), header.data(channel)?) else { return Ok(Vec::new()) };
@@ -236,12 +232,12 @@ fn numbers(header: &Header, channel: &Channel, count: usize) -> Result<Vec<f64>,
         .filter(|other| !other.is_implicit() && other.text(211) == channel.text(211) && other.is_block())
         .collect();
     let stride = if channel.is_block() { beside.len() } else { 1 };
-    // One word is said to mean the step or a header's length: where it is neither nothing nor the step, who knows.
-    if channel.is_block() && channel.whole(222).is_some_and(|told| told != 0 && told != stride) {
-        return Err(broken(format!("222 is {}, and {stride} channels stand side by side", channel.text(222))));
+    // The documents define 222 as the step or as a header length; other values are ambiguous.
+    if channel.is_block() && channel.whole(222).is_some_and(|step| step != 0 && step != stride) {
+        return Err(broken(format!("222 is {}, but {stride} channels are interleaved", channel.text(222))));
     }
     if beside.iter().any(|other| channel.is_block() && other.kind() != Some(kind)) {
-        return Err(broken("channels of several types stand side by side".to_owned()));
+        return Err(broken("interleaved channels have different types".to_owned()));
     }
     let from_zero = header.channels.iter().any(|other| other.whole(221) == Some(0));
     let first = channel.whole(221).unwrap_or(1).saturating_sub(usize::from(!from_zero));
@@ -250,8 +246,7 @@ fn numbers(header: &Header, channel: &Channel, count: usize) -> Result<Vec<f64>,
     let bytes = last.and_then(|last| last.checked_mul(kind.size()));
     let size = std::fs::metadata(&path).map_err(|source| FileError::Io { file: path.clone(), source })?.len();
     if bytes.is_none_or(|bytes| bytes as u64 > size) {
-        let problem =
-            format!("{count} values are told, and `{}` ends before", path.file_name().unwrap_or_default().display());
+        let problem = format!("`{}` ends before {count} values", path.file_name().unwrap_or_default().display());
         return Err(broken(problem));
     }
     let data = dynident_files::read(&path, size).map_err(|source| FileError::Io { file: path.clone(), source })?;

@@ -1,31 +1,31 @@
-//! What can go wrong between a file and its columns: each message names the file, the place and the fix.
+//! Errors between a file and its columns. Each message names the file, the place and the fix.
 
 use crate::kind::FileFormat;
 use std::path::{Path, PathBuf};
 
-/// A file that cannot be read as what it is.
+/// A file that cannot be read in its format.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
-    /// The operating system refused the file.
+    /// The operating system could not read the file.
     #[error("{}: cannot be read ({source}); check the path and its permissions", file.display())]
     Io {
         /// The file.
         file: PathBuf,
-        /// The system's reason.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// A file of a format that is not read.
+    /// The format is not supported.
     #[error("{}: this is {format}, which is not read; {fix}", file.display())]
     OtherFormat {
         /// The file.
         file: PathBuf,
-        /// What it is.
+        /// The format.
         format: &'static str,
-        /// How to make something of it that is read.
+        /// How to convert the file.
         fix: &'static str,
     },
-    /// A format that this build leaves out.
+    /// This build does not include the format.
     #[error(
         "{}: this is {format}, which this build does not read; build with the feature `{feature}` of dynident-formats",
         file.display()
@@ -33,35 +33,35 @@ pub enum FileError {
     NotBuilt {
         /// The file.
         file: PathBuf,
-        /// What it is.
+        /// The format.
         format: &'static str,
-        /// The feature that reads it.
+        /// The required feature.
         feature: &'static str,
     },
-    /// A file that breaks its format's rules, or is cut off.
+    /// The file violates its format, or is truncated.
     #[error("{}: {format}, {place}: {problem}; {fix}", file.display())]
     Broken {
         /// The file.
         file: PathBuf,
-        /// What it is.
+        /// The format.
         format: &'static str,
-        /// Where in it.
+        /// Place in the file.
         place: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
-        /// What to do.
+        /// The fix.
         fix: &'static str,
     },
-    /// A file without a column of numbers.
+    /// The file has no column of numbers.
     #[error("{}: {format} without a column of numbers ({found}); {fix}", file.display())]
     NoColumns {
         /// The file.
         file: PathBuf,
-        /// What it is.
+        /// The format.
         format: &'static str,
-        /// What it holds instead.
+        /// Other contents.
         found: String,
-        /// What to do.
+        /// The fix.
         fix: &'static str,
     },
 }
@@ -83,13 +83,13 @@ impl FileError {
     }
 }
 
-/// A text from a file as it can be shown: escaped, and not endless.
+/// Escapes and shortens a text from a file for a message.
 pub(crate) fn visible(text: &str) -> String {
-    const LONGEST: usize = 200;
+    const MAX_SHOWN: usize = 200;
     let shown: String = text
         .chars()
-        .take(LONGEST)
+        .take(MAX_SHOWN)
         .flat_map(|c| if c.is_control() { c.escape_default().collect::<Vec<_>>() } else { vec![c] })
         .collect();
-    if text.chars().nth(LONGEST).is_some() { shown + ".." } else { shown }
+    if text.chars().nth(MAX_SHOWN).is_some() { shown + ".." } else { shown }
 }

@@ -1,4 +1,4 @@
-//! HDF5, and MATLAB's `save -v7.3`: data sets of one length.
+//! HDF5, and MATLAB's `save -v7.3`: data sets of equal length.
 
 use crate::error::FileError;
 use crate::table::Table;
@@ -18,13 +18,11 @@ mod reading {
     use crate::arrays::{Array, ArrayTable};
     use crate::error::visible;
     use crate::kind::FileFormat;
-    use crate::limits::{Budget, SPLIT};
+    use crate::limits::{Budget, SPLIT_FIX};
     use hdf5_pure::{DType, Dataset, File, Group};
 
-    /// Groups in groups.
-    const DEEPEST: usize = 8;
-    /// Data sets at most.
-    const MOST_SETS: usize = 10_000;
+    const MAX_NESTING: usize = 8;
+    const MAX_DATA_SETS: usize = 10_000;
 
     pub(crate) fn open(path: &Path, budget: Budget) -> Result<Box<dyn Table>, FileError> {
         let error = |error: hdf5_pure::Error| {
@@ -34,9 +32,9 @@ mod reading {
         let file = File::open_streaming(path).map_err(error)?;
         let mut found = Found { path, arrays: Vec::new(), others: Vec::new(), sets: 0, budget, too_large: false };
         found.group(&file.root(), "", 0)?;
-        // A table without its largest columns would be taken for the recording.
+        // Without its largest columns, the table could be mistaken for the whole recording.
         if let (true, Some(problem)) = (found.too_large, found.others.last()) {
-            return Err(FileError::broken(path, FileFormat::Hdf5, "its data sets", problem.as_str(), SPLIT));
+            return Err(FileError::broken(path, FileFormat::Hdf5, "its data sets", problem.as_str(), SPLIT_FIX));
         }
         let others = if found.others.is_empty() { "no data sets".to_owned() } else { found.others.join(", ") };
         let table = ArrayTable::new(found.arrays).ok_or_else(|| {
@@ -52,7 +50,7 @@ mod reading {
         others: Vec<String>,
         sets: usize,
         budget: Budget,
-        /// Whether a data set was larger than the memory allows; it is the last of `others`.
+        /// Whether a data set exceeds the memory limit; it is the last of `others`.
         too_large: bool,
     }
 
@@ -65,13 +63,13 @@ mod reading {
         fn group(&mut self, group: &Group, at: &str, depth: usize) -> Result<(), FileError> {
             let name = |own: &str| if at.is_empty() { own.to_owned() } else { format!("{at}.{own}") };
             for own in group.datasets().map_err(|error| self.broken(at, &error))? {
-                // MATLAB keeps what its references point to in #refs#.
-                if self.sets >= MOST_SETS || own.starts_with('#') {
+                // MATLAB stores the targets of references in #refs#.
+                if self.sets >= MAX_DATA_SETS || own.starts_with('#') {
                     continue;
                 }
                 self.sets += 1;
                 let place = name(&own);
-                // One that cannot be read leaves the others readable.
+                // An unreadable data set does not prevent reading the others.
                 let read = group.dataset(&own).map_err(|error| error.to_string());
                 match read.and_then(|set| array(&set, &place, &mut self.budget)) {
                     Ok(array) => self.arrays.push(array),
@@ -84,7 +82,7 @@ mod reading {
                     }
                 }
             }
-            if depth < DEEPEST {
+            if depth < MAX_NESTING {
                 for own in group.groups().map_err(|error| self.broken(at, &error))? {
                     if own.starts_with('#') {
                         continue;
@@ -101,7 +99,6 @@ mod reading {
         }
     }
 
-    /// The numbers of a data set.
     fn array(set: &Dataset, place: &str, budget: &mut Budget) -> Result<Array, String> {
         let text = |error: hdf5_pure::Error| error.to_string();
         let kind = set.dtype().map_err(text)?;
@@ -118,16 +115,16 @@ mod reading {
                 | DType::U32
                 | DType::U64
         ) {
-            return Err("no numbers".to_owned());
+            return Err("not numeric".to_owned());
         }
         let shape = set.shape().map_err(text)?;
         let sides: Option<Vec<usize>> = shape.iter().map(|side| usize::try_from(*side).ok()).collect();
-        let sides = sides.and_then(|sides| Array::two_sides(&sides)).ok_or("more than two sides")?;
+        let sides = sides.and_then(|sides| Array::two_sides(&sides)).ok_or("more than two dimensions")?;
         let numbers = shape.iter().try_fold(1_u64, |all, side| all.checked_mul(*side));
         budget.take(numbers.and_then(|numbers| numbers.checked_mul(8)))?;
         let values = set.read_f64().map_err(text)?;
         if values.len() != sides[0] * sides[1] {
-            return Err("another count of numbers than its sides say".to_owned());
+            return Err("the number of values does not match the dimensions".to_owned());
         }
         Ok(Array::row_major(place.to_owned(), sides, values))
     }

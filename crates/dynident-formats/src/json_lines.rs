@@ -1,4 +1,4 @@
-//! JSON lines: one object a line, its numbers columns by their path.
+//! JSON lines: one object per line; columns are its numbers, named by their path.
 
 use crate::error::FileError;
 use crate::table::Table;
@@ -18,7 +18,7 @@ pub(crate) use json::open;
 #[cfg(feature = "json")]
 mod json {
     use super::{BufRead, FileError, Path, Table};
-    use crate::arrays::MOST_COLUMNS;
+    use crate::arrays::MAX_COLUMNS;
     use crate::kind::FileFormat;
     use crate::table::slots;
     use core::fmt::Write;
@@ -27,12 +27,10 @@ mod json {
     use std::io::Read;
     use std::path::PathBuf;
 
-    /// A line with more bytes is none.
-    const LONGEST_LINE: u64 = 1 << 22;
-    /// Lines that are searched for columns.
-    const SEARCHED: usize = 64;
+    const MAX_LINE_BYTES: u64 = 1 << 22;
+    const SEARCHED_LINES: usize = 64;
 
-    /// The numbers of `value` by their path; true and false are 1 and 0, null is a number that is missing.
+    /// Calls `found` for each number of `value` with its path; true and false are 1 and 0, null is a missing number.
     pub(crate) fn flattened(value: &Value, path: &mut String, found: &mut impl FnMut(&str, f64)) {
         let length = path.len();
         match value {
@@ -64,14 +62,13 @@ mod json {
         path: PathBuf,
         reader: Box<dyn BufRead + Send>,
         line: u64,
-        /// The bytes of a line, and the path of a number in it: kept for the next one.
+        /// Buffers for the bytes of a line and for the path of a number.
         bytes: Vec<u8>,
         number_path: String,
         names: Vec<String>,
         column_of: HashMap<String, usize>,
-        /// Lines that were read in search of columns.
         waiting: VecDeque<(u64, Value)>,
-        /// Place of each column among those that are wanted.
+        /// Index of each column among the selected ones.
         slot_of: Vec<Option<usize>>,
         truncated: bool,
     }
@@ -82,7 +79,6 @@ mod json {
         }
     }
 
-    /// The table of `reader`. Its columns are those of its first lines.
     pub(crate) fn open(path: &Path, reader: Box<dyn BufRead + Send>) -> Result<Box<dyn Table>, FileError> {
         let mut table = JsonLines {
             path: path.to_owned(),
@@ -96,10 +92,10 @@ mod json {
             slot_of: Vec::new(),
             truncated: false,
         };
-        while table.waiting.len() < SEARCHED {
+        while table.waiting.len() < SEARCHED_LINES {
             let Some(value) = table.read()? else { break };
             flattened(&value, &mut String::new(), &mut |name, _| {
-                if !table.column_of.contains_key(name) && table.names.len() < MOST_COLUMNS {
+                if !table.column_of.contains_key(name) && table.names.len() < MAX_COLUMNS {
                     table.column_of.insert(name.to_owned(), table.names.len());
                     table.names.push(name.to_owned());
                 }
@@ -116,11 +112,10 @@ mod json {
 
     impl JsonLines {
         fn broken(&self, problem: impl Into<String>) -> FileError {
-            let fix = "write one whole object a line";
+            let fix = "write one complete object per line";
             FileError::broken(&self.path, FileFormat::JsonLines, format!("line {}", self.line), problem, fix)
         }
 
-        /// The next line that is not blank.
         fn read(&mut self) -> Result<Option<Value>, FileError> {
             let mut line = core::mem::take(&mut self.bytes);
             let value = self.read_into(&mut line);
@@ -131,13 +126,13 @@ mod json {
         fn read_into(&mut self, line: &mut Vec<u8>) -> Result<Option<Value>, FileError> {
             loop {
                 line.clear();
-                let read = self.reader.by_ref().take(LONGEST_LINE).read_until(b'\n', line);
+                let read = self.reader.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', line);
                 let read = read.map_err(|source| FileError::Io { file: self.path.clone(), source })?;
                 if read == 0 {
                     return Ok(None);
                 }
                 self.line += 1;
-                if read as u64 == LONGEST_LINE {
+                if read as u64 == MAX_LINE_BYTES {
                     return Err(self.broken("it is longer than 4 MiB"));
                 }
                 let text = if self.line == 1 { line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line) } else { &line[..] };
@@ -146,7 +141,7 @@ mod json {
                 }
                 return match serde_json::from_slice(text) {
                     Ok(value @ Value::Object(_)) => Ok(Some(value)),
-                    // A last line without its end was cut off while it was written.
+                    // A last line without a newline was truncated.
                     Err(_) if !line.ends_with(b"\n") && self.line > 1 => {
                         self.truncated = true;
                         Ok(None)
@@ -182,7 +177,7 @@ mod json {
             let Some(value) = self.next()? else { return Ok(false) };
             values.fill(f64::NAN);
             let mut path = core::mem::take(&mut self.number_path);
-            // Lines mostly hold the same numbers in the same order, so that names need not be looked up.
+            // Most lines have the same numbers in the same order, so try the expected name first.
             let mut next = 0;
             flattened(&value, &mut path, &mut |name, number| {
                 let is_next = self.names.get(next).is_some_and(|expected| expected == name);

@@ -1,16 +1,16 @@
-//! The formats that are read.
+//! Supported file formats.
 
-/// A format that is read.
+/// A supported file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum FileFormat {
-    /// Text; a table of it is made by others.
+    /// Text; its table is parsed by the caller.
     Text,
-    /// Text packed by gzip.
+    /// Text compressed by gzip.
     GzipText,
-    /// Text packed by Zstandard.
+    /// Text compressed by Zstandard.
     ZstdText,
-    /// One JSON object a line.
+    /// One JSON object per line.
     JsonLines,
     /// One NumPy array.
     Npy,
@@ -18,24 +18,24 @@ pub enum FileFormat {
     Npz,
     /// MCAP.
     Mcap,
-    /// An SQLite file of rosbag2, or a folder of rosbag2 in either storage.
+    /// An SQLite file of rosbag2, or a folder of rosbag2 with either storage.
     Rosbag2,
     /// Parquet.
     Parquet,
-    /// The folder of a LeRobot data set.
+    /// Folder of a LeRobot data set.
     LeRobot,
     /// Arrow, in the file format (Feather) or as a stream.
     Arrow,
-    /// DIAdem data, which KUKA's controllers write.
+    /// DIAdem data, the trace format of KUKA controllers.
     Diadem,
     /// MATLAB, `save -v6` and `-v7`.
     Mat5,
-    /// HDF5, which MATLAB's `save -v7.3` writes too.
+    /// HDF5, also written by MATLAB's `save -v7.3`.
     Hdf5,
 }
 
 impl FileFormat {
-    /// What it is called.
+    /// Name of the format in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Text => "text",

@@ -1,33 +1,31 @@
-//! LeRobot data sets: a folder with `meta/info.json` and Parquet files below `data`, one for each episode (version 2)
-//! or for several (version 3). Layout: <https://huggingface.co/docs/lerobot/lerobot-dataset-v3>.
+//! LeRobot data sets: a folder with `meta/info.json` and Parquet files in `data`, one for each episode (version 2) or
+//! for several episodes (version 3). Layout: <https://huggingface.co/docs/lerobot/lerobot-dataset-v3>.
 
 use crate::error::FileError;
 use crate::kind::FileFormat;
 use std::path::{Path, PathBuf};
 
-/// The description of a data set, within its folder.
-const INFO: &str = "meta/info.json";
-const FETCH: &str = "fetch the data set whole (`hf download`, or `git lfs pull`)";
+const INFO_FILE: &str = "meta/info.json";
+const DOWNLOAD_FIX: &str = "download the complete data set (`hf download`, or `git lfs pull`)";
 
-/// The folder of the data set that `path` names: itself, or that of its `meta/info.json`.
+/// The folder of the data set at `path`: itself, or that of its `meta/info.json`.
 pub(crate) fn folder(path: &Path) -> Option<&Path> {
-    if path.ends_with(INFO) && path.is_file() {
+    if path.ends_with(INFO_FILE) && path.is_file() {
         return path.parent()?.parent();
     }
-    path.join(INFO).is_file().then_some(path)
+    path.join(INFO_FILE).is_file().then_some(path)
 }
 
-/// Its description, then its tables in the order of their rows.
 pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let listed = |folder: &Path| -> Result<Vec<PathBuf>, FileError> {
         let io = |source| FileError::Io { file: folder.to_owned(), source };
         let names = dynident_system::names(folder).map_err(io)?;
         let mut found: Vec<PathBuf> = names.into_iter().map(|name| folder.join(name)).collect();
-        // Numbers in names have as many digits as they need beyond three or six.
+        // Numbers in names have at least three or six digits, and more if needed.
         found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
         Ok(found)
     };
-    let mut files = vec![folder.join(INFO)];
+    let mut files = vec![folder.join(INFO_FILE)];
     for chunk in listed(&folder.join("data"))?.iter().filter(|chunk| chunk.is_dir()) {
         let tables = listed(chunk)?.into_iter().filter(|path| path.extension().is_some_and(|kind| kind == "parquet"));
         files.extend(tables);
@@ -35,7 +33,7 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     if files.len() > 1 {
         return Ok(files);
     }
-    Err(FileError::broken(folder, FileFormat::LeRobot, "data", "no chunk in it holds a Parquet file", FETCH))
+    Err(FileError::broken(folder, FileFormat::LeRobot, "data", "it contains no Parquet file", DOWNLOAD_FIX))
 }
 
 #[cfg(not(all(feature = "json", feature = "parquet")))]
@@ -48,54 +46,50 @@ pub(crate) use reading::open;
 
 #[cfg(all(feature = "json", feature = "parquet"))]
 mod reading {
-    use super::{FETCH, FileError, FileFormat, INFO, Path, PathBuf, files};
+    use super::{DOWNLOAD_FIX, FileError, FileFormat, INFO_FILE, Path, PathBuf, files};
     use crate::parquet;
     use crate::recognition;
     use crate::table::{ColumnGroup, Table};
     use serde_json::Value;
     use std::io::{BufReader, Read};
 
-    /// A description of thousands of features is shorter.
-    const LONGEST_INFO: u64 = 1 << 24;
-    /// Between episodes: no filter reaches across, and nobody takes it for a late sample.
-    const BETWEEN_EPISODES_S: f64 = 10.0;
+    const MAX_INFO_BYTES: u64 = 1 << 24;
+    /// Time between episodes, s: long enough to be treated as a gap, not as a late sample.
+    const EPISODE_GAP_S: f64 = 10.0;
     const TIME: &str = "time";
 
-    /// The tables of a data set as one.
     #[derive(Debug)]
     struct DataSet {
         folder: PathBuf,
         parts: Vec<PathBuf>,
-        /// Number of the part under way, and the part.
         current: usize,
         part: Box<dyn Table>,
-        /// Columns as the parts call them, and as this table does; behind them stands the time.
+        /// Names of the columns in the parts, and in this table, which has the time in addition.
         own_names: Vec<String>,
         names: Vec<String>,
         notes: Vec<String>,
         wanted: Vec<usize>,
         clock: Option<Clock>,
-        /// What is read of each part, and one row of it.
+        /// Columns that are read from each part, and one row of them.
         read: Vec<usize>,
         row: Vec<f64>,
         total_rows: Option<u64>,
     }
 
-    /// Time that goes on from episode to episode.
+    /// Time that continues from episode to episode.
     #[derive(Debug, Default)]
     struct Clock {
         stamp: usize,
         episode: usize,
-        /// Added to the stamps of the episode under way.
+        /// Added to the stamps of the current episode, s.
         offset_s: f64,
-        /// Episode and time of the last row.
         last: Option<(f64, f64)>,
     }
 
     impl Clock {
         fn time(&mut self, stamp: f64, episode: f64) -> f64 {
             match self.last {
-                Some((under_way, last)) if under_way != episode => self.offset_s = last + BETWEEN_EPISODES_S - stamp,
+                Some((under_way, last)) if under_way != episode => self.offset_s = last + EPISODE_GAP_S - stamp,
                 _ => {}
             }
             let time = stamp + self.offset_s;
@@ -125,7 +119,7 @@ mod reading {
             && path.contains("episode_index")
             && episodes > parts.len() as u64
         {
-            notes.push(format!("{} of {episodes} episodes, whose files are not there", episodes - parts.len() as u64));
+            notes.push(format!("the files of {} of {episodes} episodes are missing", episodes - parts.len() as u64));
         }
         let wanted = (0..names.len()).collect::<Vec<_>>();
         let mut table = DataSet {
@@ -147,10 +141,10 @@ mod reading {
     }
 
     fn read_info(folder: &Path) -> Result<Value, FileError> {
-        let path = folder.join(INFO);
+        let path = folder.join(INFO_FILE);
         let mut text = Vec::new();
         dynident_files::open(&path)
-            .and_then(|file| file.take(LONGEST_INFO).read_to_end(&mut text))
+            .and_then(|file| file.take(MAX_INFO_BYTES).read_to_end(&mut text))
             .map_err(|source| FileError::Io { file: path.clone(), source })?;
         let info: Result<Value, _> = serde_json::from_slice(&text);
         let problem = match info {
@@ -158,21 +152,27 @@ mod reading {
             Ok(_) => "it has no `features`".to_owned(),
             Err(error) => format!("it is not JSON ({error})"),
         };
-        Err(FileError::broken(folder, FileFormat::LeRobot, INFO, problem, FETCH))
+        Err(FileError::broken(folder, FileFormat::LeRobot, INFO_FILE, problem, DOWNLOAD_FIX))
     }
 
     fn open_part(folder: &Path, path: &Path) -> Result<Box<dyn Table>, FileError> {
         let io = |source| FileError::Io { file: path.to_owned(), source };
         let head = recognition::head(&mut BufReader::new(dynident_files::open(path).map_err(io)?)).map_err(io)?;
-        // What stands for a file that was not fetched is text.
+        // The pointer to a file that was not downloaded is text.
         if !head.starts_with(b"PAR1") {
             let place = path.strip_prefix(folder).unwrap_or(path).display().to_string();
-            return Err(FileError::broken(folder, FileFormat::LeRobot, place, "it is no Parquet file", FETCH));
+            return Err(FileError::broken(
+                folder,
+                FileFormat::LeRobot,
+                place,
+                "it is not a Parquet file",
+                DOWNLOAD_FIX,
+            ));
         }
         parquet::open(path)
     }
 
-    /// Columns with the entries of lists by the names that `features` gives them: `action[elbow]` for `action[1]`.
+    /// Columns with list entries named by `features`: `action[elbow]` for `action[1]`.
     fn with_entries_named(columns: &[String], features: &Value) -> Vec<String> {
         let named = |column: &String| {
             let (feature, entry) = column.strip_suffix(']')?.rsplit_once('[')?;
@@ -191,7 +191,7 @@ mod reading {
         column.strip_prefix(feature).is_some_and(|rest| rest.starts_with('[') && !rest.contains('.'))
     }
 
-    /// A list of texts, or the one list in a group: `{"motors": [..]}`.
+    /// A list of names, or the only list in a group: `{"motors": [..]}`.
     fn entry_names(names: &Value) -> Option<Vec<&str>> {
         let list = match names {
             Value::Object(group) if group.len() == 1 => group.values().next()?,
@@ -208,8 +208,8 @@ mod reading {
                 let mut part = open_part(&self.folder, path)?;
                 if part.names() != Some(&self.own_names) {
                     let place = path.strip_prefix(&self.folder).unwrap_or(path).display().to_string();
-                    let problem = "its columns, or the lengths of its lists, are not those of the first file";
-                    let fix = "name the files of one kind each by itself";
+                    let problem = "its columns, or the lengths of its lists, differ from those of the first file";
+                    let fix = "use the files with equal columns as separate logs";
                     return Err(FileError::broken(&self.folder, FileFormat::LeRobot, place, problem, fix));
                 }
                 part.select(&self.read);

@@ -1,20 +1,21 @@
-//! **What does this file hold?** A file is known by its content, never by its name, and becomes text, or a table of
-//! named columns of numbers.
+//! Reads log files of many formats. The format is detected from the content, not from the name; the result is text, or
+//! a table of named columns of numbers.
 //!
 //! | format | columns | feature |
 //! | --- | --- | --- |
-//! | text, also packed by gzip or Zstandard | the caller's business: [`Contents::Text`] | `gzip`, `zstd` |
+//! | text, also compressed by gzip or Zstandard | parsed by the caller: [`Contents::Text`] | `gzip`, `zstd` |
 //! | NumPy `.npy`, `.npz` | fields of a structured array, columns of a matrix, arrays of one length | `.npz`: `gzip` |
-//! | JSON, one object a line | numbers by their path: `arm.q[0]` | `json` |
+//! | JSON, one object per line | numbers by their path: `arm.q[0]` | `json` |
 //! | MCAP, rosbag2 | numbers of ROS 2 messages by topic and path: `/joint_states.position[elbow]` | `bags` |
 //! | Parquet | columns, lists with their indices | `parquet` |
-//! | LeRobot data sets | as Parquet, entries by their names: `action[elbow]`; time over all episodes | `json`, `parquet` |
+//! | LeRobot data sets | as Parquet, entries by their names: `action[elbow]`; time over all episodes | `json`,
+//! `parquet` |
 //! | Arrow: Feather, streams | as Parquet | `arrow` |
 //! | DIAdem header and numbers (KUKA trace) | channels, of all drives: `Istmoment[A3]` | |
-//! | MATLAB 5, MATLAB 7.3 and HDF5 | variables of one length, matrices either way up | `gzip`, `hdf5` |
+//! | MATLAB 5, MATLAB 7.3 and HDF5 | variables of one length, matrices in either orientation | `gzip`, `hdf5` |
 //!
-//! Columns that were recorded on different clocks (topics of a bag) are joined on that of the first one selected: see
-//! [`Table::select`]. Indices in names count from 0. What is allocated is bounded by what the file holds, and by
+//! Columns that were recorded on different clocks (topics of a bag) are interpolated at the times of the first selected
+//! one: see [`Table::select`]. Indices in names are 0-based. Memory is limited by the length of the file and by
 //! [`ReadLimits`]. Checksums in a file are verified. Only regular files are read.
 //!
 //! ```
@@ -42,7 +43,12 @@
         feature = "arrow",
         feature = "hdf5"
     )),
-    allow(dead_code, unused_variables, clippy::needless_pass_by_value, reason = "what formats share is not all used")
+    allow(
+        dead_code,
+        unused_variables,
+        clippy::needless_pass_by_value,
+        reason = "some shared code is unused without all formats"
+    )
 )]
 
 mod arrays;
@@ -78,18 +84,18 @@ use limits::Budget;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-/// A file, opened.
+/// An opened file.
 #[derive(Debug)]
 pub struct Opened {
-    /// What it is.
+    /// Its format.
     pub format: FileFormat,
-    /// What it holds.
+    /// Its contents.
     pub contents: Contents,
 }
 
-/// What a file holds.
+/// Contents of a file.
 pub enum Contents {
-    /// Text, unpacked.
+    /// Text, decompressed.
     Text(Box<dyn Read + Send>),
     /// Columns of numbers.
     Table(Box<dyn Table>),
@@ -104,17 +110,16 @@ impl core::fmt::Debug for Contents {
     }
 }
 
-/// Opens the file at `path`, or the folder of a rosbag2 recording or of a LeRobot data set, and finds out what it
-/// holds.
+/// Opens the file at `path`, or the folder of a rosbag2 recording or of a LeRobot data set, and detects its format.
 ///
 /// # Errors
-/// If it cannot be read, is no regular file, is of a format that is not read, is broken where its columns are named, or
-/// takes more memory than the default of [`ReadLimits`].
+/// If it cannot be read, is not a regular file, has an unsupported format, is corrupt in the part that names its
+/// columns, or needs more memory than the default of [`ReadLimits`].
 pub fn open(path: &Path) -> Result<Opened, FileError> {
     open_within(path, &ReadLimits::default())
 }
 
-/// As [`open`], with other limits of memory.
+/// As [`open`], with other memory limits.
 ///
 /// # Errors
 /// As [`open`].
@@ -145,13 +150,13 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
                 FileFormat::Text => Contents::Text(Box::new(reader)),
                 FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
                 other => {
-                    let problem = format!("it holds {}, which is read only as it is", other.name());
+                    let problem = format!("it contains {}, which is supported only uncompressed", other.name());
                     return Err(FileError::broken(path, format, "its beginning", problem, "unpack it first"));
                 }
             }
         }
         FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
-        // Not packed: an array cannot be longer than its file.
+        // Not compressed: an array cannot be longer than its file.
         FileFormat::Npy => Contents::Table(npy::open(path, reader, Budget::new(limits, u64::MAX))?),
         FileFormat::Npz => Contents::Table(npy::open_archive(path, budget)?),
         FileFormat::Mcap => bags::open_mcap(path)?,
@@ -166,8 +171,8 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
     Ok(Opened { format, contents })
 }
 
-/// The files that hold what `path` names: itself, or the parts of a rosbag2 recording, a LeRobot data set or a DIAdem
-/// recording, the description of them first.
+/// The files of `path`: itself, or the parts of a rosbag2 recording, a LeRobot data set or a DIAdem recording, with
+/// their metadata first.
 ///
 /// # Errors
 /// If a folder's list of parts cannot be read.

@@ -1,18 +1,18 @@
-//! How much memory the contents of a file may take.
+//! Memory limits for the contents of a file.
 
-/// Bound on the memory that the numbers of one file take, for the formats that are held in memory as a whole (NumPy,
-/// MATLAB, HDF5, DIAdem) and for one batch of Arrow. Text, JSON lines, Parquet and bags are read in pieces.
+/// Memory limits for the numbers of one file, for formats that are held in memory completely (NumPy, MATLAB, HDF5,
+/// DIAdem) and for one batch of Arrow. Text, JSON lines, Parquet and bags are read in pieces.
 ///
-/// A file of `n` bytes may take `min(memory_bytes, max(always_bytes, expansion · n))`. Measured on 13 logs of four arms
-/// as doubles: packing by zlib shrinks a log 1.1 to 2.9 times, and a column of one repeated value 680 times. Packed
-/// numbers that expand more than `expansion` times beyond `always_bytes` are no recording of a robot.
+/// A file of `n` bytes may use `min(memory_bytes, max(always_bytes, expansion · n))`. Measured on 13 logs of four arms
+/// as doubles: compression by zlib reduces a log by factors of 1.1 to 2.9, and a column of one repeated value by 680.
+/// Compressed numbers that expand more than `expansion` times beyond `always_bytes` are not a recording of a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReadLimits {
-    /// Largest memory, bytes. Default 2 GiB.
+    /// Maximum memory, bytes. Default 2 GiB.
     pub memory_bytes: u64,
-    /// Memory that a file of any length may take, bytes. Default 128 MiB.
+    /// Memory that a file of any length may use, bytes. Default 128 MiB.
     pub always_bytes: u64,
-    /// Bytes in memory for each byte of the file. Default 100.
+    /// Maximum number of bytes in memory per byte of the file. Default 100.
     pub expansion: u64,
 }
 
@@ -22,25 +22,21 @@ impl Default for ReadLimits {
     }
 }
 
-/// Memory that is left for the numbers of one file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Budget {
     all: u64,
     left: u64,
 }
 
-/// What to do with a file that takes too much memory.
-pub(crate) const SPLIT: &str = "split the recording, or save it as text or Parquet, which are read in pieces (from Rust, `ReadLimits` is the limit)";
+pub(crate) const SPLIT_FIX: &str = "split the recording, or save it as text or Parquet, which are read in pieces (from Rust, `ReadLimits` is the limit)";
 
 impl Budget {
-    /// The memory for a file of `file_bytes`.
     pub(crate) fn new(limits: &ReadLimits, file_bytes: u64) -> Self {
         let own = file_bytes.saturating_mul(limits.expansion).max(limits.always_bytes);
         let all = own.min(limits.memory_bytes);
         Self { all, left: all }
     }
 
-    /// Whether `bytes` more may be taken.
     pub(crate) fn allows(&self, bytes: Option<u64>) -> bool {
         bytes.is_some_and(|bytes| bytes <= self.left)
     }
@@ -48,7 +44,7 @@ impl Budget {
     /// Takes memory.
     ///
     /// # Errors
-    /// The problem in words, where there is not as much left; `None` is more than any number.
+    /// The problem, if less memory is left; `None` is an overflow.
     pub(crate) fn take(&mut self, bytes: Option<u64>) -> Result<(), String> {
         match bytes.filter(|bytes| *bytes <= self.left) {
             Some(bytes) => {
@@ -59,12 +55,8 @@ impl Budget {
         }
     }
 
-    /// The problem in words.
     pub(crate) fn problem(&self) -> String {
-        format!(
-            "its numbers would take more than {} MiB of memory, the limit for a file of this length",
-            self.all >> 20
-        )
+        format!("its numbers need more than {} MiB of memory, the limit for a file of this length", self.all >> 20)
     }
 }
 

@@ -20,20 +20,17 @@ mod reading {
     use crate::arrays::{Array, ArrayTable};
     use crate::bytes::{Bytes, Number};
     use crate::kind::FileFormat;
-    use crate::limits::{Budget, SPLIT};
+    use crate::limits::{Budget, SPLIT_FIX};
     use std::io::Read;
 
-    /// Structs in structs.
-    const DEEPEST: usize = 8;
-    /// Bytes of a name, of the sides of an array, or of the list of a struct's fields, at most.
-    const LONGEST_HEAD: usize = 1 << 20;
-    /// Bytes of numbers that are converted at once.
-    const BLOCK: usize = 1 << 16;
+    const MAX_NESTING: usize = 8;
+    /// Maximum length of a name, of the dimensions of an array, or of the list of a struct's fields, bytes.
+    const MAX_HEAD_BYTES: usize = 1 << 20;
+    const BLOCK_BYTES: usize = 1 << 16;
 
     const MATRIX: u32 = 14;
     const PACKED: u32 = 15;
 
-    /// Why a variable cannot be read.
     enum Problem {
         Cut,
         Misfit,
@@ -51,16 +48,15 @@ mod reading {
         fn at(self, path: &Path, variable: usize) -> FileError {
             let copy = "save or copy it again";
             let (problem, fix) = match self {
-                Self::Cut => ("it is cut off".to_owned(), copy),
-                Self::Misfit => ("its parts do not fit together".to_owned(), copy),
-                Self::TooLarge(problem) => (problem, SPLIT),
-                Self::Unreadable(error) => (format!("it cannot be unpacked ({error})"), copy),
+                Self::Cut => ("it is truncated".to_owned(), copy),
+                Self::Misfit => ("its parts are inconsistent".to_owned(), copy),
+                Self::TooLarge(problem) => (problem, SPLIT_FIX),
+                Self::Unreadable(error) => (format!("it cannot be decompressed ({error})"), copy),
             };
             FileError::broken(path, FileFormat::Mat5, format!("variable {variable}"), problem, fix)
         }
     }
 
-    /// Reader state: byte order, memory left, and the arrays of all variables.
     struct Found {
         big_endian: bool,
         budget: Budget,
@@ -70,7 +66,7 @@ mod reading {
 
     pub(crate) fn open(path: &Path, mut reader: impl BufRead, budget: Budget) -> Result<Box<dyn Table>, FileError> {
         let mut header = [0; 128];
-        let cut = "it is cut off";
+        let cut = "it is truncated";
         reader
             .read_exact(&mut header)
             .map_err(|_| FileError::broken(path, FileFormat::Mat5, "its header", cut, "save or copy it again"))?;
@@ -86,7 +82,7 @@ mod reading {
             let fix = "save vectors or matrices of real numbers (timetable: `save` its table2array)";
             FileError::no_columns(path, FileFormat::Mat5, names, fix)
         })?;
-        Ok(Box::new(table.with_notes(others.into_iter().map(|name| format!("{name}: no real numbers")).collect())))
+        Ok(Box::new(table.with_notes(others.into_iter().map(|name| format!("{name}: not real numbers")).collect())))
     }
 
     fn number(kind: u32) -> Option<Number> {
@@ -105,7 +101,6 @@ mod reading {
         })
     }
 
-    /// The beginning of an element.
     struct Tag {
         kind: u32,
         size: usize,
@@ -113,14 +108,13 @@ mod reading {
         short: Option<[u8; 4]>,
     }
 
-    /// Reads over the rest of `reader`; so a packed variable's checksum is compared.
+    /// Reads the rest of `reader`, so that the checksum of a compressed variable is verified.
     fn pass_over(reader: &mut dyn Read) -> Result<(), Problem> {
         std::io::copy(reader, &mut std::io::sink())?;
         Ok(())
     }
 
     impl Found {
-        /// Reads the next variable of the file; false at the end.
         fn variable(&mut self, reader: &mut impl BufRead) -> Result<bool, Problem> {
             if reader.fill_buf()?.is_empty() {
                 return Ok(false);
@@ -137,7 +131,7 @@ mod reading {
                     if tag.kind == MATRIX {
                         self.matrix(&mut unpacked, tag.size, None, 0)?;
                     }
-                    // The checksum stands behind what is unpacked.
+                    // The checksum follows the compressed data.
                     pass_over(&mut (&mut unpacked).take(8))?;
                 }
                 MATRIX => self.matrix(&mut body, size as usize, None, 0)?,
@@ -152,7 +146,7 @@ mod reading {
             reader.read_exact(&mut tag)?;
             let mut words = Bytes::new(&tag, self.big_endian);
             let (word, size) = words.u32().zip(words.u32()).ok_or(Problem::Cut)?;
-            // The short form keeps up to four bytes in the tag.
+            // The short form stores up to four bytes in the tag.
             if word >> 16 == 0 {
                 return Ok(Tag { kind: word, size: size as usize, short: None });
             }
@@ -164,18 +158,18 @@ mod reading {
             Ok(Tag { kind: word & 0xFFFF, size, short: Some(short) })
         }
 
-        /// Reads the fill bytes up to a multiple of eight; the last element may lack them.
+        /// Reads the padding to a multiple of eight bytes; it may be missing after the last element.
         fn padding(reader: &mut dyn Read, size: usize) -> Result<(), Problem> {
             pass_over(&mut reader.take((size.wrapping_neg() & 7) as u64))
         }
 
-        /// The bytes of a short element: flags, sides, a name.
+        /// The bytes of a short element: flags, dimensions, a name.
         fn head(&self, reader: &mut dyn Read) -> Result<Vec<u8>, Problem> {
             let tag = self.tag(reader)?;
             if let Some(short) = tag.short {
                 return Ok(short[..tag.size].to_vec());
             }
-            if tag.size > LONGEST_HEAD {
+            if tag.size > MAX_HEAD_BYTES {
                 return Err(Problem::Misfit);
             }
             let mut bytes = vec![0; tag.size];
@@ -184,13 +178,12 @@ mod reading {
             Ok(bytes)
         }
 
-        /// Reads the numbers of an array with `count` entries.
         fn numbers(&mut self, reader: &mut dyn Read, count: Option<usize>) -> Result<Vec<f64>, Problem> {
             let tag = self.tag(reader)?;
             let number = number(tag.kind).ok_or(Problem::Misfit)?;
             let count = count.filter(|count| count.checked_mul(number.size()) == Some(tag.size));
             let count = count.ok_or(Problem::Misfit)?;
-            // Every number takes eight bytes, however it is written.
+            // Every number needs eight bytes in memory.
             self.budget.take((count as u64).checked_mul(8)).map_err(Problem::TooLarge)?;
             let mut values = Vec::new();
             let mut convert = |bytes: &[u8]| {
@@ -201,10 +194,10 @@ mod reading {
                 convert(&short[..tag.size]);
                 return Ok(values);
             }
-            // Grows with what is really there, not with what the tag claims.
-            let (mut block, mut left) = (vec![0; BLOCK.min(tag.size)], tag.size);
+            // Grow with the available bytes, not with the length in the tag.
+            let (mut block, mut left) = (vec![0; BLOCK_BYTES.min(tag.size)], tag.size);
             while left > 0 {
-                let part = &mut block[..left.min(BLOCK)];
+                let part = &mut block[..left.min(BLOCK_BYTES)];
                 reader.read_exact(part)?;
                 convert(part);
                 left -= part.len();
@@ -213,8 +206,8 @@ mod reading {
             Ok(values)
         }
 
-        /// Adds the arrays in a matrix element of `size` bytes: its own, or those of a struct's fields. `name` is what
-        /// a struct calls it.
+        /// Adds the arrays of a matrix element of `size` bytes: the array, or those of a struct's fields. `name` is the
+        /// path of a field.
         fn matrix(
             &mut self,
             reader: &mut dyn Read,
@@ -222,7 +215,7 @@ mod reading {
             name: Option<String>,
             depth: usize,
         ) -> Result<(), Problem> {
-            // An empty field of a struct has no parts at all.
+            // An empty field of a struct has no parts.
             if size == 0 {
                 return Ok(());
             }
@@ -249,7 +242,7 @@ mod reading {
                     }
                 }
                 // struct
-                2 if depth < DEEPEST && sides.iter().all(|side| *side == 1) => {
+                2 if depth < MAX_NESTING && sides.iter().all(|side| *side == 1) => {
                     let length = self.head(reader)?;
                     let length = Bytes::new(&length, self.big_endian).u32().ok_or(Problem::Misfit)? as usize;
                     let names = self.head(reader)?;

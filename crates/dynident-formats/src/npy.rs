@@ -1,23 +1,22 @@
-//! NumPy: one array (`.npy`) or several of one length (`.npz`). Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
+//! NumPy: one array (`.npy`) or several of one length (`.npz`). Format:
+//! <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
 
-use crate::arrays::{Array, ArrayTable, MOST_COLUMNS};
+use crate::arrays::{Array, ArrayTable, MAX_COLUMNS};
 use crate::bytes::{Bytes, Number};
 use crate::error::FileError;
 use crate::kind::FileFormat;
-use crate::limits::{Budget, SPLIT};
+use crate::limits::{Budget, SPLIT_FIX};
 use crate::table::Table;
 use crate::zip;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-/// A header is a line or two; that of a structured array a few thousand bytes.
-const LONGEST_HEADER: usize = 1 << 20;
+const MAX_HEADER_BYTES: usize = 1 << 20;
 
-/// One array as its header describes it.
 struct Header {
-    /// Name (none outside of structured arrays), offset in an item, entries, how they are written.
+    /// Name (only in structured arrays), offset in an item, number of entries, and number type.
     fields: Vec<Field>,
-    /// Bytes of an item.
+    /// Bytes per item.
     item: usize,
     fortran: bool,
     shape: Vec<usize>,
@@ -30,7 +29,6 @@ struct Field {
     count: usize,
 }
 
-/// The array in `reader`.
 pub(crate) fn open(path: &Path, mut reader: impl Read, mut budget: Budget) -> Result<Box<dyn Table>, FileError> {
     let arrays = arrays(path, FileFormat::Npy, "", &mut reader, &mut budget)?;
     let named = arrays.iter().all(|array| !array.name.is_empty());
@@ -38,7 +36,6 @@ pub(crate) fn open(path: &Path, mut reader: impl Read, mut budget: Budget) -> Re
     Ok(Box::new(if named { table } else { table.nameless() }))
 }
 
-/// The arrays of an archive, by their names there.
 pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Table>, FileError> {
     let io = |source| FileError::Io { file: path.to_owned(), source };
     let mut file = dynident_files::open(path).map_err(io)?;
@@ -49,9 +46,10 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
         found += 1;
         let mut contents = BufReader::new(zip::contents(path, &mut file, member)?);
         let arrays = arrays(path, FileFormat::Npz, name, &mut contents, &mut budget);
-        // Damaged bytes explain any other fault; an array that is too large is not unpacked to its end.
+        // Check the checksum first, because it explains other errors; an array that is too large is not read to its
+        // end.
         match arrays {
-            Err(error @ FileError::Broken { fix: SPLIT, .. }) => return Err(error),
+            Err(error @ FileError::Broken { fix: SPLIT_FIX, .. }) => return Err(error),
             arrays => {
                 contents.into_inner().verify(path)?;
                 all.extend(arrays?);
@@ -61,7 +59,7 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
     if found == 0 {
         return Err(FileError::OtherFormat {
             file: path.to_owned(),
-            format: "a ZIP archive without NumPy arrays (a workbook is one, too)",
+            format: "a ZIP archive without NumPy arrays (for example a workbook)",
             fix: "unpack it, or save the workbook's sheet as CSV",
         });
     }
@@ -72,7 +70,7 @@ fn nothing(path: &Path, format: FileFormat) -> FileError {
     FileError::no_columns(path, format, "text, objects or complex numbers", "save columns of real numbers")
 }
 
-/// The numeric arrays that one `.npy` stream holds: one, or one for each field of a structured array.
+/// The numeric arrays in a `.npy` stream: one, or one for each field of a structured array.
 fn arrays(
     path: &Path,
     format: FileFormat,
@@ -86,26 +84,26 @@ fn arrays(
     let header = header(reader).map_err(&broken)?;
     let items = header.shape.iter().try_fold(1_usize, |all, side| all.checked_mul(*side));
     let bytes = items.and_then(|items| items.checked_mul(header.item));
-    let too_large = || FileError::broken(path, format, place.clone(), budget.problem(), SPLIT);
+    let too_large = || FileError::broken(path, format, place.clone(), budget.problem(), SPLIT_FIX);
     let (Some(items), Some(bytes)) = (items, bytes.filter(|bytes| budget.allows(Some(*bytes as u64)))) else {
         return Err(too_large());
     };
-    // Every number takes eight bytes, however it is written.
+    // Every number needs eight bytes in memory.
     let numbers = header.fields.iter().filter(|field| field.number.is_some()).map(|field| field.count);
     let numbers = numbers.sum::<usize>().checked_mul(items).and_then(|count| (count as u64).checked_mul(8));
     if !budget.allows(numbers) {
         return Err(too_large());
     }
     budget.take(numbers).map_err(&broken)?;
-    if header.fields.iter().map(|field| field.count).sum::<usize>() > MOST_COLUMNS {
-        return Err(broken(format!("it has more than {MOST_COLUMNS} columns")));
+    if header.fields.iter().map(|field| field.count).sum::<usize>() > MAX_COLUMNS {
+        return Err(broken(format!("it has more than {MAX_COLUMNS} columns")));
     }
-    // Grows with what is really there, not with what the header claims.
+    // Grow with the available bytes, not with the length in the header.
     let mut data = Vec::new();
     let read = reader.take(bytes as u64).read_to_end(&mut data);
-    read.map_err(|error| broken(format!("it cannot be unpacked ({error})")))?;
+    read.map_err(|error| broken(format!("it cannot be decompressed ({error})")))?;
     if data.len() < bytes {
-        return Err(broken(format!("{} bytes of {bytes} are there: the file is cut off", data.len())));
+        return Err(broken(format!("only {} of {bytes} bytes are present: the file is truncated", data.len())));
     }
     let mut arrays = Vec::new();
     for field in &header.fields {
@@ -125,7 +123,7 @@ fn arrays(
             shape.push(field.count);
         }
         let Some([rows, columns]) = Array::two_sides(&shape) else { continue };
-        // Entries of a field with several stand together, whatever the order of items; a vector has one order only.
+        // The entries of a field are contiguous for any order of items; a vector has one order only.
         let column_major = header.fortran && field.count == 1;
         let make = if column_major { Array::column_major } else { Array::row_major };
         arrays.push(make(label, [rows, columns], values));
@@ -134,23 +132,23 @@ fn arrays(
 }
 
 fn header(reader: &mut impl Read) -> Result<Header, String> {
-    let cut = |_| "its header is cut off".to_owned();
+    let cut = |_| "its header is truncated".to_owned();
     let mut begin = [0; 8];
     reader.read_exact(&mut begin).map_err(cut)?;
     if &begin[..6] != b"\x93NUMPY" {
-        return Err("it does not begin as a NumPy array".to_owned());
+        return Err("it does not start like a NumPy array".to_owned());
     }
     let mut length = [0; 4];
     let wide = begin[6] >= 2;
     reader.read_exact(&mut length[..if wide { 4 } else { 2 }]).map_err(cut)?;
     let length = u32::from_le_bytes(length) as usize;
-    if length > LONGEST_HEADER {
+    if length > MAX_HEADER_BYTES {
         return Err(format!("its header of {length} bytes is too long"));
     }
     let mut text = vec![0; length];
     reader.read_exact(&mut text).map_err(cut)?;
     let text = String::from_utf8_lossy(&text);
-    let wrong = || "its header is not understood".to_owned();
+    let wrong = || "its header is invalid".to_owned();
     let mut literal = Literal { rest: text.trim() };
     let Value::Dict(entries) = literal.value(0).ok_or_else(wrong)? else { return Err(wrong()) };
     let entry = |key: &str| entries.iter().find(|(name, _)| name == key).map(|(_, value)| value);
@@ -201,7 +199,7 @@ fn fields(descr: &Value) -> Option<(Vec<Field>, usize)> {
     }
 }
 
-/// `<f8`: how it is written, big-endian or not, and its bytes; no number for text and the like.
+/// Parses a type such as `<f8`: number type, whether it is big-endian, and bytes; `None` as type for text etc.
 fn scalar(kind: &str) -> Option<(Option<(Number, bool)>, usize)> {
     let (order, rest) = kind.split_at_checked(1)?;
     let (letter, size) = rest.split_at_checked(1)?;
@@ -224,7 +222,6 @@ fn scalar(kind: &str) -> Option<(Option<(Number, bool)>, usize)> {
     (bytes > 0 && bytes <= 1 << 20).then_some((number.map(|number| (number, order == ">")), bytes))
 }
 
-/// A literal of Python, as far as headers have them.
 enum Value<'a> {
     Dict(Vec<(String, Value<'a>)>),
     List(Vec<Value<'a>>),

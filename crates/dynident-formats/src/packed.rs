@@ -1,11 +1,11 @@
-//! Packed text, unpacked as a stream.
+//! Compressed text as a stream.
 
 use crate::error::FileError;
 use crate::kind::FileFormat;
 use std::io::Read;
 use std::path::Path;
 
-/// The unpacked bytes of `reader`, several packed members after each other included.
+/// The decompressed bytes of `reader`, including several concatenated members.
 pub(crate) fn unpacked(
     path: &Path,
     format: FileFormat,
@@ -18,7 +18,7 @@ pub(crate) fn unpacked(
         FileFormat::ZstdText => {
             let mut decoder = zstd::stream::read::Decoder::with_buffer(reader)
                 .map_err(|source| FileError::Io { file: path.to_owned(), source })?;
-            // 128 MiB: what `zstd` itself unpacks without being told to take more memory.
+            // 128 MiB, the default limit of `zstd`.
             decoder.window_log_max(27).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
             Ok(Box::new(decoder))
         }

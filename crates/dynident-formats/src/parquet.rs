@@ -15,7 +15,7 @@ pub(crate) use reading::open;
 #[cfg(feature = "parquet")]
 mod reading {
     use super::{FileError, Path, Table};
-    use crate::arrays::{LONGEST_LIST, MOST_COLUMNS};
+    use crate::arrays::{MAX_COLUMNS, MAX_LIST_COLUMNS};
     use crate::kind::FileFormat;
     use crate::parquet_pages::CheckedPages;
     use crate::table::slots;
@@ -28,19 +28,18 @@ mod reading {
     use std::panic::{AssertUnwindSafe, catch_unwind};
     use std::path::PathBuf;
 
-    /// Rows that are unpacked at once.
-    const BLOCK: usize = 4096;
+    const BLOCK_ROWS: usize = 4096;
 
-    /// One column of the file, which may be several of the table's.
+    /// One column of the file; a list is several columns of the table.
     #[derive(Debug)]
     struct Leaf {
         index: usize,
-        /// First column of the table, and how many: one, or a list's entries.
+        /// First column of the table, and the number of columns.
         begin: usize,
         count: usize,
         list: bool,
         definition: i16,
-        /// Counts of these are a second; their first is zero.
+        /// Units per second of a time stamp; values are relative to the first one.
         ticks_per_s: Option<f64>,
         origin: Option<i64>,
     }
@@ -51,13 +50,13 @@ mod reading {
         leaves: Vec<Leaf>,
         names: Vec<String>,
         notes: Vec<String>,
-        /// Place of each column among those wanted.
+        /// Index of each column among the selected ones.
         slot_of: Vec<Option<usize>>,
         wanted: usize,
         group: usize,
         readers: Vec<(usize, ColumnReader)>,
         left_in_group: usize,
-        /// Rows of a block, row-major over what is wanted.
+        /// Rows of a block, row-major, selected columns only.
         block: Vec<f64>,
         rows_in_block: usize,
         next: usize,
@@ -73,11 +72,10 @@ mod reading {
         FileError::broken(path, FileFormat::Parquet, place, error.to_string(), "write or copy it again")
     }
 
-    /// What the decoders of the format make of bytes that are not as their page says. They take lengths for granted
-    /// that only unpacking can check, and panic; here that is a broken file like any other.
+    /// Converts panics of the decoder to errors: it assumes valid lengths, which can only be checked by decompression.
     fn guarded<T>(decode: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
         catch_unwind(AssertUnwindSafe(decode))
-            .unwrap_or_else(|_| Err(ParquetError::EOF("its bytes are not what they are said to be".into())))
+            .unwrap_or_else(|_| Err(ParquetError::EOF("its bytes do not match their description".into())))
     }
 
     pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
@@ -110,7 +108,7 @@ mod reading {
     }
 
     impl ParquetTable {
-        /// That columns lie at places and have lengths: the reader takes a negative one for a defect of its own.
+        /// Rejects negative offsets and lengths, on which the reader panics.
         fn check_places(&self) -> Result<(), FileError> {
             for (group, rows) in self.file.metadata().row_groups().iter().enumerate() {
                 for (index, column) in rows.columns().iter().enumerate() {
@@ -124,7 +122,7 @@ mod reading {
                     ];
                     if places.iter().any(|place| *place < 0) {
                         let place = format!("row group {group}, column {index}");
-                        let problem = "its place or its length is negative";
+                        let problem = "its offset or its length is negative";
                         let fix = "write or copy it again";
                         return Err(FileError::broken(&self.path, FileFormat::Parquet, place, problem, fix));
                     }
@@ -137,7 +135,7 @@ mod reading {
             let schema = self.file.metadata().file_metadata().schema_descr_ptr();
             for index in 0..schema.num_columns() {
                 let column = schema.column(index);
-                // `observation.state.list.element`: the words between are the format's own.
+                // `observation.state.list.element`: the middle parts are defined by the format.
                 let parts = column.path().parts();
                 let list = column.max_rep_level() > 0;
                 let own = if list && parts.len() > 2 { &parts[..parts.len() - 2] } else { parts };
@@ -148,7 +146,7 @@ mod reading {
                 );
                 let decimal = column.converted_type() == ConvertedType::DECIMAL;
                 if !number || decimal || column.max_rep_level() > 1 {
-                    self.notes.push(format!("column {name}: no numbers, or lists of lists"));
+                    self.notes.push(format!("column {name}: not numeric, or lists of lists"));
                     continue;
                 }
                 let ticks_per_s = match (column.logical_type_ref(), column.converted_type()) {
@@ -173,8 +171,8 @@ mod reading {
                 if list || ticks_per_s.is_some() {
                     self.look_at_first(&mut leaf)?;
                 }
-                if self.names.len() + leaf.count > MOST_COLUMNS {
-                    self.notes.push(format!("column {name}: beyond {MOST_COLUMNS} columns"));
+                if self.names.len() + leaf.count > MAX_COLUMNS {
+                    self.notes.push(format!("column {name}: more than {MAX_COLUMNS} columns"));
                     continue;
                 }
                 if list {
@@ -187,7 +185,7 @@ mod reading {
             Ok(())
         }
 
-        /// The length of a list in its first row, the first of some stamps.
+        /// Reads the length of a list and the first time stamp from the first row.
         fn look_at_first(&self, leaf: &mut Leaf) -> Result<(), FileError> {
             leaf.count = usize::from(!leaf.list);
             if self.file.num_row_groups() == 0 {
@@ -198,13 +196,12 @@ mod reading {
             let mut reader = checked_reader(&*group, leaf.index).map_err(error)?;
             let read = guarded(|| read_block(&mut reader, 1)).map_err(error)?;
             if leaf.list {
-                leaf.count = read.levels.len().min(LONGEST_LIST);
+                leaf.count = read.levels.len().min(MAX_LIST_COLUMNS);
             }
             leaf.origin = read.integers.first().copied();
             Ok(())
         }
 
-        /// Begins the next group of rows; false at the end.
         fn next_group(&mut self) -> Result<bool, FileError> {
             if self.group >= self.file.num_row_groups() {
                 return Ok(false);
@@ -223,14 +220,13 @@ mod reading {
             Ok(true)
         }
 
-        /// Unpacks further rows; false at the end.
         fn next_block(&mut self) -> Result<bool, FileError> {
             while self.left_in_group == 0 {
                 if !self.next_group()? {
                     return Ok(false);
                 }
             }
-            let rows = self.left_in_group.min(BLOCK);
+            let rows = self.left_in_group.min(BLOCK_ROWS);
             let width = self.wanted;
             self.block.clear();
             self.block.resize(rows * width, f64::NAN);
@@ -278,7 +274,7 @@ mod reading {
         }
     }
 
-    /// A column of a group of rows, whose pages are looked at before they are decoded.
+    /// A column of a row group, with checks of its pages before they are decoded.
     fn checked_reader(group: &dyn RowGroupReader, index: usize) -> Result<ColumnReader, ParquetError> {
         guarded(|| {
             let column = group.metadata().schema_descr().column(index);
@@ -287,7 +283,6 @@ mod reading {
         })
     }
 
-    /// Some rows of a column.
     #[derive(Default)]
     struct Read {
         rows: usize,

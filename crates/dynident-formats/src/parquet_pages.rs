@@ -1,21 +1,19 @@
-//! Pages of a Parquet column, refused where they are shorter than their own levels, or are coded by a dictionary that
-//! the column has not: the reader takes both for granted.
+//! Checks the pages of a Parquet column, because the reader does not: a page must not be shorter than its levels, nor
+//! use a missing dictionary.
 
 use parquet::basic::Encoding;
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 use parquet::schema::types::ColumnDescriptor;
 
-/// Values of one page at most. Writers make pages of about 20,000; a page of repeated levels may claim 2^31 in a few
-/// bytes.
-const MOST_VALUES: u32 = 1 << 26;
+/// Maximum number of values of one page. Usual pages have about 20,000; a corrupt page of repeated levels may declare
+/// 2^31 in a few bytes.
+const MAX_PAGE_VALUES: u32 = 1 << 26;
 
-/// The pages of `inner`, each looked at before it is handed on.
 pub(crate) struct CheckedPages {
     inner: Box<dyn PageReader>,
-    /// Highest repetition and definition level of the column.
+    /// Maximum repetition and definition level of the column.
     highest: [i16; 2],
-    /// Whether a dictionary came before.
     has_dictionary: bool,
 }
 
@@ -24,7 +22,7 @@ impl CheckedPages {
         Self { inner, highest: [column.max_rep_level(), column.max_def_level()], has_dictionary: false }
     }
 
-    /// Whether the page holds the levels that it says it does, and follows the dictionary that it needs.
+    /// Checks the length of the levels and the presence of the dictionary.
     fn check(&mut self, page: &Page) -> Result<()> {
         let (fits, encoding) = match page {
             Page::DataPage { buf, num_values, encoding, rep_level_encoding, def_level_encoding, .. } => {
@@ -39,21 +37,21 @@ impl CheckedPages {
                 return Ok(());
             }
         };
-        if page.num_values() > MOST_VALUES {
-            return Err(ParquetError::General(format!("a page has more than {MOST_VALUES} values")));
+        if page.num_values() > MAX_PAGE_VALUES {
+            return Err(ParquetError::General(format!("a page has more than {MAX_PAGE_VALUES} values")));
         }
         let needs_dictionary = matches!(encoding, Encoding::PLAIN_DICTIONARY | Encoding::RLE_DICTIONARY);
         if !fits {
-            Err(ParquetError::EOF("a page ends within its levels".into()))
+            Err(ParquetError::EOF("a page ends inside its levels".into()))
         } else if needs_dictionary && !self.has_dictionary {
-            Err(ParquetError::General("a page is coded by a dictionary that the column has not".into()))
+            Err(ParquetError::General("a page needs a dictionary that is missing in the column".into()))
         } else {
             Ok(())
         }
     }
 
-    /// Repetition and then definition levels before the values of a page of the first version: packed bits (an encoding
-    /// that is out of use) without a length, all others with one of their own, which the reader checks.
+    /// Whether the page contains its levels. The levels precede the values of a version 1 page, repetition levels
+    /// first: packed bits (a deprecated encoding) without a length field, all others with one, which the reader checks.
     fn levels_fit(&self, page: &[u8], values: u32, encodings: [Encoding; 2]) -> bool {
         let mut rest = page;
         for (highest, encoding) in self.highest.into_iter().zip(encodings) {
@@ -101,7 +99,7 @@ impl PageReader for CheckedPages {
     }
 
     fn skip_next_page(&mut self) -> Result<()> {
-        // A dictionary that is passed over is kept by the reader until a page needs it.
+        // The reader keeps a skipped dictionary until a page needs it.
         self.has_dictionary |= self.inner.peek_next_page()?.is_some_and(|page| page.is_dict);
         self.inner.skip_next_page()
     }

@@ -4,18 +4,18 @@ use crate::error::FileError;
 use core::fmt;
 use core::ops::Range;
 
-/// Columns that were recorded together, row by row.
+/// Columns that were recorded together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnGroup {
-    /// What messages call it: a topic; `None` where the file has only one.
+    /// Name in messages, such as a topic; `None` for a single group.
     pub name: Option<String>,
-    /// Its columns.
+    /// Range of its columns.
     pub columns: Range<usize>,
-    /// Its column of time stamps in seconds, where the format has such a thing.
+    /// Index of its column of time stamps in seconds, if the format has one.
     pub time: Option<usize>,
 }
 
-/// For each of `width` columns its place among the selected ones.
+/// For each of `width` columns, its index among the selected ones.
 #[cfg(any(feature = "json", feature = "parquet"))]
 pub(crate) fn slots(width: usize, columns: &[usize]) -> Vec<Option<usize>> {
     let mut slot_of = vec![None; width];
@@ -30,39 +30,38 @@ pub trait Table: fmt::Debug + Send {
     /// Number of columns.
     fn width(&self) -> usize;
 
-    /// Names of the columns, one for each; `None` if they are addressed by 0-based index only.
+    /// Names of the columns, one for each; `None` if columns have 0-based indices only.
     fn names(&self) -> Option<&[String]>;
 
-    /// Which columns were recorded together; every column stands in one group, groups in ascending order.
+    /// Groups of columns that were recorded together, in ascending order; every column belongs to one group.
     fn groups(&self) -> Vec<ColumnGroup> {
         vec![ColumnGroup { name: None, columns: 0..self.width(), time: None }]
     }
 
-    /// The columns, each once, that [`next_row`](Self::next_row) is to give, in this order. Called before the first
-    /// row; without it, rows are those of the first group.
+    /// Selects the columns, without duplicates, that [`next_row`](Self::next_row) returns in this order. Called before
+    /// the first row; by default the columns of the first group are selected.
     ///
-    /// Rows are those of the group of the first column. Columns of other groups are interpolated linearly between
-    /// their neighbours in time; rows before such a group has begun or after it has ended are left out, and a value in
-    /// a hole of it is NaN.
+    /// Rows are those of the group of the first column. Columns of other groups are interpolated linearly in time. Rows
+    /// before the start or after the end of such a group are left out, and values in a gap of it are NaN.
     fn select(&mut self, columns: &[usize]);
 
-    /// Reads one row: a number for each selected column, NaN where it is missing; false at the end.
+    /// Reads one row: a number for each selected column, NaN if missing; false at the end.
     ///
     /// # Errors
-    /// If the file is broken there.
+    /// If the file is corrupt at this row.
     fn next_row(&mut self, values: &mut [f64]) -> Result<bool, FileError>;
 
-    /// Passes over one row; false at the end.
+    /// Skips one row; false at the end.
     ///
     /// # Errors
-    /// If the file is broken there.
+    /// If the file is corrupt at this row.
     fn skip_row(&mut self) -> Result<bool, FileError>;
 
-    /// Reads all that is left: `each` row with the number of its group, whose columns it has, in the order in which
-    /// rows lie in the file. Not after [`select`](Self::select).
+    /// Reads all remaining rows in their order in the file and passes each to `each` with its group number and the
+    /// columns of the group. Must not follow [`select`](Self::select).
     ///
     /// # Errors
-    /// If the file is broken, behind the last row that was given.
+    /// If the file is corrupt; the rows before the error were passed on.
     fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), FileError> {
         let columns = self.width();
         self.select(&(0..columns).collect::<Vec<_>>());
@@ -73,17 +72,17 @@ pub trait Table: fmt::Debug + Send {
         Ok(())
     }
 
-    /// What the file holds beside its columns and why it is none, a sentence each.
+    /// Contents that are not exposed as columns, with the reason for each.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Number of rows where it is known beforehand, or about.
+    /// Number of rows, exact or approximate, if known in advance.
     fn estimated_rows(&self) -> Option<u64> {
         None
     }
 
-    /// Whether the file is cut off behind the last row that was given.
+    /// Whether the file is truncated after the last row.
     fn truncated(&self) -> bool {
         false
     }

@@ -1,4 +1,4 @@
-//! The members of a ZIP archive, as NumPy writes them: stored or deflated, ZIP64 included.
+//! Reads ZIP archives written by NumPy: stored or deflated members, including ZIP64.
 
 use crate::bytes::Bytes;
 use crate::error::FileError;
@@ -7,35 +7,32 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Where a member lies, and how it is packed.
 #[derive(Clone, Debug)]
 pub(crate) struct Member {
     pub(crate) name: String,
     method: u16,
-    /// CRC-32 of the unpacked bytes.
+    /// CRC-32 of the decompressed bytes.
     crc: u32,
     packed: u64,
     header: u64,
 }
 
-/// The end record and the longest comment behind it.
-const END: u64 = 22 + 65535;
-/// The list of members at most: half a million arrays.
-const MOST_LIST: u64 = 1 << 26;
+/// Maximum length of the end record with its comment, bytes.
+const MAX_END_BYTES: u64 = 22 + 65535;
+const MAX_LIST_BYTES: u64 = 1 << 26;
 
 fn broken(path: &Path, place: &str, problem: &str) -> FileError {
     FileError::broken(path, FileFormat::Npz, place, problem, "copy or write it again")
 }
 
-/// The members that the archive's list names.
 pub(crate) fn members(path: &Path, file: &mut File) -> Result<Vec<Member>, FileError> {
     let io = |source| FileError::Io { file: path.to_owned(), source };
     let size = file.seek(SeekFrom::End(0)).map_err(io)?;
-    let begin = size.saturating_sub(END + 20);
+    let begin = size.saturating_sub(MAX_END_BYTES + 20);
     file.seek(SeekFrom::Start(begin)).map_err(io)?;
     let mut tail = Vec::new();
-    file.by_ref().take(END + 20).read_to_end(&mut tail).map_err(io)?;
-    let cut = || broken(path, "its end", "the list of members is missing: the archive is cut off");
+    file.by_ref().take(MAX_END_BYTES + 20).read_to_end(&mut tail).map_err(io)?;
+    let cut = || broken(path, "its end", "the list of members is missing: the archive is truncated");
     let end = tail.windows(4).rposition(|word| word == b"PK\x05\x06").ok_or_else(cut)?;
     let field = |from: usize, at: usize| {
         tail.get(from..).map(|rest| Bytes::new(rest, false)).and_then(|mut bytes| {
@@ -56,7 +53,7 @@ pub(crate) fn members(path: &Path, file: &mut File) -> Result<Vec<Member>, FileE
         }
         (length, start) = (bytes.u64().ok_or_else(cut)?, bytes.u64().ok_or_else(cut)?);
     }
-    if start.checked_add(length).is_none_or(|end| end > size) || length > MOST_LIST {
+    if start.checked_add(length).is_none_or(|end| end > size) || length > MAX_LIST_BYTES {
         return Err(cut());
     }
     file.seek(SeekFrom::Start(start)).map_err(io)?;
@@ -66,7 +63,7 @@ pub(crate) fn members(path: &Path, file: &mut File) -> Result<Vec<Member>, FileE
     let mut members = Vec::new();
     while bytes.left() > 0 {
         let member = member(&mut bytes)
-            .ok_or_else(|| broken(path, &format!("member {}", members.len()), "its entry in the list is broken"))?;
+            .ok_or_else(|| broken(path, &format!("member {}", members.len()), "its entry in the list is invalid"))?;
         members.push(member);
     }
     Ok(members)
@@ -91,7 +88,7 @@ fn member(bytes: &mut Bytes) -> Option<Member> {
         let (tag, length) = (extra.u16()?, extra.u16()?);
         let mut field = Bytes::new(extra.take(usize::from(length))?, false);
         if tag == 1 {
-            // The sizes that do not fit into 32 bits, in this order.
+            // Only sizes that exceed 32 bits are present, in this order.
             if unpacked == u32::MAX {
                 field.u64()?;
             }
@@ -106,7 +103,7 @@ fn member(bytes: &mut Bytes) -> Option<Member> {
     Some(Member { name, method, crc, packed, header })
 }
 
-/// Unpacked bytes of a member, with a running checksum.
+/// Decompressed bytes of a member, with a running checksum.
 pub(crate) struct Contents<'a> {
     reader: Box<dyn Read + 'a>,
     hasher: crc32fast::Hasher,
@@ -123,17 +120,17 @@ impl Read for Contents<'_> {
 }
 
 impl Contents<'_> {
-    /// Reads to the end and compares the checksum with the one in the archive's list.
+    /// Reads to the end and compares the checksum with that of the list.
     ///
     /// # Errors
-    /// If they differ: bytes were changed after the archive was written.
+    /// If they differ, because bytes were changed.
     pub(crate) fn verify(mut self, path: &Path) -> Result<(), FileError> {
         let mut block = [0; 1 << 12];
         loop {
             match self.read(&mut block) {
                 Ok(0) => break,
                 Ok(_) => {}
-                Err(error) => return Err(broken(path, &self.place, &format!("it cannot be unpacked ({error})"))),
+                Err(error) => return Err(broken(path, &self.place, &format!("it cannot be decompressed ({error})"))),
             }
         }
         if self.hasher.finalize() == self.crc {
@@ -143,7 +140,6 @@ impl Contents<'_> {
     }
 }
 
-/// The contents of a member as a stream.
 pub(crate) fn contents<'a>(path: &Path, file: &'a mut File, member: &Member) -> Result<Contents<'a>, FileError> {
     let io = |source| FileError::Io { file: path.to_owned(), source };
     let place = format!("member `{}`", member.name);
@@ -155,7 +151,7 @@ pub(crate) fn contents<'a>(path: &Path, file: &'a mut File, member: &Member) -> 
         .then(|| bytes.take(22))
         .flatten()
         .and_then(|_| Some([bytes.u16()?, bytes.u16()?]))
-        .ok_or_else(|| broken(path, &place, "its header is broken"))?;
+        .ok_or_else(|| broken(path, &place, "its header is invalid"))?;
     let mut own_name = Vec::new();
     file.by_ref().take(u64::from(name)).read_to_end(&mut own_name).map_err(io)?;
     if String::from_utf8_lossy(&own_name) != member.name {
@@ -169,7 +165,7 @@ pub(crate) fn contents<'a>(path: &Path, file: &'a mut File, member: &Member) -> 
         8 => Box::new(flate2::bufread::DeflateDecoder::new(std::io::BufReader::new(packed))),
         #[cfg(not(feature = "gzip"))]
         8 => {
-            let format = "a packed NumPy archive";
+            let format = "a compressed NumPy archive";
             return Err(FileError::NotBuilt { file: path.to_owned(), format, feature: "gzip" });
         }
         _ => {
@@ -177,7 +173,7 @@ pub(crate) fn contents<'a>(path: &Path, file: &'a mut File, member: &Member) -> 
                 path,
                 FileFormat::Npz,
                 place,
-                "it is packed in another way than deflate",
+                "its compression is not deflate",
                 "write it with numpy.savez or numpy.savez_compressed",
             ));
         }

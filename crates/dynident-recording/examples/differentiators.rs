@@ -1,8 +1,8 @@
-//! Bias and noise of every differentiator, against noise level and tracking error. Prints the tables of the book's page
-//! on differentiators.
+//! Bias and noise of every differentiator as functions of noise level and tracking error. Prints the tables of the
+//! book's page on differentiators.
 //!
-//! `cargo run --release -p dynident-recording --example differentiators [SEEDS [SECONDS]]`: 3 seeds and 40 s are what
-//! the book has; less is a trial.
+//! `cargo run --release -p dynident-recording --example differentiators [SEEDS [SECONDS]]`: 3 seeds and 40 s for the
+//! book; use less for a trial.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "printing tables is what this program is for")]
 
@@ -11,15 +11,14 @@ use dynident_recording::{Derivatives, DifferentiatorSettings, LogisticPath, Plac
 use std::sync::Arc;
 
 const RATE_HZ: f64 = 1000.0;
-/// BIRDy's three levels, and two beyond; degrees.
+/// The three levels of BIRDy, and two larger ones; degrees.
 const NOISE_DEG: [f64; 5] = [0.0, 1e-4, 1e-3, 1e-2, 1e-1];
-/// What the book's tables are made with.
+/// Values for the tables of the book.
 const SEEDS: u64 = 3;
 const DURATION_S: f64 = 40.0;
-/// Left out at both ends.
+/// Time left out at both ends, s.
 const TRIM_S: f64 = 1.0;
 
-/// How the joint differs from what it was commanded.
 const TRACKING: [(&str, Tracking); 6] = [
     ("none", Tracking { delay_s: 0.0, shape: 0.0, vibration: 0.0 }),
     ("10 ms late", Tracking { delay_s: 0.01, shape: 0.0, vibration: 0.0 }),
@@ -51,13 +50,12 @@ const DIFFERENTIATORS: [(&str, &str); 16] = [
 #[derive(Clone, Copy)]
 struct Tracking {
     delay_s: f64,
-    /// Stroke: so much steeper. Series: harmonic k so many times k larger.
+    /// Stroke: relative increase of the steepness. Series: relative increase k times this of harmonic k.
     shape: f64,
     /// Amplitude at 3.3 Hz, rad.
     vibration: f64,
 }
 
-/// What the joint is commanded to do, and what it does.
 #[derive(Clone, Copy)]
 enum CommandKind {
     /// The paper's joint 2 (Table 3), there and back.
@@ -118,7 +116,7 @@ impl CommandKind {
     }
 }
 
-/// Root mean square of the error without noise, of what noise adds, and of both; for dq and ddq.
+/// RMS error without noise, RMS effect of the noise, and RMS of the sum; for dq and ddq.
 #[derive(Clone, Copy, Default)]
 struct Figures {
     bias: [f64; 2],
@@ -128,7 +126,7 @@ struct Figures {
     refused: f64,
 }
 
-/// How often noise is drawn, and how much of the motion is looked at, s.
+/// Number of noise samples, and duration of the motion, s.
 #[derive(Clone, Copy)]
 struct Extent {
     seeds: u64,
@@ -147,7 +145,7 @@ fn main() {
         let times: Vec<f64> = (0..n + 200).map(|i| i as f64 / RATE_HZ).collect();
         let columns = [0, 1, 2].map(|order| times.iter().map(|t| command.at(*t, none)[order]).collect());
         let reference = Arc::new(Reference::sampled(&times, &[columns]).unwrap());
-        // By differentiator, noise, tracking.
+        // By differentiator, noise, tracking error.
         let figures: Vec<Vec<Vec<Figures>>> = DIFFERENTIATORS
             .iter()
             .map(|(method, settings)| {
@@ -181,7 +179,7 @@ fn label(differentiator: usize) -> String {
     format!("{method}, {short}")
 }
 
-/// Bias at BIRDy's standard noise by tracking error, deviation without tracking error by noise.
+/// Bias at BIRDy's standard noise for each tracking error, deviation without tracking error for each noise level.
 fn table(figures: &[Vec<Vec<Figures>>], order: usize, quantity: &str) {
     let biases: Vec<String> = TRACKING.iter().map(|(name, _)| format!("bias: {name}")).collect();
     let deviations: Vec<String> = NOISE_DEG[1..].iter().map(|noise| format!("std: {noise:.0e}°")).collect();
@@ -203,7 +201,7 @@ fn table(figures: &[Vec<Vec<Figures>>], order: usize, quantity: &str) {
     println!();
 }
 
-/// The differentiator with the least root mean square error, of those that apply to nearly all samples.
+/// The differentiator with the minimum RMS error, among those that apply to nearly all samples.
 fn winners(figures: &[Vec<Vec<Figures>>], order: usize, quantity: &str) {
     let names: Vec<&str> = TRACKING.iter().map(|(name, _)| *name).collect();
     println!("| least error of {quantity} | {} |\n| --- |{}", names.join(" | "), " --- |".repeat(names.len()));
@@ -246,7 +244,7 @@ fn measured(
     let (mut figures, mut count, mut refused) = (Figures::default(), 0.0, 0.0);
     for seed in 0..if noise_deg > 0.0 { extent.seeds } else { 1 } {
         let q: Vec<f64> = clean.iter().zip(normal(seed, n)).map(|(x, e)| x + noise_deg.to_radians() * e).collect();
-        // Without noise, but with the cut-off that the noisy data ask for.
+        // Without noise, but with the cut-off of the noisy data.
         let cutoff_hz = cutoff(&[&q[..]], RATE_HZ).cutoff_hz;
         let (noisy, kept) = run(&q, cutoff_hz);
         let (quiet, kept_quiet) = run(&clean, cutoff_hz);
@@ -271,7 +269,7 @@ fn measured(
     figures
 }
 
-/// White noise of unit variance: Box and Muller on a linear congruential generator.
+/// White noise of unit variance: Box-Muller transform of a linear congruential generator.
 fn normal(seed: u64, n: usize) -> Vec<f64> {
     let mut state = (seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mut uniform = || {

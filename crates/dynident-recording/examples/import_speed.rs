@@ -1,4 +1,4 @@
-//! How fast a log of a million samples of seven joints becomes a motion:
+//! Measures the time to convert a log with a million samples of seven joints to a motion:
 //! `cargo run --release -p dynident-recording --example import_speed [ROWS]`.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a benchmark for people")]
 
@@ -45,7 +45,7 @@ fn main() {
     }
     let bytes = std::fs::metadata(&file).unwrap().len();
     println!(
-        "{samples} samples, {} MB: {:.2} s, of which {opened:.2} s for decisions",
+        "{samples} samples, {} MB: {:.2} s, {opened:.2} s of this for opening",
         bytes >> 20,
         start.elapsed().as_secs_f64()
     );

@@ -1,17 +1,17 @@
-//! What can go wrong between a log file and a motion: each message names the file, the place and the fix.
+//! Errors between a log file and a motion. Each message names the file, the place and the fix.
 
 use crate::place::LogPlace;
 use std::path::PathBuf;
 
-/// A [`LogFormat`](crate::LogFormat) that contradicts itself or the list of joints.
+/// A [`LogFormat`](crate::LogFormat) that is inconsistent or does not match the joints.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("log format, key `{key}`: {problem}; {fix}")]
 pub struct FormatError {
     /// The key, dotted as in the study file: `torque.scale`.
     pub key: String,
-    /// What is wrong with it.
+    /// The problem.
     pub problem: String,
-    /// What to write instead.
+    /// The fix.
     pub fix: String,
 }
 
@@ -25,27 +25,27 @@ impl FormatError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// The description of the log is wrong.
+    /// The log format is invalid.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// The operating system refused the file.
+    /// The operating system could not read the file.
     #[error("{}: cannot be read ({source}); check the path and its permissions", file.display())]
     Io {
         /// The file.
         file: PathBuf,
-        /// The system's reason.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// A file that is not the one that was first read.
+    /// The file changed between two passes.
     #[error("{}: the file changed while it was read; wait until nothing writes to it, then run the command again", file.display())]
     Changed {
         /// The file.
         file: PathBuf,
     },
-    /// No row of numbers in the file.
+    /// The file contains no row of numbers.
     #[error("{}; the log needs at least one row of numbers", no_rows(place))]
     NoRows {
-        /// Where reading stopped.
+        /// Place where reading stopped.
         place: LogPlace,
     },
     /// The file is not text.
@@ -56,7 +56,7 @@ pub enum RecordingError {
         /// 1-based line.
         line: u64,
     },
-    /// Lines that end with a carriage return alone.
+    /// Lines end with a carriage return only.
     #[error("{}:{line}: carriage returns without newlines; convert the line ends, e.g. with tr '\\r' '\\n'", file.display())]
     CarriageReturns {
         /// The file.
@@ -64,10 +64,10 @@ pub enum RecordingError {
         /// 1-based line.
         line: u64,
     },
-    /// A file that cannot be read as what it is.
+    /// The file cannot be read in its format.
     #[error(transparent)]
     File(dynident_formats::FileError),
-    /// A line beyond the limit.
+    /// A line is longer than the limit.
     #[error("{}:{line}: the line is longer than {limit} bytes; is this a CSV file with one sample per line?", file.display())]
     LineTooLong {
         /// The file.
@@ -77,65 +77,65 @@ pub enum RecordingError {
         /// The limit in bytes.
         limit: usize,
     },
-    /// Two columns of one name, one of which is asked for.
-    #[error("{place}: column name `{name}` stands at columns {first} and {second}; address it by its 0-based index")]
+    /// Two columns have the requested name.
+    #[error("{place}: duplicate column name `{name}` (columns {first} and {second}); address it by its 0-based index")]
     DuplicateColumn {
-        /// Where the columns are named.
+        /// Place of the column names.
         place: LogPlace,
         /// The name.
         name: String,
-        /// 0-based index of its first place.
+        /// 0-based index of the first column.
         first: usize,
-        /// 0-based index of its second place.
+        /// 0-based index of the second column.
         second: usize,
     },
-    /// A column that the file does not have.
+    /// A requested column does not exist.
     #[error("{place}: no column `{wanted}` (key `{key}`); {hint}")]
     UnknownColumn {
-        /// Where the columns are named, or the first row.
+        /// Place of the column names, or the first row.
         place: LogPlace,
-        /// The key of the format that asks for it.
+        /// The key of the format that requests it.
         key: String,
-        /// What was asked for.
+        /// The requested column.
         wanted: String,
-        /// What exists, and the nearest name.
+        /// Existing columns, and the closest name.
         hint: String,
     },
-    /// A row with too few or too many fields.
+    /// A row has too few or too many fields.
     #[error("{place}: {found} fields where {expected} are expected; fix or delete the line{hint}")]
     RaggedRow {
-        /// Where.
+        /// The place.
         place: LogPlace,
         /// Number of fields in the header or the first row.
         expected: usize,
         /// Number of fields in this row.
         found: usize,
-        /// A further hint, or nothing.
+        /// A further hint; may be empty.
         hint: &'static str,
     },
-    /// A field that is no number.
+    /// A field is not a number.
     #[error("{place}, column {column}: `{text}` is not a number; {fix}")]
     NotANumber {
-        /// Where.
+        /// The place.
         place: LogPlace,
         /// Name or 0-based index of the column.
         column: String,
         /// The field, shortened and escaped.
         text: String,
-        /// What to do.
+        /// The fix.
         fix: &'static str,
     },
-    /// A field that is empty, NaN or infinite under `missing = "error"`.
+    /// A field is empty, NaN or infinite under `missing = "error"`.
     #[error("{place}, column {column}: `{text}` is not a finite number; set missing = \"drop\" to leave such rows out")]
     Missing {
-        /// Where.
+        /// The place.
         place: LogPlace,
         /// Name or 0-based index of the column.
         column: String,
         /// The field.
         text: String,
     },
-    /// A channel that is absurdly large once its unit, scale, matrix or offset is applied.
+    /// A channel exceeds 1e60 or is not finite after unit, scale, matrix and offset.
     #[error(
         "{log}, row {row}: {group} of joint `{joint}` is beyond 1e60 or not finite after scaling; \
          check the factors of `{group}` and the raw value"
@@ -150,8 +150,8 @@ pub enum RecordingError {
         /// The joint.
         joint: String,
     },
-    /// Files of one log that have different numbers of rows.
-    #[error("{log} ends after {rows} rows but {other} goes on; files of one log must hold the same samples")]
+    /// Files of one log have different numbers of rows.
+    #[error("{log} ends after {rows} rows, before {other}; files of one log must contain the same samples")]
     UnequalFiles {
         /// The shorter file.
         log: String,
@@ -160,35 +160,35 @@ pub enum RecordingError {
         /// A longer file.
         other: String,
     },
-    /// A channel group in another file, of a log that is no file.
-    #[error("{log}: `{key}.file` names another file, but the log is none; leave the key out")]
+    /// A channel group names a file although the log is not a file.
+    #[error("{log}: `{key}.file` is not available for a log in memory; remove the key")]
     NoFolder {
         /// Label of the log.
         log: String,
         /// Key of the channel group.
         key: &'static str,
     },
-    /// Samples in memory that do not go together.
-    #[error("{log}: {problem}; give as many values of every joint as there are samples")]
+    /// Samples in memory have inconsistent lengths.
+    #[error("{log}: {problem}; give one value per joint and sample")]
     Samples {
         /// Label of the log.
         log: String,
-        /// What does not go with what.
+        /// The inconsistency.
         problem: String,
     },
-    /// The row or time range leaves nothing.
+    /// The row or time range contains no row.
     #[error("{log}: the selection ({selection}) leaves no row after {rows} rows were read; widen it")]
     EmptySelection {
         /// Label of the log.
         log: String,
-        /// The keys in force.
+        /// The active keys.
         selection: String,
-        /// Data rows that were read.
+        /// Number of data rows that were read.
         rows: u64,
     },
-    /// Time stamps from which no rate follows.
+    /// The time stamps do not determine a rate.
     #[error(
-        "{log}: no sampling rate follows from column {column} ({reason}); \
+        "{log}: column {column} does not determine a sampling rate ({reason}); \
          check time.column and time.unit, or give rate_hz"
     )]
     NoRate {
@@ -196,23 +196,23 @@ pub enum RecordingError {
         log: String,
         /// The time column.
         column: String,
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// A setting of a filter that cannot be met.
+    /// A filter setting is invalid.
     #[error(transparent)]
     Filter(#[from] FilterError),
-    /// A table of the commanded motion that is none.
-    #[error("{}: not a reference motion: {problem}; give a table as design writes it: t_s, q1.., dq1.., ddq1..", file.display())]
+    /// A table of the commanded motion is invalid.
+    #[error("{}: not a reference motion: {problem}; give a table as written by design: t_s, q1.., dq1.., ddq1..", file.display())]
     Reference {
         /// The file.
         file: PathBuf,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
-    /// No sample at which a differentiator that needs the commanded motion applies.
+    /// A differentiator that needs the commanded motion applies to no sample.
     #[error(
-        "{log}: at none of {samples} samples does {method} apply: the joints do not follow this reference; \
+        "{log}: {method} applies to none of the {samples} samples: the joints do not follow this reference; \
          check its file, start_s and max_lag_s"
     )]
     NotFollowed {
@@ -220,20 +220,20 @@ pub enum RecordingError {
         log: String,
         /// The differentiator.
         method: &'static str,
-        /// Samples looked at.
+        /// Number of samples.
         samples: u64,
     },
-    /// Rows that stand in no order of time.
+    /// The rows are not ordered by time.
     #[error(
-        "{log}: {backward} of {rows} stamps are earlier than the one before: the rows stand in no order of time; \
+        "{log}: {backward} of {rows} stamps are earlier than the previous one: the rows are in no order of time; \
          sort them by the time column (`sort` or pandas' `sort_values`), or name another column as time"
     )]
     Unordered {
         /// Label of the log.
         log: String,
-        /// Stamps that are earlier than the one before.
+        /// Number of stamps that are earlier than the previous one.
         backward: u64,
-        /// Rows of the log.
+        /// Number of rows of the log.
         rows: u64,
     },
     /// No segment of the log is long enough for the filter.
@@ -246,7 +246,7 @@ pub enum RecordingError {
         log: String,
         /// Samples in the longest segment.
         found: usize,
-        /// Samples needed.
+        /// Minimum number of samples.
         needed: usize,
         /// The differentiator.
         method: &'static str,
@@ -260,21 +260,21 @@ fn no_rows(place: &LogPlace) -> String {
     }
 }
 
-/// A filter that cannot be built, or a signal that it cannot be applied to.
+/// A filter that cannot be built or applied.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FilterError {
-    /// A setting outside its range.
+    /// A setting is outside its range.
     #[error("filter setting `{name}` = {value}: {fix}")]
     Setting {
-        /// The setting.
+        /// Name of the setting.
         name: &'static str,
         /// Its value.
         value: f64,
-        /// The range.
+        /// The allowed range.
         fix: &'static str,
     },
-    /// A cut-off at or above half the sampling rate.
+    /// The cut-off is not below half the sampling rate.
     #[error("cut-off {cutoff_hz} Hz is not below half the sampling rate of {rate_hz} Hz; lower it")]
     AboveNyquist {
         /// The cut-off.
@@ -282,43 +282,43 @@ pub enum FilterError {
         /// The sampling rate.
         rate_hz: f64,
     },
-    /// A signal shorter than the filter's padding or window.
+    /// The signal is shorter than the filter's padding or window.
     #[error("{found} samples are too few: the {method} filter needs {needed}")]
     TooShort {
         /// The filter.
         method: &'static str,
-        /// Samples given.
+        /// Number of samples given.
         found: usize,
-        /// Samples needed.
+        /// Minimum number of samples.
         needed: usize,
     },
-    /// A fit whose unknowns the samples do not distinguish.
+    /// The samples do not determine the unknowns of a fit.
     #[error("{method}: {samples} samples do not determine the fit: {fix}")]
     Undetermined {
         /// The differentiator.
         method: &'static str,
-        /// Samples given.
+        /// Number of samples given.
         samples: usize,
-        /// What to do.
+        /// The fix.
         fix: &'static str,
     },
-    /// A commanded motion that makes no sense.
+    /// The commanded motion is invalid.
     #[error("the reference motion is wrong: {problem}")]
     Reference {
-        /// What is wrong, and the fix.
+        /// The problem and the fix.
         problem: String,
     },
-    /// A caller's own differentiator whose code is not at hand.
+    /// The code of a caller's differentiator is not available.
     #[error(
-        "the differentiator is the function `{name}`, and no file holds code: give it from the program that has it (from Python as motion = {{\"differentiator\": {{\"function\": ..}}}})"
+        "the code of the differentiator function `{name}` is not available: pass it from a program (from Python as motion = {{\"differentiator\": {{\"function\": ..}}}})"
     )]
     NoFunction {
         /// Its name.
         name: String,
     },
-    /// A differentiator that needs the commanded motion, without one.
+    /// A differentiator needs the commanded motion.
     #[error(
-        "{method} needs the motion that was commanded: name its table, reference = \"trajectory.csv\", in the differentiator or in the log"
+        "{method} needs the commanded motion: name its table, reference = \"trajectory.csv\", in the differentiator or in the log"
     )]
     NoReference {
         /// The differentiator.
@@ -326,7 +326,7 @@ pub enum FilterError {
     },
 }
 
-/// That a setting means something.
+/// Returns [`FilterError::Setting`] unless `holds`.
 pub(crate) fn require(holds: bool, name: &'static str, value: f64, fix: &'static str) -> Result<(), FilterError> {
     if holds { Ok(()) } else { Err(FilterError::Setting { name, value, fix }) }
 }

@@ -1,26 +1,24 @@
-//! **What was measured?** From a log to a motion: sources of rows, column mapping, units, clock and gaps, filters,
-//! every differentiator, and the parallel filter that decimates regressor and torque alike. All values are
-//! SI.
+//! **From a log to a motion**: sources of rows, column mapping, units, clock and gaps, filters, differentiators, and
+//! the parallel filter that decimates regressor and torque. All values are SI.
 //!
 //! # Tour
 //!
-//! | task | take |
+//! | task | use |
 //! | --- | --- |
 //! | q, dq, ddq and torque of a log file | [`MotionStream::open`] with a [`LogFormat`] |
-//! | the same of arrays in memory | [`JointSamples`], or [`MemoryLog`] for a table whose columns a format explains |
-//! | the same of anything else that gives rows | a type with [`LogSource`], made a [`Log`] |
-//! | the samples as logged, no filter | [`LogReader`] |
-//! | another differentiator | [`DifferentiatorSettings`] ([`derivative`] lists them); one's own: [`Differentiator`] |
+//! | the same for arrays in memory | [`JointSamples`], or [`MemoryLog`] for a table with a format |
+//! | the same for any other source of rows | a type that implements [`LogSource`], converted to a [`Log`] |
+//! | the samples as logged, without a filter | [`LogReader`] |
+//! | another differentiator | [`DifferentiatorSettings`] (list: [`derivative`]); a new one: [`Differentiator`] |
 //! | differentiators that use the commanded motion | [`Reference`], [`MotionStream::following`] |
-//! | what was found on the way: gaps, dead channels, lags | [`MotionStream::report`], [`report`] |
+//! | gaps, dead channels, lags and other findings | [`MotionStream::report`], [`report`] |
 //! | a cut-off from the data | [`cutoff()`] |
-//! | regressor and torque through one filter, decimated | [`Decimator`] |
+//! | regressor and torque filtered and decimated alike | [`Decimator`] |
 //! | the mean period of a periodic record and its noise | [`averaged_periods`] |
 //!
-//! The life of a log: [`LogSource`] → [`LogReader`] (units, signs, gears, ranges, missing values) → [`RawBlock`]s →
-//! outliers and held samples marked ([`SetAside`]) → pieces on a uniform clock ([`clock`]) → [`Differentiator`] →
-//! [`MotionBlock`]s. Memory does not grow with the log. Joints are known by name only; what moves them is the business
-//! of other crates.
+//! Data flow: [`LogSource`] → [`LogReader`] (units, signs, gears, ranges, missing values) → [`RawBlock`]s → outliers
+//! and held samples marked ([`SetAside`]) → pieces on a uniform clock ([`clock`]) → [`Differentiator`] →
+//! [`MotionBlock`]s. Memory does not grow with the log. Joints are identified by name only.
 //!
 //! # A file
 //!
@@ -79,12 +77,12 @@ mod quantisation;
 pub mod reference;
 pub mod report;
 
-pub use cleaning::{Reason, SetAside};
+pub use cleaning::{CleaningSettings, Reason, SetAside};
 pub use derivative::{Derivatives, Differentiator, DifferentiatorSettings, Place, SampleRanges};
 pub use error::{FilterError, FormatError, RecordingError};
 pub use filter::{AveragedPeriods, DecimationSettings, Decimator, averaged_periods, cutoff, position_noise};
 pub use log::{FileLog, JointSamples, Log, LogFormat, LogReader, LogSource, LogTable, MemoryLog, RawBlock};
-pub use motion::{MotionBlock, MotionSettings, MotionStream};
+pub use motion::{ImportLimits, MotionBlock, MotionSettings, MotionStream};
 pub use place::LogPlace;
 pub use reference::{LogisticPath, Reference, ReferenceSettings};
 pub use report::{Finding, ImportReport, Level, best_lag};

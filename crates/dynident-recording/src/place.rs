@@ -1,4 +1,4 @@
-//! Where in a log something was found, for messages.
+//! Places in a log, for messages.
 
 use core::fmt;
 
@@ -6,23 +6,23 @@ use core::fmt;
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LogPlace {
-    /// No place in particular.
+    /// The whole log.
     Whole {
         /// Label of the log.
         log: String,
     },
-    /// A line of a text.
+    /// A line of a text file.
     Line {
         /// Label of the log.
         log: String,
-        /// 1-based.
+        /// 1-based line number.
         line: u64,
     },
-    /// A row of numbers that has no line.
+    /// A row of numbers without a line.
     Row {
         /// Label of the log.
         log: String,
-        /// 0-based.
+        /// 0-based row number.
         row: u64,
     },
 }

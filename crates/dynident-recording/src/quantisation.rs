@@ -1,6 +1,6 @@
-//! The step of a channel that knows only multiples of it.
+//! Estimates the quantisation step of a channel.
 
-/// The step of which nine tenths of the differences between successive values are multiples (within 2 %).
+/// The step of which 90 % of the differences between successive values are multiples (within 2 %).
 pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> =
         values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect();
@@ -8,11 +8,11 @@ pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
         return None;
     }
     steps.sort_unstable_by(f64::total_cmp);
-    // Not the smallest as such: the rounding of the printed text makes far smaller ones.
+    // Not the minimum, because rounding of printed text causes much smaller differences.
     let least = 0.02 * steps[steps.len() / 20];
     let mut candidate = *steps.iter().find(|step| **step >= least)?;
-    // Printed text rounds the smallest differences by a percent or so, of which a hundred steps make a whole one: the
-    // larger differences tell the step better, once it is known well enough to count how many steps they are.
+    // Printed text rounds the smallest differences by about 1 %, so that errors of a hundred steps add up to a whole
+    // one. Larger differences determine the step better, once it is accurate enough to count steps in them.
     for most in [8.0, 64.0, 512.0, 4096.0] {
         let counted = steps.iter().map(|step| (step, (step / candidate).round()));
         let counted = counted.filter(|(_, count)| (1.0..=most).contains(count));
@@ -26,8 +26,8 @@ pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
     (multiples.count() as f64 >= 0.9 * steps.len() as f64).then_some(candidate)
 }
 
-/// The usual change of a signal that repeats itself, at least one sample in ten: the step of what is quantised and
-/// slow, or at rest, wherever it stands among the digits that are printed. None for one that does not.
+/// Median change of a signal in which at least 10 % of the samples repeat: the step of a signal that is quantised and
+/// slow, or at rest, also below the printed resolution. `None` for other signals.
 pub(crate) fn usual_change(values: &[f64]) -> Option<f64> {
     let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let mut changes: Vec<f64> = changes.filter(|change| *change > 0.0).collect();
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_repeats_has_a_usual_change() {
+    fn a_repeating_signal_has_a_usual_change() {
         let slow: Vec<f64> = (0..100).map(|i| f64::from(i / 4) * 0.5).collect();
         assert_eq!(usual_change(&slow), Some(0.5));
         assert_eq!(usual_change(&(0..100).map(f64::from).collect::<Vec<f64>>()), None);
@@ -57,11 +57,11 @@ mod tests {
         let quantised: Vec<f64> = smooth.iter().map(|x| (x / 0.003).round() * 0.003).collect();
         assert!(quantisation_step(&smooth).is_none());
         assert!((quantisation_step(&quantised).unwrap() - 0.003).abs() < 1e-9);
-        // Counts of 2π/65536 printed with six digits behind the point, up to five hundred of them in a step.
+        // Counts of 2π/65536 printed with six decimals, up to 500 counts in a step.
         let count = core::f64::consts::TAU / 65_536.0;
         let counts = |i: i32| (2e4 * (f64::from(i) * 0.025).sin() + 40.0 * (f64::from(i) * 0.7).sin()).round();
         let printed: Vec<f64> = (0..4000).map(|i| (counts(i) * count * 1e6).round() * 1e-6).collect();
-        // Half a digit of the last place in the largest step.
+        // Half a digit of the last decimal in the largest step.
         assert!((quantisation_step(&printed).unwrap() / count - 1.0).abs() < 1e-4);
     }
 }

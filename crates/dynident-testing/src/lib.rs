@@ -1,5 +1,5 @@
-//! What the tests of several crates share: where files are, how often an experiment is repeated, whether a file is
-//! as its schema says. It knows no other crate.
+//! Helpers for the tests of several crates: paths of files, number of repetitions of an experiment, and comparison with
+//! a JSON schema. It depends on no other crate.
 
 #![forbid(unsafe_code)]
 
@@ -12,8 +12,8 @@ pub fn repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
 }
 
-/// The folder of the public recordings, which the repository does not hold: `DYNIDENT_DATA`, else `../shared/data`
-/// beside the repository; `None`, said plainly, where there is none.
+/// The folder of the public recordings, which are not in the repository: `DYNIDENT_DATA`, or `../shared/data` relative
+/// to the repository. Prints a note and returns `None` if it does not exist.
 pub fn recordings() -> Option<PathBuf> {
     let folder = std::env::var_os("DYNIDENT_DATA").map_or_else(|| repository("../shared/data"), PathBuf::from);
     if folder.is_dir() {
@@ -26,15 +26,15 @@ pub fn recordings() -> Option<PathBuf> {
     None
 }
 
-/// How often a random experiment is repeated: `daily`, and `long` where `DYNIDENT_LONG` is 1. The long run goes on
-/// where the daily one ends, with the same seed.
+/// Number of repetitions of a random experiment: `daily`, or `long` if `DYNIDENT_LONG` is 1. The long run continues the
+/// daily one with the same seed.
 ///
 /// # Panics
-/// Where `DYNIDENT_LONG` is set to anything but 0 or 1: a long run that quietly is none would prove nothing.
+/// If `DYNIDENT_LONG` is neither 0 nor 1, because a long run must not be skipped silently.
 pub fn count(daily: usize, long: usize) -> usize {
     match std::env::var("DYNIDENT_LONG").as_deref() {
         Ok("1") => long,
         Ok("0") | Err(_) => daily,
-        Ok(other) => panic!("DYNIDENT_LONG is 0 or 1, not {other}"),
+        Ok(other) => panic!("DYNIDENT_LONG = {other}; set it to 0 or 1"),
     }
 }

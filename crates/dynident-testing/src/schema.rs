@@ -1,13 +1,13 @@
-//! A value against a JSON schema, in both directions: every key of an object has to appear in the schema, and every
-//! key that the schema requires in the object. It knows what the schemas of `docs/schemas` use of draft 7.
+//! Compares a value with a JSON schema in both directions: the schema must contain every key of an object, and the
+//! object every required key. Supports the part of draft 7 that is used by `docs/schemas`.
 
 use serde_json::Value;
 use std::collections::BTreeSet;
 
-/// Where `value` differs from the schema `docs/schemas/NAME.json`; empty if it does not.
+/// Differences of `value` from the schema `docs/schemas/NAME.json`; empty if there are no differences.
 ///
 /// # Panics
-/// Where there is no such schema.
+/// If the schema does not exist.
 pub fn differences(name: &str, value: &Value) -> Vec<String> {
     let path = crate::repository(&format!("docs/schemas/{name}.json"));
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
@@ -22,9 +22,8 @@ struct Checker<'a> {
 }
 
 impl Checker<'_> {
-    /// A value against all that its schema says of it.
     fn value(&self, schema: &Value, value: &Value, at: &str, found: &mut Vec<String>) {
-        // `true`: anything.
+        // `true` allows any value.
         let Some(rules) = schema.as_object().filter(|rules| !rules.is_empty()) else { return };
         let mut known = BTreeSet::new();
         self.part(schema, value, at, found, &mut known);
@@ -36,7 +35,7 @@ impl Checker<'_> {
         }
     }
 
-    /// A value against one part of its schema; `known` collects the keys that parts name.
+    /// Compares a value with one part of its schema; `known` collects the keys that the parts contain.
     fn part<'v>(
         &self,
         schema: &Value,
@@ -62,12 +61,12 @@ impl Checker<'_> {
             one => is_of(value, one),
         };
         if schema.get("type").is_some_and(|types| !is_one_of(types)) {
-            found.push(format!("{at}: {value} is no {}", schema["type"]));
+            found.push(format!("{at}: {value} is not of type {}", schema["type"]));
         }
         if schema.get("const").is_some_and(|only| only != value)
             || schema["enum"].as_array().is_some_and(|all| !all.contains(value))
         {
-            found.push(format!("{at}: {value} is none of {}{}", schema["const"], schema["enum"]));
+            found.push(format!("{at}: {value} is not among {}{}", schema["const"], schema["enum"]));
         }
         match value {
             Value::Object(object) => {
@@ -87,7 +86,7 @@ impl Checker<'_> {
         }
     }
 
-    /// A value against the alternative from which it differs least.
+    /// Compares a value with the alternative that has the fewest differences.
     fn best_alternative<'v>(
         &self,
         alternatives: &[Value],
@@ -106,17 +105,17 @@ impl Checker<'_> {
                 found.extend(fewest);
                 known.extend(own);
             }
-            None => found.push(format!("{at}: no alternative")),
+            None => found.push(format!("{at}: no alternative in the schema")),
         }
     }
 
-    /// The length and the values of an array against its schema.
+    /// Compares the length and the values of an array with its schema.
     fn array(&self, schema: &Value, values: &[Value], at: &str, found: &mut Vec<String>) {
         let count = values.len() as u64;
         if schema["minItems"].as_u64().is_some_and(|least| count < least)
             || schema["maxItems"].as_u64().is_some_and(|most| count > most)
         {
-            found.push(format!("{at}: {count} values"));
+            found.push(format!("{at}: wrong number of values ({count})"));
         }
         for (index, value) in values.iter().enumerate() {
             let own = schema["items"].get(index).or_else(|| schema.get("items"));
@@ -127,7 +126,6 @@ impl Checker<'_> {
     }
 }
 
-/// Whether a value has a type, by the schema's word for it.
 fn is_of(value: &Value, name: &Value) -> bool {
     match value {
         Value::Null => name == "null",

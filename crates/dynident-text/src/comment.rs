@@ -3,14 +3,14 @@
 use crate::invisible::{escape, is_invisible};
 use crate::shortened::{LINE_LENGTH, shortened};
 
-/// `text` as a part of one line of a comment in C, C++, Rust, Python, MATLAB, YAML or TOML. It cannot end the comment:
+/// `text` as part of a one-line comment in C, C++, Rust, Python, MATLAB, YAML or TOML. It cannot end the comment:
 ///
-/// - invisible characters, also newlines, are written as `\u000a`; long texts are shortened;
-/// - `*/` and `/*` are divided, so a block comment neither ends nor nests;
-/// - `??` is divided: the trigraph `??/` is a backslash of C;
-/// - a backslash at the end, which joins lines in C and C++, is written as `\u005c`;
-/// - `coding:` and `coding=` are divided: Python reads the encoding of a file from a comment of its first two lines
-///   (PEP 263), and text in UTF-7 may hold newlines.
+/// - invisible characters, including newlines, are escaped as `\u000a`; long texts are shortened;
+/// - `*/` and `/*` are separated by a blank, so a block comment neither ends nor nests;
+/// - `??` is separated, because the trigraph `??/` is a backslash in C;
+/// - a backslash at the end, which joins lines in C and C++, is escaped as `\u005c`;
+/// - `coding:` and `coding=` are separated, because Python reads the encoding of a file from a comment in its first two
+///   lines (PEP 263), and text in UTF-7 may contain newlines.
 ///
 /// ```
 /// assert_eq!(dynident_text::comment("arm */ int x; /*\nimport os"), "arm * / int x; / *\\u000aimport os");
@@ -33,7 +33,7 @@ pub fn comment(text: &str) -> String {
             out.push(c);
         }
     }
-    // GCC also joins lines where blanks follow the backslash.
+    // GCC joins lines also if blanks follow the backslash.
     let end = out.trim_end().len();
     if out[..end].ends_with('\\') {
         out.replace_range(end - 1.., "\\u005c");

@@ -3,8 +3,8 @@
 use crate::invisible::one_line;
 use std::borrow::Cow;
 
-/// `text` as a field of CSV (RFC 4180): in quotes where it holds a comma, a quote or a blank at an end. Invisible
-/// characters are written as `\u000a`. A field that a spreadsheet would take for a formula gets an apostrophe.
+/// `text` as a field of CSV (RFC 4180): in quotes if it contains a comma, a quote or a blank at an end. Invisible
+/// characters are escaped as `\u000a`. A field that a spreadsheet would interpret as a formula gets an apostrophe.
 ///
 /// ```
 /// assert_eq!(dynident_text::csv_field("elbow, left"), "\"elbow, left\"");
@@ -21,13 +21,13 @@ pub fn csv_field(text: &str) -> Cow<'_, str> {
     field
 }
 
-/// `text` as a cell or a line of Markdown: nothing in it is markup, HTML or the end of a cell.
+/// `text` as a cell or a line of Markdown, without markup, HTML or the end of a cell.
 ///
 /// ```
 /// assert_eq!(dynident_text::markdown("a|b <i>"), "a\\|b &lt;i>");
 /// ```
 pub fn markdown(text: &str) -> String {
-    // A backslash of the text first: those of the escape sequences are meant.
+    // Escape backslashes of the text before adding others.
     let mut out = String::with_capacity(text.len());
     for c in one_line(text).chars() {
         match c {

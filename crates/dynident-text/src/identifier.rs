@@ -1,10 +1,11 @@
 //! Names in code.
 
-/// Longest identifier: with what the exported functions append it stays below the 63 characters of C99 and MATLAB.
+/// Maximum length of an identifier; with the suffixes of exported functions it is below the 63 characters of C99 and
+/// MATLAB.
 pub const IDENTIFIER_LENGTH: usize = 40;
 
-/// Lower-case letters, digits and `_` of a name, beginning with a letter, at most [`IDENTIFIER_LENGTH`] characters;
-/// `robot` where nothing is left. It is a prefix of names in code and may be a keyword itself.
+/// Lower-case letters, digits and `_` of a name, starting with a letter, at most [`IDENTIFIER_LENGTH`] characters;
+/// `robot` if no letter or digit remains. The result is a prefix of names in code and may be a keyword.
 ///
 /// ```
 /// assert_eq!(dynident_text::identifier("2 Arms; import os"), "robot_2_arms__import_os");

@@ -1,10 +1,10 @@
-//! Characters that a reader does not see, and the escape sequence that shows them.
+//! Invisible characters and their escape sequences.
 
 use core::fmt::Write;
 use std::borrow::Cow;
 
-/// First and last characters of the class Cf (format) of Unicode 16.0, without those that [`char::is_control`] knows.
-const FORMAT: [(char, char); 21] = [
+/// Ranges of the class Cf (format) of Unicode 16.0, without the characters covered by [`char::is_control`].
+const FORMAT_RANGES: [(char, char); 21] = [
     ('\u{ad}', '\u{ad}'),
     ('\u{600}', '\u{605}'),
     ('\u{61c}', '\u{61c}'),
@@ -28,21 +28,21 @@ const FORMAT: [(char, char); 21] = [
     ('\u{e0020}', '\u{e007f}'),
 ];
 
-/// Whether a character is invisible and may change how the characters around it look or how a program reads them: the
-/// Unicode classes Cc (control), Cf (format, with the overrides of the writing direction), Zl and Zp
-/// (line and paragraph separators), and U+FFFE and U+FFFF, which XML forbids.
+/// Whether a character is invisible and may change the display of other characters or the parsing by a program: the
+/// Unicode classes Cc (control), Cf (format, including overrides of the writing direction), Zl and Zp (line and
+/// paragraph separators), and U+FFFE and U+FFFF, which XML forbids.
 pub fn is_invisible(c: char) -> bool {
-    // Almost all text is ASCII.
+    // Fast path, because most text is ASCII.
     if c.is_ascii() {
         return c.is_control();
     }
     c.is_control()
         || matches!(c, '\u{2028}' | '\u{2029}' | '\u{fffe}' | '\u{ffff}')
-        || FORMAT.iter().any(|(first, last)| (*first..=*last).contains(&c))
+        || FORMAT_RANGES.iter().any(|(first, last)| (*first..=*last).contains(&c))
 }
 
-/// `text` with each invisible character but the newline as `\u202e`, the escape sequence of JSON (two of them beyond
-/// U+FFFF). In a JSON document it keeps the data, on a page or a terminal it shows the character.
+/// `text` with each invisible character except the newline as `\u202e`, the escape sequence of JSON (two sequences
+/// above U+FFFF). A JSON document keeps its data, and a page or a terminal shows the character.
 ///
 /// ```
 /// assert_eq!(dynident_text::visible("a\u{202e}b\u{1b}[31m\nc"), "a\\u202eb\\u001b[31m\nc");
@@ -51,12 +51,11 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     replaced(text, |c| c != '\n' && is_invisible(c), escape)
 }
 
-/// As [`visible`], the newline too: the text stays on its line.
+/// As [`visible`], including the newline, so that the text stays on one line.
 pub fn one_line(text: &str) -> Cow<'_, str> {
     replaced(text, is_invisible, escape)
 }
 
-/// Appends the escape sequence of JSON for a character.
 pub(crate) fn escape(out: &mut String, c: char) {
     for unit in c.encode_utf16(&mut [0; 2]) {
         // Writing to a string cannot fail.
@@ -64,8 +63,8 @@ pub(crate) fn escape(out: &mut String, c: char) {
     }
 }
 
-/// `text` with each character for which `wanted` holds replaced by what `with` appends; the text itself where there is
-/// none.
+/// `text` with each character that satisfies `wanted` replaced by the output of `with`; the text itself if there is no
+/// such character.
 pub(crate) fn replaced(
     text: &str,
     wanted: impl Fn(char) -> bool,
@@ -89,7 +88,7 @@ mod tests {
     use super::*;
     use unicode_general_category::{GeneralCategory, get_general_category};
 
-    /// The table against the Unicode Character Database, as another crate holds it.
+    /// Compares the table with the Unicode Character Database of another crate.
     #[test]
     fn classes_are_those_of_unicode() {
         for c in '\0'..=char::MAX {
@@ -110,7 +109,7 @@ mod tests {
         let shown = "a\\u001b[31mb\\u009b2J\\u000d\\u0008\\u0009\\u007f\\u202ec\nλ Ü 関節 é";
         assert_eq!(visible(text), shown);
         assert_eq!(one_line(text), shown.replace('\n', "\\u000a"));
-        // A pair of surrogates, as JSON has them.
+        // A surrogate pair, as in JSON.
         assert_eq!(visible("\u{e0001}"), "\\udb40\\udc01");
         assert!(matches!(visible("joint_1 Ü"), Cow::Borrowed(_)));
     }

@@ -1,12 +1,12 @@
-//! The one writer of JSON.
+//! Writes JSON without invisible characters.
 
 use crate::invisible::visible;
 use serde::Serialize;
 use serde_json::Value;
 use std::borrow::Cow;
 
-/// A value as one line of JSON. Invisible characters, which `serde_json` writes as they are from U+007F on, are escape
-/// sequences; the data are the same.
+/// A value as one line of JSON. Invisible characters, which `serde_json` does not escape from U+007F on, are escaped;
+/// the data are unchanged.
 ///
 /// # Errors
 /// As [`serde_json::to_string`].
@@ -14,7 +14,7 @@ pub fn to_string(value: &(impl Serialize + ?Sized)) -> Result<String, serde_json
     serde_json::to_string(value).map(escaped)
 }
 
-/// As [`to_string`], on lines that are indented.
+/// As [`to_string`], with indentation.
 ///
 /// # Errors
 /// As [`serde_json::to_string_pretty`].
@@ -22,8 +22,8 @@ pub fn to_string_pretty(value: &(impl Serialize + ?Sized)) -> Result<String, ser
     serde_json::to_string_pretty(value).map(escaped)
 }
 
-/// A document of JSON as one text however it is laid out: keys in the order of their letters, no white space. Two
-/// documents with the same data have the same text, so that it can be hashed.
+/// Canonical text of a JSON document: keys in alphabetical order, no white space. Documents with equal data have equal
+/// texts, so that the text can be hashed.
 pub fn canonical(value: &Value) -> String {
     let mut out = String::new();
     push_canonical(&mut out, value);
@@ -56,7 +56,7 @@ fn push_canonical(out: &mut String, value: &Value) {
     }
 }
 
-/// Outside of strings JSON is ASCII, and its only control character is the newline.
+/// Escapes invisible characters. Outside of strings, JSON is ASCII and its only control character is the newline.
 fn escaped(text: String) -> String {
     match visible(&text) {
         Cow::Borrowed(_) => text,

@@ -1,5 +1,5 @@
-//! **What can this text do where it is written?** Names, paths and messages come from files of other people. This crate
-//! is the one place that makes them safe for an output:
+//! Safe output of texts from untrusted files: names, paths and messages cannot change the structure of the output.
+//!
 //!
 //! | output | function |
 //! | --- | --- |
@@ -12,7 +12,7 @@
 //! | JSON | `json::to_string` (feature `json`) |
 //! | a page, a picture, a terminal | [`visible`] |
 //!
-//! All of them write invisible characters as escape sequences: see [`is_invisible`].
+//! All functions escape invisible characters: see [`is_invisible`].
 
 #![forbid(unsafe_code)]
 

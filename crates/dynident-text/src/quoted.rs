@@ -3,8 +3,8 @@
 use crate::invisible::is_invisible;
 use core::fmt::Write;
 
-/// `text` in double quotes, as YAML 1.1 and 1.2 and TOML read it: quotes, backslashes and invisible characters are
-/// escape sequences (`\u202e`, beyond U+FFFF `\U000e0001`). Readers get `text` back.
+/// `text` in double quotes for YAML 1.1 and 1.2 and TOML: quotes, backslashes and invisible characters are escaped
+/// (`\u202e`, above U+FFFF `\U000e0001`). A parser returns `text`.
 ///
 /// ```
 /// assert_eq!(dynident_text::quoted("a \"b\"\n"), r#""a \"b\"\u000a""#);
@@ -17,7 +17,7 @@ pub fn quoted(text: &str) -> String {
     out
 }
 
-/// Appends `text` as it stands between double quotes.
+/// Appends the escaped `text` without the quotes.
 pub(crate) fn push_quoted(out: &mut String, text: &str) {
     for c in text.chars() {
         match c {
@@ -31,7 +31,6 @@ pub(crate) fn push_quoted(out: &mut String, text: &str) {
     }
 }
 
-/// Appends the escape sequence of YAML and TOML for a character.
 pub(crate) fn push_escape(out: &mut String, c: char) {
     // Writing to a string cannot fail.
     let _ = match u32::from(c) {

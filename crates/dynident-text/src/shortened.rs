@@ -1,14 +1,14 @@
-//! Names of a hundred thousand characters.
+//! Shortens long texts.
 
 use std::borrow::Cow;
 
-/// Longest line of a comment or a message, in characters. Longer lines are cut in the middle.
+/// Maximum length of a line of a comment or a message, characters. Longer lines are cut in the middle.
 pub const LINE_LENGTH: usize = 2000;
 
-/// `text` with at most `length` characters: of a longer one the beginning and the end, with the number of characters
-/// that were left out between them.
+/// `text` shortened to `length` characters: the beginning and the end of a longer text, with the number of omitted
+/// characters between them.
 pub fn shortened(text: &str, length: usize) -> Cow<'_, str> {
-    // A character has one byte or more.
+    // A character has at least one byte.
     if text.len() <= length {
         return Cow::Borrowed(text);
     }
@@ -31,12 +31,12 @@ pub fn shortened_lines(text: &str) -> Cow<'_, str> {
     Cow::Owned(lines.join("\n"))
 }
 
-/// Characters that a message may have between two backquotes, and as a whole.
-const MOST_BETWEEN_QUOTES: usize = 200;
-const MOST_IN_MESSAGE: usize = 20_000;
+/// Maximum number of characters between two backquotes, and in the whole message.
+const MAX_CHARS_BETWEEN_QUOTES: usize = 200;
+const MAX_MESSAGE_CHARS: usize = 20_000;
 
-/// A message with every text between backquotes shortened to 200 characters, and with 20,000 characters at most. Names,
-/// expressions and lines from files stand between backquotes, and a file may hold a name of megabytes.
+/// A message with every text between backquotes shortened to 200 characters, and with at most 20,000 characters. Names,
+/// expressions and lines from files are between backquotes; a file may contain a name of megabytes.
 pub fn shortened_message(message: &str) -> String {
     let cut = |text: &str, most: usize| {
         let count = text.chars().count();
@@ -48,8 +48,8 @@ pub fn shortened_message(message: &str) -> String {
     };
     let parts = message.split('`').enumerate();
     let parts: Vec<String> =
-        parts.map(|(k, part)| cut(part, if k % 2 == 1 { MOST_BETWEEN_QUOTES } else { usize::MAX })).collect();
-    cut(&parts.join("`"), MOST_IN_MESSAGE)
+        parts.map(|(k, part)| cut(part, if k % 2 == 1 { MAX_CHARS_BETWEEN_QUOTES } else { usize::MAX })).collect();
+    cut(&parts.join("`"), MAX_MESSAGE_CHARS)
 }
 
 #[cfg(test)]

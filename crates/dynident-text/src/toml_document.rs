@@ -4,8 +4,9 @@ use crate::invisible::{escape, is_invisible, replaced};
 use crate::quoted::{push_escape, push_quoted};
 use std::borrow::Cow;
 
-/// A document of TOML without invisible characters but white space and the byte order mark at its beginning. Comments
-/// show `\u202e`; strings get escape sequences, literal ones become basic ones for that. Readers get the same data.
+/// A TOML document without invisible characters except white space and the byte order mark at its start. Comments
+/// contain `\u202e` instead; strings get escape sequences, for which literal strings become basic ones. The data are
+/// unchanged.
 pub fn toml_document(text: &str) -> Cow<'_, str> {
     let mark = if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
     let hidden = |c: char| !matches!(c, '\n' | '\r' | '\t') && is_invisible(c);
@@ -27,7 +28,7 @@ pub fn toml_document(text: &str) -> Cow<'_, str> {
                 let length = rest.find('\n').unwrap_or(rest.len());
                 (length, replaced(&rest[..length], hidden, escape).into_owned())
             }
-            // No text that TOML accepts has one here.
+            // Valid TOML has no such character here.
             (None, _) => (first.len_utf8(), replaced(&rest[..first.len_utf8()], hidden, escape).into_owned()),
         };
         out.push_str(&piece);
@@ -36,7 +37,7 @@ pub fn toml_document(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Length of the string that begins with `quotes`; all of the text where it does not end.
+/// Length of the string that starts with `quotes`; the whole text if it does not end.
 fn string_length(text: &str, quotes: &str) -> usize {
     let is_basic = quotes.starts_with('"');
     let mut at = quotes.len();
@@ -45,7 +46,7 @@ fn string_length(text: &str, quotes: &str) -> usize {
             at += 1 + text[at + 1..].chars().next().map_or(0, char::len_utf8);
         } else if text[at..].starts_with(quotes) {
             at += quotes.len();
-            // Up to two more quotes belong to a string on several lines.
+            // Up to two more quotes belong to a multi-line string.
             let more = if quotes.len() == 3 {
                 text[at..].bytes().take(2).take_while(|b| *b == quotes.as_bytes()[0]).count()
             } else {
@@ -59,14 +60,14 @@ fn string_length(text: &str, quotes: &str) -> usize {
     text.len()
 }
 
-/// A string with escape sequences; of a literal one the basic one with the same text.
+/// A string with escape sequences; a literal string becomes a basic string with the same text.
 fn string(piece: &str, quotes: &str, hidden: impl Fn(char) -> bool) -> String {
     if quotes.starts_with('"') {
         return replaced(piece, hidden, push_escape).into_owned();
     }
     let inside = piece.strip_prefix(quotes).unwrap_or(piece);
     let inside = inside.strip_suffix(quotes).unwrap_or(inside);
-    // A newline right behind the quotes is no part of the text.
+    // A newline directly after the quotes is not part of the text.
     let inside = if quotes.len() == 3 {
         inside.strip_prefix("\r\n").or(inside.strip_prefix('\n')).unwrap_or(inside)
     } else {
@@ -91,7 +92,7 @@ mod tests {
         let read = |text: &str| text.trim_start_matches('\u{feff}').parse::<toml::Table>().unwrap();
         assert_eq!(read(text), read(&safe), "{safe}");
         assert!(matches!(toml_document("a = 'é'\n"), Cow::Borrowed("a = 'é'\n")));
-        // What is no TOML is no panic either.
+        // Invalid TOML does not cause a panic.
         for text in ["\"\\", "'''\u{202e}", "\u{202e}", "\"\"\"\u{202e}\\"] {
             assert!(!toml_document(text).contains('\u{202e}'));
         }

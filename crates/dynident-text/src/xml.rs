@@ -5,12 +5,12 @@ use crate::shortened::{LINE_LENGTH, shortened};
 use core::fmt::Write;
 use std::borrow::Cow;
 
-/// Whether XML 1.0 has a place for a character (production 2, `Char`).
+/// Whether XML 1.0 allows a character (production 2, `Char`).
 fn is_allowed(c: char) -> bool {
     !matches!(c, '\0'..='\u{8}' | '\u{b}' | '\u{c}' | '\u{e}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}')
 }
 
-/// Appends a reference to a character, or `\u0001` for one that XML cannot hold.
+/// Appends a reference to a character, or `\u0001` for a character that XML does not allow.
 fn reference(out: &mut String, c: char) {
     if is_allowed(c) {
         // Writing to a string cannot fail.
@@ -20,9 +20,10 @@ fn reference(out: &mut String, c: char) {
     }
 }
 
-/// `text` as the value of an attribute in quotes of either kind, or as the text of an element: markup characters are
-/// entities, invisible characters references. Readers get `text` back, with two exceptions: control characters that XML
-/// cannot hold are written as `\u0001`; `${` and `$(`, which the preprocessor xacro evaluates as Python, as `\u0024{`.
+/// `text` as the value of an attribute in single or double quotes, or as the text of an element: markup characters
+/// become entities, invisible characters references. A parser returns `text`, with two exceptions: control characters
+/// that XML does not allow become `\u0001`; `${` and `$(`, which the preprocessor xacro evaluates as Python, become
+/// `\u0024{`.
 ///
 /// ```
 /// assert_eq!(dynident_text::xml::escaped("a\"><b/>\u{202e}"), "a&quot;&gt;&lt;b/&gt;&#x202e;");
@@ -42,14 +43,14 @@ pub fn escaped(text: &str) -> Cow<'_, str> {
     })
 }
 
-/// `text` without the expressions of xacro; none where it has none.
+/// `text` without xacro expressions; `None` if it contains none.
 fn without_xacro(text: &str) -> Option<String> {
     let has = text.contains("${") || text.contains("$(");
     has.then(|| text.replace("${", "\\u0024{").replace("$(", "\\u0024("))
 }
 
-/// `text` as a part of one line of a comment: two hyphens are divided, a hyphen at the end is followed by a blank,
-/// invisible characters are written as `\u000a` and `${` as `\u0024{`, long texts are shortened.
+/// `text` as part of a one-line comment: two hyphens are separated, a hyphen at the end is followed by a blank,
+/// invisible characters become `\u000a` and `${` becomes `\u0024{`, long texts are shortened.
 pub fn comment(text: &str) -> String {
     let plain = without_xacro(text);
     let text = shortened(plain.as_deref().unwrap_or(text), LINE_LENGTH);
@@ -70,9 +71,9 @@ pub fn comment(text: &str) -> String {
     out
 }
 
-/// A whole document without invisible characters but white space and the byte order mark at its beginning: references
-/// in attributes and text, where readers get the same; `\u202e` in comments, processing instructions and character
-/// data, which know no references. A joiner inside of an element's own name stays.
+/// An XML document without invisible characters except white space and the byte order mark at its start: references in
+/// attributes and text, with unchanged data; `\u202e` in comments, processing instructions and character data, where
+/// references are not allowed. A joiner inside an element's name remains.
 pub fn document(text: &str) -> Cow<'_, str> {
     let mark = if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
     let hidden = |c: char| !matches!(c, '\n' | '\r' | '\t') && is_invisible(c);
@@ -102,12 +103,12 @@ pub fn document(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Length of what ends with `end`; all of it where nothing does.
+/// Length up to and including `end`; the whole text if `end` is missing.
 fn through(text: &str, end: &str) -> usize {
     text.find(end).map_or(text.len(), |at| at + end.len())
 }
 
-/// Length of the tag with which `text` begins: to the first `>` outside quotes.
+/// Length of the tag at the start of `text`: to the first `>` outside quotes.
 fn tag_length(text: &str) -> usize {
     let mut quote = None;
     for (at, byte) in text.bytes().enumerate() {
@@ -145,7 +146,7 @@ mod tests {
     use roxmltree::Document;
 
     #[test]
-    fn documents_say_the_same_without_invisible_characters() {
+    fn documents_keep_their_data_without_invisible_characters() {
         let text = "\u{feff}<?xml version=\"1.0\"?>\r\n<!-- a\u{202e} > b -->\n<robot name='x\u{202e}>\u{200b}'>\n\t<link name=\"1\u{9b}\"/>te\u{2066}xt<![CDATA[<\u{2028}]]></robot>";
         let safe = document(text);
         assert!(!safe[3..].contains(|c: char| !c.is_ascii()), "{safe}");
@@ -164,14 +165,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_left_for_xacro() {
+    fn xacro_expressions_are_escaped() {
         for safe in [escaped("${1+1}$(find a)$$({$").into_owned(), comment("${1+1}$(find a)$$({$")] {
             assert_eq!(safe, "\\u0024{1+1}\\u0024(find a)$\\u0024({$");
         }
     }
 
     #[test]
-    fn comments_hold_no_two_hyphens() {
+    fn comments_contain_no_two_hyphens() {
         assert_eq!(comment("a --> b---"), "a - -> b- - - ");
         assert_eq!(comment("a\n\u{202e}"), "a\\u000a\\u202e");
     }

@@ -1,4 +1,4 @@
-//! The columns of one batch of rows: buffers found, unpacked and checked, so that values can be taken without failing.
+//! Columns of one Arrow record batch: finds, unpacks and checks buffers, so that values can be read without errors.
 
 use super::flat::Flat;
 use super::schema::{Cell, Leaf, List, Place};
@@ -7,10 +7,9 @@ use crate::limits::Budget;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 
-/// Fill bytes behind a buffer at most, which the format aligns to 64.
-const MOST_FILL: u64 = 128;
+/// Maximum number of padding bytes after a buffer; the format aligns buffers to 64 bytes.
+const MAX_PADDING_BYTES: u64 = 128;
 
-/// How buffers are packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Packing {
     Plain,
@@ -18,22 +17,20 @@ enum Packing {
     Zstd,
 }
 
-/// Where the columns of a batch are.
 #[derive(Debug)]
 pub(super) struct Batch {
     pub(super) rows: usize,
-    /// Entries of each field.
+    /// Number of entries of each field.
     entries: Vec<usize>,
-    /// Offset and length of each buffer, and how many buffers each field of views has beyond its first ones.
+    /// Offset and length of each buffer, and the number of additional buffers of each view field.
     buffers: Vec<[i64; 2]>,
     views: Vec<[i64; 1]>,
     packing: Packing,
-    /// Where the buffers begin in the file, and the bytes of all.
+    /// Start of the buffers in the file, and their total length in bytes.
     begin: u64,
     bytes: u64,
 }
 
-/// One column of a batch, in memory.
 #[derive(Debug)]
 pub(super) struct Loaded {
     cell: Cell,
@@ -43,7 +40,7 @@ pub(super) struct Loaded {
     data: Vec<u8>,
 }
 
-/// Which entries are there; all, if there are no flags.
+/// Validity bitmap; `None` if all entries are valid.
 #[derive(Debug)]
 struct Flags(Option<Vec<u8>>);
 
@@ -59,7 +56,7 @@ impl Flags {
     }
 }
 
-/// Goes on reading at `at`; what lies near is in memory already.
+/// Moves to `at`; bytes that are already buffered are not read again.
 pub(super) fn move_to(reader: &mut BufReader<File>, at: u64) -> std::io::Result<()> {
     let now = reader.stream_position()?;
     reader.seek_relative(at as i64 - now as i64)
@@ -70,9 +67,8 @@ fn bit(bytes: &[u8], at: usize) -> bool {
 }
 
 impl Batch {
-    /// The batch that a message describes, its `bytes` of buffers at `begin`; or what is wrong with it.
     pub(super) fn read(message: Flat, begin: u64, bytes: u64) -> Result<Self, String> {
-        let batch = message.table(2).ok_or("it says nothing of its columns")?;
+        let batch = message.table(2).ok_or("the description of its columns is missing")?;
         let rows = usize::try_from(batch.i64(0)).map_err(|_| "its number of rows is negative")?;
         let mut entries = Vec::new();
         for [count, _] in batch.numbers::<2>(1) {
@@ -83,15 +79,15 @@ impl Batch {
             Some(packing) => match (packing.u8(0), packing.u8(1)) {
                 (0, 0) => Packing::Lz4,
                 (1, 0) => Packing::Zstd,
-                (codec, method) => return Err(format!("it is packed in a way that is not known ({codec}, {method})")),
+                (codec, method) => return Err(format!("unknown compression ({codec}, {method})")),
             },
         };
         Ok(Self { rows, entries, buffers: batch.numbers(2), views: batch.numbers(4), packing, begin, bytes })
     }
 
-    /// Reads a column; or says what is wrong with it. `left`: memory that may still be taken.
+    /// Reads a column; takes its memory from `left`.
     fn load(&self, leaf: &Leaf, reader: &mut BufReader<File>, left: &mut Budget) -> Result<Loaded, String> {
-        // What stands in groups, and lists, have one entry a row; entries of lists are as many as their field says.
+        // Groups and lists have one entry per row; values inside lists have the number of entries of their field.
         let mut around = Vec::new();
         for place in &leaf.around {
             around.push(self.flags(*place, self.rows, reader, left)?);
@@ -100,7 +96,7 @@ impl Batch {
         let mut list = None;
         if let Some((place, kind)) = leaf.list {
             let flags = self.flags(place, self.rows, reader, left)?;
-            entries = *self.entries.get(leaf.value.node).ok_or("it lacks a field")?;
+            entries = *self.entries.get(leaf.value.node).ok_or("a field is missing")?;
             let offsets = match kind {
                 List::Fixed(length) if length.checked_mul(self.rows).is_some_and(|all| all <= entries) => {
                     Offsets::Fixed(length)
@@ -115,7 +111,6 @@ impl Batch {
         Ok(Loaded { cell: leaf.cell, around, list, flags, data })
     }
 
-    /// The columns of `leaves` that are asked for.
     pub(super) fn loaded(
         &self,
         leaves: &[Leaf],
@@ -131,7 +126,7 @@ impl Batch {
         Ok(loaded)
     }
 
-    /// Number of the `which`-th buffer of a field.
+    /// Index of the `which`-th buffer of a field.
     fn number(&self, place: Place, which: usize) -> usize {
         let views = self.views.iter().take(place.views);
         let more = views.filter_map(|[count]| usize::try_from(*count).ok());
@@ -145,7 +140,7 @@ impl Batch {
         reader: &mut BufReader<File>,
         left: &mut Budget,
     ) -> Result<Flags, String> {
-        // Where all are there, the buffer may be empty.
+        // The bitmap may be empty if all entries are valid.
         if self.buffers.get(self.number(place, 0)).is_some_and(|[_, length]| *length == 0) {
             return Ok(Flags(None));
         }
@@ -177,7 +172,7 @@ impl Batch {
         Ok(Offsets::Each(offsets))
     }
 
-    /// The first `wanted` bytes of a buffer, unpacked.
+    /// The first `wanted` bytes of a buffer, decompressed.
     fn buffer(
         &self,
         place: Place,
@@ -188,10 +183,13 @@ impl Batch {
     ) -> Result<Vec<u8>, String> {
         left.take(wanted.map(|wanted| wanted as u64))?;
         let wanted = wanted.unwrap_or_default();
-        let [offset, length] = *self.buffers.get(self.number(place, which)).ok_or("it lacks a buffer")?;
-        let (offset, length) = u64::try_from(offset).ok().zip(u64::try_from(length).ok()).ok_or("a negative place")?;
+        let [offset, length] = *self.buffers.get(self.number(place, which)).ok_or("a buffer is missing")?;
+        let (offset, length) = u64::try_from(offset)
+            .ok()
+            .zip(u64::try_from(length).ok())
+            .ok_or("a buffer has a negative offset or length")?;
         if offset.checked_add(length).is_none_or(|end| end > self.bytes) {
-            return Err("its buffer ends behind the batch".to_owned());
+            return Err("its buffer ends after the batch".to_owned());
         }
         let problem = |error: std::io::Error| format!("its buffer cannot be read ({error})");
         move_to(reader, self.begin + offset).map_err(problem)?;
@@ -203,7 +201,7 @@ impl Batch {
             let mut claim = [0; 8];
             packed.read_exact(&mut claim).map_err(problem)?;
             match (i64::from_le_bytes(claim), self.packing) {
-                // Not worth packing.
+                // Not compressed.
                 (-1, _) => Box::new(packed),
                 (_, Packing::Lz4) => Box::new(lz4::Decoder::new(packed).map_err(problem)?),
                 (_, _) => {
@@ -214,9 +212,9 @@ impl Batch {
             }
         };
         unpacked.by_ref().take(wanted as u64).read_to_end(&mut data).map_err(problem)?;
-        // The checksum of what is packed stands behind its last byte; before that there may be fill bytes.
+        // The checksum of a compressed buffer follows its last byte, possibly after padding.
         if self.packing != Packing::Plain {
-            std::io::copy(&mut unpacked.by_ref().take(MOST_FILL), &mut std::io::sink()).map_err(problem)?;
+            std::io::copy(&mut unpacked.by_ref().take(MAX_PADDING_BYTES), &mut std::io::sink()).map_err(problem)?;
         }
         drop(unpacked);
         if data.len() < wanted {
@@ -227,7 +225,7 @@ impl Batch {
 }
 
 impl Loaded {
-    /// Where entry `entry` of a row stands; `None` if it is missing.
+    /// Index of entry `entry` of a row; `None` if it is missing.
     fn place(&self, row: usize, entry: usize) -> Option<usize> {
         if self.around.iter().any(|flags| !flags.has(row)) {
             return None;
@@ -243,7 +241,7 @@ impl Loaded {
         self.flags.has(at).then_some(at)
     }
 
-    /// Entry `entry` of a row, points in time counted from `first`; NaN if it is missing.
+    /// Entry `entry` of a row, time stamps relative to `first`; NaN if it is missing.
     pub(super) fn value(&self, row: usize, entry: usize, first: i64) -> f64 {
         let Some(at) = self.place(row, entry) else { return f64::NAN };
         match self.cell {
@@ -259,19 +257,16 @@ impl Loaded {
         }
     }
 
-    /// The whole number at `at`.
     fn ticks(&self, at: usize) -> Option<i64> {
         let Cell::Ticks { wide, .. } = self.cell else { return None };
         let mut bytes = Bytes::new(self.data.get(at * if wide { 8 } else { 4 }..)?, false);
         if wide { bytes.u64().map(|bits| bits as i64) } else { bytes.u32().map(|bits| i64::from(bits as i32)) }
     }
 
-    /// The first of the first `rows` points in time that is there.
     pub(super) fn first_ticks(&self, rows: usize) -> Option<i64> {
         (0..rows).find_map(|row| self.ticks(self.place(row, 0)?))
     }
 
-    /// Entries of the list in a row.
     pub(super) fn length(&self, row: usize) -> usize {
         let Some((_, offsets)) = &self.list else { return 1 };
         offsets.range(row).map_or(0, |(begin, end)| end - begin)

@@ -1,9 +1,9 @@
-//! Tables of FlatBuffers, in which Arrow writes its schema and the places of its columns. Every place is checked when
-//! it is followed: what points outside counts as absent. Format: <https://flatbuffers.dev/internals>.
+//! FlatBuffers tables, in which Arrow stores its schema and the places of its columns. Every offset is checked; a field
+//! with an offset outside the bytes is treated as absent. Format: <https://flatbuffers.dev/internals>.
 
 use crate::bytes::Bytes;
 
-/// One table: fields by the number of their slot.
+/// One table; fields are addressed by slot number.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Flat<'a> {
     bytes: &'a [u8],
@@ -11,28 +11,25 @@ pub(super) struct Flat<'a> {
 }
 
 impl<'a> Flat<'a> {
-    /// The table that `bytes` is of.
     pub(super) fn root(bytes: &'a [u8]) -> Option<Self> {
         Self { bytes, at: 0 }.followed(0)
     }
 
-    /// The bytes at `at`.
     fn read(&self, at: usize) -> Option<Bytes<'a>> {
         Some(Bytes::new(self.bytes.get(at..)?, false))
     }
 
-    /// The table that the offset at `at` points to.
+    /// The table at the offset stored at `at`.
     fn followed(&self, at: usize) -> Option<Self> {
         Some(Self { bytes: self.bytes, at: self.pointed(at)? })
     }
 
-    /// Where the offset at `at` points to.
+    /// The position of the offset stored at `at`.
     fn pointed(&self, at: usize) -> Option<usize> {
         let offset = self.read(at)?.u32()?;
         at.checked_add(offset as usize).filter(|place| *place < self.bytes.len())
     }
 
-    /// Where a field stands; `None` if the table has it not.
     fn place(&self, slot: usize) -> Option<usize> {
         let back = i64::from(self.read(self.at)?.u32()? as i32);
         let list = usize::try_from(self.at as i64 - back).ok()?;
@@ -47,7 +44,7 @@ impl<'a> Flat<'a> {
         }
     }
 
-    /// A number of one byte; 0 if it is absent, as in the following.
+    /// A number of one byte; 0 if absent, as in the following methods.
     pub(super) fn u8(&self, slot: usize) -> u8 {
         self.place(slot).and_then(|at| self.read(at)?.u8()).unwrap_or(0)
     }
@@ -74,7 +71,6 @@ impl<'a> Flat<'a> {
         Some(String::from_utf8_lossy(bytes.take(length)?).into_owned())
     }
 
-    /// The tables of a list; none if it is absent.
     pub(super) fn tables(&self, slot: usize) -> impl Iterator<Item = Self> + use<'a> {
         let place = self.place(slot).and_then(|at| self.pointed(at));
         let count = place.and_then(|at| self.read(at)?.u32()).unwrap_or(0) as usize;
@@ -82,7 +78,7 @@ impl<'a> Flat<'a> {
         (0..count).map_while(move |k| list.followed(place?.checked_add(4 + 4 * k)?))
     }
 
-    /// A list of whole numbers, `width` together.
+    /// A list of tuples of `WIDTH` 64-bit integers.
     pub(super) fn numbers<const WIDTH: usize>(&self, slot: usize) -> Vec<[i64; WIDTH]> {
         let Some(mut bytes) = self.place(slot).and_then(|at| self.read(self.pointed(at)?)) else { return Vec::new() };
         let count = bytes.u32().unwrap_or(0) as usize;
@@ -102,8 +98,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_points_outside_is_absent() {
-        // Offset of the table 12; its list of places at 4 (size 8, own size 8, slot 0 at 4, slot 1 at 6).
+    fn offsets_outside_the_bytes_are_absent() {
+        // Offset of the table 12; its vtable at 4 (size 8, table size 8, slot 0 at 4, slot 1 at 6).
         let mut bytes = vec![12, 0, 0, 0, 8, 0, 8, 0, 4, 0, 6, 0, 8, 0, 0, 0, 7, 1, 255, 255];
         let table = Flat::root(&bytes).unwrap();
         assert_eq!((table.u8(0), table.i16(1), table.u8(2)), (7, Some(-1), 0));

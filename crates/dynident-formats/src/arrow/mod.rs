@@ -1,5 +1,5 @@
-//! Arrow: tables in the file format (`ARROW1`, which is Feather's second version) and in the streaming format; columns
-//! as those of Parquet. Format:
+//! Arrow: tables in the file format (`ARROW1`, also called Feather version 2) and in the streaming format, with columns
+//! as for Parquet. Format:
 //! <https://arrow.apache.org/docs/format/Columnar.html#serialization-and-interprocess-communication-ipc>.
 
 #[cfg(feature = "arrow")]
@@ -14,11 +14,9 @@ mod schema;
 #[cfg(feature = "arrow")]
 pub(crate) use reading::open;
 
-/// What the file format begins and ends with.
 pub(crate) const MAGIC: &[u8] = b"ARROW1";
 
-/// Whether this is the beginning of a stream: the mark of a message, its length, and the offset of its first table,
-/// which stands near.
+/// Whether `head` is the start of a stream: a message marker, its length, and a small offset of its first table.
 pub(crate) fn begins_stream(head: &[u8]) -> bool {
     let word = |at: usize| Some(u32::from_le_bytes(head.get(at..at + 4)?.try_into().ok()?));
     let small = |at: usize, most: u32| word(at).is_some_and(|number| (1..most).contains(&number));

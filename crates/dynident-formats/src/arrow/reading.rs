@@ -1,10 +1,10 @@
-//! Messages of an Arrow file one after the other, as a table.
+//! Reads the messages of an Arrow file as a table.
 
 use super::MAGIC;
 use super::batch::{Batch, Loaded, move_to};
 use super::flat::Flat;
 use super::schema::{Cell, Leaf, List, Schema};
-use crate::arrays::{LONGEST_LIST, MOST_COLUMNS};
+use crate::arrays::{MAX_COLUMNS, MAX_LIST_COLUMNS};
 use crate::error::FileError;
 use crate::kind::FileFormat;
 use crate::limits::Budget;
@@ -13,14 +13,12 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Kinds of messages that matter.
 const SCHEMA: u8 = 1;
 const BATCH: u8 = 3;
 
-/// A message without its buffers.
 struct Message {
     head: Vec<u8>,
-    /// Where its buffers begin, and their bytes.
+    /// Start and length of its buffers in the file.
     begin: u64,
     bytes: u64,
 }
@@ -29,21 +27,18 @@ struct Message {
 struct ArrowTable {
     path: PathBuf,
     reader: BufReader<File>,
-    /// Memory for the columns of one batch.
     budget: Budget,
-    /// Where the next message begins, and where the last one ends.
     next_message: u64,
     end: u64,
-    /// Whether it is a stream, which may end anywhere.
+    /// Whether it is a stream, which may end at any byte.
     stream: bool,
     truncated: bool,
     batches: usize,
     leaves: Vec<Leaf>,
-    /// First stamp of each leaf.
     first: Vec<i64>,
     names: Vec<String>,
     notes: Vec<String>,
-    /// Leaf and entry of each column, and of each that is wanted.
+    /// Leaf and entry of each column, and of each requested column.
     columns: Vec<(usize, usize)>,
     wanted: Vec<(usize, usize)>,
     loaded: Vec<Option<Loaded>>,
@@ -94,17 +89,17 @@ fn broken(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> 
     FileError::broken(path, FileFormat::Arrow, place, problem, "write or copy it again")
 }
 
-/// Where the messages of a file of `length` bytes end: before its footer, whose length and the magic are the last
-/// bytes.
+/// End of the messages in a file of `length` bytes: the start of the footer, whose length and the magic bytes are at
+/// the end of the file.
 fn end_of_messages(reader: &mut BufReader<File>, length: u64) -> std::io::Result<Result<u64, &'static str>> {
     let mut tail = [0; 4 + MAGIC.len()];
     let Some(tail_at) = length.checked_sub(tail.len() as u64).filter(|at| *at >= 8) else {
-        return Ok(Err("it is cut off"));
+        return Ok(Err("it is truncated"));
     };
     reader.seek(SeekFrom::Start(tail_at))?;
     reader.read_exact(&mut tail)?;
     if !tail.ends_with(MAGIC) {
-        return Ok(Err("it is cut off, or its writer was never closed"));
+        return Ok(Err("it is truncated, or its writer was not closed"));
     }
     let footer = u64::from(u32::from_le_bytes([tail[0], tail[1], tail[2], tail[3]]));
     Ok(tail_at.checked_sub(footer).filter(|at| *at >= 8).ok_or("its footer is longer than the file"))
@@ -115,7 +110,6 @@ impl ArrowTable {
         format!("message at byte {}", self.next_message)
     }
 
-    /// The next message; `None` at the end.
     fn message(&mut self) -> Result<Option<Message>, FileError> {
         let io = |source| FileError::Io { file: self.path.clone(), source };
         let left = self.end.saturating_sub(self.next_message);
@@ -123,7 +117,7 @@ impl ArrowTable {
             return Ok(None);
         }
         move_to(&mut self.reader, self.next_message).map_err(io)?;
-        // Before version 0.15 a message began with its length.
+        // Before version 0.15 a message started with its length.
         let (mut prefix, mut begin) = ([0; 4], 4);
         let mut word = |reader: &mut BufReader<File>| match reader.read_exact(&mut prefix) {
             Ok(()) => Ok(Some(u32::from_le_bytes(prefix))),
@@ -143,7 +137,7 @@ impl ArrowTable {
         self.reader.read_exact(&mut head).map_err(io)?;
         let bytes = Flat::root(&head).map(|message| message.i64(3));
         let Some(bytes) = bytes.and_then(|bytes| u64::try_from(bytes).ok()) else {
-            return Err(broken(&self.path, self.place(), "it cannot be understood"));
+            return Err(broken(&self.path, self.place(), "it is invalid"));
         };
         let begin = self.next_message + begin + length;
         if begin.checked_add(bytes).is_none_or(|end| end > self.end) {
@@ -153,14 +147,14 @@ impl ArrowTable {
         Ok(Some(Message { head, begin, bytes }))
     }
 
-    /// A message that ends behind the file.
+    /// A message that extends beyond the end of the file.
     fn cut(&mut self) -> Result<Option<Message>, FileError> {
         if self.stream && self.batches > 0 {
             self.truncated = true;
             self.next_message = self.end;
             return Ok(None);
         }
-        Err(broken(&self.path, self.place(), "the file ends in it"))
+        Err(broken(&self.path, self.place(), "the file ends inside it"))
     }
 
     fn read_schema(&mut self) -> Result<(), FileError> {
@@ -168,21 +162,21 @@ impl ArrowTable {
         let found = self.message()?;
         let message = found.as_ref().and_then(|message| Flat::root(&message.head)).filter(|flat| flat.u8(1) == SCHEMA);
         let Some((message, schema)) = message.and_then(|message| Some((message, message.table(2)?))) else {
-            return Err(broken(&self.path, place, "it is no schema"));
+            return Err(broken(&self.path, place, "it is not a schema"));
         };
         if schema.i16(0).unwrap_or(0) != 0 {
-            let fix = "write it on a machine that begins numbers with their lowest byte";
-            let problem = "its numbers begin with their highest byte";
+            let fix = "write it on a little-endian machine";
+            let problem = "its numbers are big-endian";
             return Err(FileError::broken(&self.path, FileFormat::Arrow, place, problem, fix));
         }
         let Some(read) = Schema::read(schema, message.i16(0).unwrap_or(0)) else {
-            return Err(broken(&self.path, place, "it has a column of a type that is not known"));
+            return Err(broken(&self.path, place, "it has a column of unknown type"));
         };
         (self.leaves, self.notes) = (read.leaves, read.notes);
         Ok(())
     }
 
-    /// Names the columns; how long lists are, and when the first stamp was, is looked for in the first rows.
+    /// Names the columns. The length of lists and the first time stamps are taken from the first batch.
     fn find_columns(&mut self) -> Result<(), FileError> {
         let after_schema = self.next_message;
         let looked_at: Vec<bool> = self
@@ -210,9 +204,9 @@ impl ArrowTable {
                     (Some(_), loaded) => loaded.map_or(0, |loaded| loaded.length(0)),
                 },
             );
-            let count = count.min(LONGEST_LIST);
-            if self.names.len() + count > MOST_COLUMNS {
-                self.notes.push(format!("column {name}: beyond {MOST_COLUMNS} columns"));
+            let count = count.min(MAX_LIST_COLUMNS);
+            if self.names.len() + count > MAX_COLUMNS {
+                self.notes.push(format!("column {name}: more than {MAX_COLUMNS} columns"));
                 continue;
             }
             for entry in 0..count {
@@ -226,7 +220,7 @@ impl ArrowTable {
         Ok(())
     }
 
-    /// Reads the next batch that has rows, of the leaves that are asked for; false at the end.
+    /// Reads the requested leaves of the next batch with rows; false at the end.
     fn next_batch(&mut self, asked_for: impl Fn(usize) -> bool) -> Result<bool, FileError> {
         loop {
             let Some(message) = self.message()? else { return Ok(false) };
@@ -253,7 +247,7 @@ impl ArrowTable {
             for (leaf, _) in &self.wanted {
                 asked_for[*leaf] = true;
             }
-            // Something has to be there, or rows would be as many as a batch claims.
+            // Load at least one column; otherwise the number of rows is not checked against the data.
             if let (true, Some((leaf, _))) = (self.wanted.is_empty(), self.columns.first()) {
                 asked_for[*leaf] = true;
             }

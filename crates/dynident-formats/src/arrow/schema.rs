@@ -1,36 +1,35 @@
-//! What an Arrow schema says of its columns: which are numbers, and where in a batch their buffers stand.
+//! Arrow schema: which columns are numbers, and the places of their buffers in a batch.
 
 use super::flat::Flat;
 use crate::bytes::Number;
 
-/// Fields within fields.
-const DEEPEST: usize = 32;
-/// Fields of a schema, those within others included: a broken one may hold one field many times.
-const MOST_FIELDS: usize = 1 << 16;
+const MAX_NESTING: usize = 32;
+/// Maximum number of fields, including nested ones; a corrupt schema may refer to one field many times.
+const MAX_FIELDS: usize = 1 << 16;
 
-/// Where a field stands in each batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Place {
-    /// Number of its node, and of its first buffer: the flags of what is there.
+    /// Index of its node, and of its first buffer, the validity bitmap.
     pub(super) node: usize,
     pub(super) buffer: usize,
-    /// Fields before it that have as many buffers as the batch says.
+    /// Number of view fields before it, whose numbers of buffers are stored in the batch.
     pub(super) views: usize,
 }
 
-/// How a value is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Cell {
-    /// One bit.
     Flag,
-    /// A number.
     Number(Number),
-    /// Whole numbers of which so many are a second, counted from the first one if they are points in time.
-    Ticks { wide: bool, per_s: f64, from_first: bool },
+    /// Integers with `per_s` units per second; time stamps are relative to the first one.
+    Ticks {
+        wide: bool,
+        per_s: f64,
+        from_first: bool,
+    },
 }
 
 impl Cell {
-    /// Bytes of `count` values; `None` if no memory has so many.
+    /// Bytes of `count` values; `None` on overflow.
     pub(super) fn bytes(self, count: usize) -> Option<usize> {
         match self {
             Self::Flag => Some(count.div_ceil(8)),
@@ -40,45 +39,39 @@ impl Cell {
     }
 }
 
-/// How a list tells its entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum List {
-    /// By the offset of its first entry and the next list's, of 8 bytes or 4.
+    /// By the offset of its first entry and that of the next list, of 8 or 4 bytes.
     Offsets { wide: bool },
-    /// All are of this length.
+    /// All lists have this length.
     Fixed(usize),
 }
 
-/// One field of numbers, or of lists of them.
 #[derive(Clone, Debug)]
 pub(super) struct Leaf {
     pub(super) name: String,
     pub(super) cell: Cell,
-    /// Groups around it.
     pub(super) around: Vec<Place>,
     pub(super) list: Option<(Place, List)>,
     pub(super) value: Place,
 }
 
-/// The fields of a schema.
 #[derive(Debug, Default)]
 pub(super) struct Schema {
     pub(super) leaves: Vec<Leaf>,
-    /// What is no column, and why.
     pub(super) notes: Vec<String>,
 }
 
-/// A field's type, as far as it matters here.
 enum Kind {
     Cell(Cell),
     List(List),
     Group,
-    /// Not numbers; flags and so many other buffers, and whether a batch says how many more.
+    /// Not numeric: number of buffers after the bitmap, and whether a batch stores a number of further buffers.
     Other {
         buffers: usize,
         views: bool,
     },
-    /// Not known: where the fields behind it stand cannot be told.
+    /// Unknown: the places of the following fields cannot be determined.
     Unknown,
 }
 
@@ -86,9 +79,9 @@ fn ticks(unit: i16) -> f64 {
     [1.0, 1e3, 1e6, 1e9][usize::from(unit.clamp(0, 3).unsigned_abs())]
 }
 
-/// The type of a field: `Schema.fbs` of Arrow. `version` is that of the message.
+/// The type of a field, from Arrow's `Schema.fbs`. `version` is that of the message.
 fn kind(field: Flat, version: i16) -> Kind {
-    // What is written is the number of an entry of a dictionary.
+    // Dictionary encoding: the buffers contain indices.
     if field.table(4).is_some() {
         return Kind::Other { buffers: 2, views: false };
     }
@@ -97,7 +90,7 @@ fn kind(field: Flat, version: i16) -> Kind {
     let short = |slot| details.and_then(|details| details.i16(slot));
     let word = |slot| details.map_or(0, |details| details.i32(slot));
     match field.u8(2) {
-        // Nothing at all; runs of values.
+        // Null; run-end encoding.
         1 | 22 => Kind::Other { buffers: 0, views: false },
         2 => {
             let number = match (word(0), byte(1) != 0) {
@@ -120,7 +113,7 @@ fn kind(field: Flat, version: i16) -> Kind {
             _ => Kind::Unknown,
         },
         6 => Kind::Cell(Cell::Flag),
-        // The default unit of a stamp is the second, that of a duration and of a time of day the millisecond.
+        // The default unit of a time stamp is the second, that of a duration and of a time of day the millisecond.
         9 => {
             let wide = match word(1) {
                 0 | 32 => false,
@@ -135,19 +128,19 @@ fn kind(field: Flat, version: i16) -> Kind {
         21 => Kind::List(List::Offsets { wide: true }),
         16 => usize::try_from(word(0)).map_or(Kind::Unknown, |length| Kind::List(List::Fixed(length))),
         13 => Kind::Group,
-        // Texts and bytes: flags, offsets, letters. Views of lists: flags, offsets, lengths.
+        // Text and bytes: bitmap, offsets, data. List views: bitmap, offsets, lengths.
         4 | 5 | 19 | 20 | 25 | 26 => Kind::Other { buffers: 3, views: false },
-        // Decimals, dates, intervals, bytes of one length, maps.
+        // Decimals, dates, intervals, bytes of fixed length, maps.
         7 | 8 | 11 | 15 | 17 => Kind::Other { buffers: 2, views: false },
-        // Unions, which had flags before version 5: types, and offsets if they are dense.
+        // Unions, which had a bitmap before version 5: types, and offsets if they are dense.
         14 => Kind::Other { buffers: 1 + usize::from(short(0) == Some(1)) + usize::from(version < 4), views: false },
-        // Views of texts and bytes.
+        // Views of text and bytes.
         23 | 24 => Kind::Other { buffers: 2, views: true },
         _ => Kind::Unknown,
     }
 }
 
-/// Walks over the fields in the order in which a batch has their nodes and buffers.
+/// Visits the fields in the order of their nodes and buffers in a batch.
 struct Walk {
     schema: Schema,
     next: Place,
@@ -156,7 +149,6 @@ struct Walk {
 }
 
 impl Schema {
-    /// The columns of a schema; `None` if it cannot be understood to its end.
     pub(super) fn read(schema: Flat, version: i16) -> Option<Self> {
         let mut walk = Walk { schema: Self::default(), next: Place::default(), fields: 0, version };
         for field in schema.tables(1) {
@@ -169,7 +161,7 @@ impl Schema {
 impl Walk {
     fn field(&mut self, field: Flat, before: &str, around: &[Place], depth: usize) -> Option<()> {
         self.fields += 1;
-        if self.fields > MOST_FIELDS || depth > DEEPEST {
+        if self.fields > MAX_FIELDS || depth > MAX_NESTING {
             return None;
         }
         let name = before.to_owned() + &field.text(0).unwrap_or_default();
@@ -198,12 +190,12 @@ impl Walk {
                     let around = around.to_vec();
                     self.schema.leaves.push(Leaf { name, cell, around, list: Some((place, list)), value });
                 } else {
-                    self.schema.notes.push(format!("column {name}: lists of no numbers, or lists of lists"));
+                    self.schema.notes.push(format!("column {name}: lists that are not numeric, or lists of lists"));
                     self.passed(child, depth + 1)?;
                 }
             }
             Kind::Other { buffers, views } => {
-                self.schema.notes.push(format!("column {name}: no numbers"));
+                self.schema.notes.push(format!("column {name}: not numeric"));
                 self.beyond(field, buffers, views, depth)?;
             }
             Kind::Unknown => return None,
@@ -211,10 +203,9 @@ impl Walk {
         Some(())
     }
 
-    /// Passes over a field and those in it.
     fn passed(&mut self, field: Flat, depth: usize) -> Option<()> {
         self.fields += 1;
-        if self.fields > MOST_FIELDS || depth > DEEPEST {
+        if self.fields > MAX_FIELDS || depth > MAX_NESTING {
             return None;
         }
         self.next.node += 1;
@@ -227,7 +218,7 @@ impl Walk {
         self.beyond(field, buffers, views, depth)
     }
 
-    /// Passes over a field's buffers and the fields in it; those of a dictionary stand in batches of their own.
+    /// Skips a field's buffers and its children; those of a dictionary are in separate batches.
     fn beyond(&mut self, field: Flat, buffers: usize, views: bool, depth: usize) -> Option<()> {
         self.next.buffer += buffers;
         self.next.views += usize::from(views);

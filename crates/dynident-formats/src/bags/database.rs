@@ -1,4 +1,4 @@
-//! The SQLite files of rosbag2.
+//! SQLite files of rosbag2.
 
 use super::part::{Channel, Encoding, Part};
 use super::sqlite::{Rows, Sqlite, Value};
@@ -8,19 +8,18 @@ use std::collections::HashMap;
 use std::io::Read;
 use std::path::Path;
 
-/// Longest message once it is unpacked.
-const LONGEST_MESSAGE: u64 = 1 << 28;
+const MAX_MESSAGE_BYTES: u64 = 1 << 28;
 
 #[derive(Debug)]
 pub(super) struct Database {
     file: Sqlite,
     rows: Rows,
     channels: HashMap<usize, Channel>,
-    /// Places of topic, time and data in a row of messages.
+    /// Indices of topic, time and data in a row of messages.
     fields: [usize; 3],
 }
 
-/// Places of columns in the text that made a table.
+/// Indices of columns in the SQL statement that created a table.
 fn places<const N: usize>(text: &str, names: [&str; N]) -> Option<[usize; N]> {
     let list = text.split_once('(')?.1;
     let columns: Vec<&str> = list
@@ -64,7 +63,7 @@ impl Database {
         let (page, made) = (topics.1, &topics.2);
         let no_columns = || ["name", "type", "serialization_format"];
         let [name, kind, format] = places(made, no_columns())
-            .ok_or_else(|| file.broken("table topics", "it has no columns name, type and serialization_format"))?;
+            .ok_or_else(|| file.broken("table topics", "columns name, type and serialization_format are missing"))?;
         let mut channels = HashMap::new();
         let mut rows = file.rows(page)?;
         while let Some((id, row)) = file.next(&mut rows)? {
@@ -83,7 +82,7 @@ impl Database {
             channels.insert(id, Channel { topic: topic.clone(), kind: kind.clone(), encoding });
         }
         let fields = places(&messages.2, ["topic_id", "timestamp", "data"])
-            .ok_or_else(|| file.broken("table messages", "it has no columns topic_id, timestamp and data"))?;
+            .ok_or_else(|| file.broken("table messages", "columns topic_id, timestamp and data are missing"))?;
         let rows = file.rows(messages.1)?;
         Ok(Self { file, rows, channels, fields })
     }
@@ -95,7 +94,7 @@ impl Part for Database {
         let [topic, time, data] = self.fields;
         let place = || format!("message {id}");
         let (Some(&Value::Integer(topic)), Some(&Value::Integer(time))) = (row.get(topic), row.get(time)) else {
-            return Err(self.file.broken(place(), "its topic or its time is no number"));
+            return Err(self.file.broken(place(), "its topic or its time is not a number"));
         };
         let Some(Value::Blob(bytes)) = row.get_mut(data).map(|value| core::mem::replace(value, Value::Null)) else {
             return Err(self.file.broken(place(), "it has no data"));
@@ -103,13 +102,13 @@ impl Part for Database {
         let topic = usize::try_from(topic).ok().filter(|topic| self.channels.contains_key(topic));
         let topic = topic.ok_or_else(|| self.file.broken(place(), "its topic is not in the table of topics"))?;
         *message = bytes;
-        // `--compression-mode message`: every message for itself. Plain CDR begins with 0.
+        // `--compression-mode message` compresses every message separately. Plain CDR starts with 0.
         if message.starts_with(b"\x28\xB5\x2F\xFD") {
             let mut unpacked = Vec::new();
             let read = zstd::stream::read::Decoder::new(&message[..])
-                .and_then(|decoder| decoder.take(LONGEST_MESSAGE + 1).read_to_end(&mut unpacked));
+                .and_then(|decoder| decoder.take(MAX_MESSAGE_BYTES + 1).read_to_end(&mut unpacked));
             read.map_err(|error| self.file.broken(place(), format!("it cannot be unpacked ({error})")))?;
-            if unpacked.len() as u64 > LONGEST_MESSAGE {
+            if unpacked.len() as u64 > MAX_MESSAGE_BYTES {
                 return Err(self.file.broken(place(), "it is larger than 256 MiB"));
             }
             *message = unpacked;

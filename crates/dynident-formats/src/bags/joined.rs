@@ -1,29 +1,26 @@
-//! Samples of several topics on the clock of one.
+//! Combines the samples of several topics on the clock of the first one.
 
 use std::collections::VecDeque;
 
-/// Rows that wait for a topic that has fallen silent, at most.
-const MOST_WAITING: usize = 1 << 20;
-/// A step of so many mean steps is a hole.
-const HOLE: f64 = 5.0;
-/// Steps before a mean counts.
-const FEW_STEPS: u64 = 8;
+const MAX_WAITING_ROWS: usize = 1 << 20;
+/// Minimum length of a gap, mean steps.
+const MIN_GAP_STEPS: f64 = 5.0;
+const MIN_STEPS_FOR_MEAN: u64 = 8;
 
-/// The values of one topic at one time, ns.
+/// Values of one topic with their time, ns.
 type Stamped = (i64, Vec<f64>);
 
-/// One topic beside the first.
+/// A topic that is interpolated at the times of the first one.
 #[derive(Debug, Default)]
 struct Side {
     samples: VecDeque<Stamped>,
     first_ns: i64,
     last_ns: i64,
     steps: u64,
-    /// Whether a sample in the queue is the end of a hole: by time of that sample.
+    /// Times of the samples in the queue that end a gap.
     holes: VecDeque<i64>,
 }
 
-/// What became of a row.
 enum Outcome {
     Ready(Vec<f64>),
     Early,
@@ -39,26 +36,25 @@ pub(super) struct Joined {
 }
 
 impl Joined {
-    /// Joins so many topics with the first.
     pub(super) fn new(sides: usize) -> Self {
         let sides = (0..sides).map(|_| Side::default()).collect();
         Self { rows: VecDeque::new(), sides, ended: false }
     }
 
-    /// A row of the first topic.
+    /// Adds a row of the first topic.
     ///
     /// # Errors
-    /// With the number of the topic that has been silent for too long.
+    /// The index of the topic without messages for too long.
     pub(super) fn push_row(&mut self, at_ns: i64, values: Vec<f64>) -> Result<(), usize> {
         self.rows.push_back((at_ns, values));
-        if self.rows.len() <= MOST_WAITING {
+        if self.rows.len() <= MAX_WAITING_ROWS {
             return Ok(());
         }
         let silent = self.sides.iter().position(|side| side.last_ns < at_ns);
         Err(silent.unwrap_or(0))
     }
 
-    /// A sample of another topic. One that does not lie behind the one before is left out.
+    /// Adds a sample of another topic. A sample that is not later than the previous one is ignored.
     pub(super) fn push_side(&mut self, side: usize, at_ns: i64, values: Vec<f64>) {
         let side = &mut self.sides[side];
         if side.steps == 0 && side.samples.is_empty() {
@@ -68,7 +64,7 @@ impl Joined {
                 return;
             }
             let mean = (side.last_ns - side.first_ns) as f64 / side.steps.max(1) as f64;
-            if side.steps >= FEW_STEPS && (at_ns - side.last_ns) as f64 > HOLE * mean {
+            if side.steps >= MIN_STEPS_FOR_MEAN && (at_ns - side.last_ns) as f64 > MIN_GAP_STEPS * mean {
                 side.holes.push_back(at_ns);
             }
             side.steps += 1;
@@ -77,12 +73,11 @@ impl Joined {
         side.samples.push_back((at_ns, values));
     }
 
-    /// No more will come.
     pub(super) fn end(&mut self) {
         self.ended = true;
     }
 
-    /// The next row, the first topic's values and then the others'; `None` if more has to come first, or at the end.
+    /// The next row: the values of the first topic, then of the others. `None` if more input is needed, or at the end.
     pub(super) fn next(&mut self) -> Option<Vec<f64>> {
         loop {
             let (at_ns, values) = self.rows.front()?;
@@ -103,7 +98,7 @@ impl Joined {
                     return Some(row);
                 }
                 Outcome::Wait if !self.ended => return None,
-                // Before a topic has begun, or after it has ended.
+                // Before the first or after the last message of a topic.
                 Outcome::Early | Outcome::Wait => {
                     self.rows.pop_front();
                 }
@@ -113,7 +108,7 @@ impl Joined {
 }
 
 impl Side {
-    /// Its values at `at_ns`: linear between the neighbours, NaN in a hole.
+    /// Its values at `at_ns`: linear between the neighbours, NaN in a gap.
     fn at(&mut self, at_ns: i64) -> Outcome {
         while self.samples.get(1).is_some_and(|next| next.0 <= at_ns) {
             self.samples.pop_front();
@@ -142,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_are_interpolated_between_neighbours_and_left_out_where_there_are_none() {
+    fn rows_are_interpolated_between_neighbours_or_left_out() {
         let mut joined = Joined::new(1);
         for at in [5, 10, 14, 20, 26] {
             joined.push_row(at, vec![at as f64]).unwrap();
@@ -150,7 +145,7 @@ mod tests {
         assert_eq!(joined.next(), None);
         joined.push_side(0, 8, vec![1.0]);
         joined.push_side(0, 16, vec![3.0]);
-        // A clock that runs backwards is not followed.
+        // A sample with an earlier time is ignored.
         joined.push_side(0, 12, vec![100.0]);
         assert_eq!(joined.next(), Some(vec![10.0, 1.5]));
         assert_eq!(joined.next(), Some(vec![14.0, 2.5]));
@@ -163,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hole_of_the_other_topic_is_no_straight_line() {
+    fn a_gap_of_the_other_topic_is_not_interpolated() {
         let mut joined = Joined::new(1);
         for at in (0..20).chain(60..64) {
             joined.push_side(0, 10 * at, vec![at as f64]);

@@ -1,4 +1,4 @@
-//! MCAP, read from front to end: <https://mcap.dev/spec>.
+//! Reads MCAP sequentially: <https://mcap.dev/spec>.
 
 use super::part::{Channel, Encoding, Part};
 use crate::bytes::Bytes;
@@ -12,10 +12,9 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Longest record, and longest chunk once it is unpacked.
-const LONGEST_RECORD: usize = 1 << 28;
-/// Kind and length of a record.
-const RECORD_HEAD: usize = 9;
+/// Maximum length of a record, and of a decompressed chunk, bytes.
+const MAX_RECORD_BYTES: usize = 1 << 28;
+const RECORD_HEAD_BYTES: usize = 9;
 
 pub(super) struct McapFile {
     path: PathBuf,
@@ -23,7 +22,7 @@ pub(super) struct McapFile {
     reader: LinearReader,
     schemas: HashMap<u16, (String, String, String)>,
     channels: HashMap<u16, Channel>,
-    /// The chunk under way, unpacked, and where its next record begins.
+    /// The current chunk, decompressed, and the position of its next record.
     chunk: Vec<u8>,
     at: usize,
     records: u64,
@@ -40,9 +39,9 @@ impl core::fmt::Debug for McapFile {
 impl McapFile {
     pub(super) fn open(path: &Path) -> Result<Self, FileError> {
         let file = dynident_files::open(path).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
-        // Chunks are unpacked here: lengths inside of them may lie.
+        // Decompress chunks here, because the lengths inside may be wrong.
         let options = LinearReaderOptions::default()
-            .with_record_length_limit(LONGEST_RECORD)
+            .with_record_length_limit(MAX_RECORD_BYTES)
             .with_emit_chunks(true)
             .with_validate_data_section_crc(true);
         Ok(Self {
@@ -60,18 +59,17 @@ impl McapFile {
     }
 
     fn broken(&self, error: &McapError) -> FileError {
-        let fix = "`mcap recover` keeps what is whole";
+        let fix = "use `mcap recover` to keep the intact part";
         FileError::broken(&self.path, FileFormat::Mcap, format!("record {}", self.records), error.to_string(), fix)
     }
 
-    /// Unpacks a chunk and checks what came out.
     fn unpack(&mut self, header: &ChunkHeader, packed: &[u8]) -> Result<(), FileError> {
         let size = header.uncompressed_size;
-        if size > LONGEST_RECORD as u64 {
+        if size > MAX_RECORD_BYTES as u64 {
             return Err(self.broken(&McapError::ChunkTooLarge(size)));
         }
         let mut unpacked = Vec::new();
-        // One byte more than is claimed shows that the claim is wrong.
+        // Read one byte more than declared, to detect a wrong length.
         let most = size + 1;
         let read = match header.compression.as_str() {
             "" => packed.take(most).read_to_end(&mut unpacked),
@@ -92,7 +90,6 @@ impl McapFile {
         Ok(())
     }
 
-    /// The next record of the chunk under way; `None` at its end.
     fn next_in_chunk(&mut self) -> Result<Option<Record<'static>>, FileError> {
         let rest = &self.chunk[self.at..];
         if rest.is_empty() {
@@ -105,12 +102,12 @@ impl McapFile {
         });
         let Some((opcode, body)) = body else { return Err(self.broken(&McapError::UnexpectedEoc)) };
         let (length, record) = (body.len(), mcap::parse_record(opcode, body).map(Record::into_owned));
-        self.at += RECORD_HEAD + length;
+        self.at += RECORD_HEAD_BYTES + length;
         self.records += 1;
         record.map(Some).map_err(|error| self.broken(&error))
     }
 
-    /// Takes note of a record; channel and time of a message, whose bytes go to `message`.
+    /// Stores a schema or channel. For a message, returns its channel and time and writes its bytes to `message`.
     fn take(&mut self, record: Record, message: &mut Vec<u8>) -> Result<Option<(usize, i64)>, FileError> {
         match record {
             Record::Schema { header, data } => {
@@ -160,7 +157,7 @@ impl Part for McapFile {
                     let record = mcap::parse_record(opcode, data).map(Record::into_owned);
                     match record.map_err(|error| self.broken(&error))? {
                         Record::Chunk { header, data } => self.unpack(&header, &data)?,
-                        // Behind the data lie copies of channels and schemas, and indices.
+                        // Copies of channels and schemas, and indices, follow the data.
                         Record::DataEnd(_) => break,
                         record => {
                             if let Some(found) = self.take(record, message)? {
@@ -176,7 +173,7 @@ impl Part for McapFile {
                 }
                 Some(Err(error)) => return Err(self.broken(&error)),
             };
-            // In steps: what a broken length asks for may not be there.
+            // Read in steps, because a corrupt length may exceed the file.
             let space = self.reader.insert(wanted.clamp(1, 1 << 18));
             let read = self.file.read(space);
             let read = read.map_err(|source| FileError::Io { file: self.path.clone(), source })?;

@@ -1,4 +1,4 @@
-//! Messages one after the other, whatever file they lie in.
+//! Messages of all parts of a recording in sequence.
 
 use super::part::{Channel, Part};
 use super::{database, mcap_file};
@@ -6,22 +6,18 @@ use crate::error::FileError;
 use crate::kind::FileFormat;
 use std::path::{Path, PathBuf};
 
-/// The messages of all parts.
 #[derive(Debug)]
 pub(super) struct Messages {
     parts: Vec<(PathBuf, FileFormat)>,
-    /// Number of the part under way, and the part.
     current: usize,
     part: Option<Box<dyn Part>>,
     truncated: bool,
 }
 
-/// A message without its bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
-    /// Number of the part, and of the channel in it.
+    /// Index of the part, and of the channel in it.
     pub(super) channel: (usize, usize),
-    /// When it was recorded, ns.
     pub(super) log_ns: i64,
 }
 
@@ -40,7 +36,7 @@ impl Messages {
                 return Ok(Some(Header { channel: (self.current, channel), log_ns }));
             }
             self.truncated |= part.truncated();
-            // The last part stays: its channels are still asked for.
+            // Keep the last part, because its channels are still needed.
             if self.current + 1 == self.parts.len() {
                 return Ok(None);
             }
@@ -50,7 +46,6 @@ impl Messages {
         Ok(None)
     }
 
-    /// The channel of the message last read.
     pub(super) fn channel(&self, header: Header) -> Option<&Channel> {
         self.part.as_ref()?.channel(header.channel.1)
     }

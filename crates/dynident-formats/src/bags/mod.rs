@@ -1,4 +1,4 @@
-//! Recordings of messages: MCAP and rosbag2. Every topic is a group of columns with a clock of its own.
+//! Recordings of messages: MCAP and rosbag2. Every topic is a group of columns with a separate clock.
 
 use crate::error::FileError;
 use crate::kind::FileFormat;
@@ -24,36 +24,33 @@ mod topic;
 #[cfg(feature = "bags")]
 pub(crate) use table::{open_database, open_folder, open_mcap};
 
-/// The list of parts in a rosbag2 folder.
 pub(crate) const METADATA: &str = "metadata.yaml";
-/// A list of thousands of parts is shorter.
-const LONGEST_METADATA: u64 = 1 << 24;
+const MAX_METADATA_BYTES: u64 = 1 << 24;
 
-/// The parts that a rosbag2 folder's list names, in its order.
 pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     use std::io::Read;
     let path = folder.join(METADATA);
     let mut text = String::new();
     dynident_files::open(&path)
-        .and_then(|file| file.take(LONGEST_METADATA).read_to_string(&mut text))
+        .and_then(|file| file.take(MAX_METADATA_BYTES).read_to_string(&mut text))
         .map_err(|source| FileError::Io { file: path.clone(), source })?;
     let broken = |problem: String| {
-        let fix = "let `ros2 bag reindex` write it again, or name the part itself";
+        let fix = "recreate it by `ros2 bag reindex`, or specify the part";
         FileError::broken(&path, FileFormat::Rosbag2, "relative_file_paths", problem, fix)
     };
     let mut lines = text.lines().skip_while(|line| !line.trim_start().starts_with("relative_file_paths:")).skip(1);
     let mut parts = Vec::new();
     while let Some(name) = lines.next().and_then(|line| line.trim_start().strip_prefix("- ")) {
-        // Old bags name parts with the folder before them.
+        // Old bags include the folder in the names of parts.
         let name = name.trim().trim_matches(['"', '\'']);
-        let name = Path::new(name).file_name().ok_or_else(|| broken(format!("`{name}` names no file")))?;
+        let name = Path::new(name).file_name().ok_or_else(|| broken(format!("`{name}` is not a file name")))?;
         let part = folder.join(name);
         if !part.is_file() {
             return Err(broken(format!("`{}` is not in the folder", name.to_string_lossy())));
         }
         parts.push(part);
     }
-    if parts.is_empty() { Err(broken("it names no part".to_owned())) } else { Ok(parts) }
+    if parts.is_empty() { Err(broken("the list of parts is empty".to_owned())) } else { Ok(parts) }
 }
 
 #[cfg(not(feature = "bags"))]

@@ -1,4 +1,4 @@
-//! Rows of tables in an SQLite file, read from front to end. Format: <https://www.sqlite.org/fileformat2.html>.
+//! Reads the rows of tables in an SQLite file sequentially. Format: <https://www.sqlite.org/fileformat2.html>.
 
 use crate::error::FileError;
 use crate::kind::FileFormat;
@@ -6,12 +6,10 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Largest value that is read: a message of a quarter of a gigabyte.
-const LARGEST: u64 = 1 << 28;
-/// Trees of tables of 2^64 rows are not deeper.
-const DEEPEST: usize = 20;
+const MAX_RECORD_BYTES: u64 = 1 << 28;
+/// Maximum depth of a table's B-tree; 2^64 rows need less.
+const MAX_TREE_DEPTH: usize = 20;
 
-/// A field of a row.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     Null,
@@ -21,23 +19,22 @@ pub(super) enum Value {
     Blob(Vec<u8>),
 }
 
-/// An SQLite file, read only.
 #[derive(Debug)]
 pub(super) struct Sqlite {
     path: PathBuf,
     file: File,
     page_size: usize,
-    /// Bytes of a page that the tree may use.
+    /// Usable bytes of a page.
     usable: usize,
     pages: u64,
 }
 
-/// A walk over the rows of one table, by their numbers.
+/// A traversal of the rows of one table, by row number.
 #[derive(Debug)]
 pub(super) struct Rows {
     /// Pages from the root down, with the next cell of each.
     way: Vec<(Vec<u8>, u64, usize)>,
-    /// Pages that were read: a file whose pages refer to each other in a circle has fewer than that.
+    /// Number of pages read; it exceeds the number of pages only if pages refer to each other in a circle.
     read: u64,
 }
 
@@ -45,7 +42,6 @@ fn number(bytes: &[u8], at: usize, count: usize) -> Option<u64> {
     Some(bytes.get(at..at.checked_add(count)?)?.iter().fold(0, |all, byte| all << 8 | u64::from(*byte)))
 }
 
-/// A varint and where it ends.
 fn varint(bytes: &[u8], at: usize) -> Option<(u64, usize)> {
     let mut value = 0_u64;
     for k in 0..9 {
@@ -70,12 +66,12 @@ impl Sqlite {
         let size = file.seek(SeekFrom::End(0)).map_err(io)?;
         let mut found = Self { path: path.to_owned(), file, page_size: 0, usable: 0, pages: 0 };
         if head.len() < 100 {
-            return Err(found.broken("its header", "it is cut off"));
+            return Err(found.broken("its header", "it is truncated"));
         }
         let page_size = match number(&head, 16, 2) {
             Some(1) => 65536,
             Some(size) if size.is_power_of_two() && size >= 512 => size as usize,
-            _ => return Err(found.broken("its header", "the size of its pages is none")),
+            _ => return Err(found.broken("its header", "invalid page size")),
         };
         if number(&head, 56, 4) != Some(1) {
             return Err(found.broken("its header", "its text is not UTF-8"));
@@ -84,16 +80,16 @@ impl Sqlite {
         found.usable = page_size.saturating_sub(usize::from(head[20]));
         found.pages = size / page_size as u64;
         if found.usable < 480 {
-            return Err(found.broken("its header", "its pages hold nothing"));
+            return Err(found.broken("its header", "its pages have no usable bytes"));
         }
-        // A recorder that was killed leaves rows in a file beside this one.
+        // An interrupted recorder leaves rows in a -wal file.
         let beside = format!("{}-wal", path.display());
         if std::fs::metadata(&beside).is_ok_and(|wal| wal.len() > 0) {
             return Err(FileError::broken(
                 path,
                 FileFormat::Rosbag2,
                 "the file",
-                "rows that were not taken over yet stand beside it (-wal): the recording was interrupted",
+                "rows are still in its -wal file: the recording was interrupted",
                 "open and close it once with sqlite3 (`sqlite3 FILE .tables`)",
             ));
         }
@@ -112,7 +108,7 @@ impl Sqlite {
 
     fn page(&mut self, index: u64) -> Result<Vec<u8>, FileError> {
         if index == 0 || index > self.pages {
-            return Err(self.broken(format!("page {index}"), "it is not there: the file is cut off"));
+            return Err(self.broken(format!("page {index}"), "it is missing: the file is truncated"));
         }
         let io = |source| FileError::Io { file: self.path.clone(), source };
         self.file.seek(SeekFrom::Start((index - 1) * self.page_size as u64)).map_err(io)?;
@@ -121,7 +117,7 @@ impl Sqlite {
         Ok(page)
     }
 
-    /// The tables: name, first page, and the text that made each.
+    /// The tables: name, first page, and the SQL statement that created each.
     pub(super) fn tables(&mut self) -> Result<Vec<(String, u64, String)>, FileError> {
         let mut rows = self.rows(1)?;
         let mut tables = Vec::new();
@@ -135,12 +131,10 @@ impl Sqlite {
         Ok(tables)
     }
 
-    /// The rows of the table whose tree begins at `page`.
     pub(super) fn rows(&mut self, page: u64) -> Result<Rows, FileError> {
         Ok(Rows { way: vec![(self.page(page)?, page, 0)], read: 1 })
     }
 
-    /// The next row and its number.
     pub(super) fn next(&mut self, rows: &mut Rows) -> Result<Option<(i64, Vec<Value>)>, FileError> {
         while let Some((page, index, cell)) = rows.way.last_mut() {
             let index = *index;
@@ -148,7 +142,7 @@ impl Sqlite {
             let begin = if index == 1 { 100 } else { 0 };
             let kind = page[begin];
             let (Some(count), true) = (number(page, begin + 3, 2), matches!(kind, 5 | 13)) else {
-                return Err(self.broken(place(), "it is no page of a table"));
+                return Err(self.broken(place(), "it is not a page of a table"));
             };
             let head = begin + if kind == 5 { 12 } else { 8 };
             let at = *cell;
@@ -161,7 +155,7 @@ impl Sqlite {
                 number(page, begin + 8, 4)
             } else {
                 let Some(offset) = number(page, head + 2 * at, 2) else {
-                    return Err(self.broken(place(), "its list of cells is cut off"));
+                    return Err(self.broken(place(), "its list of cells is truncated"));
                 };
                 if kind == 13 {
                     let page = core::mem::take(page);
@@ -169,13 +163,13 @@ impl Sqlite {
                     if let Some((slot, _, _)) = rows.way.last_mut() {
                         *slot = page;
                     }
-                    return row?.map(Some).ok_or_else(|| self.broken(place(), format!("row {at} is broken")));
+                    return row?.map(Some).ok_or_else(|| self.broken(place(), format!("row {at} is invalid")));
                 }
                 number(page, offset as usize, 4)
             };
-            let child = child.ok_or_else(|| self.broken(place(), "a cell is cut off"))?;
+            let child = child.ok_or_else(|| self.broken(place(), "a cell is truncated"))?;
             rows.read += 1;
-            if rows.way.len() >= DEEPEST || rows.read > self.pages {
+            if rows.way.len() >= MAX_TREE_DEPTH || rows.read > self.pages {
                 return Err(self.broken(place(), "its pages refer to each other in a circle"));
             }
             let page = self.page(child)?;
@@ -184,15 +178,14 @@ impl Sqlite {
         Ok(None)
     }
 
-    /// The row in the cell at `at` of a leaf.
     fn row(&mut self, page: &[u8], at: usize) -> Result<Option<(i64, Vec<Value>)>, FileError> {
         let Some((length, at)) = varint(page, at) else { return Ok(None) };
         let Some((id, at)) = varint(page, at) else { return Ok(None) };
-        if length > LARGEST || length > self.pages * self.page_size as u64 {
+        if length > MAX_RECORD_BYTES || length > self.pages * self.page_size as u64 {
             return Ok(None);
         }
         let length = length as usize;
-        // What a cell keeps in the page, and what goes over to others (section 1.6 of the format).
+        // Length of the part in this page; the rest is on overflow pages (section 1.6 of the format).
         let most = self.usable - 35;
         let kept = if length <= most {
             length
@@ -216,7 +209,6 @@ impl Sqlite {
     }
 }
 
-/// The fields of a record.
 fn record(payload: &[u8]) -> Option<Vec<Value>> {
     let (head, mut at) = varint(payload, 0)?;
     let head = usize::try_from(head).ok()?;

@@ -1,4 +1,4 @@
-//! A recording as a table: a group of columns for each topic, joined where columns of several are asked for.
+//! A recording as a table: a group of columns for each topic; columns of several topics are joined.
 
 use super::joined::Joined;
 use super::messages::{Header, Messages};
@@ -13,23 +13,20 @@ use std::collections::HashMap;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// Messages, and their bytes, that are searched for topics and columns.
-const MOST_SEARCHED: u64 = 20_000;
-const MOST_SEARCHED_BYTES: usize = 1 << 26;
-/// Messages of a topic whose columns are looked at: several publishers may take turns.
-const SEARCHED_OF_TOPIC: u64 = 64;
+/// Maximum number of messages, and of their bytes, that are searched for topics and columns.
+const MAX_SEARCHED_MESSAGES: u64 = 20_000;
+const MAX_SEARCHED_BYTES: usize = 1 << 26;
+/// Number of messages per topic that are searched for columns; several publishers may alternate.
+const MAX_SEARCHED_PER_TOPIC: u64 = 64;
 
-/// One MCAP file.
 pub(crate) fn open_mcap(path: &Path) -> Result<Contents, FileError> {
     BagTable::open(path, &[(path.to_owned(), FileFormat::Mcap)])
 }
 
-/// One SQLite file.
 pub(crate) fn open_database(path: &Path) -> Result<Contents, FileError> {
     BagTable::open(path, &[(path.to_owned(), FileFormat::Rosbag2)])
 }
 
-/// The parts in a rosbag2 folder.
 pub(crate) fn open_folder(path: &Path) -> Result<Contents, FileError> {
     let mut found = Vec::new();
     for part in parts(path)? {
@@ -46,7 +43,7 @@ pub(crate) fn open_folder(path: &Path) -> Result<Contents, FileError> {
                 });
             }
             other => {
-                let problem = format!("it is {}, no part of a recording", other.name());
+                let problem = format!("it is {}, not a part of a recording", other.name());
                 return Err(FileError::broken(&part, FileFormat::Rosbag2, "its beginning", problem, "copy it again"));
             }
         }
@@ -60,23 +57,21 @@ struct BagTable {
     format: FileFormat,
     messages: Messages,
     topics: Vec<Topic>,
-    /// Topic of each channel that was met; none for those that are not read.
+    /// Topic of each known channel; `None` if it is not read.
     topic_of: HashMap<(usize, usize), Option<usize>>,
     names: Vec<String>,
     groups: Vec<ColumnGroup>,
     notes: Vec<String>,
-    /// What was asked for.
     plan: Plan,
     buffer: Vec<u8>,
     sample: Sample,
 }
 
-/// Which topics are read, and where their values go.
 #[derive(Debug)]
 struct Plan {
-    /// The topics, the first one's clock in force; and the columns of each.
+    /// The topics, starting with the one that provides the clock, and the columns of each.
     topics: Vec<(usize, Vec<usize>)>,
-    /// Place in a joined row of each selected column.
+    /// Index of each selected column in a joined row.
     places: Vec<usize>,
     /// Whether topics are joined by the stamps of their messages.
     by_stamp: bool,
@@ -117,14 +112,13 @@ impl BagTable {
         Ok(Contents::Table(Box::new(table)))
     }
 
-    /// Finds topics and columns in the first messages.
     fn search(&mut self) -> Result<(), FileError> {
         let (mut searched, mut bytes) = (0, 0);
-        while searched < MOST_SEARCHED && bytes < MOST_SEARCHED_BYTES {
+        while searched < MAX_SEARCHED_MESSAGES && bytes < MAX_SEARCHED_BYTES {
             let header = match self.messages.next(&mut self.buffer) {
                 Ok(Some(header)) => header,
                 Ok(None) => break,
-                // Broken further on: reading will say so when it comes there.
+                // An error after the first message is reported when the message is read.
                 Err(_) if searched > 0 => break,
                 Err(error) => return Err(error),
             };
@@ -132,7 +126,7 @@ impl BagTable {
             bytes += self.buffer.len();
             let Some(index) = self.topic(header) else { continue };
             let topic = &mut self.topics[index];
-            if topic.messages < SEARCHED_OF_TOPIC {
+            if topic.messages < MAX_SEARCHED_PER_TOPIC {
                 topic.messages += 1;
                 if let Err(problem) = topic.explore(header.log_ns, &self.buffer) {
                     let note = format!("{} ({}): {problem}", topic.name, topic.kind);
@@ -146,9 +140,9 @@ impl BagTable {
         self.topic_of.clear();
         let mut kept = Vec::new();
         for mut topic in core::mem::take(&mut self.topics) {
-            // A topic with nothing but its own time has nothing to tell.
+            // A topic with a time column only has no data.
             if topic.columns.len() == 1 {
-                let note = format!("{} ({}): no numbers", topic.name, topic.kind);
+                let note = format!("{} ({}): not numeric", topic.name, topic.kind);
                 if !self.notes.iter().any(|known| known.starts_with(&format!("{} (", topic.name))) {
                     self.notes.push(note);
                 }
@@ -168,14 +162,14 @@ impl BagTable {
         Ok(())
     }
 
-    /// The topic of the message last read; in search of columns, a new one where it is not known.
+    /// The topic of the current message. During the search for columns, a new topic is added.
     fn topic(&mut self, header: Header) -> Option<usize> {
         if let Some(known) = self.topic_of.get(&header.channel) {
             return *known;
         }
         let channel = self.messages.channel(header)?;
         let mut found = self.topics.iter().position(|topic| topic.is_of(channel));
-        // Names are given once; what is met later has no columns.
+        // Names are fixed after the search; later topics have no columns.
         if found.is_none() && self.groups.is_empty() {
             match Topic::new(channel) {
                 Ok(topic) => {
@@ -194,7 +188,6 @@ impl BagTable {
         found
     }
 
-    /// Reads the message under way, of topic `index`, into the sample.
     fn read(&mut self, index: usize, header: Header) -> Result<(), FileError> {
         let topic = &mut self.topics[index];
         topic.read(header.log_ns, &self.buffer, &mut self.sample).map_err(|problem| {
@@ -203,16 +196,15 @@ impl BagTable {
         })
     }
 
-    /// Whether a message is a row of these columns: publishers may take turns on one topic, and a message without any
-    /// of what is asked for is none.
+    /// Whether a message is a row of the selected columns. Several publishers may alternate on one topic; a message
+    /// without any selected value is ignored.
     fn is_row(&self, topic: usize, columns: &[usize], values: &[f64]) -> bool {
         let clocks = [Some(0), self.topics[topic].stamp_column()];
-        let told = |(column, value): (&usize, &f64)| !clocks.contains(&Some(*column)) && !value.is_nan();
+        let has_value = |(column, value): (&usize, &f64)| !clocks.contains(&Some(*column)) && !value.is_nan();
         let only_clocks = columns.iter().all(|column| clocks.contains(&Some(*column)));
-        only_clocks || columns.iter().zip(values).any(told)
+        only_clocks || columns.iter().zip(values).any(has_value)
     }
 
-    /// Reads messages until a row is whole.
     fn advance(&mut self) -> Result<Option<Vec<f64>>, FileError> {
         loop {
             if let Some(row) = self.plan.joined.next() {
@@ -240,9 +232,15 @@ impl BagTable {
                 self.plan.joined.push_side(at - 1, at_ns, values);
             } else if let Err(silent) = self.plan.joined.push_row(at_ns, values) {
                 let name = self.plan.topics.get(silent + 1).map_or("", |(topic, _)| self.topics[*topic].name.as_str());
-                let problem = format!("it is silent for a million messages of {}", self.topics[index].name);
+                let problem = format!("it has no messages during a million messages of {}", self.topics[index].name);
                 let place = format!("topic {name}");
-                return Err(FileError::broken(&self.path, self.format, place, problem, "name its columns in no log"));
+                return Err(FileError::broken(
+                    &self.path,
+                    self.format,
+                    place,
+                    problem,
+                    "do not use its columns in a log",
+                ));
             }
         }
     }
@@ -263,7 +261,7 @@ impl Table for BagTable {
 
     fn select(&mut self, columns: &[usize]) {
         let mut topics: Vec<(usize, Vec<usize>)> = Vec::new();
-        // Topic and column of each, and their place among what is read of the topic.
+        // Topic and column of each selected column, and its index among the values of the topic.
         let mut slots = Vec::new();
         for column in columns {
             let Some(topic) = self.groups.iter().position(|group| group.columns.contains(column)) else { continue };
@@ -305,7 +303,6 @@ impl Table for BagTable {
         Ok(self.advance()?.is_some())
     }
 
-    /// Every message once, whatever topic it is of.
     fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), FileError> {
         let columns: Vec<Vec<usize>> = self.topics.iter().map(|topic| (0..topic.columns.len()).collect()).collect();
         while let Some(header) = self.messages.next(&mut self.buffer)? {

@@ -1,48 +1,44 @@
-//! One topic: its columns, found in its first messages, and the numbers of each message.
+//! One topic: finds its columns in the first messages and reads the numbers of each message.
 
 use super::part::{Channel, Encoding};
-use crate::arrays::MOST_COLUMNS;
+use crate::arrays::MAX_COLUMNS;
 use crate::json_lines::flattened;
 use crate::ros::{Decoder, Definition, Leaves};
 use std::collections::HashMap;
 
-/// The stamp that ROS messages begin with.
 const STAMP: &str = "header.stamp";
 
-/// How a topic's messages are read.
 #[derive(Debug)]
 enum Reader {
-    /// Definitions that may explain the messages: the first that does is kept.
+    /// Possible definitions of the messages; the first one that fits is kept.
     Cdr(Vec<Decoder>),
     Json,
 }
 
-/// A topic under way.
 #[derive(Debug)]
 pub(super) struct Topic {
     pub(super) name: String,
     pub(super) kind: String,
     reader: Reader,
-    /// Names of the columns without the topic's; the first is `log_time`.
+    /// Names of the columns without the topic; the first is `log_time`.
     pub(super) columns: Vec<String>,
     column_of: HashMap<String, usize>,
     leaves: Leaves,
-    /// Shape of the message before, and the column of each of its leaves.
+    /// Shape of the previous message, and the column of each of its leaves.
     shape: Vec<u8>,
     column_of_leaf: Vec<Option<usize>>,
-    /// First value of each column that is a point in time, ns.
+    /// First value of each column of time stamps, ns.
     origins_ns: HashMap<usize, i64>,
-    /// Whether its messages carry stamps that are set.
+    /// Whether its messages have nonzero stamps.
     pub(super) stamped: bool,
     pub(super) messages: u64,
 }
 
-/// When a message was recorded and stamped, and its numbers.
 #[derive(Debug, Default)]
 pub(super) struct Sample {
     pub(super) log_ns: i64,
     pub(super) stamp_ns: Option<i64>,
-    /// One for each column, NaN where the message does not have it.
+    /// One value for each column, NaN if the message does not contain it.
     pub(super) values: Vec<f64>,
 }
 
@@ -50,7 +46,7 @@ impl Topic {
     /// The topic of a channel.
     ///
     /// # Errors
-    /// Why its messages cannot be read.
+    /// The reason why its messages cannot be read.
     pub(super) fn new(channel: &Channel) -> Result<Self, String> {
         let reader = match &channel.encoding {
             Encoding::Json => Reader::Json,
@@ -76,7 +72,6 @@ impl Topic {
         })
     }
 
-    /// Whether messages of `channel` are this topic's.
     pub(super) fn is_of(&self, channel: &Channel) -> bool {
         self.name == channel.topic && self.kind == channel.kind
     }
@@ -84,7 +79,7 @@ impl Topic {
     /// Adds the columns of a message.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The problem of the message.
     pub(super) fn explore(&mut self, log_ns: i64, message: &[u8]) -> Result<(), String> {
         self.origins_ns.entry(0).or_insert(log_ns);
         let mut names = Vec::new();
@@ -94,7 +89,7 @@ impl Topic {
                 flattened(&value, &mut String::new(), &mut |name, _| names.push(name.to_owned()));
             }
             Reader::Cdr(decoders) => {
-                let mut outcome = Err("it has no definition".to_owned());
+                let mut outcome = Err("its definition is missing".to_owned());
                 let fits = decoders.iter().position(|decoder| {
                     outcome = decoder.read(message, true, &mut self.leaves);
                     outcome.is_ok()
@@ -106,7 +101,7 @@ impl Topic {
             }
         }
         for name in names {
-            if !self.column_of.contains_key(&name) && self.columns.len() < MOST_COLUMNS {
+            if !self.column_of.contains_key(&name) && self.columns.len() < MAX_COLUMNS {
                 self.column_of.insert(name.clone(), self.columns.len());
                 self.columns.push(name);
             }
@@ -122,7 +117,6 @@ impl Topic {
         Ok(())
     }
 
-    /// The column of the message's own stamp.
     pub(super) fn stamp_column(&self) -> Option<usize> {
         self.column_of.get(STAMP).copied().filter(|_| self.stamped)
     }
@@ -130,7 +124,7 @@ impl Topic {
     /// Reads a message into `sample`.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The problem of the message.
     pub(super) fn read(&mut self, log_ns: i64, message: &[u8], sample: &mut Sample) -> Result<(), String> {
         self.messages += 1;
         sample.log_ns = log_ns;
@@ -148,7 +142,7 @@ impl Topic {
                 });
             }
             Reader::Cdr(decoders) => {
-                let decoder = decoders.first().ok_or("it has no definition")?;
+                let decoder = decoders.first().ok_or("its definition is missing")?;
                 decoder.read(message, false, &mut self.leaves)?;
                 if self.leaves.shape != self.shape || self.column_of_leaf.len() != self.leaves.values.len() {
                     decoder.read(message, true, &mut self.leaves)?;
@@ -176,7 +170,7 @@ impl Topic {
     }
 }
 
-/// Seconds after the first value, from whole nanoseconds: what is lost is the last bit of a double.
+/// Seconds after the first value, from integer nanoseconds, so that the only error is rounding to a double.
 fn seconds(ns: i64, origin: Option<&i64>) -> f64 {
     (i128::from(ns) - i128::from(origin.copied().unwrap_or(0))) as f64 / 1e9
 }

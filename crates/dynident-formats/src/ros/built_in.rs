@@ -1,5 +1,5 @@
-//! Definitions of the messages that robots' joints are recorded in, for bags that carry none (rosbag2 before ROS 2
-//! Iron). The packages' own texts, comments left out.
+//! Definitions of messages with joint data, for bags without definitions (rosbag2 before ROS 2 Iron). They are copied
+//! from the ROS packages without comments.
 
 const SEPARATOR: &str = "================================================================================\n";
 
@@ -22,15 +22,15 @@ const TWIST: &str = "MSG: geometry_msgs/Twist\nVector3 linear\nVector3 angular\n
 const VECTOR: &str = "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n";
 const QUATERNION: &str = "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n";
 
-/// `JointTrajectoryControllerState` with these points, in the versions that came after each other.
+/// Points of `JointTrajectoryControllerState` in its successive versions.
 const CONTROLLER_POINTS: [&[&str]; 3] = [
     &["reference", "feedback", "error", "output", "desired", "actual"],
     &["reference", "feedback", "error", "output"],
     &["desired", "actual", "error"],
 ];
 
-/// The definitions that a message type, `sensor_msgs/msg/JointState`, has had in the packages'
-/// versions: a message is read by the first that explains all its bytes. Empty for types that are not known here.
+/// The definitions of a message type such as `sensor_msgs/msg/JointState` in all versions of its package. The first
+/// definition that fits all bytes of a message is used. Empty for unknown types.
 pub(crate) fn definitions_of(name: &str) -> Vec<String> {
     let joined = |parts: &[&str]| parts.join(SEPARATOR);
     match name {
@@ -41,7 +41,7 @@ pub(crate) fn definitions_of(name: &str) -> Vec<String> {
             let version = |points: &&[&str]| {
                 let mut own = "std_msgs/Header header\nstring[] joint_names\n".to_owned();
                 own.extend(points.iter().map(|point| format!("trajectory_msgs/JointTrajectoryPoint {point}\n")));
-                // The oldest version knows no joints with several degrees of freedom.
+                // The oldest version has no joints with several degrees of freedom.
                 if points.len() > 3 {
                     own += "string[] multi_dof_joint_names\n";
                     own.extend(

@@ -1,37 +1,33 @@
-//! Numbers of a message in CDR, the byte format of ROS 2 (OMG DDS-XTypes 1.3, section 7.4; plain encodings).
+//! Decodes the numbers of a message in CDR, the serialisation of ROS 2 (OMG DDS-XTypes 1.3, section 7.4; plain
+//! encodings).
 
 use super::definition::{Count, Definition, Field, Kind};
 use crate::bytes::Bytes;
 
-/// Arrays with more numbers (images, clouds of points, maps) are no columns.
-const LONGEST_ARRAY: usize = 1024;
-/// Numbers of a message at most.
-const MOST_LEAVES: usize = 1 << 14;
+/// Maximum length of an array that becomes columns; longer ones are images, point clouds or maps.
+const MAX_ARRAY_COLUMNS: usize = 1024;
+const MAX_LEAVES: usize = 1 << 14;
 
-/// The numbers of one message, in the order of its definition.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Leaves {
     pub(crate) values: Vec<f64>,
-    /// Points in time as whole nanoseconds, with the index of their leaf.
+    /// Time stamps as integer nanoseconds, with the index of their leaf.
     pub(crate) stamps_ns: Vec<(usize, i64)>,
-    /// What the leaves' names hang on: lengths of arrays, and names of their entries. Two messages of one definition
-    /// with equal shapes have equal names.
+    /// Lengths of arrays, and names of their entries. Messages of one definition with equal shapes have equal paths.
     pub(crate) shape: Vec<u8>,
-    /// Path of each leaf, where it was asked for.
+    /// Path of each leaf, if requested.
     pub(crate) paths: Vec<String>,
 }
 
-/// Reads messages of one definition.
 #[derive(Clone, Debug)]
 pub(crate) struct Decoder {
     definition: Definition,
 }
 
-/// One message under way.
 struct Pass<'a, 'l> {
     messages: &'a [Vec<Field>],
     bytes: Bytes<'a>,
-    /// Largest alignment: 8, in the second version of the encoding 4.
+    /// Maximum alignment: 8, or 4 in version 2 of the encoding.
     widest: usize,
     leaves: &'l mut Leaves,
     path: Option<String>,
@@ -45,13 +41,13 @@ impl Decoder {
     /// Reads the numbers of `message` into `leaves`, with their paths if `named`.
     ///
     /// # Errors
-    /// What is wrong with the message.
+    /// The problem of the message.
     pub(crate) fn read(&self, message: &[u8], named: bool, leaves: &mut Leaves) -> Result<(), String> {
         leaves.values.clear();
         leaves.stamps_ns.clear();
         leaves.shape.clear();
         leaves.paths.clear();
-        let (header, body) = message.split_at_checked(4).ok_or("it is cut off")?;
+        let (header, body) = message.split_at_checked(4).ok_or("it is truncated")?;
         let (big_endian, widest) = match header[..2] {
             [0, 0] => (true, 8),
             [0, 1] => (false, 8),
@@ -63,12 +59,12 @@ impl Decoder {
         let path = named.then(String::new);
         let mut pass = Pass { messages: &self.definition.messages, bytes, widest, leaves, path };
         pass.message(0, &[])?;
-        // Middleware fills the last word up.
-        if pass.bytes.left() >= 8 { Err("it is longer than its definition says".to_owned()) } else { Ok(()) }
+        // The middleware may pad the last word.
+        if pass.bytes.left() >= 8 { Err("it is longer than defined".to_owned()) } else { Ok(()) }
     }
 }
 
-/// Whether a field of texts names the entries of the arrays beside it.
+/// Whether a text field contains the names of the entries of other arrays.
 fn names_entries(field: &str) -> bool {
     field == "name" || field == "names" || field.ends_with("_names")
 }
@@ -90,8 +86,8 @@ impl<'a> Pass<'a, '_> {
     }
 
     fn leaf(&mut self, value: f64) -> Result<(), String> {
-        if self.leaves.values.len() >= MOST_LEAVES {
-            return Err(format!("it has more than {MOST_LEAVES} numbers"));
+        if self.leaves.values.len() >= MAX_LEAVES {
+            return Err(format!("it has more than {MAX_LEAVES} numbers"));
         }
         self.leaves.values.push(value);
         if let Some(path) = &self.path {
@@ -100,12 +96,13 @@ impl<'a> Pass<'a, '_> {
         Ok(())
     }
 
-    /// A message whose arrays of as many entries are labelled by `labels`, unless it has names of its own.
+    /// Reads a message. Its arrays with as many entries as `labels` are named by them, unless the message has a field
+    /// of names.
     fn message(&mut self, index: usize, labels: &[&'a [u8]]) -> Result<(), String> {
         let messages = self.messages;
         let fields = &messages[index];
         if fields.is_empty() {
-            // A message cannot be empty: rosidl puts one byte into it.
+            // rosidl adds one byte to an empty message.
             return self.bytes.u8().map(|_| ()).ok_or_else(cut);
         }
         let mut own: Option<Vec<&'a [u8]>> = None;
@@ -118,12 +115,12 @@ impl<'a> Pass<'a, '_> {
                 *path += &field.name;
             }
             let found = match field.count {
-                // Names hold for the messages inside as well: joint names for the arrays of a trajectory's point.
+                // Names also apply to nested messages: joint names to the arrays of a trajectory point.
                 Count::One => self.element(field.kind, own.as_deref().unwrap_or(labels)).map(|()| None),
                 Count::Exactly(count) => self.array(field, count, own.as_deref().unwrap_or(labels)),
                 Count::Any => {
                     let count = self.length()?;
-                    // Every element takes a byte at least.
+                    // Every element needs at least one byte.
                     if count > self.bytes.left() {
                         return Err(cut());
                     }
@@ -141,10 +138,10 @@ impl<'a> Pass<'a, '_> {
         Ok(())
     }
 
-    /// The elements of an array; its texts, if they are names.
+    /// Reads the elements of an array; returns its texts if they are names.
     fn array(&mut self, field: &Field, count: usize, labels: &[&'a [u8]]) -> Result<Option<Vec<&'a [u8]>>, String> {
         if field.kind == Kind::Text {
-            let named = names_entries(&field.name) && count <= LONGEST_ARRAY;
+            let named = names_entries(&field.name) && count <= MAX_ARRAY_COLUMNS;
             let mut names = Vec::new();
             for _ in 0..count {
                 let name = self.text()?;
@@ -157,13 +154,13 @@ impl<'a> Pass<'a, '_> {
             return Ok(named.then_some(names));
         }
         let size = size(field.kind);
-        if count > LONGEST_ARRAY && size > 0 {
+        if count > MAX_ARRAY_COLUMNS && size > 0 {
             self.align(size)?;
             self.bytes.take(count.checked_mul(size).ok_or_else(cut)?).ok_or_else(cut)?;
             return Ok(None);
         }
-        if count > LONGEST_ARRAY {
-            return Err(format!("`{}` has more than {LONGEST_ARRAY} entries", field.name));
+        if count > MAX_ARRAY_COLUMNS {
+            return Err(format!("`{}` has more than {MAX_ARRAY_COLUMNS} entries", field.name));
         }
         let labelled = labels.len() == count;
         let length = self.path.as_ref().map_or(0, String::len);
@@ -221,7 +218,7 @@ impl<'a> Pass<'a, '_> {
     }
 }
 
-/// Bytes of a number; zero for what is no number.
+/// Bytes of a number; zero for other types.
 fn size(kind: Kind) -> usize {
     match kind {
         Kind::Bool | Kind::U8 | Kind::I8 => 1,
@@ -233,5 +230,5 @@ fn size(kind: Kind) -> usize {
 }
 
 fn cut() -> String {
-    "it is shorter than its definition says".to_owned()
+    "it is shorter than defined".to_owned()
 }

@@ -1,14 +1,11 @@
-//! Message definitions as bags carry them: `.msg` texts, the types that they use behind lines of `=`.
+//! Parses message definitions in bags: `.msg` texts, followed by the types that they use, separated by lines of `=`.
 //! Format: <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>.
 
 use std::collections::HashMap;
 
-/// Longest text of a definition; those of large messages have some ten thousand bytes.
-const LONGEST: usize = 1 << 20;
-/// Types inside of types.
-const DEEPEST: usize = 16;
+const MAX_DEFINITION_BYTES: usize = 1 << 20;
+const MAX_NESTING: usize = 16;
 
-/// What one element of a field is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Bool,
@@ -28,16 +25,14 @@ pub(crate) enum Kind {
     Time,
     /// `builtin_interfaces/Duration`: one number, s.
     Duration,
-    /// Index of another message.
     Message(usize),
 }
 
-/// How many elements a field has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Count {
     One,
     Exactly(usize),
-    /// Written before the elements.
+    /// Stored before the elements.
     Any,
 }
 
@@ -48,19 +43,19 @@ pub(crate) struct Field {
     pub(crate) count: Count,
 }
 
-/// A message type and those that it uses; the first is the message itself.
+/// A message type and the types that it uses; the first one is the message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Definition {
     pub(crate) messages: Vec<Vec<Field>>,
 }
 
 impl Definition {
-    /// The definition of `name` (`sensor_msgs/msg/JointState`) from its text.
+    /// Parses the definition of `name` (`sensor_msgs/msg/JointState`).
     ///
     /// # Errors
-    /// What is wrong with the text.
+    /// The problem of the text.
     pub(crate) fn parse(name: &str, text: &str) -> Result<Self, String> {
-        if text.len() > LONGEST {
+        if text.len() > MAX_DEFINITION_BYTES {
             return Err("its definition is longer than a megabyte".to_owned());
         }
         // The texts of all types, by package/Type.
@@ -94,10 +89,10 @@ impl Definition {
         depth: usize,
     ) -> Result<usize, String> {
         if let Some(index) = known.get(name) {
-            return if *index == usize::MAX { Err(format!("type `{name}` holds itself")) } else { Ok(*index) };
+            return if *index == usize::MAX { Err(format!("type `{name}` contains itself")) } else { Ok(*index) };
         }
-        if depth > DEEPEST {
-            return Err(format!("its types are nested more than {DEEPEST} deep"));
+        if depth > MAX_NESTING {
+            return Err(format!("its types are nested more than {MAX_NESTING} deep"));
         }
         let text = texts.get(name).ok_or_else(|| format!("it uses type `{name}`, which is not defined"))?;
         known.insert(name.to_owned(), usize::MAX);
@@ -125,7 +120,6 @@ impl Definition {
     }
 }
 
-/// Parts of a text between lines of `=`.
 fn sections(text: &str) -> Vec<&str> {
     let (mut parts, mut begin, mut at) = (Vec::new(), 0, 0);
     for line in text.split_inclusive('\n') {
@@ -140,7 +134,7 @@ fn sections(text: &str) -> Vec<&str> {
     parts
 }
 
-/// `sensor_msgs/msg/JointState` as `sensor_msgs/JointState`.
+/// `sensor_msgs/JointState` from `sensor_msgs/msg/JointState`.
 fn short(name: &str) -> String {
     let name = name.trim();
     match (name.split('/').next(), name.rsplit('/').next()) {
@@ -149,12 +143,12 @@ fn short(name: &str) -> String {
     }
 }
 
-/// Type, count and name of a line that declares a field; `None` for constants, comments and blank lines.
+/// Type, count and name of a field declaration; `None` for constants, comments and blank lines.
 fn declaration(line: &str) -> Result<Option<(&str, Count, &str)>, String> {
     let mut words = line.split('#').next().unwrap_or_default().split_whitespace();
     let (Some(kind), Some(name)) = (words.next(), words.next()) else { return Ok(None) };
-    let wrong = || format!("`{}` declares no field", line.trim());
-    // Constants: `TYPE NAME=value`, blanks around the sign or not; a field's default follows without a sign.
+    let wrong = || format!("`{}` is not a field declaration", line.trim());
+    // Constants: `TYPE NAME=value`, possibly with blanks around the sign; the default of a field has no sign.
     if name.contains('=') || words.next().is_some_and(|word| word.starts_with('=')) {
         return Ok(None);
     }
@@ -200,7 +194,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn definitions_are_read_with_what_they_use() {
+    fn definitions_are_parsed_with_their_types() {
         let text = format!(
             "# comment\nuint8 A=1\nstring B = \"x # y\"\nHeader header # stamp\nPart[<=3] parts\nfloat64[2] pair\nint32 n 5\n{0}\n\
              MSG: pkg/Header\nbuiltin_interfaces/Time stamp\nstring<=8 frame_id\n{0}\nMSG: pkg/Part\nbool[] flags\n",
@@ -216,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_definition_is_refused() {
+    fn invalid_definitions_are_rejected() {
         let itself = format!("B b\n{0}\nMSG: p/B\nA a\n", "=".repeat(80));
         for text in ["Unknown x", "int32[0] x", "int32] x", "int32[x] y", "float64 ,", &itself] {
             assert!(Definition::parse("p/A", text).is_err(), "{text}");

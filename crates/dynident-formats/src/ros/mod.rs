@@ -1,4 +1,4 @@
-//! ROS 2 messages: their definitions, and the numbers in their bytes.
+//! ROS 2 messages: their definitions and the decoding of their numbers.
 
 mod built_in;
 mod cdr;

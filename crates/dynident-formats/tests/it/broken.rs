@@ -1,12 +1,11 @@
-//! Files that are cut off, altered or hostile: an error that names the file, the place and what to do, and never a
-//! panic, an endless loop or memory that the file cannot fill.
+//! Truncated, altered or malicious files cause an error with the file, the place and the fix, and never a panic, an
+//! endless loop or memory that the file cannot fill.
 
 use super::golden::folder;
 use dynident_formats::{Contents, FileError, open};
 use std::io::{Read, Write};
 use std::path::Path;
 
-/// Reads everything: how many rows, or what is wrong.
 fn drain(path: &Path) -> Result<usize, FileError> {
     let mut rows = 0;
     match open(path)?.contents {
@@ -37,7 +36,7 @@ fn files() -> Vec<std::path::PathBuf> {
     files
 }
 
-fn told(error: &FileError, file: &str) {
+fn check_message(error: &FileError, file: &str) {
     let message = error.to_string();
     assert!(message.contains(file), "{message}");
     assert!(message.contains(';') || message.contains('('), "no fix: {message}");
@@ -54,7 +53,7 @@ fn files_that_are_cut_off_anywhere_are_read_so_far_or_refused() {
         for k in 0..steps {
             std::fs::write(&path, &whole[..whole.len() * k / steps]).unwrap();
             if let Err(error) = drain(&path) {
-                told(&error, "cut.log");
+                check_message(&error, "cut.log");
             }
         }
     }
@@ -73,21 +72,21 @@ fn files_with_altered_bytes_are_read_or_refused() {
         let whole = std::fs::read(&file).unwrap();
         for _ in 0..60 {
             let mut bytes = whole.clone();
-            // The head more often than the rest: that is where lengths stand.
+            // Mostly the start of the file, because it contains lengths.
             let within = if draw() % 2 == 0 { bytes.len().min(600) } else { bytes.len() };
             for _ in 0..=draw() % 4 {
                 bytes[draw() % within] = [0, 0xFF, 0x7F, 0x80, draw() as u8][draw() % 5];
             }
             std::fs::write(&path, &bytes).unwrap();
             if let Err(error) = drain(&path) {
-                told(&error, "altered.log");
+                check_message(&error, "altered.log");
             }
         }
     }
 }
 
 #[test]
-fn what_was_cut_off_while_it_was_recorded_is_read_so_far() {
+fn truncated_recordings_are_read_up_to_the_end() {
     let scratch = tempfile::tempdir().unwrap();
     let path = scratch.path().join("crash.mcap");
     let whole = std::fs::read(folder().join("zstd.mcap")).unwrap();
@@ -105,7 +104,7 @@ fn what_was_cut_off_while_it_was_recorded_is_read_so_far() {
     let mut row = [0.0];
     while table.next_row(&mut row).unwrap() {}
     assert!(row == [2.0] && table.truncated());
-    // A stream of Arrow has no end before it is closed; a file of Arrow without its end was not finished.
+    // An Arrow stream has no footer before it is closed; an Arrow file without a footer is incomplete.
     let path = scratch.path().join("crash.arrow");
     let whole = std::fs::read(folder().join("stream.arrows")).unwrap();
     std::fs::write(&path, &whole[..whole.len() * 9 / 10]).unwrap();
@@ -120,7 +119,7 @@ fn what_was_cut_off_while_it_was_recorded_is_read_so_far() {
     std::fs::write(&path, &whole[..whole.len() * 9 / 10]).unwrap();
     let message = drain(&path).unwrap_err().to_string();
     assert!(
-        message.ends_with("its end: it is cut off, or its writer was never closed; write or copy it again"),
+        message.ends_with("its end: it is truncated, or its writer was not closed; write or copy it again"),
         "{message}"
     );
 }
@@ -137,8 +136,9 @@ fn claims_that_the_file_cannot_fill_take_no_memory() {
     file.write_all(&[0; 80]).unwrap();
     drop(file);
     let message = drain(&path).unwrap_err().to_string();
-    assert!(message.contains("80 bytes of 1600000000 are there"), "{message}");
-    for (shape, words) in [("(9999999999999, 9999999999)", "more than 2048 MiB of memory"), ("(-1,)", "not understood")]
+    assert!(message.contains("only 80 of 1600000000 bytes are present"), "{message}");
+    for (shape, words) in
+        [("(9999999999999, 9999999999)", "more than 2048 MiB of memory"), ("(-1,)", "its header is invalid")]
     {
         let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -151,13 +151,13 @@ fn claims_that_the_file_cannot_fill_take_no_memory() {
 }
 
 #[test]
-fn formats_that_are_not_read_are_named() {
+fn unsupported_formats_are_named() {
     let scratch = tempfile::tempdir().unwrap();
     let path = scratch.path().join("log.csv");
     for (bytes, words) in [
         (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag, which is not read; convert it to MCAP"),
         (b"FEA1\0\0", "write it as Parquet"),
-        (b"ARROW1\0\0", "its end: it is cut off"),
+        (b"ARROW1\0\0", "its end: it is truncated"),
         (b"BZh91AY&SY", "unpack it first"),
         (b"\xFF\xFEa\0", "save it as UTF-8"),
         (b"PK\x03\x04nothing", "the list of members is missing"),
@@ -171,18 +171,18 @@ fn formats_that_are_not_read_are_named() {
     assert!(message.contains("cannot be read"), "{message}");
     std::fs::write(scratch.path().join("metadata.yaml"), "relative_file_paths:\n  - gone.mcap\n").unwrap();
     let message = open(scratch.path()).unwrap_err().to_string();
-    assert!(message.contains("`gone.mcap` is not in the folder; let `ros2 bag reindex`"), "{message}");
+    assert!(message.contains("`gone.mcap` is not in the folder; recreate it by `ros2 bag reindex`"), "{message}");
 }
 
 #[test]
-fn a_data_set_that_is_not_whole_says_what_is_missing() {
+fn an_incomplete_data_set_names_the_missing_files() {
     let scratch = tempfile::tempdir().unwrap();
     let set = scratch.path().join("set");
     std::fs::create_dir_all(set.join("meta")).unwrap();
     let golden = folder().join("lerobot_v2");
     let refused = |words: &str| {
         let error = drain(&set).expect_err(words);
-        told(&error, "set");
+        check_message(&error, "set");
         assert!(error.to_string().contains(words), "{error}");
     };
     std::fs::write(set.join("meta/info.json"), "{").unwrap();
@@ -193,29 +193,29 @@ fn a_data_set_that_is_not_whole_says_what_is_missing() {
     assert!(drain(&set).is_err());
     let chunk = set.join("data/chunk-000");
     std::fs::create_dir_all(&chunk).unwrap();
-    refused("no chunk in it holds a Parquet file; fetch the data set whole");
+    refused("it contains no Parquet file; download the complete data set");
     let episodes = golden.join("data/chunk-000");
     std::fs::copy(episodes.join("episode_000000.parquet"), chunk.join("episode_000000.parquet")).unwrap();
     let Contents::Table(table) = open(&set).unwrap().contents else { panic!() };
-    assert!(table.notes().contains(&"2 of 3 episodes, whose files are not there".to_owned()), "{:?}", table.notes());
+    assert!(table.notes().contains(&"the files of 2 of 3 episodes are missing".to_owned()), "{:?}", table.notes());
     assert_eq!(drain(&set).unwrap(), 15);
-    // What stands for a file that Git left behind; a table of another kind.
+    // The pointer of Git LFS to a missing file; a table with other columns.
     let second = chunk.join("episode_000001.parquet");
     std::fs::write(&second, "version https://git-lfs.github.com/spec/v1\n").unwrap();
-    refused("episode_000001.parquet: it is no Parquet file; fetch the data set whole");
+    refused("episode_000001.parquet: it is not a Parquet file; download the complete data set");
     std::fs::copy(folder().join("snappy.parquet"), &second).unwrap();
-    refused("episode_000001.parquet: its columns, or the lengths of its lists, are not those of the first file");
+    refused("episode_000001.parquet: its columns, or the lengths of its lists, differ from those of the first file");
 }
 
 #[test]
-fn a_trace_that_is_not_whole_says_what_is_missing() {
+fn an_incomplete_trace_names_the_missing_files() {
     let scratch = tempfile::tempdir().unwrap();
     let golden = |name: &str| std::fs::read(folder().join("trace").join(name)).unwrap();
     let refused = |header: &[u8], words: &str| {
         let path = scratch.path().join("run_NextGenDrive#1.dat");
         std::fs::write(&path, header).unwrap();
         let error = drain(&path).expect_err(words);
-        told(&error, "run_NextGenDrive#");
+        check_message(&error, "run_NextGenDrive#");
         assert!(error.to_string().contains(words), "{error}");
     };
     let header = golden("run_NextGenDrive#1.dat");
@@ -224,32 +224,29 @@ fn a_trace_that_is_not_whole_says_what_is_missing() {
         assert!(text.contains(from));
         text.replacen(from, to, 1).chars().map(|letter| letter as u8).collect::<Vec<_>>()
     };
-    refused(
-        &header,
-        "channel `Istposition`: there is no file `renamed_NextGenDrive#1.r64`; copy the whole trace again",
-    );
+    refused(&header, "channel `Istposition`: file `renamed_NextGenDrive#1.r64` is missing; copy the whole trace again");
     let data = golden("run_NextGenDrive#1.r64");
     let beside = scratch.path().join("run_NextGenDrive#1.r64");
     std::fs::write(&beside, &data[..data.len() - 8]).unwrap();
-    refused(&header, "40 values are told, and `run_NextGenDrive#1.r64` ends before");
+    refused(&header, "`run_NextGenDrive#1.r64` ends before 40 values");
     std::fs::write(&beside, &data).unwrap();
-    refused(b"DIAEXTENDED\r\n#BEGINCHANNELHEADER\r\n200,Zeit\r\n", "it describes no channel to its end");
-    refused(&changed("221,1\r\n", "221,1\r\n222,3\r\n"), "222 is 3, and 2 channels stand side by side");
-    refused(&changed("214,REAL64", "214,REAL32"), "channels of several types stand side by side");
-    refused(&changed("220,40", "220,-40"), "it has no length (220)");
+    refused(b"DIAEXTENDED\r\n#BEGINCHANNELHEADER\r\n200,Zeit\r\n", "it contains no complete channel");
+    refused(&changed("221,1\r\n", "221,1\r\n222,3\r\n"), "222 is 3, but 2 channels are interleaved");
+    refused(&changed("214,REAL64", "214,REAL32"), "interleaved channels have different types");
+    refused(&changed("220,40", "220,-40"), "its length (220) is missing");
     std::fs::write(scratch.path().join("run_NextGenDrive#2.dat"), changed("241,0.004", "241,0.002")).unwrap();
     refused(&header, "its time differs from that of the first drive");
 }
 
 #[test]
-fn what_mutated_inputs_found_is_refused() {
-    // An attachment longer than its chunk; a column at a negative place; a page shorter than its packed levels; a page
-    // coded by a dictionary that is not there; split streams of bytes that are shorter than their values.
+fn inputs_found_by_fuzzing_are_rejected() {
+    // An attachment longer than its chunk; a column with a negative offset; a page shorter than its packed levels; a
+    // page with a missing dictionary; byte stream split data shorter than its values.
     let corpus = ["bags/wrong_length.mcap", "parquet/negative_place.parquet", "parquet/short_page.parquet"];
     let seeds = corpus.map(|file| format!("../../fuzz/corpus/{file}"));
     let refused = ["tests/refused/no_dictionary.parquet", "tests/refused/short_split.parquet"];
     for file in seeds.iter().map(String::as_str).chain(refused) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
-        told(&drain(&path).expect_err(file), file.rsplit('/').next().unwrap());
+        check_message(&drain(&path).expect_err(file), file.rsplit('/').next().unwrap());
     }
 }

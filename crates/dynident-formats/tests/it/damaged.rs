@@ -1,5 +1,5 @@
-//! Damaged and hostile files: flipped bytes are refused by the format's checksum, and packed numbers that fill the
-//! memory before anything is unpacked.
+//! Damaged and malicious files: checksums reveal flipped bytes, and compressed numbers that would fill the memory are
+//! rejected before decompression.
 
 use super::golden::folder;
 use dynident_formats::{Contents, FileError, ReadLimits, open, open_within};
@@ -8,7 +8,7 @@ use std::io::Read;
 use std::io::Write;
 use std::path::Path;
 
-/// Everything that a file holds, bit by bit; or what is wrong.
+/// All contents of a file as bits; or the error.
 fn all(path: &Path) -> Result<(Vec<u64>, bool), FileError> {
     let mut bits = Vec::new();
     match open(path)?.contents {
@@ -27,7 +27,7 @@ fn all(path: &Path) -> Result<(Vec<u64>, bool), FileError> {
     }
 }
 
-/// A byte that is flipped anywhere is an error, or lies where nothing is read from; never other numbers.
+/// A flipped byte causes an error or is in an unused place; it never changes the numbers.
 #[test]
 fn flipped_bytes_never_give_other_numbers() {
     let scratch = tempfile::tempdir().unwrap();
@@ -37,17 +37,18 @@ fn flipped_bytes_never_give_other_numbers() {
         std::fs::write(&path, &whole).unwrap();
         let (expected, _) = all(&path).unwrap();
         let mut refused = 0;
-        // The list at an archive's end has no checksum: a member with another ending of its name is no array.
+        // The list at the end of an archive has no checksum: with a changed ending of its name, a member is not an
+        // array.
         let end = whole.windows(4).position(|word| word == b"PK\x01\x02").unwrap_or(whole.len());
         let steps = 150.min(end);
-        // Without its first bytes a file is one of another format.
+        // The first bytes determine the format, so skip them.
         for k in (0..steps).filter(|k| end * k / steps >= 8) {
             let mut bytes = whole.clone();
             bytes[end * k / steps] ^= 0x40;
             std::fs::write(&path, &bytes).unwrap();
             match all(&path) {
                 Err(_) => refused += 1,
-                // A broken length ends a bag early, and that is reported.
+                // A corrupt length truncates a bag, which is reported.
                 Ok((_, true)) => {}
                 Ok((found, false)) => assert!(found == expected, "{file}, byte {}", end * k / steps),
             }
@@ -64,7 +65,7 @@ fn a_damaged_member_of_an_archive_is_named() {
     let mut bytes = archive(&[("time", &array), ("q1", &array)], false);
     std::fs::write(&path, &bytes).unwrap();
     assert!(all(&path).is_ok());
-    // The last byte of the second array: its sign and exponent.
+    // The last byte of the second array: sign and exponent.
     let at = bytes.windows(4).position(|word| word == b"PK\x01\x02").unwrap() - 1;
     bytes[at] ^= 0x40;
     std::fs::write(&path, &bytes).unwrap();
@@ -72,7 +73,7 @@ fn a_damaged_member_of_an_archive_is_named() {
     assert!(message.contains("member `q1.npy`") && message.contains("checksum (CRC-32)"), "{message}");
 }
 
-/// 8 GB of zeros in a file of a few hundred bytes or kilobytes are refused before they are unpacked.
+/// 8 GB of zeros in a file of a few hundred bytes or kilobytes are rejected before decompression.
 #[cfg(feature = "gzip")]
 #[test]
 fn packed_numbers_do_not_fill_the_memory() {
@@ -86,16 +87,16 @@ fn packed_numbers_do_not_fill_the_memory() {
         assert!(message.contains(words), "{message}");
     };
     refused(&archive(&[("t_s", &npy("(1000000000,)", &zeros))], true), "128 MiB of memory");
-    // One column of bytes: each takes eight in memory.
+    // One column of bytes, each of which needs eight bytes in memory.
     refused(&archive(&[("t_s", &npy_of("|u1", "(100000000,)", &zeros))], true), "128 MiB of memory");
     refused(&mat(&matrix(1 << 28, &zeros)), "128 MiB of memory");
-    // The bomb of the review: a matrix of 2 GiB whose parts are zeros.
+    // A matrix that declares 2 GiB and consists of zeros.
     let mut hollow = [14_u32.to_le_bytes(), 0x7fff_fff0_u32.to_le_bytes()].concat();
     hollow.extend((0..16).flat_map(|_| zeros.iter().copied()));
     refused(&mat(&hollow), "variable 0");
     assert!(started.elapsed().as_secs() < 20);
 
-    // What is there is read, also with a smaller limit as long as it fits.
+    // Valid contents are read, also with a smaller limit that is sufficient.
     let small = mat(&matrix(1000, &[0; 8000]));
     std::fs::write(&path, &small).unwrap();
     assert!(open(&path).is_ok());
@@ -104,7 +105,6 @@ fn packed_numbers_do_not_fill_the_memory() {
     assert!(open_within(&path, &ReadLimits { memory_bytes: 8000, ..limits }).is_ok());
 }
 
-/// An array of doubles.
 fn npy(shape: &str, data: &[u8]) -> Vec<u8> {
     npy_of("<f8", shape, data)
 }
@@ -115,7 +115,6 @@ fn npy_of(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), data].concat()
 }
 
-/// A ZIP archive of arrays.
 fn archive(members: &[(&str, &[u8])], packed: bool) -> Vec<u8> {
     let (mut bytes, mut list) = (Vec::new(), Vec::new());
     for (name, data) in members {
@@ -148,7 +147,7 @@ fn deflated(_: &[u8]) -> Vec<u8> {
     Vec::new()
 }
 
-/// A MATLAB file of one packed element.
+/// A MATLAB file with one compressed element.
 #[cfg(feature = "gzip")]
 fn mat(element: &[u8]) -> Vec<u8> {
     let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
@@ -162,7 +161,7 @@ fn mat(element: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A matrix element that claims `count` doubles in one column and contains `data`.
+/// A matrix element that declares `count` doubles in one column and contains `data`.
 #[cfg(feature = "gzip")]
 fn matrix(count: u32, data: &[u8]) -> Vec<u8> {
     let words = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>();

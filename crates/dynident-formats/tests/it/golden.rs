@@ -1,4 +1,4 @@
-//! Files that other programs wrote (`golden/formats.py`) give the numbers that were put into them, to the last bit.
+//! Files written by other programs (`golden/formats.py`) give their original numbers, bit by bit.
 
 use dynident_formats::{Contents, FileFormat, Table, files, open};
 use serde_json::Value;
@@ -9,7 +9,7 @@ pub(crate) fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../golden/formats")
 }
 
-/// A hexadecimal float as Python writes it: `-0x1.8p+3`.
+/// Parses a hexadecimal float of Python: `-0x1.8p+3`.
 fn hexadecimal(text: &str) -> f64 {
     if text == "nan" {
         return f64::NAN;
@@ -19,12 +19,11 @@ fn hexadecimal(text: &str) -> f64 {
     let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
     let digits = u64::from_str_radix(&format!("{whole}{fraction}"), 16).unwrap();
     let exponent: i32 = exponent.parse().unwrap();
-    // In two steps: 2^-1074 times a whole number is exact, but 2^-1080 is zero.
+    // In two steps, because 2^-1074 times an integer is exact, but 2^-1080 is zero.
     let exponent = exponent - 4 * i32::try_from(fraction.len()).unwrap();
     sign * digits as f64 * 2f64.powi(exponent / 2) * 2f64.powi(exponent - exponent / 2)
 }
 
-/// All rows of some columns, by name or index.
 pub(crate) fn columns(table: &mut dyn Table, names: &[&str]) -> Vec<Vec<f64>> {
     let place = |name: &&str| match table.names() {
         Some(names) => names.iter().position(|known| known == name).unwrap_or_else(|| panic!("no {name}: {names:?}")),
@@ -51,7 +50,7 @@ fn same(name: &str, found: &[f64], expected: &[f64]) {
 }
 
 #[test]
-fn every_file_gives_the_numbers_that_were_put_into_it() {
+fn every_file_gives_its_original_numbers() {
     let golden: Value = serde_json::from_slice(&std::fs::read(folder().join("values.json")).unwrap()).unwrap();
     let series: Vec<Vec<f64>> = golden["series"]
         .as_array()
@@ -92,7 +91,7 @@ fn every_file_gives_the_numbers_that_were_put_into_it() {
                     }
                     continue;
                 }
-                // One group at a time: each has its own clock.
+                // One group at a time, because each has a separate clock.
                 for group in table.groups() {
                     let of_group = |name: &str| match table.names() {
                         Some(known) => known[group.columns.clone()].iter().any(|one| one == name),
@@ -106,7 +105,6 @@ fn every_file_gives_the_numbers_that_were_put_into_it() {
                         same(&format!("{file}: {name}"), found, values);
                     }
                 }
-                // No column is missed, and none is there that should not be.
                 if let Some(known) = table.names() {
                     assert!(names.iter().all(|name| known.iter().any(|one| one == name)), "{file}: {known:?}");
                     let bag = known.iter().any(|name| name.ends_with("log_time"));
@@ -118,7 +116,7 @@ fn every_file_gives_the_numbers_that_were_put_into_it() {
 }
 
 #[test]
-fn files_are_known_by_their_content() {
+fn formats_are_detected_from_the_content() {
     let scratch = tempfile::tempdir().unwrap();
     for (file, format) in [
         ("table.csv.gz", FileFormat::GzipText),
@@ -151,18 +149,19 @@ fn files_are_known_by_their_content() {
 }
 
 #[test]
-fn topics_are_groups_with_their_own_clock_and_rows_are_those_of_the_first_column() {
+fn topics_are_groups_and_rows_are_those_of_the_first_column() {
     let Contents::Table(mut table) = open(&folder().join("two_clocks.mcap")).unwrap().contents else { panic!() };
     let groups = table.groups();
     let names: Vec<String> = groups.iter().map(|group| group.name.clone().unwrap()).collect();
     assert_eq!(names, ["/joint_states", "/tau"]);
     let time = |index: usize| table.names().unwrap()[groups[index].time.unwrap()].clone();
     assert_eq!([time(0), time(1)], ["/joint_states.header.stamp", "/tau.log_time"]);
-    // On the clock of the torques: thirteen of them, the last two behind the last joint state or not.
+    // On the clock of the torques: thirteen rows.
     let found = columns(table.as_mut(), &["/tau.log_time", "/joint_states.position[elbow]"]);
     assert_eq!(found[0].len(), 13);
     assert!(found[0].windows(2).all(|pair| (pair[1] - pair[0] - 0.025).abs() < 1e-12));
-    // The elbow moves as 0.7 cos 5t: the straight line between samples 10 ms apart errs by 0.7 · 25 · 0.01² / 8.
+    // The elbow moves as 0.7 cos 5t; linear interpolation between samples 10 ms apart has the error 0.7 · 25 · 0.01² /
+    // 8.
     for (k, q) in found[1].iter().enumerate() {
         let t = 0.012_345_678 + 0.025 * k as f64;
         assert!((q - 0.7 * (5.0 * t).cos()).abs() < 2.2e-4 + 0.7 * 5.0 * 6e-5, "{k}: {q}");

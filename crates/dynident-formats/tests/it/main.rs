@@ -1,4 +1,4 @@
-//! Tests of what files hold, in one program.
+//! Integration tests of file formats in one binary.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod broken;

@@ -1,54 +1,47 @@
-//! Torque that stands still while its joint moves: repeated by a recorder, or cut off at what a channel can show.
+//! Finds torque that stays constant while its joint moves: repeated by a recorder, or clipped at the channel's range.
 
-use super::outliers::middle_size;
+use super::CleaningSettings;
+use super::outliers::median_size;
 use crate::quantisation::{quantisation_step, usual_change};
 
-/// Shortest run of one value that is looked at, samples.
-const SHORTEST: usize = 10;
-/// Samples to either side that a run is held against, at most.
-pub(super) const AROUND: usize = 512;
-/// Times the longest run nearby that a held one has to last.
-const TIMES_NEARBY: usize = 6;
-/// Different values that the torque has to take nearby: a torque that hardly changes repeats by its quantisation.
-const VALUES_NEARBY: usize = 6;
-/// Least motion during the run as a share of the motion nearby in as many samples.
-const SHARE_OF_MOTION: f64 = 0.1;
-/// Least motion in steps of a quantised encoder, and least usual change of a quantised torque over as many samples.
-const QUANTA: f64 = 4.0;
+/// Maximum window on either side with which a run is compared, samples.
+pub(super) const MAX_WINDOW: usize = 512;
 
 /// A run of one value, from `from` to `to` (exclusive).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Run {
     pub(super) from: usize,
     pub(super) to: usize,
-    /// At an extreme of the channel: there the first sample is no better than the others.
+    /// Whether the value is an extreme of the channel; then the first sample is invalid too.
     pub(super) saturated: bool,
 }
 
 impl Run {
-    /// The samples that were not measured: of a held torque the first one was.
-    pub(super) fn invented(&self) -> core::ops::Range<usize> {
+    /// Samples that were not measured; the first sample of a held (not saturated) run was measured.
+    pub(super) fn unmeasured(&self) -> core::ops::Range<usize> {
         self.from + usize::from(!self.saturated)..self.to
     }
 }
 
-/// Runs of one and the same torque in `tau` while the position `q` moves on, longer than the quantisation explains: at
-/// least ten samples, six times the longest run nearby, where the torque takes several values. At `extremes` of the
-/// channel the torque is saturated, again and again: there runs at an extreme nearby do not count. The peak of a
-/// smooth torque in quantisation steps is at most `2 / (√2 − 1) = 4.8` times as long as the step beside it.
-pub(super) fn held_runs(tau: &[f64], q: &[f64], extremes: [f64; 2]) -> Vec<Run> {
+/// Finds runs of one torque value in `tau` during which the position `q` moves, longer than quantisation explains: at
+/// least ten samples, and six times the longest run nearby, where the torque takes several values. A run at one of the
+/// `extremes` of the channel is saturated; other runs at an extreme are then ignored when the longest run nearby is
+/// determined. The peak of a smooth torque in quantisation steps is at most `2 / (√2 − 1) = 4.8` times as long as the
+/// adjacent step.
+pub(super) fn held_runs(tau: &[f64], q: &[f64], extremes: [f64; 2], limits: &CleaningSettings) -> Vec<Run> {
+    let shortest = limits.held_samples;
     let mut held = Vec::new();
     let n = tau.len();
     let mut from = 0;
-    while from + SHORTEST <= n {
-        // Most samples differ from the one at the run's least length, which is looked at first.
-        if tau[from] != tau[from + SHORTEST - 1] || tau[from..from + SHORTEST].iter().any(|value| *value != tau[from]) {
+    while from + shortest <= n {
+        // Most samples differ from the one at the minimum run length, so compare with that one first.
+        if tau[from] != tau[from + shortest - 1] || tau[from..from + shortest].iter().any(|value| *value != tau[from]) {
             from += 1;
             continue;
         }
-        let to = (from + SHORTEST..n).find(|k| tau[*k] != tau[from]).unwrap_or(n);
+        let to = (from + shortest..n).find(|k| tau[*k] != tau[from]).unwrap_or(n);
         let run = Run { from, to, saturated: extremes.contains(&tau[from]) };
-        if is_held(tau, q, run, extremes) {
+        if is_held(tau, q, run, extremes, limits) {
             held.push(run);
         }
         from = to;
@@ -56,9 +49,9 @@ pub(super) fn held_runs(tau: &[f64], q: &[f64], extremes: [f64; 2]) -> Vec<Run> 
     held
 }
 
-fn is_held(tau: &[f64], q: &[f64], run: Run, extremes: [f64; 2]) -> bool {
+fn is_held(tau: &[f64], q: &[f64], run: Run, extremes: [f64; 2], limits: &CleaningSettings) -> bool {
     let length = run.to - run.from;
-    let around = length.clamp(5 * SHORTEST, AROUND);
+    let around = length.clamp(5 * limits.held_samples, MAX_WINDOW);
     let sides = [run.from.saturating_sub(around)..run.from, run.to..(run.to + around).min(tau.len())];
     let mut changes = Vec::new();
     let (mut longest, mut values, mut samples, mut path) = (0, 0, 0, 0.0);
@@ -71,35 +64,39 @@ fn is_held(tau: &[f64], q: &[f64], run: Run, extremes: [f64; 2]) -> bool {
         let mut current = 0;
         for k in 0..tau.len() {
             current = if k > 0 && tau[k] == tau[k - 1] { current + 1 } else { 1 };
-            // Of a saturated torque the others of its kind tell nothing.
+            // Saturation repeats, so other runs at an extreme are not a reference for the usual length.
             if !run.saturated || !extremes.contains(&tau[k]) {
                 longest = longest.max(current);
             }
         }
     }
     let step = quantisation_step(&tau[run.from.saturating_sub(around)..(run.to + around).min(tau.len())]);
-    let changes_enough = step.is_none_or(|step| middle_size(changes.into_iter()) > QUANTA * step);
+    let changes_enough = step.is_none_or(|step| median_size(changes.into_iter()) > limits.held_steps * step);
     let moved = q[run.from..run.to].windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
-    // To and fro: how far apart its ends are says nothing.
+    // For back-and-forth motion, use the range, not the distance between the ends.
     let [low, high] = q[run.from..run.to]
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &q| [low.min(q), high.max(q)]);
     let net = high - low;
     let expected = path * length as f64 / samples.max(1) as f64;
-    samples >= 2 * SHORTEST
-        && values >= VALUES_NEARBY
+    samples >= 2 * limits.held_samples
+        && values >= limits.held_changes_nearby
         && changes_enough
-        && length >= TIMES_NEARBY * longest
-        && moved > SHARE_OF_MOTION * expected
-        && net > SHARE_OF_MOTION * moved
-        && quantisation_step(q).is_none_or(|step| net > QUANTA * step)
-        && usual_change(&q[run.from..run.to]).is_none_or(|change| net > QUANTA * change)
+        && length >= limits.held_run_ratio * longest
+        && moved > limits.held_motion_share * expected
+        && net > limits.held_motion_share * moved
+        && quantisation_step(q).is_none_or(|step| net > limits.held_steps * step)
+        && usual_change(&q[run.from..run.to]).is_none_or(|change| net > limits.held_steps * change)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::derivative::test_signals::normal;
+
+    fn held(tau: &[f64], q: &[f64], extremes: [f64; 2]) -> Vec<Run> {
+        held_runs(tau, q, extremes, &CleaningSettings::default())
+    }
 
     fn signals(n: usize) -> (Vec<f64>, Vec<f64>) {
         let noise = normal(11, n);
@@ -118,26 +115,25 @@ mod tests {
                     *tau = (*tau / step).round() * step;
                 }
             }
-            assert!(held_runs(&tau, &q, [-20.5, 20.5]).is_empty(), "{step}");
+            assert!(held(&tau, &q, [-20.5, 20.5]).is_empty(), "{step}");
             let value = tau[1500];
             tau[1500..1700].fill(value);
-            let found = held_runs(&tau, &q, [-20.5, 20.5]);
+            let found = held(&tau, &q, [-20.5, 20.5]);
             assert_eq!(found.len(), 1, "{step}: {found:?}");
-            // The samples beside it may happen to have its value.
+            // Adjacent samples may happen to have the same value.
             assert!(found[0].from.abs_diff(1500) <= 2 && found[0].to.abs_diff(1700) <= 2, "{step}: {found:?}");
         }
     }
 
-    /// The joint is back where it was when the torque goes on.
+    /// At the end of the run the joint is back at the position of its start.
     #[test]
-    fn a_torque_that_drops_out_while_the_joint_goes_to_and_fro_is_held() {
+    fn a_torque_dropout_during_back_and_forth_motion_is_held() {
         let noise = normal(13, 6000);
         let t = |i: usize| i as f64 * 0.01;
         let mut tau: Vec<f64> = (0..6000).map(|i| 20.0 * (1.5 * t(i)).sin() + 0.05 * noise[i]).collect();
         let q: Vec<f64> = (0..6000).map(|i| (1.5 * t(i)).cos()).collect();
-        // A period of the motion.
         tau[2000..2419].fill(0.0);
-        let found = held_runs(&tau, &q, [-20.5, 20.5]);
+        let found = held(&tau, &q, [-20.5, 20.5]);
         assert_eq!(found, [Run { from: 2000, to: 2419, saturated: false }]);
     }
 
@@ -145,40 +141,40 @@ mod tests {
     fn rest_coarse_steps_and_slow_updates_are_not_held() {
         let (tau, q) = signals(4000);
         let coarse: Vec<f64> = tau.iter().map(|tau| (tau / 4.0).round() * 4.0).collect();
-        assert!(held_runs(&coarse, &q, [-20.0, 20.0]).is_empty());
+        assert!(held(&coarse, &q, [-20.0, 20.0]).is_empty());
         let slow: Vec<f64> = (0..4000).map(|i| tau[i / 8 * 8]).collect();
-        assert!(held_runs(&slow, &q, [-20.5, 20.5]).is_empty());
+        assert!(held(&slow, &q, [-20.5, 20.5]).is_empty());
         let mut resting = (tau.clone(), q.clone());
         resting.0[1000..2000].fill(3.0);
         resting.1[1000..2000].fill(0.4);
-        assert!(held_runs(&resting.0, &resting.1, [-20.5, 20.5]).is_empty());
-        // A count of the encoder now and then is no motion.
+        assert!(held(&resting.0, &resting.1, [-20.5, 20.5]).is_empty());
+        // Occasional encoder counts at rest are not motion.
         resting.1[1000..2000].iter_mut().enumerate().for_each(|(i, q)| *q += 2e-6 * (i / 60) as f64);
-        assert!(held_runs(&resting.0[900..1100], &resting.1[900..1100], [-20.5, 20.5]).is_empty());
-        // The peaks of a torque without noise, in steps.
+        assert!(held(&resting.0[900..1100], &resting.1[900..1100], [-20.5, 20.5]).is_empty());
+        // Peaks of a noise-free torque, quantised.
         for step in [0.05, 0.1, 0.37, 1.0] {
             let smooth = |i: usize| (20.0 * (1.5 * i as f64 * 0.001).sin() / step).round() * step;
             let stepped: Vec<f64> = (0..20_000).map(smooth).collect();
             let q: Vec<f64> = (0..20_000).map(|i| (1.5 * f64::from(i) * 0.001 + 0.7).cos()).collect();
             let extremes = [-1.0, 1.0].map(|sign| sign * stepped.iter().copied().fold(0.0, f64::max));
-            assert!(held_runs(&stepped, &q, extremes).is_empty(), "{step}");
+            assert!(held(&stepped, &q, extremes).is_empty(), "{step}");
         }
     }
 
-    /// Also where they are cut off four times as often as they are told.
+    /// Also for limits that clip most samples.
     #[test]
-    fn what_is_cut_off_at_an_extreme_is_saturated() {
+    fn clipped_torque_is_saturated() {
         let noise = normal(12, 8000);
         let tau: Vec<f64> = (0..8000).map(|i| 20.0 * (6.0 * i as f64 * 0.001).sin() + 0.05 * noise[i]).collect();
         let q: Vec<f64> = (0..8000).map(|i| (6.0 * f64::from(i) * 0.001 + 0.7).cos()).collect();
         for limit in [19.0, 12.0, 4.0] {
             let clipped: Vec<f64> = tau.iter().map(|tau| tau.clamp(-limit, limit)).collect();
-            let found = held_runs(&clipped, &q, [-limit, limit]);
+            let found = held(&clipped, &q, [-limit, limit]);
             assert!(found.iter().all(|run| run.saturated), "{limit}: {found:?}");
-            let told: usize = found.iter().map(|run| run.invented().len()).sum();
+            let detected: usize = found.iter().map(|run| run.unmeasured().len()).sum();
             let cut = tau.iter().filter(|tau| tau.abs() > limit).count();
-            // Runs of fewer than ten samples, where noise crosses the limit, are left.
-            assert!(told as f64 > 0.9 * cut as f64 && told <= cut, "{limit}: {told} of {cut}");
+            // Runs shorter than ten samples, where noise crosses the limit, are not detected.
+            assert!(detected as f64 > 0.9 * cut as f64 && detected <= cut, "{limit}: {detected} of {cut}");
         }
     }
 }

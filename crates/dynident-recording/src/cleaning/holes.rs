@@ -1,18 +1,16 @@
-//! Holes in the rows that are short against the motion: filled, so that the motion goes on, and marked.
+//! Fills holes in the rows that are short compared with the motion, and marks the filled rows.
 
 use crate::clock::timeline::Places;
 use crate::log::RawBlock;
 
-/// Degree of the polynomials across holes.
 const DEGREE: usize = 5;
-/// Fewest and most rows on either side that a hole is filled from.
-const FEWEST: usize = 6;
-pub(super) const MOST: usize = 64;
+/// Minimum and maximum number of rows on either side from which a hole is filled.
+const MIN_SIDE_ROWS: usize = 6;
+pub(super) const MAX_SIDE_ROWS: usize = 64;
 
-/// Values at `places` of the polynomial of degree 5 that lies nearest to `values` at `known`.
+/// Values at `places` of the least-squares polynomial of degree 5 through `values` at `known`.
 ///
-/// Polynomials orthonormal over the known places, made by two Gram-Schmidt passes on the powers, and carried along to
-/// the wanted ones.
+/// The basis is orthonormal over `known`: two Gram-Schmidt passes on the powers, evaluated at `places` as well.
 fn polynomial(known: &[f64], values: &[f64], places: &[f64]) -> Vec<f64> {
     let count = known.len();
     let middle = 0.5 * (known[0] + known[count - 1]);
@@ -45,9 +43,8 @@ fn polynomial(known: &[f64], values: &[f64], places: &[f64]) -> Vec<f64> {
     out
 }
 
-/// The last rows before a block, for holes at its begin.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Before {
+pub(super) struct PastRows {
     pub(super) raw: RawBlock,
     pub(super) places: Places,
 }
@@ -62,7 +59,6 @@ fn channels_mut(block: &mut RawBlock) -> impl Iterator<Item = &mut Vec<f64>> {
     q.iter_mut().chain(tau).chain(dq).chain(ddq).chain(temperature_c)
 }
 
-/// Appends some rows of a block to another.
 fn append(to: &mut RawBlock, from: &RawBlock, rows: core::ops::Range<usize>) {
     to.row.extend_from_slice(&from.row[rows.clone()]);
     to.time_s.extend_from_slice(&from.time_s[rows.clone()]);
@@ -71,7 +67,6 @@ fn append(to: &mut RawBlock, from: &RawBlock, rows: core::ops::Range<usize>) {
     }
 }
 
-/// A block with as many channels and no rows.
 fn empty_like(block: &RawBlock) -> RawBlock {
     let none = |channels: &[Vec<f64>]| vec![Vec::new(); channels.len()];
     RawBlock {
@@ -85,23 +80,24 @@ fn empty_like(block: &RawBlock) -> RawBlock {
     }
 }
 
-/// A block with its holes filled; `invented` are the places of the rows that were not measured.
+/// A block with its holes filled; `filled` are the indices of the rows that were not measured.
 pub(super) struct Filled {
     pub(super) raw: RawBlock,
     pub(super) places: Places,
-    pub(super) invented: Vec<usize>,
-    /// For every row of the block as it came its place in this one.
-    pub(super) moved: Vec<usize>,
+    pub(super) filled: Vec<usize>,
+    /// For each row of the original block, its index in this block.
+    pub(super) new_index: Vec<usize>,
 }
 
-/// Fills the holes of a block, positions by one polynomial of degree 5 through the rows on either side (twice as many
-/// as are missing, 6 to 64), all else by straight lines. A hole with too few rows beside it begins a new piece instead.
-pub(super) fn fill(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawBlock>) -> Filled {
+/// Fills the holes of a block: positions by one polynomial of degree 5 through the rows on either side (twice the
+/// number of missing rows, 6 to 64), other channels by straight lines. A hole with too few rows next to it starts a new
+/// piece instead.
+pub(super) fn fill(before: &PastRows, block: &RawBlock, places: &Places, next: Option<&RawBlock>) -> Filled {
     let mut out = Filled {
         raw: empty_like(block),
         places: Places::default(),
-        invented: Vec::new(),
-        moved: Vec::with_capacity(block.rows()),
+        filled: Vec::new(),
+        new_index: Vec::with_capacity(block.rows()),
     };
     let mut done = 0;
     let take = |out: &mut Filled, from: usize, to: usize| {
@@ -109,17 +105,17 @@ pub(super) fn fill(before: &Before, block: &RawBlock, places: &Places, next: Opt
         append(&mut out.raw, block, from..to);
         out.places.steps.extend_from_slice(&places.steps[from..to]);
         out.places.begins.extend_from_slice(&places.begins[from..to]);
-        out.moved.extend(shift..shift + to - from);
+        out.new_index.extend(shift..shift + to - from);
     };
     for &hole in &places.holes {
         take(&mut out, done, hole);
         let shift = out.raw.rows();
-        if let Some(rows) = across(before, block, places, next, hole) {
+        if let Some(rows) = fill_hole(before, block, places, next, hole) {
             let count = rows.raw.rows();
             append(&mut out.raw, &rows.raw, 0..count);
             out.places.steps.extend_from_slice(&rows.places.steps);
             out.places.begins.extend_from_slice(&rows.places.begins);
-            out.invented.extend(shift..shift + count);
+            out.filled.extend(shift..shift + count);
             take(&mut out, hole, hole + 1);
         } else {
             take(&mut out, hole, hole + 1);
@@ -131,8 +127,14 @@ pub(super) fn fill(before: &Before, block: &RawBlock, places: &Places, next: Opt
     out
 }
 
-/// The rows of one hole; `None` with too few rows beside it.
-fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawBlock>, hole: usize) -> Option<Before> {
+/// The rows of one hole; `None` if too few rows are next to it.
+fn fill_hole(
+    before: &PastRows,
+    block: &RawBlock,
+    places: &Places,
+    next: Option<&RawBlock>,
+    hole: usize,
+) -> Option<PastRows> {
     let earlier = before.raw.rows();
     let joined = |k: usize| if k < earlier { (&before.raw, &before.places, k) } else { (block, places, k - earlier) };
     let step_of = |k: usize| {
@@ -143,8 +145,8 @@ fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawB
     let (from, to) = (step_of(at.checked_sub(1)?), step_of(at));
     let missing = (to - from).round() as usize;
     let missing = missing.checked_sub(1).filter(|missing| *missing > 0)?;
-    let wanted = (2 * missing).clamp(FEWEST, MOST);
-    // Uninterrupted rows on either side, nearest first; behind the block's end those of the next one, evenly spaced.
+    let wanted = (2 * missing).clamp(MIN_SIDE_ROWS, MAX_SIDE_ROWS);
+    // Uninterrupted rows on either side, nearest first; after the block's end, rows of the next block, evenly spaced.
     let is_seam = |k: usize| {
         let (_, places, k) = joined(k);
         places.begins[k] || places.holes.contains(&k)
@@ -159,13 +161,13 @@ fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawB
         last += 1;
     }
     let beyond = if last == total { (wanted - (last - at)).min(next.map_or(0, RawBlock::rows)) } else { 0 };
-    if at - first < FEWEST || last - at + beyond < FEWEST {
+    if at - first < MIN_SIDE_ROWS || last - at + beyond < MIN_SIDE_ROWS {
         return None;
     }
     let end = step_of(total - 1);
     let known: Vec<f64> = (first..last).map(step_of).chain((1..=beyond).map(|k| end + k as f64)).collect();
     let steps: Vec<f64> = (1..=missing).map(|k| from + (to - from) * k as f64 / (missing + 1) as f64).collect();
-    let mut rows = Before { raw: empty_like(block), ..Before::default() };
+    let mut rows = PastRows { raw: empty_like(block), ..PastRows::default() };
     let line = |a: f64, b: f64, k: usize| a + (b - a) * (k + 1) as f64 / (missing + 1) as f64;
     let (row_before, time_before) = {
         let (raw, _, k) = joined(at - 1);
@@ -192,14 +194,13 @@ fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawB
     Some(rows)
 }
 
-/// The last rows of a block, for holes at the begin of the next.
-pub(super) fn last_rows(block: &RawBlock, places: &Places) -> Before {
-    let from = block.rows().saturating_sub(MOST);
+pub(super) fn last_rows(block: &RawBlock, places: &Places) -> PastRows {
+    let from = block.rows().saturating_sub(MAX_SIDE_ROWS);
     let mut raw = empty_like(block);
     append(&mut raw, block, from..block.rows());
     let places =
         Places { steps: places.steps[from..].to_vec(), begins: places.begins[from..].to_vec(), holes: Vec::new() };
-    Before { raw, places }
+    PastRows { raw, places }
 }
 
 #[cfg(test)]

@@ -1,64 +1,69 @@
-//! From rows as they were read to rows that a motion is made of.
+//! Cleans the rows of a log before a motion is made from them.
 //!
-//! [`CleanRows`] reads two blocks ahead and, on the way: finds single torque samples far from those around them
-//! (`outliers`) and torque that stands still while its joint moves (`held`: repeated, or saturated), both marked so
-//! that no row of a fit holds them; replaces lone spikes of a position (`spikes`); gives each row its place by the
-//! clock; and fills holes that are short against the motion (`holes`), marked likewise. What it did is kept for the
-//! report.
+//! [`CleanRows`] reads two blocks ahead. It finds single torque samples far from their neighbours (`outliers`) and
+//! torque that stays constant while its joint moves (`held`: repeated or saturated), and marks both so that no row of a
+//! fit uses them. It replaces single spikes of a position (`spikes`), assigns each row its place on the clock, and
+//! fills and marks holes that are short compared with the motion (`holes`). The report lists these corrections.
 
 mod held;
 mod holes;
 mod outliers;
 mod set_aside;
+mod settings;
 mod spikes;
 
 pub use set_aside::{Reason, SetAside};
+pub use settings::CleaningSettings;
 pub(crate) use spikes::replace_spikes;
 
 use crate::clock::timeline::{Places, Timeline};
 use crate::error::RecordingError;
 use crate::log::{LogReader, RawBlock, RawBlocks};
-use holes::{Before, Filled, fill, last_rows};
+use holes::{Filled, PastRows, fill, last_rows};
 use set_aside::Tally;
 use std::collections::VecDeque;
 
-/// Some rows, ready for the grid.
 #[derive(Debug, Default)]
 pub(crate) struct CleanBlock {
     pub(crate) raw: RawBlock,
     pub(crate) places: Places,
-    /// For each joint the rows whose torque does not count, ascending.
+    /// For each joint the rows whose torque is ignored, ascending.
     pub(crate) marked: Vec<Vec<usize>>,
 }
 
-/// A log's rows, read ahead and cleaned.
 #[derive(Debug)]
 pub(crate) struct CleanRows {
     reader: RawBlocks,
     timeline: Timeline,
-    keep_outliers: bool,
+    /// `None` keeps all samples.
+    limits: Option<CleaningSettings>,
     joints: usize,
     /// Read, not cleaned.
     waiting: Option<RawBlock>,
     /// Cleaned, not placed.
     cleaned: VecDeque<(RawBlock, Vec<Vec<usize>>)>,
     ended: bool,
-    /// The last torques as logged and positions as cleaned.
+    /// Last torques as logged and last positions as cleaned.
     tail: [Vec<Vec<f64>>; 2],
     /// Smallest and largest torque of each joint, and its spread.
     extremes: Vec<[f64; 2]>,
     spread: Vec<f64>,
-    before: Before,
+    before: PastRows,
     tally: Tally,
     bridged: [u64; 2],
 }
 
 impl CleanRows {
-    pub(crate) fn new(reader: LogReader, timeline: Timeline, joints: &[String], keep_outliers: bool) -> Self {
+    pub(crate) fn new(
+        reader: LogReader,
+        timeline: Timeline,
+        joints: &[String],
+        limits: Option<CleaningSettings>,
+    ) -> Self {
         Self {
             reader: RawBlocks::new(reader),
             timeline,
-            keep_outliers,
+            limits,
             joints: joints.len(),
             waiting: None,
             cleaned: VecDeque::new(),
@@ -66,32 +71,31 @@ impl CleanRows {
             tail: [vec![Vec::new(); joints.len()], vec![Vec::new(); joints.len()]],
             extremes: vec![[f64::INFINITY, f64::NEG_INFINITY]; joints.len()],
             spread: vec![0.0; joints.len()],
-            before: Before::default(),
+            before: PastRows::default(),
             tally: Tally::new(joints),
             bridged: [0; 2],
         }
     }
 
-    /// The same, its rows read ahead by a thread of their own from now on.
-    pub(crate) fn read_beside(self) -> Self {
-        Self { reader: self.reader.beside(), ..self }
+    /// Reads rows ahead in a separate thread from now on.
+    pub(crate) fn read_in_thread(self) -> Self {
+        Self { reader: self.reader.in_thread(), ..self }
     }
 
     pub(crate) fn reader(&self) -> &RawBlocks {
         &self.reader
     }
 
-    /// What was set aside so far.
     pub(crate) fn set_aside(&self) -> Vec<SetAside> {
         self.tally.all()
     }
 
-    /// Holes that were filled, and the samples in them.
+    /// Number of filled holes, and of samples in them.
     pub(crate) fn bridged(&self) -> [u64; 2] {
         self.bridged
     }
 
-    /// The next rows; `None` at the end. `read` sees every block as it was logged.
+    /// The next rows; `None` at the end. `read` is called with every block as logged.
     pub(crate) fn next_block(&mut self, read: &mut dyn FnMut(&RawBlock)) -> Result<Option<CleanBlock>, RecordingError> {
         while self.cleaned.len() < 2 && !(self.ended && self.waiting.is_none()) {
             let next = self.read(read)?;
@@ -107,12 +111,12 @@ impl CleanRows {
             CleanBlock { raw, places, marked }
         } else {
             let holes = places.holes.len() as u64;
-            let Filled { raw, places, invented, moved } = fill(&self.before, &raw, &places, next);
-            // A hole that could not be filled begins a piece.
-            self.bridged[0] += if invented.is_empty() { 0 } else { holes };
-            self.bridged[1] += invented.len() as u64;
+            let Filled { raw, places, filled, new_index } = fill(&self.before, &raw, &places, next);
+            // A hole that could not be filled starts a new piece.
+            self.bridged[0] += if filled.is_empty() { 0 } else { holes };
+            self.bridged[1] += filled.len() as u64;
             let marked = marked.into_iter().map(|marked| {
-                let mut rows: Vec<usize> = marked.into_iter().map(|row| moved[row]).chain(invented.clone()).collect();
+                let mut rows: Vec<usize> = marked.into_iter().map(|row| new_index[row]).chain(filled.clone()).collect();
                 rows.sort_unstable();
                 rows
             });
@@ -136,17 +140,14 @@ impl CleanRows {
         Ok(Some(block))
     }
 
-    /// Finds what does not count, and puts something sane in its place.
     fn clean(&mut self, mut block: RawBlock) -> (RawBlock, Vec<Vec<usize>>) {
         let rows = block.rows();
         self.tally.rows += rows as u64;
         let mut marked = vec![Vec::new(); self.joints];
-        if self.keep_outliers {
-            return (block, marked);
-        }
+        let Some(limits) = &self.limits else { return (block, marked) };
         let next = self.waiting.as_ref();
         for (joint, marked) in marked.iter_mut().enumerate() {
-            // Positions first: whether a joint moves is asked of them.
+            // Positions first: the test for held torque uses them.
             let joined = |tail: &[f64], own: &[f64], next: Option<&[f64]>, most: usize| -> Vec<f64> {
                 let ahead = next.map_or(&[][..], |next| &next[..next.len().min(most)]);
                 [tail, own, ahead].concat()
@@ -155,8 +156,8 @@ impl CleanRows {
             let next_q = next.map(|next| &next.q[joint][..]);
             let mut q = joined(&q_tail[joint], &block.q[joint], next_q, usize::MAX);
             let own = q_tail[joint].len()..q_tail[joint].len() + rows;
-            let seen = own.end + held::AROUND.min(q.len() - own.end);
-            let spikes = replace_spikes(&mut q[..seen], own.clone());
+            let seen = own.end + held::MAX_WINDOW.min(q.len() - own.end);
+            let spikes = replace_spikes(&mut q[..seen], own.clone(), limits);
             for &at in &spikes {
                 let index = at - own.start;
                 let old = core::mem::replace(&mut block.q[joint][index], q[at]);
@@ -165,14 +166,14 @@ impl CleanRows {
 
             let next_tau = next.map(|next| &next.tau[joint][..]);
             let tau = joined(&tau_tail[joint], &block.tau[joint], next_tau, usize::MAX);
-            let spread = spread(tau[own.start.saturating_sub(held::AROUND)..own.end].to_vec());
+            let spread = spread(tau[own.start.saturating_sub(held::MAX_WINDOW)..own.end].to_vec());
             self.spread[joint] = self.spread[joint].max(spread);
-            let held_runs = held::held_runs(&tau, &q, self.extremes[joint]);
-            let single = outliers::outliers(&tau[..seen], own.clone(), self.spread[joint]);
+            let held_runs = held::held_runs(&tau, &q, self.extremes[joint], limits);
+            let single = outliers::outliers(&tau[..seen], own.clone(), self.spread[joint], limits);
             marked.extend(single.iter().map(|at| at - own.start));
             for run in &held_runs {
-                let invented = run.invented();
-                let repeated = invented.start.max(own.start)..run.to.min(own.end);
+                let unmeasured = run.unmeasured();
+                let repeated = unmeasured.start.max(own.start)..run.to.min(own.end);
                 marked.extend(repeated.clone().map(|at| at - own.start));
             }
             marked.sort_unstable();
@@ -185,7 +186,7 @@ impl CleanRows {
             let mut repaired = tau[own.start.saturating_sub(1)..seen].to_vec();
             let shift = own.start - own.start.saturating_sub(1);
             let places: Vec<usize> = marked.iter().map(|index| index + shift).collect();
-            outliers::bridged(&mut repaired, &places);
+            outliers::interpolate_marked(&mut repaired, &places);
             block.tau[joint].copy_from_slice(&repaired[shift..shift + rows]);
             for &at in &single {
                 let index = at - own.start;
@@ -193,10 +194,10 @@ impl CleanRows {
                 self.tally.add((joint, Reason::Outlier), &block, index, values, 1);
             }
             for run in &held_runs {
-                let invented = run.invented();
-                let repeated = invented.start.max(own.start)..run.to.min(own.end);
+                let unmeasured = run.unmeasured();
+                let repeated = unmeasured.start.max(own.start)..run.to.min(own.end);
                 if !repeated.is_empty() {
-                    let begins = u64::from(invented.start >= own.start);
+                    let begins = u64::from(unmeasured.start >= own.start);
                     let index = repeated.start - own.start;
                     let values = [tau[repeated.start]; 2];
                     let reason = if run.saturated { Reason::Saturated } else { Reason::Held };
@@ -208,20 +209,19 @@ impl CleanRows {
     }
 }
 
-/// From the value above a twentieth of all to the one below a twentieth.
+/// Difference of the 95 % and the 5 % quantile.
 fn spread(mut values: Vec<f64>) -> f64 {
     let part = values.len() / 20;
     let above = values.len() - 1 - part;
     let (below, largest, _) = values.select_nth_unstable_by(above, f64::total_cmp);
     let largest = *largest;
-    // The one value of a single sample is both.
+    // With a single sample both quantiles are the same value.
     let smallest = if part < above { *below.select_nth_unstable_by(part, f64::total_cmp).1 } else { largest };
     largest - smallest
 }
 
-/// Keeps the last samples of what has passed.
 fn keep_last(tail: &mut Vec<f64>, own: &[f64]) {
     tail.extend_from_slice(own);
-    let unneeded = tail.len().saturating_sub(held::AROUND);
+    let unneeded = tail.len().saturating_sub(held::MAX_WINDOW);
     tail.drain(..unneeded);
 }

@@ -1,98 +1,83 @@
-//! Single torque samples far from those around them.
+//! Finds single torque samples far from their neighbours.
 
+use super::CleaningSettings;
 use crate::quantisation::quantisation_step;
 
-/// Samples of a group of which the median is taken.
+/// Samples per median.
 const GROUP: usize = 5;
-/// Samples to either side that a judgement needs: two groups.
-pub(super) const REACH: usize = 2 * GROUP;
-/// Samples over which the noise is taken to be alike.
-const NOISE_SPAN: usize = 512;
-/// Robust standard deviations that a sample has to stand off. Normal noise does so once in 10¹⁵ samples.
-const TIMES_NOISE: f64 = 8.0;
-/// Least distance as a share of the spread of the torque: less does not matter to any fit.
-const SHARE_OF_SPREAD: f64 = 0.005;
-/// Least distance in steps of a quantised channel.
-const QUANTA: f64 = 3.5;
-/// Times the usual distance of its nearest neighbours that a sample has to stand off: a peak over several samples takes
-/// them along.
-const TIMES_NEIGHBOURS: f64 = 5.0;
-/// Near an end of the log, where a line through ten samples has to tell what would be beyond it: times as far as
-/// elsewhere that a sample has to stand off, and times the usual change from sample to sample nearby (a controller that
-/// settles swings).
-const TIMES_AT_ENDS: f64 = 4.0;
-const TIMES_CHANGES: f64 = 2.0;
-/// Nearest neighbours to either side.
+/// Samples needed on either side of a tested sample: two groups.
+const REACH: usize = 2 * GROUP;
+/// Window over which the noise is taken as stationary, samples.
+pub(super) const NOISE_WINDOW: usize = 512;
+/// Factor on the minimum distance near an end of the log, where a line through ten samples is extrapolated.
+const END_FACTOR: f64 = 4.0;
+/// Near an end, minimum ratio to the usual change between samples nearby (a settling controller oscillates).
+const END_CHANGE_RATIO: f64 = 2.0;
 const NEIGHBOURS: usize = 3;
-/// With more samples apart than this they are the nature of the signal.
-const LARGEST_SHARE: f64 = 0.15;
-/// Share of outliers that follow one another directly above which they are pulses of the torque, and fewest of them to
-/// say so.
-const LARGEST_BESIDE: f64 = 0.2;
-const FEWEST_PULSES: usize = 10;
-/// So many side by side, off the same way by at least this share of the one in question, are a pulse of the torque (a
-/// contact, a drive that catches up).
-const SIDE_BY_SIDE: usize = 3;
-const SHARE_OF_PULSE: f64 = 0.25;
-/// Fewest samples to judge by.
-const FEWEST: usize = 64;
+/// Maximum share of outliers that directly follow another one; above it they are pulses of the torque. The share is
+/// used only with at least the given number of outliers.
+const MAX_ADJACENT_SHARE: f64 = 0.2;
+const MIN_OUTLIERS_FOR_PULSES: usize = 10;
+/// Number of adjacent samples that form a pulse of the torque (a contact, a drive that catches up) if each deviates in
+/// the same direction by at least the given share of the tested sample.
+const PULSE_SAMPLES: usize = 3;
+const MIN_PULSE_SHARE: f64 = 0.25;
+pub(super) const MIN_SAMPLES: usize = 64;
+/// Ratio of the standard deviation to the median absolute deviation of normal noise.
+pub(super) const SIGMA_PER_MAD: f64 = 1.4826;
 
-/// Standard deviations in one median of absolute deviations of normal noise.
-const NORMAL: f64 = 1.4826;
-
-/// Places of outliers in `own` (a part of `x`), which stands among its neighbours in `x`.
+/// Indices of outliers in `own`, a range of `x`; the rest of `x` are its neighbours.
 ///
-/// Before and behind a sample stand two groups of five; a group's median does not care for two outliers in it. The
-/// cubic through the four medians is where a smooth torque would be; the lines through those before and those behind
-/// are the torque on either side of a step (friction reversed, contact made). A sample is an outlier
-/// if it lies outside of all of these by more than eight robust standard deviations of samples from their cubics
-/// nearby, half a percent of the torque's spread, and three steps of a quantised channel. Source of the rule by
-/// medians: Hampel, J. Am. Stat. Assoc. 69 (1974) 383; Davies and Gather, J. Am. Stat. Assoc. 88 (1993) 782. Groups
-/// beside the sample and the step are this project's own.
-pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> Vec<usize> {
-    if x.len() < FEWEST {
+/// Two groups of five samples lie before and two after the tested sample; the median of a group tolerates two outliers.
+/// The cubic through the four medians estimates a smooth torque; the lines through the two medians before and the two
+/// after estimate the torque on either side of a step (friction reversal, contact). A sample is an outlier if it lies
+/// outside all of these by more than eight robust standard deviations of nearby samples from their cubics, 0.5 % of the
+/// torque's spread, and 3.5 steps of a quantised channel. Source of the median rule: Hampel, J. Am. Stat. Assoc. 69
+/// (1974) 383; Davies and Gather, J. Am. Stat. Assoc. 88 (1993) 782. The groups and the test for steps are this
+/// project's extensions.
+pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64, limits: &CleaningSettings) -> Vec<usize> {
+    if x.len() < MIN_SAMPLES {
         return Vec::new();
     }
     let around = Surroundings::of(x);
-    let apart = around.apart(own.clone(), spread);
-    let limit = limit_of(apart.iter().map(|apart| apart.times));
-    let mut found: Vec<usize> = apart.iter().filter(|apart| apart.times > limit).map(|apart| apart.sample).collect();
-    if found.is_empty() || found.len() as f64 > LARGEST_SHARE * own.len() as f64 {
+    let far = around.far_samples(own.clone(), spread, limits);
+    let limit = gap_limit(far.iter().map(|sample| sample.times));
+    let mut found: Vec<usize> = far.iter().filter(|far| far.times > limit).map(|far| far.sample).collect();
+    if found.is_empty() || found.len() as f64 > limits.max_outlier_share * own.len() as f64 {
         return Vec::new();
     }
-    // Errors come one by one; what lasts for some samples again and again is a torque.
+    // Recorder errors are isolated; repeated deviations over several samples are torque.
     let beside = (1..found.len()).filter(|&k| found[k] == found[k - 1] + 1).count();
-    if found.len() >= FEWEST_PULSES && beside as f64 > LARGEST_BESIDE * found.len() as f64 {
+    if found.len() >= MIN_OUTLIERS_FOR_PULSES && beside as f64 > MAX_ADJACENT_SHARE * found.len() as f64 {
         return Vec::new();
     }
     if let Some(step) = quantisation_step(x) {
-        found.retain(|&i| around.outside(i) > QUANTA * step);
+        found.retain(|&i| around.outside(i) > limits.outlier_steps * step);
     }
     found.retain(|&i| !around.is_pulse(i));
     found
 }
 
-/// Samples and the torques that the medians of the groups around each suggest for it.
+/// Samples and the estimates of each sample from the medians of the groups around it.
 struct Surroundings<'a> {
     x: &'a [f64],
-    /// Medians of five successive samples, the ends continued.
+    /// Medians of five successive samples, extrapolated at the ends.
     medians: Vec<f64>,
     /// Distance of each sample from its cubic.
     off: Vec<f64>,
 }
 
-/// A sample that is far from its cubic.
-struct Apart {
+struct FarSample {
     sample: usize,
-    /// Distance in units of the least that an outlier has.
+    /// Ratio of the distance to the minimum distance of an outlier.
     times: f64,
 }
 
 impl<'a> Surroundings<'a> {
     fn of(x: &'a [f64]) -> Self {
         let n = x.len();
-        // The ends are mirrored in the point where the line through the two groups inside ends: a slope goes on beyond
-        // it, and the last sample itself, which may be an outlier, has no effect.
+        // The ends are extended by point reflection about the extrapolated line through the two inner groups. This
+        // preserves a slope, and the last sample, which may be an outlier, has no effect.
         let end = |at: &dyn Fn(usize) -> f64| {
             let [near, far] =
                 [1, 1 + GROUP].map(|from| median_of_five(&core::array::from_fn::<f64, GROUP, _>(|k| at(from + k))));
@@ -111,13 +96,13 @@ impl<'a> Surroundings<'a> {
         around
     }
 
-    /// The medians of the two groups before sample `i` and of the two behind it.
+    /// Medians of the two groups before sample `i` and of the two after it.
     fn medians_around(&self, i: usize) -> [f64; 4] {
         let place = i + REACH;
         [place - 2 * GROUP, place - GROUP, place + 1, place + 1 + GROUP].map(|from| self.medians[from])
     }
 
-    /// How far sample `k` lies above all that is suggested for sample `i`, or below.
+    /// Signed distance of sample `k` outside the range of the estimates for sample `i`.
     fn signed(&self, i: usize, k: usize) -> f64 {
         let x = self.x;
         let usual = usual_range(self.medians_around(i), x[i] - self.off[i]);
@@ -128,8 +113,8 @@ impl<'a> Surroundings<'a> {
         self.signed(i, i).abs()
     }
 
-    /// Least distance of an outlier near an end, where only one side is known: a signal that swings from sample to
-    /// sample has no outlier there.
+    /// Minimum distance of an outlier near an end, where only one side is known. It grows with the change between
+    /// samples, so that a signal that oscillates there has no outliers.
     fn least_at_an_end(&self, i: usize, least: f64) -> f64 {
         let n = self.x.len();
         if (REACH..n - REACH).contains(&i) {
@@ -137,51 +122,49 @@ impl<'a> Surroundings<'a> {
         }
         let nearby = i.saturating_sub(GROUP)..(i + GROUP).min(n - 1);
         let nearby = nearby.filter(|k| *k != i && k + 1 != i);
-        let changes = middle_size(nearby.map(|k| self.x[k + 1] - self.x[k]));
-        f64::max(TIMES_AT_ENDS * least, TIMES_CHANGES * changes)
+        let changes = median_size(nearby.map(|k| self.x[k + 1] - self.x[k]));
+        f64::max(END_FACTOR * least, END_CHANGE_RATIO * changes)
     }
 
-    /// The samples of `own` that are far from their cubics.
-    fn apart(&self, own: core::ops::Range<usize>, spread: f64) -> Vec<Apart> {
+    fn far_samples(&self, own: core::ops::Range<usize>, spread: f64, limits: &CleaningSettings) -> Vec<FarSample> {
         let (x, off, n) = (self.x, &self.off, self.x.len());
-        let overall = NORMAL * middle_size(off.iter().copied());
+        let overall = SIGMA_PER_MAD * median_size(off.iter().copied());
         let mostly_repeats = 2 * x.windows(2).filter(|pair| pair[0] == pair[1]).count() > n;
-        let mut apart = Vec::new();
-        let half = NOISE_SPAN / 2;
+        let mut far = Vec::new();
+        let half = NOISE_WINDOW / 2;
         let mut from = own.start;
         while from < own.end {
             let to = (from + half).min(own.end);
             let (low, high) = (from.saturating_sub(half / 2), (to + half / 2).min(n));
-            let noise = f64::max(NORMAL * middle_size(off[low..high].iter().copied()), 0.5 * overall);
-            // Where most samples lie on a line there is no noise to go by, only the spread of the whole.
-            let share = if noise > 0.0 && !mostly_repeats { SHARE_OF_SPREAD } else { 2.0 };
-            let least = f64::max(TIMES_NOISE * noise, share * spread).max(f64::MIN_POSITIVE);
+            let noise = f64::max(SIGMA_PER_MAD * median_size(off[low..high].iter().copied()), 0.5 * overall);
+            // If most samples lie on a line, the noise estimate is invalid; use the spread.
+            let share = if noise > 0.0 && !mostly_repeats { limits.outlier_spread_share } else { 2.0 };
+            let least = f64::max(limits.outlier_noise_ratio * noise, share * spread).max(f64::MIN_POSITIVE);
             for i in from..to {
                 if off[i].abs() > 0.5 * least {
                     let nearby = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n);
-                    let usual = TIMES_NEIGHBOURS * middle_size(nearby.map(|k| self.outside(k)));
+                    let usual = limits.outlier_neighbour_ratio * median_size(nearby.map(|k| self.outside(k)));
                     let usual = usual.max(self.least_at_an_end(i, least));
-                    apart.push(Apart { sample: i, times: self.outside(i) / least.max(usual) });
+                    far.push(FarSample { sample: i, times: self.outside(i) / least.max(usual) });
                 }
             }
             from = to;
         }
-        apart
+        far
     }
 
-    /// Whether sample `i` and its neighbours are a pulse of the torque.
     fn is_pulse(&self, i: usize) -> bool {
-        let beside = |k: &usize| self.signed(i, *k) / self.signed(i, i) > SHARE_OF_PULSE;
-        let before = (0..i).rev().take(SIDE_BY_SIDE).take_while(beside).count();
-        let behind = (i + 1..self.x.len()).take(SIDE_BY_SIDE).take_while(beside).count();
-        before + 1 + behind >= SIDE_BY_SIDE
+        let beside = |k: &usize| self.signed(i, *k) / self.signed(i, i) > MIN_PULSE_SHARE;
+        let before = (0..i).rev().take(PULSE_SAMPLES).take_while(beside).count();
+        let behind = (i + 1..self.x.len()).take(PULSE_SAMPLES).take_while(beside).count();
+        before + 1 + behind >= PULSE_SAMPLES
     }
 }
 
-/// Where outliers begin, for distances in units of the least that one can have: at one, or twice as far, and so on,
-/// until more lie behind the limit than between it and its half. What errors of the recorder do stands apart from the
-/// noise; a noise with long tails thins out.
-pub(super) fn limit_of(distances: impl Iterator<Item = f64>) -> f64 {
+/// Smallest power of two (at least 1) with more `distances` above it than between its half and itself. Distances are
+/// in units of the minimum distance of an outlier. Recorder errors are separated from the noise by a gap; noise with
+/// long tails has none.
+pub(super) fn gap_limit(distances: impl Iterator<Item = f64>) -> f64 {
     let distances: Vec<f64> = distances.collect();
     let mut limit = 1.0;
     loop {
@@ -194,8 +177,8 @@ pub(super) fn limit_of(distances: impl Iterator<Item = f64>) -> f64 {
     }
 }
 
-/// From the least to the largest of what the medians at -8, -3, 3 and 8 suggest at 0: the lines through those before
-/// and those behind, the cubic through all.
+/// Range of the estimates at 0 from the medians at -8, -3, 3 and 8: the line through the first two, the line through
+/// the last two, and the cubic through all.
 fn usual_range(values: [f64; 4], smooth: f64) -> core::ops::Range<f64> {
     let [far, before, behind, beyond] = values;
     let suggested = [before + 0.6 * (before - far), behind + 0.6 * (behind - beyond), smooth];
@@ -203,8 +186,8 @@ fn usual_range(values: [f64; 4], smooth: f64) -> core::ops::Range<f64> {
     low..suggested.iter().fold(f64::NEG_INFINITY, |high, value| high.max(*value))
 }
 
-/// What stands in place of outliers: the line between the nearest samples that are none.
-pub(super) fn bridged(x: &mut [f64], marked: &[usize]) {
+/// Replaces the marked samples by the line between the nearest samples that are not marked.
+pub(super) fn interpolate_marked(x: &mut [f64], marked: &[usize]) {
     let mut at = 0;
     while at < marked.len() {
         let mut last = at;
@@ -223,9 +206,9 @@ pub(super) fn bridged(x: &mut [f64], marked: &[usize]) {
     }
 }
 
-/// The middle one of the values' sizes `|x|`; zero of none.
-pub(super) fn middle_size(values: impl Iterator<Item = f64>) -> f64 {
-    // Bits of numbers without a sign stand in the numbers' order, and compare faster.
+/// Median of the absolute values; zero without values.
+pub(super) fn median_size(values: impl Iterator<Item = f64>) -> f64 {
+    // The bits of nonnegative floats have the order of the floats and compare faster.
     let mut sizes: Vec<u64> = values.map(|value| value.abs().to_bits()).collect();
     if sizes.is_empty() {
         return 0.0;
@@ -237,7 +220,7 @@ pub(super) fn middle_size(values: impl Iterator<Item = f64>) -> f64 {
 fn median_of_five(x: &[f64]) -> f64 {
     let (a, b) = (x[0].min(x[1]), x[0].max(x[1]));
     let (c, d) = (x[2].min(x[3]), x[2].max(x[3]));
-    // The smaller of the two minima and the larger of the two maxima are not the middle.
+    // The smaller minimum and the larger maximum are not the median.
     let (low, high) = (a.max(c), b.min(d));
     low.min(high).max(low.max(high).min(x[4]))
 }
@@ -251,7 +234,7 @@ mod tests {
         let mut sorted = x.to_vec();
         sorted.sort_by(f64::total_cmp);
         let spread = sorted[19 * x.len() / 20] - sorted[x.len() / 20];
-        outliers(x, 0..x.len(), spread)
+        outliers(x, 0..x.len(), spread, &CleaningSettings::default())
     }
 
     /// Torque with gravity, inertia and dry friction.
@@ -273,10 +256,10 @@ mod tests {
         let n = 20_000;
         let noise = normal(7, n);
         let clean: Vec<f64> = (0..n).map(|i| torque(i) + 0.1 * noise[i]).collect();
-        // Two normal samples in ten million stand off by eight deviations of the whole rule.
+        // Normal noise exceeds eight deviations in two of ten million samples.
         assert!(found(&clean).is_empty(), "{:?}", found(&clean));
         let pick = normal(8, n);
-        // The upper twentieth of a normal sample.
+        // The upper 5 % of a normal sample.
         let spoilt: Vec<usize> = (0..n).filter(|i| pick[*i] > 1.645).collect();
         let mut x = clean;
         for &i in &spoilt {
@@ -284,14 +267,14 @@ mod tests {
         }
         let found = found(&x);
         assert!(found.iter().all(|i| spoilt.contains(i)), "{} of {}", found.len(), spoilt.len());
-        // Three of five neighbours are outliers themselves in a thousandth of the groups.
+        // In 0.1 % of the groups, three of five neighbours are outliers.
         assert!(found.len() as f64 > 0.97 * spoilt.len() as f64, "{} of {}", found.len(), spoilt.len());
     }
 
     #[test]
-    fn ends_on_a_slope_are_none_and_an_outlier_at_an_end_is_found() {
+    fn ends_on_a_slope_are_valid_and_an_outlier_at_an_end_is_found() {
         for from in (0..4000).step_by(37) {
-            // Without the step of dry friction: of a step some samples before an end only one side is there.
+            // Without dry friction: for a step close to an end, samples exist on one side only.
             let smooth = |i: usize| torque(i) - 4.0 * (1.3 * i as f64 * 0.004).sin().signum();
             let mut x: Vec<f64> = (from..from + 300).map(smooth).collect();
             assert!(found(&x).is_empty(), "{from}: {:?}", found(&x));
@@ -302,20 +285,20 @@ mod tests {
     }
 
     #[test]
-    fn long_tails_thin_out_and_outliers_stand_apart() {
+    fn long_tails_are_kept_and_isolated_outliers_are_found() {
         let n = 20_000;
         let (a, b) = (normal(13, n), normal(14, n));
-        // Student's t with one and a half degrees of freedom or so: a normal over a power of another.
+        // Heavy tails, close to Student's t with 1.5 degrees of freedom: a normal over a power of another.
         let mut x: Vec<f64> = (0..n).map(|i| torque(i) + 0.1 * a[i] / b[i].abs().powf(0.7).max(0.01)).collect();
         let few = found(&x).len();
-        // A thousandth stands off by eight deviations; what is flagged is the farthest few.
+        // About 0.1 % of the samples exceed eight deviations; only the farthest are flagged.
         assert!(few < 10, "{few}");
         x[777] = 1e9;
         assert!(found(&x).contains(&777));
     }
 
     #[test]
-    fn coloured_noise_exact_torque_steps_and_steps_of_a_current_are_none() {
+    fn coloured_noise_exact_torque_steps_and_oscillations_are_kept() {
         let n = 20_000;
         let noise = normal(3, n);
         let mut last = 0.0;
@@ -333,12 +316,12 @@ mod tests {
         assert!(found(&(0..n).map(torque).collect::<Vec<f64>>()).is_empty());
         let quantised: Vec<f64> = (0..n).map(|i| ((torque(i) + 0.02 * noise[i]) / 0.5).round() * 0.5).collect();
         assert!(found(&quantised).is_empty());
-        // A controller that swings in during the first samples, as a Panda's does.
+        // A controller that oscillates during the first samples, as on a Panda.
         let swing = [-11.0, 8.0, -6.0, 5.5, -5.0, -9.0, 4.0, 1.0];
         let swings: Vec<f64> =
             (0..500).map(|i| 0.3 * torque(i) + swing.get(i).copied().unwrap_or(0.02 * noise[i])).collect();
         assert!(found(&swings).is_empty(), "{:?}", found(&swings));
-        // A blow that fades within some samples.
+        // An impact that decays within a few samples.
         let blow = |i: usize| if i % 700 < 8 && i > 8 { 6.0 * (-0.3 * (i % 700) as f64).exp() } else { 0.0 };
         let blows: Vec<f64> = (0..3000).map(|i| torque(i) + 0.02 * noise[i] + blow(i)).collect();
         assert!(found(&blows).is_empty(), "{:?}", found(&blows));

@@ -1,27 +1,26 @@
-//! What was set aside of a log, and an example of each.
+//! Samples rejected from a log, with an example of each kind.
 
 use crate::log::{Quantity, RawBlock};
 use serde::{Deserialize, Serialize};
 
-/// Why samples were set aside.
+/// Reason why samples were rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Reason {
-    /// A torque far from those before and behind it: left out of torque and regressor alike.
+    /// Torque far from its neighbours: left out of torque and regressor.
     Outlier,
-    /// A torque that is repeated while its joint moves: left out of torque and regressor alike.
+    /// Torque that is repeated while its joint moves: left out of torque and regressor.
     Held,
-    /// A torque that is cut off at an extreme of its channel while its joint moves: left out of torque and regressor
-    /// alike.
+    /// Torque clipped at an extreme of its channel while its joint moves: left out of torque and regressor.
     Saturated,
-    /// A position that no motion makes: replaced by the cubic through its neighbours.
+    /// Single position that deviates from its neighbours: replaced by the cubic through them.
     Spike,
 }
 
 impl Reason {
-    /// What it is found in.
+    /// Channel in which it is found.
     pub fn channel(self) -> Quantity {
         match self {
             Self::Outlier | Self::Held | Self::Saturated => Quantity::Torque,
@@ -30,60 +29,59 @@ impl Reason {
     }
 }
 
-/// Samples of one channel of one joint that were set aside.
+/// Rejected samples of one channel of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SetAside {
-    /// What it measures.
+    /// Channel.
     pub channel: Quantity,
-    /// The joint.
+    /// Joint name.
     pub joint: String,
-    /// Why.
+    /// Reason.
     pub reason: Reason,
-    /// How many samples.
+    /// Number of samples.
     pub samples: u64,
-    /// In how many places: runs of a held or saturated torque, else as many as samples.
+    /// Number of runs of a held or saturated torque; otherwise the number of samples.
     pub places: u64,
-    /// Their share of the rows used, 0 to 1.
+    /// Share of the rows used, 0 to 1.
     pub share: f64,
-    /// 0-based data row in the file of the one that stands off farthest; of a held or saturated torque, of the first.
+    /// 0-based data row in the file of the sample that deviates most; for held or saturated torque, of the first
+    /// sample.
     pub row: u64,
-    /// Its time, in seconds after the first data row of the file.
+    /// Time of that row, in seconds after the first data row of the file.
     pub time_s: f64,
-    /// Its value (SI).
+    /// Value of that sample (SI).
     pub value: f64,
-    /// What its neighbours suggest (SI).
+    /// Value estimated from its neighbours (SI).
     pub expected: f64,
 }
 
 impl SetAside {
-    /// What was found, as a sentence.
     pub(crate) fn sentence(&self) -> String {
         let Self { samples, places, row, time_s, value, expected, .. } = self;
         let share = 100.0 * self.share;
         match self.reason {
             Reason::Outlier => format!(
-                "{samples} samples ({share:.2} %) stand far off those before and behind them, e.g. {value:.4} for about \
-                 {expected:.4} at {time_s:.3} s (row {row}); they are left out of torque and regressor alike"
+                "{samples} samples ({share:.2} %) stand far off those before and behind them, e.g. {value:.4} for \
+                 about {expected:.4} at {time_s:.3} s (row {row}); they are left out of torque and regressor"
             ),
             Reason::Held => format!(
-                "is repeated {places} times while the joint moves, {samples} samples ({share:.2} %) in all, e.g. {value:.4} \
-                 from {time_s:.3} s (row {row}) on; they are left out of torque and regressor alike"
+                "is repeated {places} times while the joint moves, {samples} samples ({share:.2} %) in all, e.g. \
+                 {value:.4} from {time_s:.3} s (row {row}) on; they are left out of torque and regressor"
             ),
             Reason::Saturated => format!(
-                "saturated: stands {places} times at an extreme of the channel while the joint moves, {samples} samples \
-                 ({share:.2} %) in all, e.g. at {value:.4} from {time_s:.3} s (row {row}) on; they are left out of torque \
-                 and regressor alike"
+                "saturated: constant at an extreme of the channel {places} times while the joint moves, {samples} \
+                 samples ({share:.2} %) in all, e.g. {value:.4} from {time_s:.3} s (row {row}) on; they are left out \
+                 of torque and regressor"
             ),
             Reason::Spike => format!(
-                "{samples} samples ({share:.2} %) stand alone, e.g. {value:.6} for about {expected:.6} at {time_s:.3} s \
-                 (row {row}); they are replaced by what their neighbours say"
+                "{samples} single samples ({share:.2} %) are spikes, e.g. {value:.6} instead of about {expected:.6} at \
+                 {time_s:.3} s (row {row}); they are replaced by interpolation"
             ),
         }
     }
 }
 
-/// Counts what is set aside.
 #[derive(Clone, Debug)]
 pub(super) struct Tally {
     joints: Vec<String>,
@@ -96,7 +94,7 @@ impl Tally {
         Self { joints: joints.to_vec(), rows: 0, found: Vec::new() }
     }
 
-    /// One sample of `block`: its value and what its neighbours suggest.
+    /// Adds one sample of `block`: its value and the estimate from its neighbours.
     pub(super) fn add(
         &mut self,
         place: (usize, Reason),
@@ -108,7 +106,7 @@ impl Tally {
         self.add_run(place, block, index, values, (samples, samples));
     }
 
-    /// Some samples, and how many places begin with them.
+    /// Adds `samples` samples in `places` new runs.
     pub(super) fn add_run(
         &mut self,
         (joint, reason): (usize, Reason),
@@ -134,7 +132,6 @@ impl Tally {
         }
     }
 
-    /// All of it, by joint.
     pub(super) fn all(&self) -> Vec<SetAside> {
         let mut all = self.found.clone();
         all.sort_by_key(|(joint, found)| (*joint, found.reason as u8));

@@ -1,82 +1,77 @@
-//! Single positions that no motion makes.
+//! Finds and replaces single positions that no motion can cause.
 
-use super::outliers::{limit_of, middle_size};
+use super::CleaningSettings;
+use super::outliers::{MIN_SAMPLES, NOISE_WINDOW, SIGMA_PER_MAD, gap_limit, median_size};
 use crate::quantisation::{quantisation_step, usual_change};
 
-/// Samples to either side that a judgement needs.
-pub(super) const REACH: usize = 4;
-/// Robust standard deviations of the fourth difference that a spike has to stand off.
-const TIMES_NOISE: f64 = 12.0;
-/// Samples over which the noise is taken to be alike.
-const NOISE_SPAN: usize = 512;
-/// How closely the fourth differences around a spike have to be its own (RMS), as a share of the largest; those of a
-/// kink differ by a sixth.
-const ALIKE: f64 = 0.08;
-/// The same where noise of three deviations would allow more.
-const ALIKE_IN_NOISE: f64 = 0.14;
-/// Least size in steps of a quantised encoder.
-const QUANTA: f64 = 3.5;
-const NORMAL: f64 = 1.4826;
-const FEWEST: usize = 64;
-/// With more spikes than this share they are the nature of the signal.
-const LARGEST_SHARE: f64 = 0.05;
+const REACH: usize = 4;
+/// Maximum RMS deviation of the fourth differences around a spike from the pattern of a spike, as a share of the
+/// largest; for a kink it is a sixth.
+const MAX_PATTERN_ERROR: f64 = 0.08;
+/// The same limit where three standard deviations of the noise exceed it.
+const MAX_PATTERN_ERROR_IN_NOISE: f64 = 0.14;
 
-/// Replaces lone spikes of `own` (a part of `x`) by the cubic through their four neighbours and returns their places.
+/// Replaces single spikes of `own` (a range of `x`) by the cubic through their four neighbours and returns their
+/// indices.
 ///
-/// The fourth difference of a lone spike A is `A (1, -4, 6, -4, 1)`, of a jump `A (1, -3, 3, -1)`, of a kink
-/// `A (1, -2, 1)`: a spike is known by its pattern, so that neither a jump of the angle nor an acceleration that begins
-/// at once is taken for one. It has to stand off by twelve robust standard deviations of the fourth differences nearby.
-pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec<usize> {
+/// The fourth difference of a spike A is `A (1, -4, 6, -4, 1)`, of a jump `A (1, -3, 3, -1)`, of a kink `A (1, -2, 1)`.
+/// This pattern distinguishes a spike from a jump of the angle or a sudden acceleration. Its size must exceed twelve
+/// robust standard deviations of the fourth differences nearby.
+pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>, limits: &CleaningSettings) -> Vec<usize> {
     let n = x.len();
-    if n < FEWEST {
+    if n < MIN_SAMPLES {
         return Vec::new();
     }
     let fourth = |x: &[f64], i: usize| {
-        // Differences of differences: positions far from zero keep their digits.
+        // Differences of differences keep the digits of positions far from zero.
         let d = [x[i - 1] - x[i - 2], x[i] - x[i - 1], x[i + 1] - x[i], x[i + 2] - x[i + 1]];
         (d[3] - d[2]) - 2.0 * (d[2] - d[1]) + (d[1] - d[0])
     };
     let all: Vec<f64> = (2..n - 2).map(|i| fourth(x, i)).collect();
-    let overall = NORMAL * middle_size(all.iter().copied());
-    // Place, size, distance in units of the least, and whether it is the pattern of a spike.
+    let overall = SIGMA_PER_MAD * median_size(all.iter().copied());
+    // Index, size, ratio to the minimum size, and whether the pattern is that of a spike.
     let mut apart: Vec<(usize, f64, f64, bool)> = Vec::new();
     let inside = own.start.max(REACH)..own.end.min(n - REACH);
-    let half = NOISE_SPAN / 2;
+    let half = NOISE_WINDOW / 2;
     let mut from = inside.start;
     while from < inside.end {
         let to = (from + half).min(inside.end);
         let (low, high) = (from.saturating_sub(half / 2 + 2), (to + half / 2 - 2).min(all.len()));
-        let noise = NORMAL * middle_size(all[low..high].iter().copied());
-        let least = TIMES_NOISE * f64::max(noise, 0.5 * overall);
+        let noise = SIGMA_PER_MAD * median_size(all[low..high].iter().copied());
+        let least = limits.spike_noise_ratio * f64::max(noise, 0.5 * overall);
         for i in from..to {
             let at = |k: usize| all[i + k - 4];
             let peak = at(2);
             let size = peak.abs();
-            // A rounded sum of doubles is no spike.
+            // Ignore rounding errors.
             if size <= 0.5 * least || size <= 1e-12 * x[i].abs() || (0..5).any(|k| at(k).abs() > size) {
                 continue;
             }
             let rest = [at(0) - peak / 6.0, at(1) + peak / 1.5, at(3) + peak / 1.5, at(4) - peak / 6.0];
             let rest = (0.25 * rest.iter().map(|rest| rest * rest).sum::<f64>()).sqrt();
-            let is_lone = rest < f64::max(ALIKE * size, (3.0 / TIMES_NOISE * least).min(ALIKE_IN_NOISE * size));
+            let is_lone = rest
+                < f64::max(
+                    MAX_PATTERN_ERROR * size,
+                    (3.0 / limits.spike_noise_ratio * least).min(MAX_PATTERN_ERROR_IN_NOISE * size),
+                );
             apart.push((i, peak / 6.0, size / least, is_lone));
         }
         from = to.max(from + 1);
     }
-    // Other roughness as large as that speaks against spikes: a motion with noise of long tails.
-    let limit = limit_of(apart.iter().map(|(_, _, times, is_lone)| if *is_lone { *times } else { times.min(1.0) }));
+    // Other roughness of the same size indicates noise with long tails, not spikes.
+    let limit = gap_limit(apart.iter().map(|(_, _, times, is_lone)| if *is_lone { *times } else { times.min(1.0) }));
     let lone = apart.into_iter().filter(|(_, _, times, is_lone)| *is_lone && *times > limit);
     let mut found: Vec<(usize, f64)> = lone.map(|(i, size, ..)| (i, size)).collect();
-    if found.is_empty() || found.len() as f64 > LARGEST_SHARE * own.len() as f64 {
+    if found.is_empty() || found.len() as f64 > limits.max_spike_share * own.len() as f64 {
         return Vec::new();
     }
     if let Some(step) = quantisation_step(x) {
-        found.retain(|(_, size)| size.abs() > QUANTA * step);
+        found.retain(|(_, size)| size.abs() > limits.spike_steps * step);
     }
-    // At rest a count of the encoder to and fro is none.
+    // At rest, single encoder counts back and forth are not spikes.
     found.retain(|(i, size)| {
-        let nearby = &x[i.saturating_sub(NOISE_SPAN / 4)..(i + NOISE_SPAN / 4).min(n)];
-        usual_change(nearby).is_none_or(|change| size.abs() > QUANTA * change)
+        let nearby = &x[i.saturating_sub(NOISE_WINDOW / 4)..(i + NOISE_WINDOW / 4).min(n)];
+        usual_change(nearby).is_none_or(|change| size.abs() > limits.spike_steps * change)
     });
     for &(i, _) in &found {
         x[i] = (4.0 * (x[i - 1] + x[i + 1]) - x[i - 2] - x[i + 2]) / 6.0;
@@ -88,6 +83,11 @@ pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec
 mod tests {
     use super::*;
     use crate::derivative::test_signals::normal;
+
+    fn replaced(x: &mut [f64]) -> Vec<usize> {
+        let all = 0..x.len();
+        replace_spikes(x, all, &CleaningSettings::default())
+    }
 
     fn motion(i: usize) -> f64 {
         let t = i as f64 * 0.002;
@@ -101,14 +101,14 @@ mod tests {
             let noise = normal(5, n);
             let clean: Vec<f64> = (0..n).map(|i| motion(i) + sigma * noise[i]).collect();
             let mut x = clean.clone();
-            assert!(replace_spikes(&mut x, 0..n).is_empty(), "{sigma}");
+            assert!(replaced(&mut x).is_empty(), "{sigma}");
             let places = [700, 1500, 1510, 3333];
             for &i in &places {
                 x[i] += if i % 2 == 0 { spike } else { -spike };
             }
-            assert_eq!(replace_spikes(&mut x, 0..n), places, "{sigma}");
+            assert_eq!(replaced(&mut x), places, "{sigma}");
             for i in 0..n {
-                // The cubic's own noise is below σ, and its bias 9 h⁴ of the fourth derivative: 1e-9.
+                // The cubic's noise is below σ; its bias is 9 h⁴ times the fourth derivative: 1e-9.
                 assert!((x[i] - clean[i]).abs() < 8.0 * sigma + 1e-8, "{sigma} {i}");
             }
         }
@@ -121,7 +121,7 @@ mod tests {
         let kink = |i: usize| motion(i) + (i as f64 - 2500.0).max(0.0) * 1e-4;
         let starts = |i: usize| (i as f64 - 2500.0).max(0.0).powi(2) * 1e-5;
         let encoder = |i: usize| (motion(i) / 1e-3).round() * 1e-3;
-        // A joint at rest on the edge of a count, printed with five digits.
+        // A joint at rest between two encoder counts, printed with five digits.
         let digits = |x: f64| format!("{x:.4e}").parse::<f64>().unwrap();
         let rest = |i: usize| {
             digits(
@@ -131,7 +131,7 @@ mod tests {
         let signals: [&dyn Fn(usize) -> f64; 5] = [&jump, &kink, &starts, &encoder, &rest];
         for (which, signal) in signals.into_iter().enumerate() {
             let mut x: Vec<f64> = (0..n).map(signal).collect();
-            assert_eq!(replace_spikes(&mut x, 0..n), Vec::<usize>::new(), "{which}");
+            assert_eq!(replaced(&mut x), Vec::<usize>::new(), "{which}");
         }
     }
 }

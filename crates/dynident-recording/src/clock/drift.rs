@@ -1,49 +1,46 @@
-//! Stamps that jitter about a rate that changes slowly: local lines through them, and how far an even grid drifts off.
+//! Time stamps that jitter about a slowly varying rate: local lines through them, and their drift from an even grid.
 
-/// Windows that are tried, rows to either side.
-const HALVES: [usize; 10] = [4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048];
-/// A longer window is taken as long as it predicts left-out stamps within this of the best one.
-const NEARLY_BEST: f64 = 1.05;
-/// Steps by which an even grid has to drift off before it counts: less is no more than the place within a step.
-const LEAST_DRIFT: f64 = 1.0;
-/// Share by which the rate has to vary (RMS). Velocities are wrong by this share and inertias by twice of it.
-const LEAST_VARIATION: f64 = 1e-3;
-/// Rows on either side of a jump that have to agree that it lasts.
-const AGREEING: usize = 8;
-/// The least jump, in steps, that counts as missing rows.
-const LEAST_JUMP: f64 = 0.6;
+use super::settings::ClockSettings;
+
+/// Half widths of the windows that are tried, rows.
+const HALF_WIDTHS: [usize; 10] = [4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048];
+/// A longer window is accepted while its error for left-out stamps is within this factor of the minimum.
+const MAX_ERROR_RATIO: f64 = 1.05;
+/// Rows on either side of a jump that must show that it lasts.
+const JUMP_ROWS: usize = 8;
+/// Minimum jump that indicates missing rows, steps.
+const MIN_JUMP_STEPS: f64 = 0.6;
 
 /// Rows needed on either side of a block to smooth the block's stamps.
-pub(crate) const MARGIN: usize = HALVES[HALVES.len() - 1] + 2 * AGREEING;
+pub(crate) const CONTEXT_ROWS: usize = HALF_WIDTHS[HALF_WIDTHS.len() - 1] + 2 * JUMP_ROWS;
 
-/// How far stamps stray from an even grid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drift {
-    /// Rows to either side of the local lines.
+    /// Half width of the local lines, rows.
     pub(crate) half: usize,
-    /// Largest less smallest distance of the smoothed stamps from the even grid through them, in steps.
+    /// Range of the deviations of the smoothed stamps from the even grid, steps.
     pub(crate) steps: f64,
-    /// RMS of the rate's relative variation.
+    /// RMS of the relative variation of the rate.
     pub(crate) variation: f64,
 }
 
-/// The windows, rows to either side, that come into question: the longest of those that predict left-out stamps about
-/// best, and all longer ones. None for fewer than 64 rows.
+/// Candidate half widths, rows: the longest window with nearly the minimum error for left-out stamps, and all longer
+/// windows. Empty for fewer than 64 rows.
 pub(crate) fn windows(place: &[f64], stamp: &[f64], begins: &[bool]) -> &'static [usize] {
     if place.len() < 64 {
         return &[];
     }
     let begins = with_jumps(place, stamp, begins);
-    let errors: Vec<f64> = HALVES.iter().map(|half| left_out_error(place, stamp, &begins, *half)).collect();
+    let errors: Vec<f64> = HALF_WIDTHS.iter().map(|half| left_out_error(place, stamp, &begins, *half)).collect();
     let least = errors.iter().fold(f64::INFINITY, |least, error| least.min(*error));
-    // Exact stamps have no error at any window: the floor is a millionth of a step.
-    let allowed = (NEARLY_BEST * least).max(1e-6);
-    &HALVES[errors.iter().rposition(|error| *error <= allowed).unwrap_or(HALVES.len())..]
+    // Exact stamps have zero error for any window, hence the floor of a millionth of a step.
+    let allowed = (MAX_ERROR_RATIO * least).max(1e-6);
+    &HALF_WIDTHS[errors.iter().rposition(|error| *error <= allowed).unwrap_or(HALF_WIDTHS.len())..]
 }
 
 impl Drift {
-    /// Of rows `place` (their numbers) with stamps `stamp` (in steps), smoothed by local lines through `half` rows to
-    /// either side; `begins` marks the first row of a piece. At least two rows.
+    /// Drift of rows `place` (row numbers) with stamps `stamp` (in steps), smoothed by local lines of half width
+    /// `half`; `begins` marks the first row of each piece. Needs at least two rows.
     pub(crate) fn of(place: &[f64], stamp: &[f64], begins: &[bool], half: usize) -> Self {
         let begins = with_jumps(place, stamp, begins);
         let smooth = smoothed_runs(place, stamp, &begins, half);
@@ -61,33 +58,32 @@ impl Drift {
             square += ((smooth[i] - smooth[i - span]) / rows - 1.0).powi(2);
             count += 1.0;
         }
-        // Jumps within a piece are missing rows: the rate of an even grid is wrong by the whole step there.
+        // Jumps within a piece are missing rows, where the rate of an even grid is wrong by the whole step.
         let jumps =
             (1..place.len()).filter(|&i| begins[i]).map(|i| stamp[i] - stamp[i - 1] - (place[i] - place[i - 1]));
-        let jumps: f64 = jumps.filter(|jump| jump.abs() < AGREEING as f64).map(|jump| jump * jump).sum();
+        let jumps: f64 = jumps.filter(|jump| jump.abs() < JUMP_ROWS as f64).map(|jump| jump * jump).sum();
         let variation = (square / f64::max(count, 1.0) + jumps / place.len() as f64).sqrt();
         Self { half, steps: high - low, variation }
     }
 
-    /// Whether an even grid would be wrong.
-    pub(crate) fn matters(&self) -> bool {
-        self.steps > LEAST_DRIFT && self.variation > LEAST_VARIATION
+    pub(crate) fn exceeds(&self, limits: &ClockSettings) -> bool {
+        self.steps > limits.min_drift_steps && self.variation > limits.min_rate_variation
     }
 }
 
-/// The stamps smoothed by local lines through `half` of them to either side; never across the begin of a piece, nor
-/// across a jump that lasts: there rows are missing.
+/// The stamps smoothed by local lines of half width `half`, separately for each piece and between lasting jumps
+/// (missing rows).
 pub(crate) fn smoothed(place: &[f64], stamp: &[f64], begins: &[bool], half: usize) -> Vec<f64> {
     smoothed_runs(place, stamp, &with_jumps(place, stamp, begins), half)
 }
 
-/// Distance of stamps from the line with one step a row that lies nearest, piece by piece.
+/// Deviation of stamps from the grid of one step per row, piece by piece.
 fn off_grid(place: &[f64], stamp: &[f64], begins: &[bool]) -> Vec<f64> {
-    // Jumps belong to the drift, gaps and stamps that run backwards do not: there a new grid begins.
+    // Jumps are part of the drift; a new grid starts at gaps and at stamps that go backwards.
     let mut off: Vec<f64> = place.iter().zip(stamp).map(|(place, stamp)| stamp - place).collect();
     let mut shift = 0.0;
     for i in 0..off.len() {
-        if i > 0 && begins[i] && (off[i] - shift - off[i - 1]).abs() >= AGREEING as f64 {
+        if i > 0 && begins[i] && (off[i] - shift - off[i - 1]).abs() >= JUMP_ROWS as f64 {
             shift = off[i] - off[i - 1];
         }
         off[i] -= shift;
@@ -95,21 +91,21 @@ fn off_grid(place: &[f64], stamp: &[f64], begins: &[bool]) -> Vec<f64> {
     off
 }
 
-/// Pieces cut further where a jump lasts.
+/// Starts of pieces, with lasting jumps added.
 fn with_jumps(place: &[f64], stamp: &[f64], begins: &[bool]) -> Vec<bool> {
     let off: Vec<f64> = place.iter().zip(stamp).map(|(place, stamp)| stamp - place).collect();
     let n = off.len();
     let mut cut = begins.to_vec();
     for i in 1..n {
         let jump = off[i] - off[i - 1];
-        // Rows can be missing; stamps that fall back only catch up.
-        if cut[i] || jump < LEAST_JUMP {
+        // A backward jump is not a missing row.
+        if cut[i] || jump < MIN_JUMP_STEPS {
             continue;
         }
-        let from = (i.saturating_sub(AGREEING)..i).rev().find(|k| begins[*k]).unwrap_or(i.saturating_sub(AGREEING));
-        let to = (i + 1..n.min(i + AGREEING)).find(|k| begins[*k]).unwrap_or(n.min(i + AGREEING));
+        let from = (i.saturating_sub(JUMP_ROWS)..i).rev().find(|k| begins[*k]).unwrap_or(i.saturating_sub(JUMP_ROWS));
+        let to = (i + 1..n.min(i + JUMP_ROWS)).find(|k| begins[*k]).unwrap_or(n.min(i + JUMP_ROWS));
         let lasting = median(&off[i..to]) - median(&off[from..i]);
-        cut[i] = lasting > f64::max(LEAST_JUMP, 0.7 * jump);
+        cut[i] = lasting > f64::max(MIN_JUMP_STEPS, 0.7 * jump);
     }
     cut
 }
@@ -124,13 +120,12 @@ fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// A local line at one row: its value there, and the weight of the row's own stamp in it.
+/// A local line at one row: its value, and the weight of the row's stamp in it.
 struct LocalLine {
     value: f64,
     own: f64,
 }
 
-/// Hands the local line at every row to `see`.
 fn local_lines(place: &[f64], stamp: &[f64], begins: &[bool], half: usize, mut see: impl FnMut(usize, LocalLine)) {
     let n = place.len();
     let mut start = 0;
@@ -172,8 +167,8 @@ fn smoothed_runs(place: &[f64], stamp: &[f64], begins: &[bool], half: usize) -> 
     smooth
 }
 
-/// RMS error with which a stamp follows from the line through its neighbours alone. Source: the left-out residual of a
-/// linear smoother, `e / (1 - h)`; Wahba, Spline Models for Observational Data (1990), 4.2.
+/// RMS error of the prediction of a stamp from its neighbours. Source: the left-out residual of a linear smoother,
+/// `e / (1 - h)`; Wahba, Spline Models for Observational Data (1990), 4.2.
 fn left_out_error(place: &[f64], stamp: &[f64], begins: &[bool], half: usize) -> f64 {
     let (mut square, mut count) = (0.0, 0.0_f64);
     local_lines(place, stamp, begins, half, |i, line| {
@@ -203,10 +198,10 @@ mod tests {
         let wander = |x: f64| 40.0 * (x / 900.0).sin();
         let stamp: Vec<f64> = place.iter().map(|x| x + wander(*x) + noise(*x as usize)).collect();
         let drift = Drift::of(&place, &stamp, &begins, windows(&place, &stamp, &begins)[0]);
-        assert!(drift.matters() && (70.0..90.0).contains(&drift.steps), "{drift:?}");
+        assert!(drift.exceeds(&ClockSettings::default()) && (70.0..90.0).contains(&drift.steps), "{drift:?}");
         let smooth = smoothed(&place, &stamp, &begins, drift.half);
         let worst = (200..5800).map(|i| (smooth[i] - place[i] - wander(place[i])).abs()).fold(0.0, f64::max);
-        // Jitter of 0.17 steps RMS over some tens of rows, and the wander's curvature over them.
+        // Jitter of 0.17 steps RMS averaged over tens of rows, and the curvature of the drift over them.
         assert!(worst < 0.1, "{worst} over {}", drift.half);
     }
 
@@ -218,10 +213,10 @@ mod tests {
             Drift::of(&place, stamp, &begins, half)
         };
         let stamp: Vec<f64> = place.iter().map(|x| x + noise(*x as usize)).collect();
-        assert!(!best(&stamp).matters());
+        assert!(!best(&stamp).exceeds(&ClockSettings::default()));
         let stamp: Vec<f64> = place.iter().map(|x| x + (x / 300.0).floor() + 0.3 * noise(*x as usize)).collect();
         let drift = best(&stamp);
-        assert!(drift.matters(), "{drift:?}");
+        assert!(drift.exceeds(&ClockSettings::default()), "{drift:?}");
         let smooth = smoothed(&place, &stamp, &begins, drift.half);
         for i in (299..5900).step_by(300) {
             assert!((smooth[i + 1] - smooth[i] - 2.0).abs() < 0.15, "{i}: {} {}", smooth[i], smooth[i + 1]);

@@ -1,71 +1,59 @@
-//! From rows with stamps to pieces of samples on a uniform clock.
+//! Converts rows with time stamps to pieces of samples on a uniform clock.
 //!
-//! [`Clock`] is the decision about the rate, and whether the stamps, the stamps smoothed (`drift`) or the even spacing
-//! are to be believed. The `Timeline` gives each row its place by it, the `Segmenter` cuts a stream of rows at gaps,
-//! and its `Resampler` puts each piece on a grid of its own.
+//! [`Clock`] is the decision on the rate and on the times of the samples: stamps, smoothed stamps (`drift`) or even
+//! spacing. The `Timeline` assigns each row its place, the `Segmenter` cuts the rows at gaps, and its `Resampler`
+//! interpolates each piece on a separate grid.
 
 mod drift;
 mod resampler;
 pub(crate) mod segments;
+mod settings;
 pub(crate) mod timeline;
+
+pub use settings::ClockSettings;
 
 use drift::{Drift, smoothed, windows};
 
 use crate::log::ClockRule;
 use serde::{Deserialize, Serialize};
 
-/// Jitter below which the question of the clock is idle: standard deviation of the steps over their mean. At 0.1 % of a
-/// step the position error of a wrong decision is a thousandth of the motion within one step.
-pub(crate) const NEGLIGIBLE_JITTER: f64 = 1e-3;
+/// Minimum distance of two stamps, as a share of the mean step. The second of two closer stamps is mostly noise and is
+/// ignored in the interpolation.
+pub(crate) const MIN_STEP_RATIO: f64 = 0.1;
 
-/// Stamps closer together than this part of the mean step carry no information beside the noise: the second is left out
-/// when stamps are interpolated.
-pub(crate) const SHORTEST_STEP: f64 = 0.1;
-
-/// Share by which one spacing has to predict positions better than another to be believed.
-const CLEARLY: f64 = 0.1;
-
-/// Share of rows with equal stamps that have the positions of the one before where rows are repeated.
-const MOST_REPEAT: f64 = 0.9;
-
-/// What the first rows say about the clock.
+/// Properties of the clock, estimated from the first rows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Clock {
-    /// Samples per second on the uniform grid.
+    /// Sample rate of the uniform grid, Hz.
     pub rate_hz: f64,
-    /// Whether samples count as evenly spaced (the stamps only gave the mean rate).
+    /// Whether samples are treated as evenly spaced (only the mean rate is taken from the stamps).
     pub uniform: bool,
-    /// Median step in seconds.
+    /// Median step, s.
     pub median_step_s: f64,
-    /// Whether rows whose stamp equals the one before repeat it: they are no samples. Otherwise such stamps are
-    /// rounded, and their rows are as far apart as all others.
+    /// Whether a row with the same stamp as the previous row is a copy of it and is ignored. Otherwise equal stamps are
+    /// rounded, and their rows have the usual spacing.
     #[serde(default)]
     pub repeats_rows: bool,
-    /// RMS error with which each position follows from its four neighbours by a cubic, relative to the motion, if the
-    /// spacing is taken as even; `None` if the question was idle.
+    /// RMS error of the cubic prediction of each position from its four neighbours, relative to the motion, for even
+    /// spacing; `None` if it was not needed.
     pub misfit_uniform: Option<f64>,
-    /// The same if the stamps are believed.
+    /// The same for the stamps.
     pub misfit_stamps: Option<f64>,
-    /// Steps by which the stamps, smoothed, stray from an even grid (largest less smallest); `None` if the question was
-    /// idle.
+    /// Range of the deviation of the smoothed stamps from an even grid, steps; `None` if it was not needed.
     #[serde(default)]
     pub drift_steps: Option<f64>,
-    /// Rows over which stamps are smoothed by local lines; 0 if they are not.
+    /// Number of rows over which stamps are smoothed by local lines; 0 if they are not smoothed.
     #[serde(default)]
     pub smoothing_rows: usize,
-    /// The decision in a sentence.
+    /// The decision in one sentence.
     pub evidence: String,
 }
 
-/// Where samples stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Spacing {
-    /// At equal steps.
     Even,
-    /// At the stamps.
     Stamps,
-    /// At the stamps smoothed by local lines.
     Smoothed,
 }
 
@@ -81,27 +69,29 @@ impl Clock {
 
 /// Decides on the clock from the stamps `time_s` and positions `q` (one slice for each joint) of the first rows.
 ///
-/// Rule: with a jitter below [`NEGLIGIBLE_JITTER`] spacing is even. Otherwise two questions. *Do single stamps tell
-/// when their samples were taken?* Every sample is predicted from its four neighbours by the cubic through them, once
-/// at even spacing and once at the stamps; where sampling was regular and only the stamps jitter (a time taken after
-/// transmission), the first predicts better, and the other way round. Stamps are believed if they predict at least 10 %
-/// better. *Does the rate change slowly?* No cubic over five samples can tell, and noise of the position hides jitter
-/// besides; but stamps that stray ever further from an even grid do. Where they stray by more than a step, and the rate
-/// varies by more than 0.1 %, samples stand at the stamps smoothed by local lines, over as many rows as predict
-/// left-out stamps best: the drift is followed, jitter is averaged out.
+/// With a jitter below [`negligible_jitter`](ClockSettings::negligible_jitter) spacing is even. Otherwise:
 ///
-/// Equal stamps: where such rows repeat the positions of the one before and others do not, rows are repeated and take
-/// no time. Otherwise stamps are rounded to more than a step, and the mean step counts every row.
+/// 1. Does each stamp show when its sample was taken? Every sample is predicted from its four neighbours by the cubic
+///    through them, at even spacing and at the stamps. If only the stamps jitter (a time taken after transmission),
+///    even spacing predicts better. The stamps are used if they predict at least 10 % better.
+/// 2. Does the rate change slowly? A cubic over five samples cannot show this. If the smoothed stamps deviate from an
+///    even grid by more than a step and the rate varies by more than 0.1 %, the smoothed stamps are used. The smoothing
+///    window minimises the prediction error of left-out stamps, so that the drift is followed and jitter averaged out.
 ///
-/// Steps are the unit throughout, so nothing depends on the unit of time. `Err` holds the reason why no rate follows.
+/// Equal stamps: if such rows repeat the positions of the previous row and others do not, the rows are copies and take
+/// no time. Otherwise stamps are rounded to more than a step, and the mean step includes every row.
+///
+/// Steps are the unit throughout, so the result is independent of the unit of time. `Err` holds the reason why no rate
+/// can be determined.
 pub(crate) fn clock(
     rule: ClockRule,
     time_s: &[f64],
     row: &[u64],
     q: &[Vec<f64>],
     max_gap_steps: f64,
+    limits: &ClockSettings,
 ) -> Result<Clock, String> {
-    let steps = MeanStep::of(time_s, row, q, max_gap_steps)?;
+    let steps = MeanStep::of(time_s, row, q, max_gap_steps, limits.min_repeat_share)?;
     let MeanStep { mean_s, median_s, rounded, repeats_rows, .. } = steps;
     let rate_hz = mean_s.recip();
     let mut result = Clock {
@@ -115,49 +105,56 @@ pub(crate) fn clock(
         smoothing_rows: 0,
         evidence: String::new(),
     };
-    let share = steps.jitter_in_words(row.len());
-    if rule == ClockRule::Auto && steps.jitter < NEGLIGIBLE_JITTER {
+    let share = steps.describe_jitter(row.len());
+    if rule == ClockRule::Auto && steps.jitter < limits.negligible_jitter {
         result.evidence = format!("even spacing: {share} is negligible");
         return Ok(result);
     }
     let (uniform, stamps) = misfits(time_s, q, mean_s, max_gap_steps * median_s);
-    let drift = drift(time_s, row, q, rate_hz, max_gap_steps * median_s);
+    let drift = drift(time_s, row, q, rate_hz, max_gap_steps * median_s, limits);
     result.misfit_uniform = Some(uniform);
     result.misfit_stamps = Some(stamps);
     result.drift_steps = drift.map(|drift| drift.steps);
     let smoothing_rows = drift.map_or(0, |drift| 2 * drift.half + 1);
-    // Rounding alone makes stamps stray by what they are rounded to, either way.
+    // Rounded stamps deviate by the rounding step in either direction.
     let by_rounding = if rounded > 0 { 2.0 * median_s / mean_s } else { 0.0 };
-    let stamps_predict_better = stamps.partial_cmp(&((1.0 - CLEARLY) * uniform)) == Some(core::cmp::Ordering::Less);
+    let stamps_predict_better =
+        stamps.partial_cmp(&((1.0 - limits.min_improvement) * uniform)) == Some(core::cmp::Ordering::Less);
     (result.uniform, result.smoothing_rows) = match rule {
         ClockRule::Stamps => (false, 0),
         ClockRule::Smoothed => (false, smoothing_rows),
         ClockRule::Auto if stamps_predict_better => (false, 0),
-        ClockRule::Auto if drift.is_some_and(|drift| drift.matters() && drift.steps > by_rounding) => {
+        ClockRule::Auto if drift.is_some_and(|drift| drift.exceeds(limits) && drift.steps > by_rounding) => {
             (false, smoothing_rows)
         }
         ClockRule::Uniform | ClockRule::Auto => (true, 0),
     };
     let misfit = format!("misfit of a local cubic: {uniform:.3e} evenly spaced, {stamps:.3e} at the stamps ({share})");
-    result.evidence = decision_in_words(rule, &result, &misfit, drift);
+    result.evidence = describe_decision(rule, &result, &misfit, drift);
     Ok(result)
 }
 
-/// The steps between successive rows, without gaps.
+/// Steps between successive rows, without gaps.
 struct MeanStep {
     mean_s: f64,
     /// Median of the positive steps, gaps included.
     median_s: f64,
     /// Standard deviation over the mean.
     jitter: f64,
-    /// Stamps that equal the one before because they are rounded.
+    /// Number of stamps equal to the previous one because of rounding.
     rounded: usize,
-    /// Whether stamps that equal the one before belong to rows that repeat it.
+    /// Whether rows with the previous stamp are copies of the previous row.
     repeats_rows: bool,
 }
 
 impl MeanStep {
-    fn of(time_s: &[f64], row: &[u64], q: &[Vec<f64>], max_gap_steps: f64) -> Result<Self, String> {
+    fn of(
+        time_s: &[f64],
+        row: &[u64],
+        q: &[Vec<f64>],
+        max_gap_steps: f64,
+        min_repeat_share: f64,
+    ) -> Result<Self, String> {
         let successive = || (1..time_s.len()).filter(|i| row[*i] == row[i - 1] + 1);
         let all = successive().map(|i| time_s[i] - time_s[i - 1]);
         let mut steps: Vec<f64> = all.filter(|step| *step > 0.0 && step.is_finite()).collect();
@@ -168,7 +165,7 @@ impl MeanStep {
         let median_s = steps[steps.len() / 2];
         let usual = &steps[..steps.partition_point(|step| *step <= max_gap_steps * median_s)];
         let equal: Vec<usize> = successive().filter(|i| time_s[*i] == time_s[i - 1]).collect();
-        let repeats_rows = !equal.is_empty() && repeat_the_one_before(q, &equal, successive());
+        let repeats_rows = !equal.is_empty() && repeats_rows(q, &equal, successive(), min_repeat_share);
         let rounded = if repeats_rows { 0 } else { equal.len() };
         let usual = [&vec![0.0; rounded], usual].concat();
         let count = usual.len() as f64;
@@ -181,20 +178,18 @@ impl MeanStep {
         Ok(Self { mean_s, median_s, jitter: deviation / mean_s, rounded, repeats_rows })
     }
 
-    /// The jitter, and how many of the stamps are rounded.
-    fn jitter_in_words(&self, stamps: usize) -> String {
+    fn describe_jitter(&self, stamps: usize) -> String {
         let by_rows = match self.rounded {
             0 => String::new(),
             rounded => {
-                format!("; {rounded} of {stamps} stamps equal the one before: they are rounded, and all rows count")
+                format!("; {rounded} of {stamps} stamps equal the one before: they are rounded, and all rows are used")
             }
         };
         format!("{:.3} % jitter{by_rows}", 100.0 * self.jitter)
     }
 }
 
-/// The decision in a sentence.
-fn decision_in_words(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option<Drift>) -> String {
+fn describe_decision(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option<Drift>) -> String {
     let spacing = match clock.spacing() {
         Spacing::Even => "even spacing".to_owned(),
         Spacing::Stamps => "stamps".to_owned(),
@@ -202,7 +197,7 @@ fn decision_in_words(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option
     };
     let strays = drift.map_or_else(String::new, |drift| {
         let Drift { steps, variation, .. } = drift;
-        format!("; the stamps stray {steps:.2} steps from an even grid, the rate varies by {:.2} %", 100.0 * variation)
+        format!("; the stamps drift {steps:.2} steps from an even grid, the rate varies by {:.2} %", 100.0 * variation)
     });
     match rule {
         ClockRule::Auto if clock.spacing() == Spacing::Smoothed => {
@@ -210,26 +205,33 @@ fn decision_in_words(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option
         }
         ClockRule::Auto => format!("{spacing}, decided by the {misfit}{strays}"),
         ClockRule::Uniform | ClockRule::Stamps | ClockRule::Smoothed => {
-            format!("{spacing}, as asked; {misfit}{strays}")
+            format!("{spacing}, as configured; {misfit}{strays}")
         }
     }
 }
 
-/// Whether the rows `equal` have the positions of the row before, while `all` rows mostly have not.
-fn repeat_the_one_before(q: &[Vec<f64>], equal: &[usize], all: impl Iterator<Item = usize>) -> bool {
+/// Whether the rows `equal` have the positions of the previous row, while most of `all` rows do not.
+fn repeats_rows(q: &[Vec<f64>], equal: &[usize], all: impl Iterator<Item = usize>, min_share: f64) -> bool {
     let is_same = |i: usize| q.iter().all(|q| q[i] == q[i - 1]);
     let share = |rows: &mut dyn Iterator<Item = usize>| {
         let (same, count) = rows.fold((0_u32, 0_u32), |(same, count), i| (same + u32::from(is_same(i)), count + 1));
         f64::from(same) / f64::from(count.max(1_u32))
     };
     let others = &mut all.filter(|i| equal.binary_search(i).is_err());
-    share(&mut equal.iter().copied()) > MOST_REPEAT && share(others) < 1.0 - MOST_REPEAT
+    share(&mut equal.iter().copied()) > min_share && share(others) < 1.0 - min_share
 }
 
-/// How far the stamps stray from an even grid; smoothed over as many rows as predict left-out stamps best, and over
-/// more as long as positions follow from their neighbours clearly worse than at even spacing: jitter that lasts for
-/// several rows (packets that come late together) is none of the rate.
-fn drift(time_s: &[f64], row: &[u64], q: &[Vec<f64>], rate_hz: f64, longest_step_s: f64) -> Option<Drift> {
+/// Drift of the stamps from an even grid. The smoothing window minimises the error for left-out stamps. It is enlarged
+/// while positions are predicted clearly worse than at even spacing, because jitter over several rows (packets that
+/// arrive late together) is not a change of the rate.
+fn drift(
+    time_s: &[f64],
+    row: &[u64],
+    q: &[Vec<f64>],
+    rate_hz: f64,
+    longest_step_s: f64,
+    limits: &ClockSettings,
+) -> Option<Drift> {
     let place: Vec<f64> = row.iter().map(|row| *row as f64).collect();
     let stamp: Vec<f64> = time_s.iter().map(|time_s| time_s * rate_hz).collect();
     let is_gap = |i: usize| {
@@ -242,14 +244,15 @@ fn drift(time_s: &[f64], row: &[u64], q: &[Vec<f64>], rate_hz: f64, longest_step
         found = Some(Drift::of(&place, &stamp, &begins, half));
         let smooth = smoothed(&place, &stamp, &begins, half);
         let (uniform, stamps) = misfits(&smooth, q, 1.0, longest_step_s * rate_hz);
-        if stamps <= (1.0 + CLEARLY) * uniform {
+        if stamps <= (1.0 + limits.min_improvement) * uniform {
             break;
         }
     }
     found
 }
 
-/// RMS misfit of the cubic through two neighbours on either side, over all joints in units of each joint's deviation.
+/// RMS misfit of the cubic through two neighbours on either side, over all joints, in units of each joint's standard
+/// deviation: at even spacing and at the stamps.
 fn misfits(time_s: &[f64], q: &[Vec<f64>], mean: f64, max_gap: f64) -> (f64, f64) {
     let (mut uniform, mut stamps, mut count) = (0.0, 0.0, 0.0);
     let scales: Vec<f64> = q.iter().map(|q| deviation(q)).collect();
@@ -258,7 +261,7 @@ fn misfits(time_s: &[f64], q: &[Vec<f64>], mean: f64, max_gap: f64) -> (f64, f64
         let times = [nodes[0], nodes[1], 0.0, nodes[2], nodes[3]];
         let usual = times.windows(2).all(|pair| {
             let step = pair[1] - pair[0];
-            step > SHORTEST_STEP * mean && step < max_gap
+            step > MIN_STEP_RATIO * mean && step < max_gap
         });
         if !usual {
             continue;
@@ -301,32 +304,35 @@ pub(crate) fn lagrange(at: f64, nodes: [f64; 4]) -> [f64; 4] {
 mod tests {
     use super::*;
 
-    /// Stamps with two decimals of a recorder at 125 Hz and 200 Hz: four steps of 10 ms for five rows, one for two. The
-    /// rate is that of the rows.
+    fn auto_clock(time_s: &[f64], row: &[u64], q: &[Vec<f64>]) -> Result<Clock, String> {
+        clock(ClockRule::Auto, time_s, row, q, 5.0, &ClockSettings::default())
+    }
+
+    /// Stamps with two decimals of a recorder at 125 Hz and 200 Hz: four steps of 10 ms for five rows, or one for two.
     #[test]
     fn rounded_stamps_keep_the_rate_of_the_rows() {
         for rate_hz in [125.0, 200.0, 1000.0] {
             let time: Vec<f64> = (0..2000).map(|i| (f64::from(i) / rate_hz * 100.0).round() / 100.0).collect();
             let q: Vec<f64> = (0..2000).map(|i| (f64::from(i) / rate_hz * 4.0).sin()).collect();
             let row: Vec<u64> = (0..2000).collect();
-            let found = clock(ClockRule::Auto, &time, &row, &[q], 5.0).unwrap();
+            let found = auto_clock(&time, &row, &[q]).unwrap();
             assert!((found.rate_hz / rate_hz - 1.0).abs() < 2e-3, "{rate_hz}: {found:?}");
             assert!(found.uniform && !found.repeats_rows, "{found:?}");
         }
     }
 
-    /// Rows that stand twice are no samples: the rate is that of the others. A robot at rest whose stamps are rounded
-    /// repeats its positions as well, and no row of it is another's copy.
+    /// Copied rows are ignored in the rate. A robot at rest with rounded stamps also repeats its positions, but its
+    /// rows are not copies.
     #[test]
-    fn repeated_rows_are_told_from_a_robot_at_rest() {
+    fn repeated_rows_are_distinguished_from_a_robot_at_rest() {
         let twice = |i: u32| f64::from(i / 2) * 0.008;
         let row: Vec<u64> = (0..2000).collect();
         let time: Vec<f64> = (0..2000).map(twice).collect();
         let q: Vec<f64> = time.iter().map(|t| (4.0 * t).sin()).collect();
-        let found = clock(ClockRule::Auto, &time, &row, &[q], 5.0).unwrap();
+        let found = auto_clock(&time, &row, &[q]).unwrap();
         assert!(found.repeats_rows && (found.rate_hz - 125.0).abs() < 1e-6, "{found:?}");
         let time: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.8).round() / 100.0).collect();
-        let found = clock(ClockRule::Auto, &time, &row, &[vec![0.7; 2000]], 5.0).unwrap();
+        let found = auto_clock(&time, &row, &[vec![0.7; 2000]]).unwrap();
         assert!(!found.repeats_rows && (found.rate_hz / 125.0 - 1.0).abs() < 2e-3, "{found:?}");
     }
 
@@ -343,37 +349,37 @@ mod tests {
         let at = |i: usize| if sampled_at_stamps { stamp(i) } else { even(i) };
         let q = vec![(0..n).map(|i| (at(i) * 4.0).sin()).collect::<Vec<f64>>()];
         let row: Vec<u64> = (0..n as u64).collect();
-        clock(ClockRule::Auto, &time, &row, &q, 5.0).unwrap()
+        auto_clock(&time, &row, &q).unwrap()
     }
 
     #[test]
-    fn the_data_tell_whether_stamps_or_samples_jitter() {
+    fn jitter_of_stamps_and_of_samples_is_distinguished() {
         assert!(decided(false).uniform, "{:?}", decided(false));
         assert!(!decided(true).uniform, "{:?}", decided(true));
         assert!((decided(true).rate_hz - 200.0).abs() < 0.1);
     }
 
-    /// The decision for samples taken at `taken(row)` steps and stamped `stamp(row)`, with noise of the position, in
-    /// units of time of which a second has `unit`.
+    /// The decision for samples taken at `taken(row)` steps and stamped `stamp(row)`, with position noise, for `unit`
+    /// time units per second.
     fn decided_in(unit: f64, sigma: f64, taken: impl Fn(usize) -> f64, stamp: impl Fn(usize) -> f64) -> Clock {
         let n = 20_000;
         let noise = crate::derivative::test_signals::normal(4, n);
         let q: Vec<f64> = (0..n).map(|i| (taken(i) * 0.002).sin() + sigma * noise[i]).collect();
         let time: Vec<f64> = (0..n).map(|i| stamp(i) * 0.001 * unit).collect();
         let row: Vec<u64> = (0..n as u64).collect();
-        clock(ClockRule::Auto, &time, &row, &[q], 5.0).unwrap()
+        auto_clock(&time, &row, &[q]).unwrap()
     }
 
     #[test]
     fn drift_is_followed_under_noise_that_hides_it_from_the_cubic() {
-        // Blocks of 500 rows at rates some percent apart.
+        // Blocks of 500 rows at rates that differ by some percent.
         let rate = |block: usize| 1.0 + 0.06 * (block as f64 * 2.4).sin();
         let taken = |i: usize| (0..i / 500).map(|b| 500.0 * rate(b)).sum::<f64>() + (i % 500) as f64 * rate(i / 500);
         for unit in [1e-3, 1.0, 1e3] {
             for sigma in [0.0, 1e-4] {
                 let found = decided_in(unit, sigma, taken, |i| taken(i) + jitter(i));
                 assert_eq!(found.spacing(), Spacing::Smoothed, "{unit} {sigma}: {found:?}");
-                // Nothing depends on the unit of time.
+                // The result is independent of the unit of time.
                 let other = decided_in(1.0, sigma, taken, |i| taken(i) + jitter(i));
                 assert_eq!(found.smoothing_rows, other.smoothing_rows, "{unit} {sigma}");
             }
@@ -395,8 +401,8 @@ mod tests {
     }
 
     #[test]
-    fn no_rate_follows_from_a_clock_that_stands() {
-        assert!(clock(ClockRule::Auto, &[0.0; 5], &[0, 1, 2, 3, 4], &[], 5.0).is_err());
-        assert!(clock(ClockRule::Auto, &[0.0], &[0], &[], 5.0).is_err());
+    fn a_stopped_clock_has_no_rate() {
+        assert!(auto_clock(&[0.0; 5], &[0, 1, 2, 3, 4], &[]).is_err());
+        assert!(auto_clock(&[0.0], &[0], &[]).is_err());
     }
 }

@@ -1,18 +1,17 @@
-//! Channels on a uniform grid: copied where samples stand on it, interpolated by local cubics where they do not.
+//! Interpolates channels to a uniform grid: samples on the grid are copied, others interpolated by local cubics.
 
-use super::{SHORTEST_STEP, lagrange};
+use super::{MIN_STEP_RATIO, lagrange};
 
-/// Streams one uninterrupted segment of channels onto the grid `first + k`, time counted in steps.
+/// Streams one uninterrupted segment of channels onto the grid `first + k`, time in steps.
 ///
-/// Between samples it is the cubic through the two samples on either side (at the ends of the segment, through the four
-/// nearest): continuous, exact for cubics, error `(9/384) h⁴ |q''''|` at even spacing. A sample that stands within
-/// 1e-6 steps of a grid point is copied.
+/// Between samples it evaluates the cubic through the two samples on either side (at the ends of the segment, through
+/// the four nearest): continuous, exact for cubics, error `(9/384) h⁴ |q''''|` at even spacing. A sample within 1e-6
+/// steps of a grid point is copied.
 #[derive(Clone, Debug)]
 pub(crate) struct Resampler {
-    /// Stamps in steps, of the samples that are still needed.
+    /// Stamps of the samples that are still needed, in steps.
     stamps: Vec<f64>,
     channels: Vec<Vec<f64>>,
-    /// Next grid point.
     next: f64,
     /// Index of the last sample at or before the next grid point.
     at: usize,
@@ -23,8 +22,8 @@ impl Resampler {
         Self { stamps: Vec::new(), channels: vec![Vec::new(); channels], next: 0.0, at: 0 }
     }
 
-    /// Adds the samples of `columns` from `index` on at the stamps that `stamps` gives, up to one that does not stand
-    /// far enough behind the one before, as infinite stamps never do; returns how many were added.
+    /// Adds the samples of `columns` from `index` on, at `stamps`, up to the first stamp that is too close to the
+    /// previous one (never for infinite stamps); returns the number of added samples.
     pub(crate) fn push<'a>(
         &mut self,
         stamps: impl Iterator<Item = f64>,
@@ -35,7 +34,7 @@ impl Resampler {
         for stamp in stamps {
             match self.stamps.last() {
                 None => self.next = stamp,
-                Some(last) if stamp - last >= SHORTEST_STEP => {}
+                Some(last) if stamp - last >= MIN_STEP_RATIO => {}
                 Some(_) => break,
             }
             self.stamps.push(stamp);
@@ -50,7 +49,7 @@ impl Resampler {
     /// Appends to `out` every grid point that later samples cannot change, or all that remain if the segment `ended`.
     pub(crate) fn drain(&mut self, ended: bool, out: &mut [Vec<f64>]) {
         let n = self.stamps.len();
-        // Only differences of stamps enter the weights, so the origin does not matter.
+        // The weights contain only differences of stamps, so their origin is arbitrary.
         let ahead = if ended { 1 } else { 3 };
         while self.at + ahead <= n && (ended || n >= 4) {
             while self.at + 1 < n && self.stamps[self.at + 1] <= self.next + 1e-6 {
@@ -87,7 +86,7 @@ impl Resampler {
         }
     }
 
-    /// Samples from the one at work on that stand on successive grid points each, as many as `ahead` lets come now.
+    /// Number of samples from the current one that lie on successive grid points, limited by `ahead`.
     fn run_on_grid(&self, ahead: usize) -> usize {
         let mut next = self.next;
         let is_on_grid = |stamp: &&f64| {

@@ -1,8 +1,8 @@
-//! Uninterrupted pieces of a log, each on its own uniform grid.
+//! Splits a log into uninterrupted pieces, each on a separate uniform grid.
 
 use super::resampler::Resampler;
 
-/// Cuts a stream of rows where a piece begins and resamples each piece.
+/// Cuts a stream of rows at the start of each piece and resamples each piece.
 #[derive(Clone, Debug)]
 pub(crate) struct Segmenter {
     resampler: Resampler,
@@ -12,14 +12,13 @@ pub(crate) struct Segmenter {
     crowded: u64,
 }
 
-/// Some rows on their way to the grid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlacedRows<'a> {
-    /// Stamps in seconds.
+    /// Stamps, s.
     pub(crate) time_s: &'a [f64],
-    /// Places in steps.
+    /// Places, in steps.
     pub(crate) steps: &'a [f64],
-    /// Whether a row cannot follow the one before.
+    /// Whether a row starts a new piece.
     pub(crate) begins: &'a [bool],
 }
 
@@ -33,7 +32,6 @@ impl Segmenter {
         self.closed
     }
 
-    /// Time of the piece's first sample.
     pub(crate) fn first_time_s(&self) -> f64 {
         self.first.map_or(0.0, |(_, time_s)| time_s)
     }
@@ -43,13 +41,13 @@ impl Segmenter {
         self.first.map_or(0.0, |(first, _)| steps - first)
     }
 
-    /// Samples left out for standing too close to the one before.
+    /// Number of samples left out because they are too close to the previous one.
     pub(crate) fn crowded(&self) -> u64 {
         self.crowded
     }
 
-    /// Takes rows from `at` on until they end or the piece does; returns the row where it stopped. `columns` gives the
-    /// channels.
+    /// Takes rows from `at` on until the rows or the piece ends; returns the row where it stopped. `columns` returns
+    /// the channels.
     pub(crate) fn feed<'a, I: Iterator<Item = &'a Vec<f64>>>(
         &mut self,
         rows: PlacedRows<'_>,
@@ -67,7 +65,7 @@ impl Segmenter {
             let follow = rows.begins[index + 1..].iter().take_while(|begins| !**begins).count();
             let steps = &rows.steps[index..=index + follow];
             let added = self.resampler.push(steps.iter().map(|step| step - first), index, columns());
-            // What ended the run is one that stands too close.
+            // The sample that ended the run is too close to the previous one.
             self.crowded += u64::from(added < steps.len());
             index += (added + 1).min(steps.len());
             self.last = true;
@@ -76,7 +74,6 @@ impl Segmenter {
         rows.steps.len()
     }
 
-    /// Ends the piece: appends what is left of it to `out`.
     pub(crate) fn close(&mut self, out: &mut [Vec<f64>]) {
         if !self.closed {
             self.resampler.drain(true, out);
@@ -84,7 +81,6 @@ impl Segmenter {
         }
     }
 
-    /// Starts the next piece.
     pub(crate) fn reopen(&mut self) {
         self.closed = false;
         self.first = None;

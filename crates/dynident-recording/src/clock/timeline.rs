@@ -1,45 +1,40 @@
-//! Where rows stand on the time axis, in steps of the even grid, and where a piece of the log ends.
+//! Places rows on the time axis, in steps of the even grid, and finds where a piece of the log ends.
 
-use super::drift::{MARGIN, smoothed};
+use super::drift::{CONTEXT_ROWS, smoothed};
 use super::{Clock, Spacing};
 use crate::log::RawBlock;
 
-/// Rows before and after a block that its places depend on.
-const AROUND: usize = MARGIN;
+/// Maximum gap that is kept in the places, steps (eleven days at 1 kHz). A longer one is a wrong stamp, and places
+/// after it would lose precision.
+const MAX_GAP_STEPS: f64 = 1e9;
 
-/// Longest gap that places keep, in steps: eleven days at a kilohertz. Behind a longer one, which only a wrong stamp
-/// makes, they would lose their fractions.
-const LONGEST_GAP: f64 = 1e9;
+/// Number of rows within which the stamps after a late packet are on time again.
+const MAX_LATE_ROWS: usize = 32;
 
-/// Rows within which late packets have caught up.
-const LATE_ROWS: usize = 32;
-
-/// The places of a block's rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Places {
     /// Steps of the even grid since the log's first row.
     pub(crate) steps: Vec<f64>,
-    /// Whether a row cannot follow the one before: behind a gap, or earlier than it.
+    /// Whether a row starts a new piece: after a gap, or with an earlier stamp than the previous row.
     pub(crate) begins: Vec<bool>,
-    /// Rows behind a hole that is longer than a gap and can be bridged.
+    /// Rows after a hole that is longer than a gap and can be filled.
     pub(crate) holes: Vec<usize>,
 }
 
-/// Gives rows their places as they come.
 #[derive(Clone, Debug)]
 pub(crate) struct Timeline {
     clock: Clock,
     longest_step_s: f64,
     longest_step_rows: f64,
-    /// Longest hole that is bridged, in steps.
+    /// Maximum hole that is filled, steps.
     bridged_steps: f64,
-    /// Number, stamp in seconds and whether a piece begins, of the last rows.
+    /// Number, stamp in seconds and whether a piece starts, of the last rows.
     past: Vec<(u64, f64, bool)>,
     last: Option<(u64, f64, f64)>,
 }
 
 impl Timeline {
-    /// On `clock`; a step longer than `max_gap_steps` median steps is a gap, but for holes of at most `bridged_steps`.
+    /// A step longer than `max_gap_steps` median steps is a gap, except holes of at most `bridged_steps` steps.
     pub(crate) fn new(clock: &Clock, max_gap_steps: f64, bridged_steps: f64) -> Self {
         Self {
             clock: clock.clone(),
@@ -51,7 +46,6 @@ impl Timeline {
         }
     }
 
-    /// The places of the rows of `block`, which `next` follows.
     pub(crate) fn places(&mut self, block: &RawBlock, next: Option<&RawBlock>) -> Places {
         let (rate, n) = (self.clock.rate_hz, block.rows());
         let mut places = Places { steps: Vec::with_capacity(n), begins: vec![false; n], holes: Vec::new() };
@@ -68,8 +62,8 @@ impl Timeline {
                     } else if is_gap {
                         places.holes.push(index);
                     }
-                    let even = match (is_gap && hole < LONGEST_GAP, self.clock.repeats_rows && time == 0.0) {
-                        // No time has passed: the row is left out for standing where the one before does.
+                    let even = match (is_gap && hole < MAX_GAP_STEPS, self.clock.repeats_rows && time == 0.0) {
+                        // A copy of the previous row has the same place and is left out.
                         (_, true) => 0.0,
                         (true, false) => hole.round().max(rows),
                         (false, false) => rows,
@@ -88,17 +82,17 @@ impl Timeline {
         places
     }
 
-    /// Whether a stamp that comes late is followed by ones that make up for it: a packet that was late, not a gap. One
-    /// later than all the rows that could make up for it is no packet's, but a gap or a wrong number.
+    /// Whether a late stamp is caused by a late packet, not by a gap: later stamps are on time again within
+    /// `MAX_LATE_ROWS` rows.
     fn catches_up(&self, last_row: u64, last_s: f64, block: &RawBlock, index: usize, next: Option<&RawBlock>) -> bool {
         let late = (block.time_s[index] - last_s) * self.clock.rate_hz;
-        // Rows that are repeated come twice in their time: they would make up for any gap.
-        if self.clock.spacing() == Spacing::Stamps || self.clock.repeats_rows || late > LATE_ROWS as f64 {
+        // Repeated rows come at twice the rate and would compensate any gap.
+        if self.clock.spacing() == Spacing::Stamps || self.clock.repeats_rows || late > MAX_LATE_ROWS as f64 {
             return false;
         }
         let own = block.row[index..].iter().zip(&block.time_s[index..]);
         let further = next.into_iter().flat_map(|next| next.row.iter().zip(&next.time_s));
-        own.chain(further).skip(1).take(LATE_ROWS).any(|(&row, &time_s)| {
+        own.chain(further).skip(1).take(MAX_LATE_ROWS).any(|(&row, &time_s)| {
             let late = (time_s - last_s) * self.clock.rate_hz - (row - last_row) as f64;
             time_s >= last_s && late < 1.0
         })
@@ -112,7 +106,7 @@ impl Timeline {
         rows.extend_from_slice(&own);
         if let Some(next) = next {
             let mut last = own.last().map(|(row, time_s, _)| (*row, *time_s));
-            for (&row, &time_s) in next.row.iter().zip(&next.time_s).take(AROUND) {
+            for (&row, &time_s) in next.row.iter().zip(&next.time_s).take(CONTEXT_ROWS) {
                 let begins = last.is_some_and(|(last_row, last_s)| {
                     let hole = f64::max((row - last_row) as f64, (time_s - last_s) * rate);
                     time_s < last_s || hole > f64::max(self.bridged_steps, self.longest_step_s * rate)
@@ -127,7 +121,7 @@ impl Timeline {
         let smooth = smoothed(&numbers, &stamps, &begins, self.clock.smoothing_rows / 2);
         places.steps.copy_from_slice(&smooth[self.past.len()..self.past.len() + own.len()]);
         self.past.extend(own);
-        let unneeded = self.past.len().saturating_sub(AROUND);
+        let unneeded = self.past.len().saturating_sub(CONTEXT_ROWS);
         self.past.drain(..unneeded);
     }
 }
@@ -135,17 +129,17 @@ impl Timeline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clock::clock;
+    use crate::clock::{ClockSettings, clock};
     use crate::log::ClockRule;
 
-    /// A hole of ten samples in a log whose rows stand twice is a gap: the repeated rows behind it are no late packet.
+    /// A hole of ten samples in a log with repeated rows is a gap; the repeated rows after it are not a late packet.
     #[test]
-    fn repeated_rows_make_up_for_no_gap() {
+    fn repeated_rows_do_not_hide_a_gap() {
         let sample = |row: usize| row / 2 + if row < 400 { 0 } else { 10 };
         let time_s: Vec<f64> = (0..800).map(|row| sample(row) as f64 * 0.008).collect();
         let row: Vec<u64> = (0..800).collect();
         let q: Vec<f64> = time_s.iter().map(|t| (3.0 * t).sin()).collect();
-        let clock = clock(ClockRule::Auto, &time_s, &row, &[q], 5.0).unwrap();
+        let clock = clock(ClockRule::Auto, &time_s, &row, &[q], 5.0, &ClockSettings::default()).unwrap();
         assert!(clock.repeats_rows, "{clock:?}");
         let block = RawBlock { row, time_s, ..RawBlock::default() };
         let places = Timeline::new(&clock, 5.0, 0.0).places(&block, None);

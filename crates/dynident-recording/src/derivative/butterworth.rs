@@ -1,13 +1,12 @@
-//! Butterworth low-passes, zero-phase and causal, and the exact central differences of what they leave.
+//! Butterworth low-pass filters, zero-phase and causal, with central differences of the filtered signal.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::FilterError;
 use crate::filter::sections::{Section, Triple, butterworth_low_pass, pole_radius, run};
 
-/// Transients at the end of a window fall below this part of the signal inside [`Differentiator::context_samples`].
-const TRANSIENT: f64 = 1e-15;
+/// Share of the signal below which transients at the end of a window fall inside [`Differentiator::context_samples`].
+const MAX_TRANSIENT_SHARE: f64 = 1e-15;
 
-/// The one-way filter that both share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Cascade {
     order: usize,
@@ -16,7 +15,7 @@ struct Cascade {
 
 impl Cascade {
     fn new(order: usize, cutoff_hz: f64) -> Result<Self, FilterError> {
-        // Any rate above twice the cut-off does for checking the two.
+        // Any rate above twice the cut-off validates order and cut-off.
         butterworth_low_pass(order, cutoff_hz, 4.0 * cutoff_hz)?;
         Ok(Self { order, cutoff_hz })
     }
@@ -25,8 +24,8 @@ impl Cascade {
         butterworth_low_pass(self.order, self.cutoff_hz, rate_hz)
     }
 
-    /// Length of the odd extension: three times the filter's length, as `sosfiltfilt` has it. It covers the reach of
-    /// the differences, which is three samples.
+    /// Length of the odd extension: three times the filter's length, as in `sosfiltfilt`. It exceeds the three samples
+    /// that the differences need.
     fn padding(&self) -> usize {
         3 * (self.order + 1)
     }
@@ -34,14 +33,13 @@ impl Cascade {
     fn context_samples(&self, rate_hz: f64) -> usize {
         let Ok(sections) = self.sections(rate_hz) else { return 0 };
         // The factor covers the amplification of transients by the cascade.
-        let decay = (TRANSIENT.ln() / pole_radius(&sections).ln()).abs();
+        let decay = (MAX_TRANSIENT_SHARE.ln() / pole_radius(&sections).ln()).abs();
         (1.3 * decay).ceil() as usize + self.padding()
     }
 }
 
-/// Puts the first and second differences of a signal beside it: d1[n] = x[n] - x[n-1], d2[n] = d1[n+1] - d1[n],
-/// constant before the start. The steady state in which a forward run starts is that of a constant, whose differences
-/// are zero.
+/// Adds the first and second differences of a signal: d1[n] = x[n] - x[n-1], d2[n] = d1[n+1] - d1[n], constant before
+/// the start. A forward run starts in the steady state of a constant, whose differences are zero.
 fn add_differences(signal: &mut [Triple]) {
     let last = signal.len() - 1;
     for n in (1..=last).rev() {
@@ -52,14 +50,13 @@ fn add_differences(signal: &mut [Triple]) {
     }
 }
 
-/// Runs the cascade forwards from the steady state of the first value. The run of d2 is one sample ahead of d1: its own
-/// history begins with d2[-1] = d1[0] - d1[-1] = 0.
+/// Runs the cascade forwards from the steady state of the first value. The run of d2 is one sample ahead of d1: its
+/// history starts with d2[-1] = d1[0] - d1[-1] = 0.
 fn run_forwards(sections: &[Section], signal: &mut [Triple]) {
     let start = signal[0][0];
     run(sections, signal, [start, 0.0, 0.0], false);
 }
 
-/// Runs the cascade backwards from the steady state of the last value.
 fn run_backwards(sections: &[Section], signal: &mut [Triple]) {
     let end = signal[signal.len() - 1][0];
     run(sections, signal, [end, 0.0, 0.0], true);
@@ -68,27 +65,27 @@ fn run_backwards(sections: &[Section], signal: &mut [Triple]) {
 /// A Butterworth low-pass run forwards and backwards, then differentiated.
 ///
 /// Filtered position: `scipy.signal.sosfiltfilt(butter(order, cutoff_hz, fs=rate_hz, output="sos"), q)`, with its odd
-/// extension by the default length at both ends. The amplitude is `1 / (1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`,
+/// extension of default length at both ends. The amplitude is `1 / (1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`,
 /// so one half at the cut-off.
 ///
-/// Derivatives: central differences of sixth order of the filtered signal y (its extension included, so that there is
-/// no one-sided formula at the ends), with δ²y = y₊ - 2y + y₋ and μδy = (y₊ - y₋)/2:
+/// Derivatives: central differences of sixth order of the filtered signal y (including its extension, so there is no
+/// one-sided formula at the ends), with δ²y = y₊ - 2y + y₋ and μδy = (y₊ - y₋)/2:
 ///
 /// `dq = rate · (μδ - μδ³/6 + μδ⁵/30) y`,  `ddq = rate² · (δ² - δ⁴/12 + δ⁶/90) y`
 ///
-/// The differences are not taken from y itself: first and second differences of q go through the same recursion beside
-/// q. That is the same by linearity, but rounding is then relative to the acceleration and not to the position, which
-/// is what a 5 kHz log needs (two differences of y would cost eight digits there).
+/// First and second differences of q pass through the same recursion as q. By linearity this equals differences of y,
+/// but the rounding error is relative to the acceleration, not to the position. A 5 kHz log needs this: two differences
+/// of y would cost eight digits.
 /// Source: Abramowitz and Stegun, Handbook of Mathematical Functions, 25.3; Gustafsson, IEEE Trans. Signal Process. 44
 /// (1996) 988.
 pub type ButterworthZeroPhase = Butterworth<true>;
 
 /// A Butterworth low-pass run forwards only, then differentiated by central differences of sixth order.
 ///
-/// Amplitude `1 / √(1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`, so 0.707 at the cut-off. q, dq and ddq all come late
-/// by the filter's delay; the torque does not, unless it passes [`smooth`](Differentiator::smooth) as
-/// well. A regressor that lags the torque by δ biases the fit by about ωδ at each frequency ω of the motion: this way
-/// stands here for comparison, and for logs whose torque was filtered the same way.
+/// Amplitude `1 / √(1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`, so 0.707 at the cut-off. The filter delays q, dq and
+/// ddq; the torque is delayed only if it passes [`smooth`](Differentiator::smooth) as well. A regressor that lags the
+/// torque by δ biases the fit by about ωδ at each frequency ω of the motion. Use this filter for comparison, and for
+/// logs whose torque was filtered in the same way.
 ///
 /// The run starts in the steady state of a point-mirrored extension of three filter lengths, as in
 /// [`ButterworthZeroPhase`].
@@ -111,12 +108,12 @@ impl<const BOTH_WAYS: bool> Butterworth<BOTH_WAYS> {
         Ok(Self { cascade: Cascade::new(order, cutoff_hz)? })
     }
 
-    /// The cut-off of one run: of both, the gain there is one half.
+    /// Cut-off of a single run; the gain of two runs is one half there.
     pub fn cutoff_hz(&self) -> f64 {
         self.cascade.cutoff_hz
     }
 
-    /// The filtered signal between its extensions of the returned length, with its differences if they are wanted.
+    /// The filtered signal with extensions of the returned length at both ends, optionally with its differences.
     fn filtered(&self, rate_hz: f64, signal: &[f64], differences: bool) -> Result<(Vec<Triple>, usize), FilterError> {
         self.check_length(signal.len())?;
         let (sections, pad) = (self.cascade.sections(rate_hz)?, self.cascade.padding());
@@ -126,8 +123,7 @@ impl<const BOTH_WAYS: bool> Butterworth<BOTH_WAYS> {
         }
         run_forwards(&sections, &mut signal);
         if BOTH_WAYS {
-            // Beyond the end the first difference is zero, so the second difference at the end is minus the first
-            // there.
+            // Beyond the end the first difference is zero, so the second difference at the end is minus the first one.
             let last = signal.len() - 1;
             signal[last][2] = -signal[last][1];
             run_backwards(&sections, &mut signal);
@@ -137,8 +133,8 @@ impl<const BOTH_WAYS: bool> Butterworth<BOTH_WAYS> {
 }
 
 impl LowPass {
-    /// Seconds by which a slow signal comes out late: the group delay at zero frequency. For an analogue Butterworth
-    /// filter of order n that is `Σ_k sin(π(2k+1)/2n) / (2π f_c)`, so 2.61/(2π f_c) for order 4.
+    /// Delay of a slow signal, s: the group delay at zero frequency. For an analogue Butterworth filter of order n it
+    /// is `Σ_k sin(π(2k+1)/2n) / (2π f_c)`, so 2.61/(2π f_c) for order 4.
     ///
     /// # Errors
     /// If the cut-off is not below half of `rate_hz`.
@@ -183,12 +179,12 @@ impl<const BOTH_WAYS: bool> Differentiator for Butterworth<BOTH_WAYS> {
     }
 }
 
-/// Value, first and second derivative at sample `n` from the signal with its backward first and central second
-/// differences: central differences of sixth order.
+/// Value, first and second derivative at sample `n` by central differences of sixth order, from the signal with its
+/// backward first and central second differences.
 fn sixth_order(signal: &[Triple], n: usize, rate_hz: f64) -> [f64; 3] {
     let d2 = |k: isize| signal[n.wrapping_add_signed(k)][2];
     let first = 0.5 * (signal[n][1] + signal[n + 1][1]);
-    // mu delta^3 and mu delta^5, delta^4 and delta^6 from second differences.
+    // μδ³, μδ⁵, δ⁴ and δ⁶ from second differences.
     let third = 0.5 * (d2(1) - d2(-1));
     let fifth = 0.5 * (d2(2) - 2.0 * d2(1) + 2.0 * d2(-1) - d2(-2));
     let fourth = d2(1) - 2.0 * d2(0) + d2(-1);
@@ -200,7 +196,7 @@ fn sixth_order(signal: &[Triple], n: usize, rate_hz: f64) -> [f64; 3] {
     ]
 }
 
-/// The signal with `pad` more on either side, point-mirrored at its end values: `2 x₀ - x_k`.
+/// The signal extended by `pad` samples on either side, point-mirrored at its end values: `2 x₀ - x_k`.
 fn extended(signal: &[f64], pad: usize) -> Vec<Triple> {
     let (first, last) = (signal[0], signal[signal.len() - 1]);
     let before = signal[1..=pad].iter().rev().map(|x| 2.0 * first - x);
@@ -222,7 +218,7 @@ mod tests {
         let (mut y, mut dy, mut ddy) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         filter.differentiate(rate, &q, Derivatives { q: &mut y, dq: &mut dy, ddq: &mut ddy }).unwrap();
         let omega = TAU * cutoff;
-        // Truncation of the sixth-order formulas: (omega h)^6 / 140 = 3e-8 and / 560 = 7e-9 of the derivative.
+        // Truncation of the sixth-order formulas: (ωh)⁶/140 = 3e-8 and /560 = 7e-9 of the derivative.
         for i in 800..1200 {
             let (sin, cos) = (omega * time(i)).sin_cos();
             assert!((y[i] - 0.5 * sin).abs() < 1e-10, "{i}: {}", y[i]);
@@ -239,7 +235,7 @@ mod tests {
         assert!(filter.smooth(20.0, &[0.0; 100], &mut [0.0; 100]).is_err());
         assert!(ButterworthZeroPhase::new(4, f64::NAN).is_err());
         assert!(ButterworthZeroPhase::new(0, 1.0).is_err());
-        // A cut-off with which no digit would be left.
+        // A cut-off too low for double precision.
         let slow = ButterworthZeroPhase::new(4, 1e-9).unwrap();
         assert!(slow.smooth(1000.0, &[0.0; 100], &mut [0.0; 100]).is_err());
         assert_eq!(slow.context_samples(1000.0), Some(0));
@@ -247,8 +243,8 @@ mod tests {
     }
 
     #[test]
-    fn a_sine_comes_out_with_the_filters_gain_and_phase() {
-        // An independent route: the transfer function as a product of analogue poles at the warped frequency.
+    fn a_sine_gets_the_gain_and_phase_of_the_filter() {
+        // Independent reference: the transfer function as a product of analogue poles at the warped frequency.
         let (rate, cutoff, frequency, n) = (500.0, 10.0, 6.0, 2000_usize);
         let x = (core::f64::consts::PI * frequency / rate).tan() / (core::f64::consts::PI * cutoff / rate).tan();
         let (mut gain, mut phase) = (1.0, 0.0);
@@ -264,7 +260,7 @@ mod tests {
         let mut out = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
         let [y, dy, ddy] = &mut out;
         filter.differentiate(rate, &q, Derivatives { q: y, dq: dy, ddq: ddy }).unwrap();
-        // Truncation of the sixth-order formulas: (omega h)^6 / 140 = 1.3e-9 of the derivative; transients have died by
+        // Truncation of the sixth-order formulas: (ωh)⁶/140 = 1.3e-9 of the derivative. Transients have decayed by
         // half-way.
         for i in 1000..1990 {
             let (sin, cos) = (omega * i as f64 / rate + phase).sin_cos();
@@ -278,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_comes_late_by_the_delay() {
+    fn a_ramp_is_delayed_by_the_group_delay() {
         let (rate, n) = (1000.0, 3000_usize);
         for order in 1..=8 {
             let filter = LowPass::new(order, 5.0).unwrap();

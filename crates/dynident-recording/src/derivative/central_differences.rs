@@ -1,22 +1,22 @@
-//! Central differences of order 2 to 8 of the positions as logged: no filter.
+//! Central differences of order 2 to 8 of the logged positions, without a filter.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::{FilterError, require};
 
-/// Finite differences on `order + 1` points, central inside, shifted at the two ends (the same points, weights for the
-/// place), so exact for polynomials of degree `order`. The position is passed through.
+/// Finite differences on `order + 1` points, central inside and one-sided at the ends, exact for polynomials of degree
+/// `order`. The position is not filtered.
 ///
 /// The weights come from Fornberg's recursion: Math. Comp. 51 (1988) 699. The first derivative of order 2 is
 /// `numpy.gradient(q, h, edge_order=2)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CentralDifferences {
     order: usize,
-    /// For the place p among the points: weights of first and second derivative at unit step.
+    /// Weights of the first and second derivative at unit step, for each place among the points.
     weights: Vec<[Vec<f64>; 2]>,
 }
 
 impl CentralDifferences {
-    /// Differences of accuracy `order`.
+    /// Creates differences of accuracy `order`.
     ///
     /// # Errors
     /// If `order` is not 2, 4, 6 or 8.
@@ -49,7 +49,7 @@ impl Differentiator for CentralDifferences {
             let from = i.saturating_sub(half).min(n - 1 - self.order);
             let [first, second] = &self.weights[i - from];
             let points = &q[from..=from + self.order];
-            // Differences to the sample itself: rounding is then relative to the motion, not to where it takes place.
+            // Differences to the sample itself make the rounding error relative to the motion, not to the position.
             let sum = |weights: &[f64]| weights.iter().zip(points).map(|(w, x)| w * (x - q[i])).sum::<f64>();
             out.q[i] = q[i];
             out.dq[i] = rate_hz * sum(first);
@@ -112,10 +112,10 @@ mod tests {
     }
 
     #[test]
-    fn noise_grows_as_the_closed_form_says() {
+    fn noise_gain_follows_the_closed_form() {
         let (rate, n) = (1000.0, 40_000);
         let out = differentiated(&CentralDifferences::new(2).unwrap(), rate, &normal(11, n));
-        // 1/(√2 dt) and √6/dt²; 40 000 samples of short memory: one deviation is below 1 %, 4 of them.
+        // 1/(√2 dt) and √6/dt². For 40 000 samples one standard deviation is below 1 %; four are allowed.
         assert!((rms(&out[1]) / (rate / 2.0_f64.sqrt()) - 1.0).abs() < 0.04);
         assert!((rms(&out[2]) / (rate * rate * 6.0_f64.sqrt()) - 1.0).abs() < 0.04);
     }

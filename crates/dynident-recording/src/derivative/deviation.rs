@@ -1,4 +1,4 @@
-//! Smoothing only what the joint does beside its reference.
+//! Smooths only the deviation of a joint from its reference.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges, add_sample};
 use super::reference_lag::{check_joint, check_max_lag, piece_lag};
@@ -6,16 +6,15 @@ use crate::error::FilterError;
 use crate::reference::Reference;
 use std::sync::Arc;
 
-/// `q = q_d + e`: any other differentiator smooths and differentiates the deviation e alone, and the reference's own
-/// derivatives are added exactly:
+/// `q = q_d + e`: another differentiator smooths and differentiates the deviation e, and the exact derivatives of the
+/// reference are added:
 ///
 /// `dq = dq_d + S{e}'`, `ddq = ddq_d + S{e}''`
 ///
-/// A linear smoother S takes `(1 - H) e` instead of `(1 - H) q`: its bias shrinks by the size of e against q, while its
-/// noise stays. Equal noise, less bias; or a lower cut-off, so less noise, at equal bias. With `max_lag_s` the
-/// reference is first shifted by the lag of the whole piece, so that a delay leaves nothing in e. Samples where a
-/// reference that does not rest at its ends has ended are marked.
-/// Source: this project's own.
+/// A linear smoother S attenuates `(1 - H) e` instead of `(1 - H) q`: its bias shrinks by the size of e relative to q,
+/// and its noise is unchanged. This gives less bias at equal noise, or a lower cut-off and less noise at equal bias.
+/// With `max_lag_s` the reference is first shifted by the lag of the whole piece, so that a delay does not contribute
+/// to e. Samples after the end of a reference that ends in motion are marked. Source: this project.
 #[derive(Debug)]
 pub struct Deviation {
     reference: Arc<Reference>,
@@ -24,7 +23,8 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// From `reference`, the deviation smoothed by `smoother`; with `max_lag_s` behind the joint's own lag.
+    /// Creates a differentiator that smooths the deviation from `reference` by `smoother`, after a lag of at most
+    /// `max_lag_s` if given.
     ///
     /// # Errors
     /// If `max_lag_s` is not positive and at most 60.
@@ -46,7 +46,6 @@ impl Differentiator for Deviation {
     }
 
     fn context_samples(&self, rate_hz: f64) -> Option<usize> {
-        // The lag depends on the whole piece.
         if self.max_lag_s.is_some() { None } else { self.smoother.context_samples(rate_hz) }
     }
 
@@ -61,8 +60,8 @@ impl Differentiator for Deviation {
             None => 0.0,
         };
         let time_s = |i: usize| place.time_s(i) - lag_s;
-        // Where the reference is not known, the deviation of the nearest sample where it is: a jump would reach into
-        // good samples.
+        // Where the reference is not known, repeat the deviation of the nearest known sample: a jump would disturb
+        // valid samples.
         let known: Vec<bool> = (0..q.len()).map(|i| self.reference.covers(place.joint, time_s(i))).collect();
         let mut deviation = vec![0.0; q.len()];
         let mut last = (0..q.len()).find(|&i| known[i]).unwrap_or(0);
@@ -109,11 +108,11 @@ mod tests {
         for (lag, max_lag_s) in [(0.0, None), (0.0, Some(0.2)), (0.11, Some(0.2))] {
             let exact: Vec<[f64; 3]> = (0..1300).map(|i| PATH.at(f64::from(i) / 100.0 - lag)).collect();
             let q: Vec<f64> = exact.iter().map(|x| x[0]).collect();
-            // A cut-off far below the motion: what it would take from q, it cannot take from e = 0.
+            // The cut-off is far below the motion, but the deviation is zero.
             let out = differentiated(&deviation(0.2, max_lag_s), 100.0, &q);
             for i in 0..1300 {
                 for order in 0..3 {
-                    // The lag is found to 1e-6 s at least, times the velocities.
+                    // The lag is accurate to 1e-6 s at least, multiplied by the velocities.
                     assert!((out[order][i] - exact[i][order]).abs() < 2e-5, "{order} {i}");
                 }
             }
@@ -121,8 +120,8 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_smoother_plus_what_the_smoother_does_to_the_reference() {
-        // Linearity: the noise is the smoother's, whatever the reference.
+    fn noise_is_smoothed_and_the_reference_is_exact() {
+        // By linearity the noise is that of the smoother, for any reference.
         let n = 1000;
         let noise: Vec<f64> = normal(2, n).iter().map(|e| 1e-3 * e).collect();
         let clean: Vec<f64> = (0..n).map(|i| PATH.at(i as f64 / 100.0)[0]).collect();
@@ -138,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sampled_reference_that_ends_in_motion_marks_what_comes_after() {
+    fn samples_after_a_reference_that_ends_in_motion_are_marked() {
         let times: Vec<f64> = (0..101).map(|i| f64::from(i) * 0.01).collect();
         let columns = [times.clone(), vec![1.0; 101], vec![0.0; 101]];
         let reference = Arc::new(Reference::sampled(&times, &[columns]).unwrap());

@@ -1,9 +1,9 @@
-//! From q to dq and ddq: the interface of every differentiator there is, and of those that a caller plugs in.
+//! Interface of differentiators from q to dq and ddq, also for differentiators of a caller.
 
 use crate::error::FilterError;
 use core::ops::Range;
 
-/// Where a differentiator writes: three slices of the input's length.
+/// Output slices of a differentiator, each of the input's length.
 #[derive(Debug)]
 pub struct Derivatives<'a> {
     /// Filtered position.
@@ -14,12 +14,12 @@ pub struct Derivatives<'a> {
     pub ddq: &'a mut [f64],
 }
 
-/// Which samples are looked at: differentiators that know the commanded motion need the joint and the time.
+/// Time and joint of the samples, for differentiators that use the commanded motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Samples per second.
+    /// Sample rate, Hz.
     pub rate_hz: f64,
-    /// The joint, in the order of the reference.
+    /// Joint index, in the order of the reference.
     pub joint: usize,
     /// Time of the first sample, seconds after the log's first row.
     pub first_time_s: f64,
@@ -31,16 +31,15 @@ impl Place {
         Self { rate_hz, joint: 0, first_time_s: 0.0 }
     }
 
-    /// Time of sample `i`.
+    /// Time of sample `i`, s.
     pub fn time_s(&self, i: usize) -> f64 {
         self.first_time_s + i as f64 / self.rate_hz
     }
 }
 
-/// Samples, as ascending ranges.
+/// Sample indices as ascending ranges.
 pub type SampleRanges = Vec<Range<usize>>;
 
-/// Appends sample `i` to ascending ranges.
 pub(crate) fn add_sample(ranges: &mut SampleRanges, i: usize) {
     match ranges.last_mut() {
         Some(last) if last.end >= i => last.end = last.end.max(i + 1),
@@ -48,21 +47,21 @@ pub(crate) fn add_sample(ranges: &mut SampleRanges, i: usize) {
     }
 }
 
-/// One differentiator: from uniformly sampled positions of one joint to filtered position, velocity and acceleration.
+/// Estimates filtered position, velocity and acceleration from uniformly sampled positions of one joint.
 ///
-/// A differentiator that states its [`context_samples`](Self::context_samples) works through a long log in pieces: a
-/// window with so many samples more on either side gives inside what the whole log would give. Ways that fit something
-/// to the whole piece, or estimate a lag over it, leave the default.
+/// A differentiator with finite [`context_samples`](Self::context_samples) processes a long log in pieces: with that
+/// number of extra samples on either side, a window gives the same result as the whole log. Methods that fit the whole
+/// piece, or estimate a lag over it, keep the default.
 ///
-/// Name, shortest signal and [`differentiate_at`](Self::differentiate_at) make a new differentiator. It need not be
-/// known to this crate: [`MotionStream::with_differentiator`](crate::MotionStream::with_differentiator) takes it as it
-/// is.
+/// A new differentiator needs a name, the minimum number of samples and
+/// [`differentiate_at`](Self::differentiate_at).
+/// [`MotionStream::with_differentiator`](crate::MotionStream::with_differentiator) accepts any implementation.
 ///
 /// ```
 /// use dynident_recording::{Derivatives, Differentiator, FilterError, Place, SampleRanges};
 /// use dynident_recording::{JointSamples, MotionBlock, MotionSettings, MotionStream};
 ///
-/// /// Backward differences: crude, and late by half a sample and by one.
+/// /// Backward differences: inaccurate, and delayed by half a sample and by one sample.
 /// #[derive(Debug)]
 /// struct Backward;
 ///
@@ -84,7 +83,7 @@ pub(crate) fn add_sample(ranges: &mut SampleRanges, i: usize) {
 ///             out.dq[i] = place.rate_hz * (q0 - q1);
 ///             out.ddq[i] = place.rate_hz * place.rate_hz * (q0 - 2.0 * q1 + q2);
 ///         }
-///         // The first two samples have no past: they are to be left out.
+///         // The first two samples have no previous samples: leave them out.
 ///         Ok(if place.first_time_s == 0.0 { vec![0..2; 1] } else { Vec::new() })
 ///     }
 /// }
@@ -102,31 +101,30 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
     /// Name as in the study file.
     fn name(&self) -> &'static str;
 
-    /// Shortest signal that it can be applied to.
+    /// Minimum signal length, samples.
     fn minimum_samples(&self) -> usize;
 
-    /// Samples on either side of a piece within which the ends of the window are felt (to 1e-12 of the signal);
-    /// `None` if every sample depends on the whole piece, which is the default.
+    /// Number of samples at either end of a window that depend on samples outside the window (by more than 1e-12 of the
+    /// signal); `None` (default) if every sample depends on the whole piece.
     fn context_samples(&self, rate_hz: f64) -> Option<usize> {
         let _ = rate_hz;
         None
     }
 
-    /// Fills `out` from the positions `q` at `place`; which joint it is, and when, matters only to differentiators that
-    /// follow a [`Reference`](crate::Reference).
+    /// Fills `out` from the positions `q` at `place`. Joint and time are used only by differentiators that follow a
+    /// [`Reference`](crate::Reference).
     ///
-    /// Returns the samples at which this differentiator does not apply: velocity and acceleration there mean nothing.
+    /// Returns the samples where velocity and acceleration are not valid.
     ///
     /// # Errors
-    /// [`FilterError`] if `q` is shorter than [`minimum_samples`](Self::minimum_samples) or the filter does not exist
-    /// at this rate.
+    /// [`FilterError`] if `q` is shorter than [`minimum_samples`](Self::minimum_samples) or the filter is invalid at
+    /// this rate.
     ///
     /// # Panics
     /// If a slice of `out` is shorter than `q`.
     fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError>;
 
-    /// Applies only the smoothing to another signal of the same clock (a torque), as it is applied to q; by default
-    /// there is none.
+    /// Applies the smoothing of q to another signal of the same clock (a torque); by default the signal is unchanged.
     ///
     /// # Errors
     /// As [`differentiate_at`](Self::differentiate_at).
@@ -136,8 +134,7 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
         Ok(())
     }
 
-    /// As [`differentiate_at`](Self::differentiate_at), the samples taken for those of the first joint from time zero
-    /// on.
+    /// Calls [`differentiate_at`](Self::differentiate_at) for the first joint from time zero on.
     ///
     /// # Errors
     /// As [`differentiate_at`](Self::differentiate_at).
@@ -145,7 +142,7 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
         self.differentiate_at(Place::start(rate_hz), q, out).map(drop)
     }
 
-    /// Refuses a signal that is shorter than [`minimum_samples`](Self::minimum_samples).
+    /// Checks that a signal has at least [`minimum_samples`](Self::minimum_samples) samples.
     ///
     /// # Errors
     /// [`FilterError::TooShort`].

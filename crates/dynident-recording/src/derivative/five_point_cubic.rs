@@ -1,4 +1,4 @@
-//! Five-point cubic smoothing of torque, low-pass filtered differences of position.
+//! Five-point cubic smoothing of the torque, and low-pass filtered differences of the position.
 
 use super::butterworth::ButterworthZeroPhase;
 use super::central_differences::CentralDifferences;
@@ -7,13 +7,13 @@ use super::savitzky_golay::SavitzkyGolay;
 use crate::error::{FilterError, require};
 
 /// Torque ([`smooth`](Differentiator::smooth)): the least-squares cubic on five points, `(-3, 12, 17, 12, -3)/35`,
-/// `passes` times, at the ends the first and last cubic's own values. Position: one zero-phase Butterworth filter of
-/// order 4 for q, dq and ddq, the latter by central differences of second order.
+/// `passes` times; at the ends, the values of the first and last cubic. Position: one zero-phase Butterworth filter of
+/// order 4 for q, dq and ddq, the latter two by central differences of second order.
 ///
-/// One pass has the gain `(17 + 24 cos ω - 6 cos 2ω)/35` at ω radians a sample: 1 - 3ω⁴/35 for slow signals, so each
-/// pass costs them nearly nothing; white noise keeps √(17/35) = 0.70 of its size in the first pass.
-/// Source: Zhang et al., as cited in the paper behind this project, for the combination (it does not say whether its
-/// low-pass is zero-phase); Savitzky and Golay, Anal. Chem. 36 (1964) 1627, table I, for the weights.
+/// One pass has the gain `(17 + 24 cos ω - 6 cos 2ω)/35` at ω rad per sample: 1 - 3ω⁴/35 for slow signals. White noise
+/// is reduced to √(17/35) = 0.70 in the first pass.
+/// Source: Zhang et al., as cited in the paper behind this project, for the combination (the phase of its low-pass is
+/// not given); Savitzky and Golay, Anal. Chem. 36 (1964) 1627, table I, for the weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FivePointCubic {
     cubic: SavitzkyGolay,
@@ -23,7 +23,7 @@ pub struct FivePointCubic {
 }
 
 impl FivePointCubic {
-    /// `passes` passes over the torque, and `cutoff_hz` for the derivatives.
+    /// Creates a smoother with `passes` passes over the torque and `cutoff_hz` for the derivatives.
     ///
     /// # Errors
     /// If `passes` is not 1 to 1000 or the cut-off is not positive.
@@ -53,7 +53,8 @@ impl Differentiator for FivePointCubic {
     }
 
     fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError> {
-        // The filter first: by linearity the same inside, but at the ends it would start from one noisy difference.
+        // Filter first: by linearity this is equivalent inside, but at the ends the filter would start from a noisy
+        // difference.
         let mut filtered = vec![0.0; q.len()];
         self.low_pass.smooth(place.rate_hz, q, &mut filtered)?;
         self.differences.differentiate_at(place, &filtered, out)
@@ -91,7 +92,7 @@ mod tests {
         let noise = normal(5, 40_000);
         let mut out = vec![0.0; noise.len()];
         FivePointCubic::new(1, 1.0).unwrap().smooth(100.0, &noise, &mut out).unwrap();
-        // One deviation of the ratio is below √(2/40 000) = 0.7 %.
+        // One standard deviation of the ratio is below √(2/40 000) = 0.7 %.
         assert!((rms(&out) / (17.0_f64 / 35.0).sqrt() - 1.0).abs() < 0.03);
     }
 
@@ -106,7 +107,7 @@ mod tests {
         let h = w / rate;
         for i in 600..1400 {
             let (sin, cos) = (h * i as f64).sin_cos();
-            // Rounding through the recursion only.
+            // The tolerance covers rounding in the recursion.
             assert!((out[1][i] - filter * rate * h.sin() * cos).abs() < 1e-8 * w, "{i}");
             assert!((out[2][i] + filter * rate * rate * 2.0 * (1.0 - h.cos()) * sin).abs() < 1e-8 * w * w, "{i}");
         }

@@ -1,18 +1,18 @@
-//! A Fourier series fitted to the positions in the time domain.
+//! Fits a Fourier series to the positions in the time domain.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use super::harmonic_fit::{HarmonicFit, check_series};
 use crate::error::FilterError;
 
-/// Least squares of an offset, a straight line (unless left out) and harmonics 1 to K of `base_hz` to the whole piece;
-/// position, velocity and acceleration are the series' own, so exact for a motion inside the series:
+/// Least-squares fit of an offset, an optional straight line and harmonics 1 to K of `base_hz` to the whole piece.
+/// Position, velocity and acceleration are those of the series, so exact for a motion inside the series:
 ///
 /// `q(t) = c + d t + Σ_k a_k sin(2π k f t) + b_k cos(2π k f t)`
 ///
-/// Noise of standard deviation σ in N samples over whole periods leaves `σ √((2K + 1)/N)` in q, and `σ √(2 Σ
-/// (2πkf)²/N)`, `σ √(2 Σ (2πkf)⁴/N)` in dq and ddq. The bias is whatever the motion holds beside the series: tracking
-/// errors at other frequencies, transients before the motion repeats.
-/// Source: Swevers, Ganseman, Tükel, de Schutter, van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730.
+/// Noise of standard deviation σ in N samples over whole periods causes a standard deviation of `σ √((2K + 1)/N)` in q,
+/// `σ √(2 Σ (2πkf)²/N)` in dq and `σ √(2 Σ (2πkf)⁴/N)` in ddq. The bias is the motion outside the series: tracking
+/// errors at other frequencies, and transients before the motion repeats. Source: Swevers, Ganseman, Tükel, de
+/// Schutter, van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FourierFit {
     base_hz: f64,
@@ -21,7 +21,7 @@ pub struct FourierFit {
 }
 
 impl FourierFit {
-    /// A series of `harmonics` harmonics of `base_hz`, with a straight line if `trend`.
+    /// Creates a series of `harmonics` harmonics of `base_hz`, with a straight line if `trend`.
     ///
     /// # Errors
     /// If the base frequency is not positive or the harmonics are not 1 to 200.
@@ -72,7 +72,7 @@ mod tests {
     #[test]
     fn a_series_with_a_line_is_differentiated_exactly() {
         let (rate, base) = (200.0, 0.13);
-        // Neither a whole number of periods nor at rest at the ends.
+        // Not a whole number of periods, and not at rest at the ends.
         let motion = |t: f64| {
             let mut x = [4.0 - 0.2 * t, -0.2, 0.0];
             for (k, (a, b)) in [(0.7, -0.2), (0.1, 0.3), (-0.05, 0.02)].into_iter().enumerate() {
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_comes_out_as_the_closed_form_says() {
+    fn noise_gain_follows_the_closed_form() {
         // Ten whole periods: the columns are orthogonal, and the variance is that of 2K + 1 coefficients.
         let (rate, base, harmonics, n) = (100.0, 0.5, 3_usize, 2000_usize);
         let fit = FourierFit::new(base, harmonics, false).unwrap();
@@ -111,13 +111,13 @@ mod tests {
         let expected = [(2.0 * power(0) + 1.0) / n as f64, 2.0 * power(1) / n as f64, 2.0 * power(2) / n as f64];
         for (sum, expected) in sums.iter().zip(expected) {
             // 40 runs of 7 (6, 6, unequally weighted) chi-square values: relative deviation √(2/240) = 0.09, up to 0.13
-            // where one harmonic leads; 4 of them.
+            // if one harmonic dominates; four deviations are allowed.
             assert!((sum / runs as f64 / expected - 1.0).abs() < 0.5, "{sums:?} {expected:?}");
         }
     }
 
     #[test]
-    fn what_cannot_be_distinguished_is_refused() {
+    fn indistinguishable_harmonics_are_rejected() {
         assert!(FourierFit::new(0.0, 3, true).is_err());
         assert!(FourierFit::new(f64::NAN, 3, true).is_err());
         assert!(FourierFit::new(1.0, 0, true).is_err());

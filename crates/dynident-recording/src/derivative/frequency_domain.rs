@@ -2,46 +2,45 @@
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::{FilterError, require};
-use crate::filter::bridge::{LEAST_SAMPLES, bridge};
+use crate::filter::bridge::{MIN_END_SAMPLES, bridge};
 use core::f64::consts::{PI, TAU};
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
-/// Length of the bridge that leads from the end of a piece back to its begin, in periods of the cut-off.
+/// Length of the bridge from the end of a piece to its start, in periods of the cut-off.
 const BRIDGE_PERIODS: f64 = 8.0;
 
-/// Where the tapered band ends, in cut-offs.
-const TAPER: f64 = 2.0;
+/// End of the tapered band, in cut-offs.
+const TAPER_END_RATIO: f64 = 2.0;
 
-/// What stands beyond the ends of a piece: the transform takes it to repeat.
+/// Extension of a piece beyond its ends (the transform assumes a periodic signal).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Ends {
-    /// A smooth bridge back to the begin, over eight periods of the cut-off: value, velocity and acceleration go on
-    /// without a jump, whatever the motion does at its ends. The band ends gently, by half a cosine from the cut-off to
-    /// twice it, so that what is left rings near the ends only; one period of the cut-off at either end does not count.
+    /// A smooth bridge from the end to the start, over eight periods of the cut-off, with continuous value, velocity
+    /// and acceleration for any motion. The gain falls as half a cosine from the cut-off to twice the cut-off, so that
+    /// ringing is limited to the ends; one period of the cut-off at either end is ignored.
     #[default]
     Tapered,
-    /// The piece, then the piece backwards: value and acceleration go on without a jump, and so does the velocity of a
-    /// motion that is at rest at both ends.
+    /// The piece, then the piece reversed: value and acceleration are continuous, and so is the velocity of a motion at
+    /// rest at both ends.
     Mirrored,
-    /// The piece again: for whole periods of a settled periodic motion. Anything else leaks into all frequencies.
+    /// The piece repeated: for whole periods of a steady periodic motion. Any other motion leaks into all frequencies.
     Periodic,
 }
 
-/// The discrete Fourier transform X of the whole piece, kept from zero to the cut-off and zero elsewhere:
+/// Differentiates the discrete Fourier transform X of the whole piece, truncated at the cut-off:
 ///
 /// `q = F⁻¹{X}`, `dq = F⁻¹{jω X}`, `ddq = F⁻¹{-ω² X}`, |ω| <= 2π f_c.
 ///
 /// Exact for a periodic motion below the cut-off over whole periods ([`Ends::Periodic`]). White noise of standard
-/// deviation σ leaves `σ √(2 f_c/rate)` in q, `2π f_c σ √(2 f_c/(3 rate))` in dq and `(2π f_c)² σ √(2 f_c/(5 rate))` in
-/// ddq; with tapered ends 1.17, 1.65 and 2.41 times that. A motion that is mirrored while it moves rings far into the
-/// piece: take tapered ends.
-/// Source: Swevers, Ganseman, Tükel, de Schutter, van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730; the tapered
-/// ends are this project's own.
+/// deviation σ causes a standard deviation of `σ √(2 f_c/rate)` in q, `2π f_c σ √(2 f_c/(3 rate))` in dq and `(2π f_c)²
+/// σ √(2 f_c/(5 rate))` in ddq; with tapered ends 1.17, 1.65 and 2.41 times these values. A motion that is mirrored
+/// while it moves rings far into the piece; use tapered ends. Source: Swevers, Ganseman, Tükel, de Schutter, van
+/// Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730; the tapered ends are from this project.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrequencyDomain {
     cutoff_hz: f64,
@@ -49,7 +48,7 @@ pub struct FrequencyDomain {
 }
 
 impl FrequencyDomain {
-    /// Keeps what lies at or below `cutoff_hz`.
+    /// Creates a differentiator that keeps frequencies up to `cutoff_hz`.
     ///
     /// # Errors
     /// If the cut-off is not positive.
@@ -58,14 +57,13 @@ impl FrequencyDomain {
         Ok(Self { cutoff_hz, ends })
     }
 
-    /// Samples of one period of the cut-off: what a polynomial is fitted to at tapered ends, and what does not count
-    /// there.
+    /// Samples in one period of the cut-off: the length of the polynomial fit at tapered ends, and of the ignored ends.
     fn edge(&self, rate_hz: f64) -> usize {
-        ((rate_hz / self.cutoff_hz).ceil() as usize).max(LEAST_SAMPLES)
+        ((rate_hz / self.cutoff_hz).ceil() as usize).max(MIN_END_SAMPLES)
     }
 
     fn gain(&self, hz: f64) -> f64 {
-        let beyond = (hz / self.cutoff_hz - 1.0) / (TAPER - 1.0);
+        let beyond = (hz / self.cutoff_hz - 1.0) / (TAPER_END_RATIO - 1.0);
         match self.ends {
             _ if beyond <= 0.0 => 1.0,
             Ends::Tapered if beyond < 1.0 => 0.5 * (1.0 + (PI * beyond).cos()),
@@ -73,14 +71,14 @@ impl FrequencyDomain {
         }
     }
 
-    /// Applies (jω)^order in the band, for each of `orders`.
+    /// Applies (jω)^order in the band, with the order from 0 to `out.len() - 1`.
     fn transformed(&self, rate_hz: f64, signal: &[f64], out: &mut [&mut [f64]]) -> Result<(), FilterError> {
         let n = signal.len();
         self.check_length(n)?;
         if self.cutoff_hz.partial_cmp(&(0.5 * rate_hz)) != Some(core::cmp::Ordering::Less) {
             return Err(FilterError::AboveNyquist { cutoff_hz: self.cutoff_hz, rate_hz });
         }
-        // Relative to the first sample: rounding then scales with the motion.
+        // Relative to the first sample, so that the rounding error scales with the motion.
         let origin = signal[0];
         let mut input: Vec<f64> = signal.iter().map(|x| x - origin).collect();
         match self.ends {
@@ -114,7 +112,7 @@ impl FrequencyDomain {
                 };
                 *bin *= factor;
             }
-            // What a real signal's first and last bin must be, to the last bit.
+            // The first and last bin of a real signal are real.
             bins[0].im = 0.0;
             if length.is_multiple_of(2)
                 && let Some(last) = bins.last_mut()
@@ -162,7 +160,7 @@ mod tests {
 
     #[test]
     fn whole_periods_are_differentiated_exactly() {
-        // Even and odd numbers of samples; the second harmonic stands at the cut-off itself.
+        // Even and odd numbers of samples; the second harmonic lies at the cut-off.
         for n in [400_usize, 401] {
             let (rate, base) = (100.0, 100.0 / n as f64);
             let differentiator = FrequencyDomain::new(2.0 * base * (1.0 + 1e-12), Ends::Periodic).unwrap();
@@ -182,7 +180,7 @@ mod tests {
 
     #[test]
     fn a_mirrored_motion_from_rest_to_rest_has_no_jump_at_its_ends() {
-        // A half cosine mirrored is a whole one: exact although the piece ends elsewhere than it began.
+        // A half cosine mirrored is a full cosine, so the result is exact.
         let (rate, n) = (200.0, 501_usize);
         let w = core::f64::consts::PI * rate / (n as f64 - 1.0);
         let q: Vec<f64> = (0..n).map(|i| 1.0 - (w * i as f64 / rate).cos()).collect();
@@ -193,7 +191,7 @@ mod tests {
         }
     }
 
-    /// A sum of sines that is cut wherever it happens to be: mirrored it rings far into the piece.
+    /// A sum of sines cut at arbitrary ends: mirrored, it rings far into the piece.
     #[test]
     fn a_motion_that_moves_at_its_ends_rings_only_near_them() {
         let (rate, n, cutoff) = (500.0, 10_000_usize, 1.0);
@@ -214,14 +212,13 @@ mod tests {
             let [own_q, dq, ddq] = &mut out;
             let place = Place { rate_hz: rate, joint: 0, first_time_s: 0.0 };
             let marked = differentiator.differentiate_at(place, &q, Derivatives { q: own_q, dq, ddq }).unwrap();
-            let counts = |i: &usize| (500..n - 500).contains(i);
-            let error = |k: usize| (0..n).filter(counts).map(|i| (out[k][i] - at(i)[k]).abs()).fold(0.0, f64::max);
+            let is_compared = |i: &usize| (500..n - 500).contains(i);
+            let error = |k: usize| (0..n).filter(is_compared).map(|i| (out[k][i] - at(i)[k]).abs()).fold(0.0, f64::max);
             (marked, [error(0), error(1), error(2)])
         };
         let (marked, tapered) = worst(Ends::Tapered);
-        // One period of the cut-off at either end.
         assert_eq!(marked, [0..500, n - 500..n]);
-        // What is left of a jump in the third derivative (10 rad/s³) behind a gentle band edge, a period of the cut-off
+        // Effect of a jump in the third derivative (10 rad/s³) through a tapered band edge, one period of the cut-off
         // away: below a thousandth of the velocity (1.9 rad/s) and the acceleration (3 rad/s²).
         assert!(tapered[0] < 1e-3 && tapered[1] < 2e-3 && tapered[2] < 3e-3, "{tapered:?}");
         let (marked, mirrored) = worst(Ends::Mirrored);
@@ -229,26 +226,26 @@ mod tests {
     }
 
     #[test]
-    fn a_gentle_band_edge_lets_the_documented_noise_through() {
+    fn a_tapered_band_edge_has_the_documented_noise_gain() {
         let (rate, cutoff, n) = (1000.0, 40.0, 1 << 15);
         let out = differentiated(&FrequencyDomain::new(cutoff, Ends::Tapered).unwrap(), rate, &normal(3, n));
         let (top, band) = (TAU * cutoff, 2.0 * cutoff / rate);
         let expected = [1.17 * band.sqrt(), 1.65 * top * (band / 3.0).sqrt(), 2.41 * top * top * (band / 5.0).sqrt()];
         for (out, expected) in out.iter().zip(expected) {
-            // As below, and the bridge is of another noise: 10 periods of the cut-off of 1311.
+            // As below; in addition, the bridge (10 of 1311 periods of the cut-off) has other noise.
             assert!((rms(out) / expected - 1.0).abs() < 0.13, "{} {expected}", rms(out));
         }
     }
 
     #[test]
-    fn noise_comes_out_as_the_band_says() {
+    fn noise_gain_follows_the_bandwidth() {
         let (rate, cutoff, n) = (1000.0, 40.0, 1 << 15);
         let out = differentiated(&FrequencyDomain::new(cutoff, Ends::Periodic).unwrap(), rate, &normal(3, n));
         let (top, band) = (TAU * cutoff, 2.0 * cutoff / rate);
         let expected = [band.sqrt(), top * (band / 3.0).sqrt(), top * top * (band / 5.0).sqrt()];
         for (out, expected) in out.iter().zip(expected) {
-            // 2620 real coefficients, those near the top counting most: relative deviation below √(5/(2·2620)) = 3 %; 4
-            // of them.
+            // 2620 real coefficients, mainly those near the cut-off: relative deviation below √(5/(2·2620)) = 3 %; four
+            // deviations are allowed.
             assert!((rms(out) / expected - 1.0).abs() < 0.12, "{} {expected}", rms(out));
         }
     }
@@ -257,7 +254,7 @@ mod tests {
     fn bad_cutoffs_and_short_signals_are_refused() {
         assert!(FrequencyDomain::new(0.0, Ends::Periodic).is_err());
         assert!(FrequencyDomain::new(f64::INFINITY, Ends::Periodic).is_err());
-        // A polynomial needs ten samples.
+        // The polynomial fit needs ten samples.
         assert!(FrequencyDomain::new(3.0, Ends::Tapered).unwrap().smooth(10.0, &[0.0; 9], &mut [0.0; 9]).is_err());
         let differentiator = FrequencyDomain::new(3.0, Ends::Mirrored).unwrap();
         assert!(differentiator.smooth(10.0, &[0.0; 3], &mut [0.0; 3]).is_err());

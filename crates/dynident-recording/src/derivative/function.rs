@@ -1,11 +1,10 @@
-//! A caller's own differentiator among the settings: shared code, which no file holds.
+//! A differentiator of the caller as part of the settings; it is shared and not serialised.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::FilterError;
 use std::sync::Arc;
 
-/// The code of a [`Differentiator`] that this crate does not know, or none where settings were read from a file. Equal
-/// to itself and its clones alone.
+/// Code of a caller's [`Differentiator`]; empty if settings were read from a file. Equal only to itself and its clones.
 #[derive(Clone, Debug, Default)]
 pub struct DifferentiatorCode(Option<Arc<dyn Differentiator>>);
 
@@ -26,14 +25,12 @@ impl PartialEq for DifferentiatorCode {
 }
 
 impl DifferentiatorCode {
-    /// The differentiator, where there is code.
     pub(super) fn build(&self) -> Option<Box<dyn Differentiator>> {
         let code = self.0.clone()?;
         Some(Box::new(Shared(code)))
     }
 }
 
-/// A differentiator that others hold as well.
 #[derive(Debug)]
 struct Shared(Arc<dyn Differentiator>);
 

@@ -1,23 +1,22 @@
-//! Least squares of a straight line and harmonics: the series, its fit and its derivatives.
+//! Least-squares fit of a straight line and harmonics.
 
 use crate::error::{FilterError, require};
 use core::f64::consts::TAU;
 
-/// Rows that are gathered before the next reduction to a triangle.
-const BLOCK: usize = 512;
-/// A column whose new part is smaller than this share of it cannot be determined from the others: six digits of the fit
-/// would be left.
-const DEPENDENT: f64 = 1e-10;
+const BLOCK_ROWS: usize = 512;
+/// Minimum ratio of the pivot to the norm of a column. Below it a column is linearly dependent: six digits of the fit
+/// would remain.
+const MIN_PIVOT_RATIO: f64 = 1e-10;
 
-/// `x(t) = c + d s + Σ_k a_k sin(2π k f t) + b_k cos(2π k f t)`, k = 1 .. K, with s the time scaled to ±1 over the
+/// `x(t) = c + d s + Σ_k a_k sin(2π k f t) + b_k cos(2π k f t)`, k = 1 .. K, with the time s scaled to ±1 over the
 /// samples.
 ///
-/// The straight line takes what does not repeat: without it an end away from the start leaks into all harmonics.
+/// The straight line models the aperiodic part: otherwise different end values leak into all harmonics.
 #[derive(Clone, Debug)]
 pub(crate) struct HarmonicFit {
     base_hz: f64,
     rate_hz: f64,
-    /// Middle of the samples and half their span, in samples.
+    /// Centre and half span of the samples, in samples.
     middle: f64,
     half: f64,
     harmonics: usize,
@@ -26,7 +25,7 @@ pub(crate) struct HarmonicFit {
 }
 
 impl HarmonicFit {
-    /// The fit to uniformly sampled values, by Householder reduction of blocks of rows.
+    /// Fits uniformly sampled values by Householder reduction of blocks of rows.
     ///
     /// # Errors
     /// If the samples do not distinguish the harmonics, or the highest one is not below half the rate.
@@ -45,7 +44,7 @@ impl HarmonicFit {
         let half = 0.5 * (signal.len() as f64 - 1.0).max(1.0);
         let mut fit = Self { base_hz, rate_hz, middle: half, half, harmonics, trend, coefficients: Vec::new() };
         let columns = fit.columns();
-        // Relative to the first sample: rounding then scales with the motion.
+        // Relative to the first sample, so that the rounding error scales with the motion.
         let origin = signal.first().copied().unwrap_or(0.0);
         let mut triangle = Triangle::new(columns + 1);
         let mut row = vec![0.0; columns + 1];
@@ -57,7 +56,7 @@ impl HarmonicFit {
         fit.coefficients = triangle.solution().ok_or(FilterError::Undetermined {
             method,
             samples: signal.len(),
-            fix: "the piece is too short for harmonics of this base frequency: raise base_hz, lower harmonics, or leave the trend out",
+            fix: "the piece is too short for harmonics of this base frequency: raise base_hz, lower harmonics, or disable the trend",
         })?;
         fit.coefficients[0] += origin;
         Ok(fit)
@@ -80,7 +79,7 @@ impl HarmonicFit {
     }
 
     fn phase(&self, harmonic: usize, sample: usize) -> f64 {
-        // Whole turns are taken away before the multiplication by 2π: the argument stays small in a long log.
+        // Remove whole turns before the multiplication by 2π, so that the argument stays small in a long log.
         TAU * (harmonic as f64 * self.base_hz * sample as f64 / self.rate_hz).fract()
     }
 
@@ -105,7 +104,7 @@ impl HarmonicFit {
     }
 }
 
-/// Settings that both Fourier fits share.
+/// Checks the settings of the Fourier fits.
 ///
 /// # Errors
 /// A base frequency that is not positive, or harmonics that are not 1 to 200.
@@ -115,7 +114,7 @@ pub(crate) fn check_series(base_hz: f64, harmonics: usize) -> Result<(), FilterE
     require((1..=200).contains(&harmonics), "harmonics", harmonics as f64, "give 1 to 200")
 }
 
-/// The triangular factor of a tall matrix that comes row by row; its last column is the right-hand side.
+/// Triangular factor of a tall matrix that is added row by row; the last column is the right-hand side.
 /// Source: Golub and Van Loan, Matrix Computations, 5.1 and 5.2.
 struct Triangle {
     width: usize,
@@ -131,7 +130,7 @@ impl Triangle {
     fn push(&mut self, row: &[f64]) {
         self.rows.push(row.to_vec());
         self.squares.iter_mut().zip(row).for_each(|(sum, x)| *sum += x * x);
-        if self.rows.len() >= self.width + BLOCK {
+        if self.rows.len() >= self.width + BLOCK_ROWS {
             self.reduce();
         }
     }
@@ -169,7 +168,7 @@ impl Triangle {
         rows.truncate(width);
     }
 
-    /// The least-squares solution; `None` if a column depends on those before it.
+    /// The least-squares solution; `None` if a column depends linearly on the previous ones.
     fn solution(mut self) -> Option<Vec<f64>> {
         self.reduce();
         let columns = self.width - 1;
@@ -180,7 +179,9 @@ impl Triangle {
         for k in (0..columns).rev() {
             let row = &self.rows[k];
             let pivot = row[k];
-            if pivot.abs().partial_cmp(&(DEPENDENT * self.squares[k].sqrt())) != Some(core::cmp::Ordering::Greater) {
+            if pivot.abs().partial_cmp(&(MIN_PIVOT_RATIO * self.squares[k].sqrt()))
+                != Some(core::cmp::Ordering::Greater)
+            {
                 return None;
             }
             let rest: f64 = (k + 1..columns).map(|j| row[j] * solution[j]).sum();

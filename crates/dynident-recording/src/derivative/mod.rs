@@ -1,15 +1,14 @@
-//! From q to dq and ddq.
+//! Differentiators from q to dq and ddq.
 //!
-//! [`Differentiator`] is the interface, also for differentiators that this crate does not know;
-//! [`DifferentiatorSettings`] is the registry of those that it does. They come in three kinds:
+//! [`Differentiator`] is the interface, also for differentiators of a caller; [`DifferentiatorSettings`] is the
+//! registry of the differentiators in this crate:
 //!
-//! * filters and local fits, which work through a long log in pieces: [`ButterworthZeroPhase`] (the default),
-//!   [`LowPass`], [`CentralDifferences`], [`SmoothedDifferences`], [`SavitzkyGolay`], [`FivePointCubic`];
+//! * filters and local fits, which process a long log in pieces: [`ButterworthZeroPhase`] (the default), [`LowPass`],
+//!   [`CentralDifferences`], [`SmoothedDifferences`], [`SavitzkyGolay`], [`FivePointCubic`];
 //! * fits to a whole piece: [`FourierFit`], [`VelocitySeries`], [`FrequencyDomain`];
 //! * differentiators that use the commanded motion: [`PositionMap`], [`TimeWarp`], [`Deviation`].
 //!
-//! A further differentiator is a file here and its variant of [`DifferentiatorSettings`]; the compiler asks for the
-//! rest.
+//! To add a differentiator, add a file here and a variant of [`DifferentiatorSettings`].
 
 mod butterworth;
 mod central_differences;

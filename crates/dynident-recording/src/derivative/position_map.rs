@@ -1,4 +1,4 @@
-//! Velocity and acceleration read from the position on a known stroke: the paper's map.
+//! Computes velocity and acceleration from the position on a known stroke (the map of the paper).
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges, add_sample};
 use super::reference_lag::{check_joint, check_max_lag, lags, samples_of};
@@ -6,25 +6,22 @@ use crate::error::FilterError;
 use crate::reference::Reference;
 use std::sync::Arc;
 
-/// Halvings that bring a bracket of any stroke below the last bit of its time.
-const HALVINGS: usize = 60;
+/// Number of bisections: reduces the bracket of any stroke below the resolution of its time.
+const BISECTIONS: usize = 60;
 
-/// On a stroke that goes one way, position alone determines velocity and acceleration, `dq = g(q)`, `ddq =
-/// g'(q) g(q)`. For the paper's logistic strokes in closed form, its Eqs. 15 and 16
-/// ([`LogisticPath::rates`](crate::LogisticPath::rates)); for any other reference by solving `q_d(s) = q` for s within
-/// the stroke.
+/// On a monotone stroke the position determines velocity and acceleration, `dq = g(q)`, `ddq = g'(q) g(q)`. For the
+/// paper's logistic strokes in closed form, its Eqs. 15 and 16 ([`LogisticPath::rates`](crate::LogisticPath::rates));
+/// for any other reference by solving `q_d(s) = q` for s within the stroke.
 ///
-/// * The branch (there or back, which stroke) is chosen by phase at the time `t - δ`, with the lag δ of the joint
-///   behind its reference estimated (one for each stroke, by least squares): a joint that lags is still on the earlier
-///   branch.
-/// * Outside the stroke, where the formulas have the wrong sign, and on strokes that turn or are not followed within
-///   the longest lag, the map does not apply: such samples are returned as marked.
-/// * Where the reference rests there is no stroke: velocity and acceleration are the reference's own, at most 1e-3 of
-///   their peaks.
+/// * The branch (there or back, which stroke) is chosen by the phase at the time `t - δ`, with the estimated lag δ of
+///   the joint (one for each stroke, by least squares), because a joint that lags is still on the previous branch.
+/// * Samples are marked outside the stroke, where the formulas have the wrong sign, and on strokes that turn or are not
+///   followed within the maximum lag.
+/// * Where the reference rests, velocity and acceleration are those of the reference, at most 1e-3 of their peaks.
 ///
-/// Noise σ of q comes out as at most ωσ in dq and ω²σ in ddq. A pure lag costs nothing; any other tracking error e =
-/// q_d - q biases dq by `ė - g'(q) e`, |g'| <= ω. q itself is passed through.
-/// Source: the paper's Eqs. 15 and 16; branch by lag and refusal are this project's.
+/// Position noise σ causes at most ωσ in dq and ω²σ in ddq. A pure lag causes no error; any other tracking error e =
+/// q_d - q biases dq by `ė - g'(q) e`, |g'| <= ω. The position is not filtered.
+/// Source: the paper's Eqs. 15 and 16; branch by lag and rejection of samples are from this project.
 #[derive(Clone, Debug)]
 pub struct PositionMap {
     reference: Arc<Reference>,
@@ -32,7 +29,7 @@ pub struct PositionMap {
 }
 
 impl PositionMap {
-    /// For joints that follow `reference` within `max_lag_s`.
+    /// Creates a map for joints that follow `reference` within `max_lag_s`.
     ///
     /// # Errors
     /// If `max_lag_s` is not positive and at most 60.
@@ -41,8 +38,8 @@ impl PositionMap {
         Ok(Self { reference, max_lag_s })
     }
 
-    /// Velocity and acceleration at `q` on a stroke of a sampled reference between two times.
-    fn inverted(&self, joint: usize, q: f64, from_s: f64, to_s: f64) -> Option<[f64; 2]> {
+    /// Velocity and acceleration at `q` on the stroke of a sampled reference between two times.
+    fn rates_at_position(&self, joint: usize, q: f64, from_s: f64, to_s: f64) -> Option<[f64; 2]> {
         let [start, end] = [from_s, to_s].map(|t| self.reference.at(joint, t)[0]);
         let upward = end > start;
         let below = |x: f64| if upward { x < q } else { x > q };
@@ -50,7 +47,7 @@ impl PositionMap {
             return None;
         }
         let (mut low, mut high) = (from_s, to_s);
-        for _ in 0..HALVINGS {
+        for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
             if below(self.reference.at(joint, middle)[0]) {
                 low = middle;
@@ -95,7 +92,7 @@ impl Differentiator for PositionMap {
                 } else if let Some(path) = reference.logistic_path(joint) {
                     path.rates(q[i], reference.goes_there(joint, time_s))
                 } else {
-                    self.inverted(joint, q[i], stroke.from_s, stroke.to_s)
+                    self.rates_at_position(joint, q[i], stroke.from_s, stroke.to_s)
                 };
                 match rates {
                     Some(rates) => [out.dq[i], out.ddq[i]] = rates,
@@ -139,15 +136,16 @@ mod tests {
     fn a_lagging_joint_is_mapped_exactly_also_past_the_splices() {
         let lag = 0.31;
         let q: Vec<f64> = (0..6100).map(|i| PATH.at(place().time_s(i) - lag)[0]).collect();
-        // The sampled reference is the closed form to 1e-12 in q; near the stroke's ends its inverse is as good as the
-        // velocity there allows.
+        // The sampled reference equals the closed form to 1e-12 in q; near the ends of a stroke the error of its
+        // inverse is divided by the small velocity.
         for (reference, tolerance) in [(Reference::logistic(&[PATH]).unwrap(), 1e-6), (sampled(), 1e-5)] {
             let ([_, dq, ddq], marked) = mapped(reference, &q);
             assert!(marked.is_empty(), "{marked:?}");
             for i in 0..q.len() {
                 let t = place().time_s(i) - lag;
                 let [_, exact, second] = PATH.at(t);
-                // A splice is at rest only to 1e-3 of the peak, and the lag at the first sample is not yet the joint's.
+                // A splice is at rest only to 1e-3 of the peak, and the estimated lag is not yet valid at the first
+                // sample.
                 let near_rest = 1e-3 * PATH.peaks()[0];
                 if exact.abs() > 2.0 * near_rest {
                     assert!((dq[i] - exact).abs() < tolerance && (ddq[i] - second).abs() < tolerance, "{i}");
@@ -160,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_wrong_branch_would_show_and_samples_outside_the_stroke_are_marked() {
-        // An overshoot by a twentieth: q beyond h + A while the reference still moves.
+        // An overshoot by 5 %: q beyond h + A while the reference still moves.
         let q: Vec<f64> =
             (0..6100).map(|i| PATH.offset + 1.05 * (PATH.at(place().time_s(i))[0] - PATH.offset)).collect();
         let outside = |x: f64| !(0.0..=1.0).contains(&((x - PATH.offset) / PATH.amplitude));
@@ -196,7 +194,7 @@ mod tests {
             let [q, speed, acceleration] = PATH.at(place().time_s(i));
             errors[0].push(dq[i] - speed);
             errors[1].push(ddq[i] - acceleration);
-            // g' = ±ω(1 - 2s) and (g'g)' = ω²(1 - 6s + 6s²), s the part of the stroke that is done.
+            // g' = ±ω(1 - 2s) and (g'g)' = ω²(1 - 6s + 6s²), with s the completed share of the stroke.
             let s = (q - PATH.offset) / PATH.amplitude;
             expected[0] += (PATH.omega * (1.0 - 2.0 * s)).powi(2) / middle.len() as f64;
             expected[1] += (PATH.omega.powi(2) * (1.0 - 6.0 * s + 6.0 * s * s)).powi(2) / middle.len() as f64;
@@ -204,7 +202,7 @@ mod tests {
         for order in 0..2 {
             let bound = sigma * PATH.omega.powi(order as i32 + 1);
             assert!(rms(&errors[order]) <= bound);
-            // About 2000 samples: 2 %; 5 of them.
+            // About 2000 samples: 2 % standard deviation; five deviations are allowed.
             assert!((rms(&errors[order]) / (sigma * expected[order].sqrt()) - 1.0).abs() < 0.1, "{order}");
         }
     }

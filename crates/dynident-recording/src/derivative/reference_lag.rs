@@ -1,33 +1,30 @@
-//! By how much a joint comes after its reference, stroke by stroke.
+//! Estimates the lag of a joint behind its reference, stroke by stroke.
 
 use super::differentiator::Place;
 use crate::error::{FilterError, require};
 use crate::reference::Reference;
 use crate::reference::Stroke;
 
-/// Samples of a stroke that the coarse search looks at.
-const COARSE_SAMPLES: usize = 400;
-/// Lags that the coarse search tries on either side.
+const MAX_COARSE_SAMPLES: usize = 400;
+/// Number of lags on either side of zero in the coarse search.
 const COARSE_LAGS: i32 = 50;
-/// The search halves its step or better each time; it ends long before this.
-const MOST_STEPS: usize = 30;
+/// Maximum number of Gauss-Newton steps; each step at least halves the change.
+const MAX_ITERATIONS: usize = 30;
 
-/// The lag of one stroke.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StrokeLag {
-    /// The stroke.
     pub(super) stroke: Stroke,
-    /// Seconds by which the joint comes after its reference there; 0 if no sample of the stroke is in the piece.
+    /// Lag of the joint behind its reference, s; 0 if no sample of the stroke is in the piece.
     pub(super) lag_s: f64,
-    /// Whether the best lag lies at the end of the search: then the joint does not follow this reference.
+    /// Whether the best lag is at the limit of the search; then the joint does not follow this reference.
     pub(super) at_limit: bool,
 }
 
-/// For every stroke of the joint's reference the lag δ that minimises `Σ (q(t) - q_d(t - δ))²` over the stroke's
-/// samples, |δ| <= `max_lag_s`: a coarse search, then Gauss-Newton with `∂/∂δ q_d(t - δ) = -dq_d(t - δ)`. White noise σ
-/// of q leaves a standard deviation of `σ/√(Σ dq_d²)`.
+/// For every stroke of the joint's reference, the lag δ that minimises `Σ (q(t) - q_d(t - δ))²` over the stroke's
+/// samples, |δ| <= `max_lag_s`: a coarse search, then Gauss-Newton with `∂/∂δ q_d(t - δ) = -dq_d(t - δ)`. White
+/// position noise σ causes a standard deviation of `σ/√(Σ dq_d²)`.
 ///
-/// The lag of the whole piece, which says where each stroke's samples lie, stands before those of the strokes.
+/// Returns the lag of the whole piece, which assigns samples to strokes, and the lags of the strokes.
 ///
 /// # Errors
 /// [`FilterError::Setting`] if `max_lag_s` is not positive, finite and at most 60; [`FilterError::Reference`] if the
@@ -73,15 +70,15 @@ pub(super) fn check_joint(reference: &Reference, place: Place) -> Result<(), Fil
     Err(FilterError::Reference { problem })
 }
 
-/// Samples that belong to the stroke of a joint that comes `lag_s` late.
+/// Samples of a stroke for a joint with lag `lag_s`.
 pub(super) fn samples_of(stroke: &Stroke, lag_s: f64, place: Place, samples: usize) -> core::ops::Range<usize> {
-    // Infinite ends saturate.
+    // Infinite times saturate.
     let index =
         |time_s: f64| (((time_s + lag_s - place.first_time_s) * place.rate_hz).ceil().max(0.0) as usize).min(samples);
     index(stroke.owns_from_s)..index(stroke.owns_to_s)
 }
 
-/// Best lag over `samples`, and whether the search ended at its limit.
+/// Best lag over `samples`, and whether it is at the limit of the search.
 fn best(
     reference: &Reference,
     place: Place,
@@ -91,8 +88,7 @@ fn best(
 ) -> (f64, bool) {
     let [least, most] = range_s;
     let joint = place.joint;
-    let step = (samples.len() / COARSE_SAMPLES).max(1);
-    // Samples at which the shifted reference is known.
+    let step = (samples.len() / MAX_COARSE_SAMPLES).max(1);
     let known = |i: usize, lag_s: f64| reference.covers(joint, place.time_s(i) - lag_s);
     let mean_square = |lag_s: f64, step: usize| {
         let (mut squares, mut count) = (0.0, 0);
@@ -107,14 +103,14 @@ fn best(
         .map(|lag_s| (mean_square(lag_s, step), lag_s))
         .fold((f64::INFINITY, 0.0), |best, tried| if tried.0 < best.0 { tried } else { best })
         .1;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_ITERATIONS {
         let (mut gradient, mut curvature) = (0.0, 0.0);
         for i in samples.clone().filter(|&i| known(i, lag_s)) {
             let [q_d, dq_d, _] = reference.at(joint, place.time_s(i) - lag_s);
             gradient += dq_d * (q_d - q[i]);
             curvature += dq_d * dq_d;
         }
-        // A coarse step at most, so that it stays in the valley that the search found.
+        // At most one coarse step, so that the iteration stays in the minimum that the search found.
         let longest = most / f64::from(COARSE_LAGS);
         let change = (gradient / curvature).clamp(-longest, longest);
         if !change.is_finite() {
@@ -145,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn each_stroke_has_its_own_lag() {
+    fn each_stroke_has_a_separate_lag() {
         let reference = Reference::logistic(&[PATH]).unwrap();
         let half = 0.5 * PATH.period_s;
         let q: Vec<f64> = (0..3600)
@@ -177,7 +173,7 @@ mod tests {
                 lags(&reference, place(), &q, 0.2).unwrap().1[0].lag_s - 0.02
             })
             .collect();
-        // 100 runs: the standard deviation is known to 7 %; 4 of them.
+        // 100 runs: the relative standard deviation is 7 %; four deviations are allowed.
         assert!((rms(&errors) / (sigma / power.sqrt()) - 1.0).abs() < 0.28, "{}", rms(&errors));
     }
 

@@ -1,13 +1,12 @@
-//! Savitzky-Golay: a polynomial fitted to a sliding window.
+//! Savitzky-Golay filter: a polynomial fitted to a sliding window.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::{FilterError, require};
 use crate::filter::orthonormal::orthonormal_polynomials;
 
-/// Least-squares polynomial of `degree` on `window` samples, its value and derivatives at the middle; in the first and
-/// last half window those of the first and last full window, as `scipy.signal.savgol_filter(q, window, degree, deriv=d,
-/// delta=1/rate, mode="interp")`.
-/// Source: Savitzky and Golay, Anal. Chem. 36 (1964) 1627.
+/// Value and derivatives at the centre of the least-squares polynomial of `degree` on `window` samples; in the first
+/// and last half window, of the polynomial of the first and last full window. Equals `scipy.signal.savgol_filter(q,
+/// window, degree, deriv=d, delta=1/rate, mode="interp")`. Source: Savitzky and Golay, Anal. Chem. 36 (1964) 1627.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SavitzkyGolay {
     window: usize,
@@ -16,7 +15,7 @@ pub struct SavitzkyGolay {
 }
 
 impl SavitzkyGolay {
-    /// A filter over `window` samples.
+    /// Creates a filter over `window` samples.
     ///
     /// # Errors
     /// If `window` is even or beyond 501, or `degree` is not 2 to 8 and below `window`.
@@ -29,7 +28,7 @@ impl SavitzkyGolay {
     }
 }
 
-/// Weights from polynomials that are orthonormal over the window, the abscissa scaled to ±1.
+/// Weights from polynomials that are orthonormal over the window, with the abscissa scaled to ±1.
 fn polynomial_weights(window: usize, degree: usize) -> Vec<[Vec<f64>; 3]> {
     let half = (window / 2) as f64;
     let basis = orthonormal_polynomials(window, degree);
@@ -48,7 +47,7 @@ impl SavitzkyGolay {
         let from = i.saturating_sub(self.window / 2).min(signal.len() - self.window);
         let points = &signal[from..from + self.window];
         let weights = &self.weights[i - from][derivative];
-        // Relative to the sample itself, so that rounding scales with the motion; the value's weights sum to one.
+        // Relative to the sample itself, so that rounding scales with the motion. The weights of the value sum to one.
         let sum: f64 = weights.iter().zip(points).map(|(w, x)| w * (x - signal[i])).sum();
         if derivative == 0 { sum + signal[i] } else { sum }
     }

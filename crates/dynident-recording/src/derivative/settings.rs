@@ -1,4 +1,4 @@
-//! What a study file may ask for under `differentiator`: the registry of every differentiator that is offered.
+//! Settings of the study key `differentiator`: the registry of all differentiators.
 
 use super::butterworth::{ButterworthZeroPhase, LowPass};
 use super::central_differences::CentralDifferences;
@@ -19,7 +19,7 @@ use crate::reference::{Reference, ReferenceSettings};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// One differentiator with its settings, as a study file names it under `differentiator`.
+/// Type and settings of a differentiator, as in the study key `differentiator`.
 ///
 /// ```
 /// use dynident_recording::DifferentiatorSettings;
@@ -31,16 +31,17 @@ use std::sync::Arc;
 #[serde(tag = "method", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum DifferentiatorSettings {
-    /// [`ButterworthZeroPhase`]; without `cutoff_hz` the cut-off is chosen from the data ([`cutoff`](crate::cutoff())).
+    /// [`ButterworthZeroPhase`]; without `cutoff_hz` the cut-off is estimated from the data
+    /// ([`cutoff`](crate::cutoff())).
     Butterworth {
         /// Order of the one-way filter, 1 to 12; 4 by default.
         #[serde(default = "four")]
         order: usize,
-        /// Cut-off; chosen from the data by default.
+        /// Cut-off, Hz; estimated from the data by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cutoff_hz: Option<f64>,
     },
-    /// [`CentralDifferences`] of the positions as logged.
+    /// [`CentralDifferences`] of the logged positions.
     CentralDifferences {
         /// Order of accuracy: 2, 4, 6 or 8; 4 by default.
         #[serde(default = "four")]
@@ -54,35 +55,35 @@ pub enum DifferentiatorSettings {
         #[serde(default = "four")]
         degree: usize,
     },
-    /// [`LowPass`]: a causal Butterworth filter, which makes everything late.
+    /// [`LowPass`]: a causal Butterworth filter, which delays position, velocity and acceleration.
     LowPass {
         /// Order, 1 to 12; 4 by default.
         #[serde(default = "four")]
         order: usize,
-        /// Cut-off; chosen from the data by default.
+        /// Cut-off, Hz; estimated from the data by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cutoff_hz: Option<f64>,
     },
     /// [`FourierFit`]: a series fitted to the positions of the whole piece.
     FourierFit {
-        /// Base frequency of the motion.
+        /// Base frequency of the motion, Hz.
         base_hz: f64,
         /// Highest harmonic, 1 to 200.
         harmonics: usize,
-        /// Whether a straight line is fitted beside them; true by default.
+        /// Whether to fit a straight line as well; true by default.
         #[serde(default = "yes")]
         trend: bool,
     },
-    /// [`FrequencyDomain`]: jω up to a cut-off, nothing beyond.
+    /// [`FrequencyDomain`]: multiplication by jω up to a cut-off.
     FrequencyDomain {
-        /// Highest frequency that is kept; chosen from the data by default.
+        /// Maximum frequency, Hz; estimated from the data by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cutoff_hz: Option<f64>,
-        /// What stands beyond the ends; a smooth bridge by default.
+        /// Extension of the signal beyond its ends; a smooth bridge by default.
         #[serde(default)]
         ends: Ends,
     },
-    /// [`SmoothedDifferences`]: central differences, acceleration and torque by a moving average.
+    /// [`SmoothedDifferences`]: central differences; acceleration and torque are smoothed by a moving average.
     SmoothedDifferences {
         /// Order of accuracy of the differences; 2 by default.
         #[serde(default = "two")]
@@ -90,62 +91,62 @@ pub enum DifferentiatorSettings {
         /// Odd number of samples, 3 to 501.
         window: usize,
     },
-    /// [`FivePointCubic`]: torque by five-point cubic smoothing, low-pass filtered differences of position.
+    /// [`FivePointCubic`]: five-point cubic smoothing of the torque, low-pass filtered differences of the position.
     FivePointCubic {
         /// Passes over the torque; 1 by default.
         #[serde(default = "one")]
         passes: usize,
-        /// Cut-off of the low-pass; chosen from the data by default.
+        /// Cut-off of the low-pass filter, Hz; estimated from the data by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cutoff_hz: Option<f64>,
     },
     /// [`VelocitySeries`]: a Fourier series fitted to the filtered velocity.
     #[serde(rename = "speed-series")]
     VelocitySeries {
-        /// Base frequency of the motion.
+        /// Base frequency of the motion, Hz.
         base_hz: f64,
         /// Highest harmonic, 1 to 200.
         harmonics: usize,
-        /// Cut-off of the filter; chosen from the data by default.
+        /// Cut-off of the filter, Hz; estimated from the data by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cutoff_hz: Option<f64>,
     },
-    /// [`PositionMap`]: the paper's map, position to velocity and acceleration on a known stroke.
+    /// [`PositionMap`]: the paper's map from position to velocity and acceleration on a known stroke.
     #[serde(alias = "logistic-map")]
     PositionMap {
-        /// The commanded motion; a log may have its own.
+        /// The commanded motion; the reference of a log takes precedence.
         #[serde(default)]
         reference: ReferenceSettings,
-        /// Longest lag of a joint behind it that is looked for, s; 0.5 by default.
+        /// Maximum lag of a joint behind the reference, s; 0.5 by default.
         #[serde(default = "half")]
         max_lag_s: f64,
     },
-    /// [`TimeWarp`]: the reference at a shifted time, one lag a stroke.
+    /// [`TimeWarp`]: the reference at a shifted time, with one lag per stroke.
     TimeWarp {
-        /// The commanded motion; a log may have its own.
+        /// The commanded motion; the reference of a log takes precedence.
         #[serde(default)]
         reference: ReferenceSettings,
-        /// Longest lag of a joint behind it that is looked for, s; 0.5 by default.
+        /// Maximum lag of a joint behind the reference, s; 0.5 by default.
         #[serde(default = "half")]
         max_lag_s: f64,
     },
-    /// A caller's own [`Differentiator`]: no file holds its code.
+    /// A caller's [`Differentiator`]; its code is not serialised.
     Function {
-        /// What it is called in results.
+        /// Name in results.
         function: String,
         /// The code.
         #[serde(skip)]
         code: DifferentiatorCode,
     },
-    /// [`Deviation`]: the reference's own derivatives, and those of the smoothed deviation from it.
+    /// [`Deviation`]: the derivatives of the reference plus those of the smoothed deviation from it.
     Deviation {
-        /// The commanded motion; a log may have its own.
+        /// The commanded motion; the reference of a log takes precedence.
         #[serde(default)]
         reference: ReferenceSettings,
-        /// Any of the differentiators that need no reference; zero-phase Butterworth by default.
+        /// Any differentiator that needs no reference; zero-phase Butterworth by default.
         #[serde(default)]
         smoother: Box<DifferentiatorSettings>,
-        /// Shift the reference by the joint's lag behind it, at most so many seconds; not shifted by default.
+        /// Maximum lag by which the reference is shifted, s; not shifted by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         max_lag_s: Option<f64>,
     },
@@ -178,7 +179,7 @@ impl Default for DifferentiatorSettings {
 }
 
 impl DifferentiatorSettings {
-    /// Checks what can be checked without a log and without the reference's table.
+    /// Checks the settings without a log and without the table of the reference.
     ///
     /// # Errors
     /// A [`FilterError`] that names the setting.
@@ -202,7 +203,7 @@ impl DifferentiatorSettings {
         Ok(())
     }
 
-    /// How the commanded motion is named; `None` for differentiators that need none.
+    /// The commanded motion; `None` for differentiators that need none.
     pub fn reference(&self) -> Option<&ReferenceSettings> {
         match self {
             Self::PositionMap { reference, .. }
@@ -239,18 +240,18 @@ impl DifferentiatorSettings {
         }
     }
 
-    /// The cut-off that the settings name (a deviation's smoother names its own); `None` where there is none, or it is
-    /// left to the data.
+    /// The cut-off in the settings (for a deviation, that of its smoother), Hz; `None` if it is estimated from the
+    /// data, or if the differentiator has no cut-off.
     pub fn cutoff_hz(&self) -> Option<f64> {
         self.clone().cutoff_place().copied().flatten()
     }
 
-    /// Whether the cut-off is left to the data.
+    /// Whether the cut-off is estimated from the data.
     pub fn wants_cutoff(&self) -> bool {
         matches!(self.clone().cutoff_place(), Some(None))
     }
 
-    /// The same with this cut-off, where it was left to the data.
+    /// Sets the cut-off if the settings do not contain one.
     #[must_use]
     pub fn with_cutoff(mut self, chosen_cutoff_hz: f64) -> Self {
         if let Some(place) = self.cutoff_place() {
@@ -259,8 +260,8 @@ impl DifferentiatorSettings {
         self
     }
 
-    /// The differentiator; `chosen_cutoff_hz` stands in where the settings name none. A commanded motion has to be
-    /// given in closed form: see [`build_following`](Self::build_following).
+    /// Creates the differentiator; `chosen_cutoff_hz` is used if the settings contain no cut-off. A commanded motion
+    /// must be in closed form: see [`build_following`](Self::build_following).
     ///
     /// # Errors
     /// A [`FilterError`] that names the setting.
@@ -268,11 +269,11 @@ impl DifferentiatorSettings {
         self.build_following(chosen_cutoff_hz, None)
     }
 
-    /// As [`build`](Self::build), with the commanded motion, which stands before what the settings name.
+    /// As [`build`](Self::build), with the commanded motion, which takes precedence over that of the settings.
     ///
     /// # Errors
-    /// A [`FilterError`] that names the setting; [`FilterError::NoReference`] if this differentiator needs a motion and
-    /// has none.
+    /// A [`FilterError`] that names the setting; [`FilterError::NoReference`] if this differentiator needs a commanded
+    /// motion and has none.
     pub fn build_following(
         &self,
         chosen_cutoff_hz: f64,
@@ -318,7 +319,6 @@ impl DifferentiatorSettings {
 mod tests {
     use super::*;
 
-    /// A result stores its settings as JSON, and `validate` reads them back.
     #[test]
     fn settings_survive_json() {
         for text in [
@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cutoff_left_to_the_data_is_filled_in_wherever_it_stands() {
+    fn an_estimated_cutoff_is_filled_in_also_in_the_smoother() {
         let settings: DifferentiatorSettings = toml::from_str("method = \"deviation\"").unwrap();
         assert!(settings.wants_cutoff());
         let settings = settings.with_cutoff(3.0).with_cutoff(5.0);

@@ -1,18 +1,16 @@
-//! Smoothing after central differences.
+//! Central differences with a smoothed acceleration.
 
 use super::central_differences::CentralDifferences;
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::{FilterError, require};
 
-/// Central differences of the positions as logged, the acceleration then smoothed by a moving average of `window`
-/// samples; the torque is smoothed in the same way where `smooth_torque` asks for it. Position and velocity
-/// stay as they are.
+/// Central differences of the logged positions; the acceleration is smoothed by a moving average of `window` samples,
+/// and so is the torque with `smooth_torque`. Position and velocity are not smoothed.
 ///
-/// White noise σ of the position leaves `σ rate/√2` in dq (order 2). In ddq the average of second differences
-/// telescopes to the difference of two slopes, so `2 σ rate²/W` for 2 <= W, where the differences alone have `√6 σ
-/// rate²`. The average takes `(W² - 1)/(24 rate²)` of the acceleration's own second derivative. Near the ends the
-/// window shrinks, staying centred.
-/// Source: Xu et al., as cited in the paper behind this project.
+/// White position noise σ causes `σ rate/√2` in dq (order 2). In ddq the average of second differences telescopes to
+/// the difference of two slopes, so `2 σ rate²/W` for 2 <= W, compared with `√6 σ rate²` without the average. The
+/// average reduces the acceleration by `(W² - 1)/(24 rate²)` times its second derivative. Near the ends the window
+/// shrinks and stays centred. Source: Xu et al., as cited in the paper behind this project.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothedDifferences {
     differences: CentralDifferences,
@@ -21,7 +19,7 @@ pub struct SmoothedDifferences {
 }
 
 impl SmoothedDifferences {
-    /// Differences of accuracy `order`, the acceleration averaged over `window` samples.
+    /// Creates differences of accuracy `order`, with the acceleration averaged over `window` samples.
     ///
     /// # Errors
     /// If `order` is not 2, 4, 6 or 8, or `window` is even or beyond 501.
@@ -61,7 +59,7 @@ impl Differentiator for SmoothedDifferences {
     }
 }
 
-/// The mean of `window` samples about each; fewer, still centred, near the ends.
+/// Mean of `window` samples about each sample; fewer, still centred, near the ends.
 fn moving_average(signal: &[f64], window: usize, out: &mut [f64]) {
     let n = signal.len();
     for (i, out) in out.iter_mut().enumerate().take(n) {
@@ -77,11 +75,12 @@ mod tests {
     use crate::derivative::test_signals::{differentiated, normal, rms};
 
     #[test]
-    fn noise_is_reduced_as_the_closed_form_says() {
+    fn noise_reduction_follows_the_closed_form() {
         let (rate, n) = (100.0, 40_000);
         for window in [3_usize, 11, 51] {
             let out = differentiated(&SmoothedDifferences::new(2, window).unwrap(), rate, &normal(7, n));
-            // 40 000 samples, correlated over the window: one deviation is at most √(51/80 000) = 2.5 %; 4 of them.
+            // 40 000 samples, correlated over the window: one standard deviation is at most √(51/80 000) = 2.5 %; four
+            // are allowed.
             let expected = 2.0 * rate * rate / window as f64;
             let inside = &out[2][window..n - window];
             assert!((rms(inside) / expected - 1.0).abs() < 0.1, "{window}: {} {expected}", rms(inside));
@@ -90,13 +89,13 @@ mod tests {
     }
 
     #[test]
-    fn a_cubic_is_differentiated_exactly_and_a_sine_loses_what_the_average_takes() {
+    fn a_cubic_is_differentiated_exactly_and_a_sine_with_the_gain_of_the_average() {
         let (rate, n, window) = (100.0, 300_usize, 21_usize);
         let differentiator = SmoothedDifferences::new(4, window).unwrap();
         let t = |i: usize| i as f64 / rate;
         let out = differentiated(&differentiator, rate, &(0..n).map(|i| t(i).powi(3)).collect::<Vec<_>>());
         for i in 0..n {
-            // Rounding: positions of 27 to 1e-16, times rate² and the weights, whose sizes add up to 30 at the ends.
+            // Rounding: positions of 27 to 1e-16, times rate² and the weights, whose absolute sum is 30 at the ends.
             assert!((out[2][i] - 6.0 * t(i)).abs() < 1e-8, "{i}");
         }
         let w = 3.0;
@@ -105,7 +104,7 @@ mod tests {
         let x = 0.5 * w / rate;
         let gain = (window as f64 * x).sin() / (window as f64 * x.sin());
         for i in 20..n - 20 {
-            // Differences of fourth order: (w h)^4/90 = 9e-9 of the acceleration.
+            // Differences of fourth order: (ωh)⁴/90 = 9e-9 of the acceleration.
             assert!((out[2][i] + gain * w * w * (w * t(i)).sin()).abs() < 1e-7, "{i}");
         }
     }

@@ -1,4 +1,4 @@
-//! The reference at a shifted time, one shift a stroke.
+//! Evaluates the reference at a shifted time, with one shift per stroke.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges, add_sample};
 use super::reference_lag::{check_joint, check_max_lag, lags, samples_of};
@@ -7,13 +7,12 @@ use crate::reference::Reference;
 use std::sync::Arc;
 
 /// `dq(t) = dq_d(t - δ_s)`, `ddq(t) = ddq_d(t - δ_s)`, with one lag δ_s for each stroke s of the joint (by least
-/// squares); q is passed through.
+/// squares). The position is not filtered.
 ///
-/// Exact under any lag that is constant over a stroke. White noise σ of q leaves `|ddq_d| σ/√(Σ dq_d²)` in dq and
-/// `|jerk_d| σ/√(Σ dq_d²)` in ddq: a thousand samples shrink the map's noise by thirty. Whatever else the joint does,
-/// an overshoot, a vibration, a wrong amplitude, is not seen at all: that is bias. Samples of strokes that are not
-/// followed within the longest lag are marked.
-/// Source: this project's own.
+/// Exact for any lag that is constant over a stroke. White position noise σ causes `|ddq_d| σ/√(Σ dq_d²)` in dq and
+/// `|jerk_d| σ/√(Σ dq_d²)` in ddq: with a thousand samples, a thirtieth of the noise of
+/// [`PositionMap`](super::PositionMap). Any other deviation (overshoot, vibration, wrong amplitude) is ignored and
+/// causes bias. Samples of strokes that are not followed within the maximum lag are marked. Source: this project.
 #[derive(Clone, Debug)]
 pub struct TimeWarp {
     reference: Arc<Reference>,
@@ -21,7 +20,7 @@ pub struct TimeWarp {
 }
 
 impl TimeWarp {
-    /// For joints that follow `reference` within `max_lag_s`.
+    /// Creates a differentiator for joints that follow `reference` within `max_lag_s`.
     ///
     /// # Errors
     /// If `max_lag_s` is not positive and at most 60.
@@ -81,11 +80,10 @@ mod tests {
     }
 
     #[test]
-    fn noise_shrinks_with_the_strokes_length_as_the_closed_form_says() {
+    fn noise_decreases_with_the_length_of_a_stroke() {
         let (sigma, n, lag) = (1e-3, 1800_usize, 0.07);
         let exact: Vec<[f64; 3]> = (0..n).map(|i| PATH.at(i as f64 / 100.0 - lag)).collect();
         let power: f64 = exact.iter().map(|x| x[1] * x[1]).sum();
-        // The sample with the largest acceleration.
         let at = (0..n).max_by(|a, b| exact[*a][2].total_cmp(&exact[*b][2])).unwrap();
         let errors: Vec<f64> = (0..100)
             .map(|run| {
@@ -95,7 +93,7 @@ mod tests {
                 out[1][at] - exact[at][1]
             })
             .collect();
-        // 100 runs: 7 %; 4 of them.
+        // 100 runs: 7 % standard deviation; four deviations are allowed.
         let expected = exact[at][2].abs() * sigma / power.sqrt();
         assert!((rms(&errors) / expected - 1.0).abs() < 0.28, "{} {expected}", rms(&errors));
     }

@@ -1,18 +1,18 @@
-//! A Fourier series fitted to the filtered velocity.
+//! Fits a Fourier series to the filtered velocity.
 
 use super::butterworth::ButterworthZeroPhase;
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use super::harmonic_fit::{HarmonicFit, check_series};
 use crate::error::FilterError;
 
-/// q and dq by a zero-phase Butterworth filter of order 4; a Fourier series (offset and harmonics 1 to K of `base_hz`)
-/// fitted to that dq over the whole piece; dq and ddq are the series' own value and derivative. q stays the filtered
-/// position.
+/// Filters q and dq by a zero-phase Butterworth filter of order 4 and fits a Fourier series (offset and harmonics 1 to
+/// K of `base_hz`) to this dq over the whole piece. dq and ddq are the value and derivative of the series; q is the
+/// filtered position.
 ///
-/// Exact for a periodic motion in the series and well below the cut-off. The fit keeps `√((2K + 1)/N)` of white noise
-/// in N samples; the noise of a filtered difference is not white and smaller at the series' low frequencies, so ddq has
-/// about the noise of [`FourierFit`](super::FourierFit).
-/// Source: Feng et al., as cited in the paper behind this project.
+/// Exact for a periodic motion in the series and well below the cut-off. The fit passes `√((2K + 1)/N)` of white noise
+/// in N samples. The noise of a filtered difference is smaller at the low frequencies of the series, so the noise of
+/// ddq is about that of [`FourierFit`](super::FourierFit). Source: Feng et al., as cited in the paper behind this
+/// project.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VelocitySeries {
     base_hz: f64,
@@ -21,7 +21,7 @@ pub struct VelocitySeries {
 }
 
 impl VelocitySeries {
-    /// A series of `harmonics` harmonics of `base_hz` for velocities filtered at `cutoff_hz`.
+    /// Creates a series of `harmonics` harmonics of `base_hz` for velocities filtered at `cutoff_hz`.
     ///
     /// # Errors
     /// If a frequency is not positive or the harmonics are not 1 to 200.
@@ -64,7 +64,7 @@ mod tests {
     use core::f64::consts::TAU;
 
     #[test]
-    fn a_series_goes_through_with_the_filters_gain() {
+    fn a_series_is_multiplied_by_the_gain_of_the_filter() {
         let (rate, base, cutoff, n) = (200.0, 0.5, 10.0, 4000_usize);
         let q: Vec<f64> = (0..n)
             .map(|i| {
@@ -80,8 +80,8 @@ mod tests {
             let x = w * i as f64 / rate;
             let dq = w * (gain(base) * x.cos() - 0.9 * gain(3.0 * base) * (3.0 * x).sin());
             let ddq = -w * w * (gain(base) * x.sin() + 2.7 * gain(3.0 * base) * (3.0 * x).cos());
-            // The filter's transients at the two ends (some tenths of a second of twenty) reach the fit with at most a
-            // thousandth of the velocity.
+            // The transients at the two ends (some tenths of a second of 20 s) change the fit by at most a thousandth
+            // of the velocity.
             assert!((out[1][i] - dq).abs() < 2e-3 * w && (out[2][i] - ddq).abs() < 6e-3 * w * w, "{i}");
         }
     }

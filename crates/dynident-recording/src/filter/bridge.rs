@@ -1,14 +1,14 @@
-//! What a piece can be followed by so that it repeats without a jump.
+//! Extends a piece so that it repeats without a jump.
 
 use super::orthonormal::{half, orthonormal_polynomials};
 
 /// Degree of the polynomials at the ends.
 const DEGREE: usize = 4;
 
-/// The least samples of an end that a polynomial is fitted to.
-pub(crate) const LEAST_SAMPLES: usize = 2 * (DEGREE + 1);
+/// Minimum number of samples for the polynomial fit at an end.
+pub(crate) const MIN_END_SAMPLES: usize = 2 * (DEGREE + 1);
 
-/// Value, first and second derivative by sample at sample `place` of the polynomial that fits `signal` best.
+/// Value, first and second derivative per sample, at sample `place` of the polynomial fitted to `signal`.
 fn state(signal: &[f64], basis: &[[Vec<f64>; 3]], place: usize) -> [f64; 3] {
     let origin = signal[place];
     let mut state = [origin, 0.0, 0.0];
@@ -21,16 +21,16 @@ fn state(signal: &[f64], basis: &[[Vec<f64>; 3]], place: usize) -> [f64; 3] {
     state
 }
 
-/// `steps - 1` samples that lead from behind the signal's end back to its begin in `steps` steps: the quintic
-/// polynomial through value, velocity and acceleration of both, which are those of polynomials of degree 4 fitted to
-/// `window` samples at either end. The signal and these, repeated, have no jump up to the second derivative.
+/// `steps - 1` samples from the signal's end back to its start in `steps` steps: the quintic polynomial through value,
+/// velocity and acceleration at both ends, estimated by polynomials of degree 4 through `window` samples. The repeated
+/// extended signal has no jump up to the second derivative.
 pub(crate) fn bridge(signal: &[f64], window: usize, steps: usize) -> Vec<f64> {
     let basis = orthonormal_polynomials(window, DEGREE);
     let [from, v0, a0] = state(&signal[signal.len() - window..], &basis, window - 1);
     let [to, v1, a1] = state(&signal[..window], &basis, 0);
     let length = steps as f64;
     let (c1, c2) = (v0 * length, 0.5 * a0 * length * length);
-    // What is left of value, slope and curvature at the far end.
+    // Remaining value, slope and curvature at the far end.
     let (rise, slope, curvature) = (to - from - c1 - c2, v1 * length - c1 - 2.0 * c2, a1 * length * length - 2.0 * c2);
     let c3 = 10.0 * rise - 4.0 * slope + 0.5 * curvature;
     let c4 = -15.0 * rise + 7.0 * slope - curvature;
@@ -47,7 +47,7 @@ pub(crate) fn bridge(signal: &[f64], window: usize, steps: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// A quartic is its own fit: the whole is smooth to the third difference at both seams.
+    /// The fit of a quartic is exact: the extended signal is smooth to the third difference at both seams.
     #[test]
     fn the_bridge_meets_both_ends_up_to_the_second_derivative() {
         let n = 200;

@@ -1,75 +1,111 @@
-//! A cut-off chosen from the data: where the motion's acceleration has faded into the noise of the position.
+//! Estimates the cut-off: the frequency above which position noise exceeds the motion's acceleration.
 
+use crate::error::{FilterError, require};
 use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
 
-/// Samples that are looked at, at most.
-pub(crate) const CUTOFF_SAMPLES: usize = 1 << 16;
+pub(crate) const MAX_CUTOFF_SAMPLES: usize = 1 << 16;
 
-/// Part of the acceleration's power (noise subtracted) that the pass band has to hold.
-const POWER_SHARE: f64 = 0.9999;
-/// Two-way Butterworth filters of order 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it.
-/// What the filter takes from positions alone, and not from torque, biases the fit; this margin keeps it to 0.4 % at
-/// the motion's highest frequency.
-const MARGIN: f64 = 2.0;
-/// A spectrum this far above the noise floor counts as motion.
-const ABOVE_NOISE: f64 = 10.0;
-/// No cut-off comes closer to the sampling rate than this part of it.
-const HIGHEST: f64 = 0.4;
+/// Limits of the choice of a cut-off. They are not part of a study file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CutoffSettings {
+    /// Share of the acceleration's power (noise subtracted) below the maximum frequency of the motion, 0.9999 by
+    /// default.
+    pub power_share: f64,
+    /// Ratio of the cut-off to the maximum frequency of the motion, 2 by default. Two-way Butterworth filters of order
+    /// 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it. Attenuation of positions but not of
+    /// torque biases the fit; the default limits it to 0.4 %.
+    pub margin: f64,
+    /// Minimum ratio of the spectrum to the noise floor for motion, 10 by default.
+    pub min_noise_ratio: f64,
+    /// Maximum ratio of the cut-off to the sampling rate, 0.4 by default.
+    pub max_rate_share: f64,
+}
 
-/// A cut-off and why.
+impl Default for CutoffSettings {
+    fn default() -> Self {
+        Self { power_share: 0.9999, margin: 2.0, min_noise_ratio: 10.0, max_rate_share: 0.4 }
+    }
+}
+
+impl CutoffSettings {
+    /// Checks the limits.
+    ///
+    /// # Errors
+    /// A [`FilterError`] that names the setting.
+    pub fn validate(&self) -> Result<(), FilterError> {
+        let Self { power_share, margin, min_noise_ratio, max_rate_share } = *self;
+        require(power_share > 0.0 && power_share < 1.0, "power_share", power_share, "give a number between 0 and 1")?;
+        require(margin.is_finite() && margin >= 1.0, "margin", margin, "give a finite number, 1 or more")?;
+        let fix = "give a finite number, 1 or more";
+        require(min_noise_ratio.is_finite() && min_noise_ratio >= 1.0, "min_noise_ratio", min_noise_ratio, fix)?;
+        let is_share = max_rate_share > 0.0 && max_rate_share < 0.5;
+        require(is_share, "max_rate_share", max_rate_share, "give a number between 0 and 0.5")
+    }
+}
+
+/// A cut-off with its evidence.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CutoffChoice {
-    /// The cut-off for all joints.
+    /// Cut-off of all joints, Hz.
     pub cutoff_hz: f64,
-    /// What each joint alone would ask for; `None` for a joint that does not move.
+    /// Cut-off that each joint needs, Hz; `None` for a joint that does not move.
     pub joints_hz: Vec<Option<f64>>,
-    /// Where each joint's motion has faded into the noise of its position; `None` for a joint that does not move.
+    /// Frequency at which each joint's motion falls below its position noise, Hz; `None` for a joint that does not
+    /// move.
     #[serde(default)]
     pub faded_hz: Vec<Option<f64>>,
-    /// The choice in a sentence.
+    /// The choice in one sentence.
     pub evidence: String,
 }
 
 /// Chooses one cut-off for all joints from uniformly sampled positions `q` (one slice for each joint; at most the first
 /// 65 536 samples are used).
 ///
-/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, three pieces, so that
-/// nothing depends on the unit of time):
-/// * Noise in the position makes the spectrum of the acceleration rise with frequency. Behind the peak of the
-///   velocity's spectrum, the first frequency at which the acceleration's (smoothed over a quarter octave) comes within
-///   twice its minimum is the valley where motion has faded into noise.
-/// * Data that were filtered before have their valley far above the motion: there the frequency counts below which
+/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, three pieces;
+/// independent of the unit of time):
+/// * Position noise makes the spectrum of the acceleration rise with frequency. Above the peak of the velocity's
+///   spectrum, the valley is the first frequency at which the acceleration's spectrum (smoothed over a quarter octave)
+///   falls below twice its minimum. There the motion disappears in the noise.
+/// * Data that were filtered before have their valley far above the motion. Hence the second frequency, below which
 ///   99.99 % of the acceleration's power up to the valley lies.
 ///
-/// The joint asks for twice the lower of the two; the log's cut-off is the highest of its joints', at most 0.4 of the
-/// rate. A joint whose spectrum nowhere stands above ten times its median over the upper half of the band does not
-/// count.
+/// The joint needs twice the lower of the two; the cut-off of the log is the maximum over the joints, at most 0.4 of
+/// the rate. A joint is ignored if its spectrum never exceeds ten times its median over the upper half of the band.
 pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
+    cutoff_within(q, rate_hz, &CutoffSettings::default())
+}
+
+/// [`cutoff`] with other limits than the defaults.
+pub fn cutoff_within<S: AsRef<[f64]>>(q: &[S], rate_hz: f64, limits: &CutoffSettings) -> CutoffChoice {
+    let CutoffSettings { margin, max_rate_share, .. } = *limits;
     let spectra: Vec<Option<Spectrum>> = q.iter().map(|q| spectrum(q.as_ref())).collect();
-    let joints: Vec<Option<Content>> =
-        spectra.iter().map(|spectrum| spectrum.as_ref().and_then(|spectrum| content(spectrum, rate_hz))).collect();
-    let highest = HIGHEST * rate_hz;
-    let asked = |content: &Content| (MARGIN * content.power_hz).min(highest);
+    let joints: Vec<Option<Content>> = spectra
+        .iter()
+        .map(|spectrum| spectrum.as_ref().and_then(|spectrum| content(spectrum, rate_hz, limits)))
+        .collect();
+    let highest = max_rate_share * rate_hz;
+    let joint_cutoff_hz = |content: &Content| (margin * content.power_hz).min(highest);
     let leading = joints.iter().enumerate().filter_map(|(joint, content)| content.as_ref().map(|c| (joint, c)));
     let leading = leading.max_by(|a, b| a.1.power_hz.total_cmp(&b.1.power_hz));
-    let joints_hz = joints.iter().map(|content| content.as_ref().map(asked)).collect();
+    let joints_hz = joints.iter().map(|content| content.as_ref().map(joint_cutoff_hz)).collect();
     let faded_hz = joints.iter().map(|content| content.as_ref().map(|content| content.valley_hz)).collect();
     match leading {
         None => CutoffChoice {
             cutoff_hz: 0.1 * rate_hz,
             joints_hz,
             faded_hz,
-            evidence: "no joint moves above its noise: a tenth of the sampling rate".to_owned(),
+            evidence: "no joint moves above its noise: the cut-off is a tenth of the sampling rate".to_owned(),
         },
         Some((joint, content)) => CutoffChoice {
-            cutoff_hz: asked(content),
+            cutoff_hz: joint_cutoff_hz(content),
             joints_hz,
             faded_hz,
             evidence: format!(
-                "joint {} (0-based) reaches highest: its acceleration fades into the noise ({:.1e} per sample of position) at {:.3} Hz, \
-                 and 99.99 % of its power below that lies below {:.3} Hz; times {MARGIN}, at most {HIGHEST} of the rate",
+                "joint {} (0-based) needs the highest cut-off: its acceleration falls below the noise ({:.1e} per \
+                 sample of position) at {:.3} Hz, and 99.99 % of its power below that lies below {:.3} Hz; times \
+                 {margin}, at most {max_rate_share} of the rate",
                 joint, content.noise, content.valley_hz, content.power_hz,
             ),
         },
@@ -83,15 +119,14 @@ struct Content {
     noise: f64,
 }
 
-/// The spectrum of a joint's position and acceleration.
 struct Spectrum {
-    /// Of the second difference, bin by bin from the second on.
+    /// Spectrum of the second difference, from the second bin on.
     acceleration: Vec<f64>,
-    /// The same as position.
+    /// Spectrum of the position, from the second bin on.
     position: Vec<f64>,
     /// Variance of the position noise of one sample.
     floor: f64,
-    /// Samples of a piece.
+    /// Samples per piece.
     length: usize,
 }
 
@@ -101,7 +136,7 @@ fn response(k: usize, length: usize) -> f64 {
 }
 
 fn spectrum(q: &[f64]) -> Option<Spectrum> {
-    let q = &q[..q.len().min(CUTOFF_SAMPLES)];
+    let q = &q[..q.len().min(MAX_CUTOFF_SAMPLES)];
     let (first, rest) = q.split_first()?;
     if q.len() < 64 || rest.iter().all(|x| x == first) || q.iter().any(|x| !x.is_finite()) {
         return None;
@@ -116,26 +151,25 @@ fn spectrum(q: &[f64]) -> Option<Spectrum> {
     Some(Spectrum { acceleration: power[1..].to_vec(), position, floor, length })
 }
 
-fn content(spectrum: &Spectrum, rate_hz: f64) -> Option<Content> {
+fn content(spectrum: &Spectrum, rate_hz: f64, limits: &CutoffSettings) -> Option<Content> {
     let Spectrum { acceleration, position, floor, length } = spectrum;
     let valley = valley(acceleration);
-    let end = position.iter().rposition(|power| *power > ABOVE_NOISE * floor)?.min(valley);
+    let end = position.iter().rposition(|power| *power > limits.min_noise_ratio * floor)?.min(valley);
     let power: Vec<f64> = (0..=end).map(|k| ((position[k] - floor) * response(k + 1, *length)).max(0.0)).collect();
     let total: f64 = power.iter().sum();
-    if position[0] <= ABOVE_NOISE * floor || total <= 0.0 {
+    if position[0] <= limits.min_noise_ratio * floor || total <= 0.0 {
         return None;
     }
     let mut sum = 0.0;
     let last = power.iter().position(|power| {
         sum += power;
-        sum >= POWER_SHARE * total
+        sum >= limits.power_share * total
     });
     let hertz = |k: usize| (k + 1) as f64 * rate_hz / *length as f64;
     Some(Content { power_hz: hertz(last.unwrap_or(end)), valley_hz: hertz(valley), noise: floor.sqrt() })
 }
 
-/// Index (bin minus one) at which the acceleration's spectrum has come down to twice its minimum behind the main
-/// motion.
+/// Index (bin minus one) at which the acceleration's spectrum has fallen to twice its minimum above the main motion.
 fn valley(acceleration: &[f64]) -> usize {
     let bins = acceleration.len();
     let sums: Vec<f64> = core::iter::once(0.0)
@@ -162,7 +196,7 @@ fn previous_power_of_two(n: usize) -> usize {
     n.checked_ilog2().map_or(1, |log| 1 << log)
 }
 
-/// Welch's power spectrum: bin k is the variance per bin of white noise of unit variance being one.
+/// Welch's power spectrum, scaled so that white noise of unit variance has 1 in each bin.
 /// Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70.
 pub(crate) fn welch(signal: &[f64], length: usize) -> Option<Vec<f64>> {
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
@@ -192,22 +226,13 @@ pub(crate) fn welch(signal: &[f64], length: usize) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::derivative::test_signals::sums_of_uniforms;
     use core::f64::consts::TAU;
-
-    /// White noise of unit variance from a linear congruential generator, twelve uniforms a sample.
-    fn noise(n: usize) -> Vec<f64> {
-        let mut state = 12345_u64;
-        let mut uniform = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..n).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
-    }
 
     #[test]
     fn the_cutoff_lies_between_the_highest_harmonic_and_the_noise() {
         let (rate, n) = (500.0, 20_000);
-        let noise = noise(n);
+        let noise = sums_of_uniforms(12345, n);
         for sigma in [0.0, 1e-6, 1e-4] {
             let q: Vec<f64> = (0..n)
                 .map(|i| {
@@ -217,14 +242,14 @@ mod tests {
                 })
                 .collect();
             let choice = cutoff(&[q], rate);
-            // The highest harmonic is 2 Hz and carries a third of the acceleration's power.
+            // The highest harmonic is 2 Hz and has a third of the acceleration's power.
             assert!((2.0..6.0).contains(&choice.cutoff_hz), "sigma {sigma}: {choice:?}");
         }
     }
 
     #[test]
-    fn joints_that_stand_still_do_not_decide() {
-        let q = [noise(5000), vec![1.0; 5000]];
+    fn joints_at_rest_are_ignored() {
+        let q = [sums_of_uniforms(12345, 5000), vec![1.0; 5000]];
         let choice = cutoff(&q, 100.0);
         assert_eq!(choice.joints_hz, [None, None], "{choice:?}");
         assert_eq!(choice.cutoff_hz, 10.0);

@@ -1,4 +1,4 @@
-//! The parallel filter: one linear-phase low-pass for torque and every regressor column, then every n-th row.
+//! The parallel filter: one linear-phase low-pass for torque and all regressor columns, then decimation.
 
 use crate::error::{FilterError, require};
 use core::f64::consts::PI;
@@ -11,18 +11,18 @@ use std::sync::Arc;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct DecimationSettings {
-    /// Every how many rows one is kept, 1 to 1000; 10 by default.
+    /// Decimation factor, 1 to 1000; 10 by default.
     pub factor: usize,
-    /// Middle of the transition band (gain one half); by default 0.4 of the rate after decimation.
+    /// Centre of the transition band (gain one half), Hz; by default 0.4 of the rate after decimation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cutoff_hz: Option<f64>,
-    /// Width of the transition band; by default 0.4 of the rate after decimation, so that the stop band starts at 0.6
-    /// of it.
+    /// Width of the transition band, Hz; by default 0.4 of the rate after decimation, so that the stop band starts at
+    /// 0.6 of this rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transition_hz: Option<f64>,
-    /// Attenuation in the stop band, 21 to 120 dB; the gain in the pass band (up to 0.2 of the reduced rate) lies
-    /// within `4 · 10^(-A/20)` of one, 0.4 % at the default of 60: each of the band's two edges ripples by one such
-    /// unit, and making the gain at zero frequency one can double that.
+    /// Attenuation in the stop band, 21 to 120 dB. The gain in the pass band (up to 0.2 of the reduced rate) is within
+    /// `4 · 10^(-A/20)` of one, 0.4 % at the default of 60: the ripple of the two band edges is added, and normalising
+    /// the gain at zero frequency can double it.
     pub stop_band_db: f64,
 }
 
@@ -32,12 +32,12 @@ impl Default for DecimationSettings {
     }
 }
 
-/// Longest filter: beyond this the transition band is narrower than any log of ours can use.
+/// Maximum filter length, coefficients. A longer filter has a narrower transition band than logs require.
 const MAX_TAPS: usize = 20_001;
 
 impl DecimationSettings {
-    /// The filter's coefficients at `rate_hz`: windowed sinc with Kaiser's window, odd length, symmetric, unit gain at
-    /// zero frequency.
+    /// Filter coefficients at `rate_hz`: windowed sinc with Kaiser's window, odd length, symmetric, unit gain at zero
+    /// frequency.
     ///
     /// `h[k] = 2 f_c/rate · sinc(2 f_c/rate · (k - M)) · I₀(β √(1 - ((k - M)/M)²)) / I₀(β)`, length `(A - 7.95) /
     /// (2.285 Δω) + 1` with A two decibels above `stop_band_db`.
@@ -61,7 +61,7 @@ impl DecimationSettings {
         }
         let transition = self.transition_hz.unwrap_or(0.4 * reduced).min(2.0 * cutoff).min(rate_hz - 2.0 * cutoff);
         require(transition.is_finite() && transition > 0.0, "transition_hz", transition, "give a positive width")?;
-        // Kaiser's formulas are good to about a decibel; aiming two higher makes the documented figures hold.
+        // Kaiser's formulas are accurate to about 1 dB; 2 dB margin guarantee the documented attenuation.
         let attenuation = self.stop_band_db + 2.0;
         let beta = if attenuation > 50.0 {
             0.1102 * (attenuation - 8.7)
@@ -101,11 +101,11 @@ fn bessel_i0(x: f64) -> f64 {
     sum
 }
 
-/// Filters and decimates panels of columns, all alike, as they come.
+/// Filters and decimates panels of columns with one filter, in a stream.
 ///
-/// Only rows whose whole filter support lies inside the signal are produced ("valid" convolution): output row `k`
-/// belongs to input row `k · factor + half_length` and has no delay; nothing is invented at the ends. The result does
-/// not depend on how the input is cut into panels.
+/// Produces only rows whose filter support is inside the signal ("valid" convolution): output row `k` belongs to input
+/// row `k · factor + half_length` and has no delay. The result is independent of the partition of the input into
+/// panels.
 ///
 /// ```
 /// use dynident_recording::{DecimationSettings, Decimator};
@@ -123,24 +123,24 @@ pub struct Decimator {
     filter: Arc<Filter>,
     columns: usize,
     level: Level,
-    /// Sums of the outputs whose support has begun and not ended, those of one output side by side; output `k` has
-    /// place `k` modulo their number.
+    /// Partial sums of the outputs with incomplete support, by output and column; output `k` has index `k` modulo their
+    /// number.
     begun: Vec<Block>,
-    /// Some rows of the columns at work.
+    /// Rows of the current columns.
     signal: Vec<Block>,
-    /// Rows and outputs of this signal so far.
+    /// Number of rows and outputs of this signal so far.
     rows: usize,
     outputs: usize,
 }
 
-/// Rows are summed in blocks of this many, counted from the signal's first row, whatever the processor's lane count and
-/// however the input is cut: row `i` always goes to sum `i` modulo this.
+/// Number of partial sums per output: row `i` of the signal is added to sum `i` modulo this. The order of summation is
+/// thus independent of the lane count and of the partition of the input.
 const BLOCK: usize = 8;
 
-/// Rows that are looked at together: with eight columns they stay in the first-level cache beside the coefficients.
-const PIECE: usize = 512;
+/// Rows that are processed together: with eight columns they and the coefficients fit into the first-level cache.
+const PIECE_ROWS: usize = 512;
 
-/// As many numbers as stand in a line of the cache.
+/// One cache line of numbers.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct Block([f64; BLOCK]);
@@ -149,18 +149,17 @@ impl Block {
     const ZERO: Self = Self([0.0; BLOCK]);
 }
 
-/// What all decimators of the same settings share.
 #[derive(Debug)]
 struct Filter {
-    /// The coefficients with 0, 1, .. zeros before them, filled up with zeros: for outputs whose support begins so many
-    /// rows behind a block's first.
+    /// The coefficients, shifted by 0, 1, .. and padded with zeros: for outputs whose support starts at this row of a
+    /// block.
     phases: [Vec<Block>; BLOCK],
     length: usize,
     factor: usize,
 }
 
 impl Decimator {
-    /// A decimator for panels of `columns` columns sampled at `rate_hz`.
+    /// Creates a decimator for panels of `columns` columns sampled at `rate_hz`.
     ///
     /// # Errors
     /// A [`FilterError`] that names the setting.
@@ -189,7 +188,7 @@ impl Decimator {
         Self { filter, columns, level: Level::detect(), begun, signal: Vec::new(), rows: 0, outputs: 0 }
     }
 
-    /// Rows on either side of an output row that enter it: the first output belongs to this input row.
+    /// Half length of the filter in rows: the first output belongs to this input row.
     pub fn half_length(&self) -> usize {
         self.filter.length / 2
     }
@@ -204,21 +203,20 @@ impl Decimator {
         index * self.filter.factor as u64 + self.half_length() as u64
     }
 
-    /// Takes the next `rows` rows of the column-major `panel` (`panel[column * rows + row]`) and replaces the contents
+    /// Adds the next `rows` rows of the column-major `panel` (`panel[column * rows + row]`) and replaces the contents
     /// of `out` by the output rows that are now complete, column-major with the returned row count as stride.
     ///
     /// # Panics
-    /// If `panel` has not `rows` times the number of columns entries.
+    /// If the length of `panel` is not `rows` times the number of columns.
     pub fn push(&mut self, panel: &[f64], rows: usize, out: &mut Vec<f64>) -> usize {
         assert_eq!(panel.len(), rows * self.columns, "panel of {rows} rows and {} columns", self.columns);
         let Filter { length, factor, .. } = *self.filter;
         let end = self.rows + rows;
         let complete = if end >= length { (end - length) / factor + 1 } else { 0 };
         let (before, produced) = (self.outputs, complete - self.outputs);
-        // Every place is written.
         out.resize(produced * self.columns, 0.0);
-        for from in (0..rows).step_by(PIECE) {
-            let taken = PIECE.min(rows - from);
+        for from in (0..rows).step_by(PIECE_ROWS) {
+            let taken = PIECE_ROWS.min(rows - from);
             dispatch(
                 self.level,
                 Convolution {
@@ -240,32 +238,31 @@ impl Decimator {
         produced
     }
 
-    /// Ends the signal: forgets its last rows, so that the next [`push`](Self::push) starts a new one. Returns the
-    /// output rows produced since the start.
+    /// Ends the signal, so that the next [`push`](Self::push) starts a new one. Returns the number of output rows since
+    /// the start.
     pub fn finish(&mut self) -> u64 {
         self.rows = 0;
         core::mem::take(&mut self.outputs) as u64
     }
 }
 
-/// Where complete outputs go: column by column, those from number `before` on.
+/// Destination of complete outputs, column by column, from number `before` on.
 struct Complete<'a> {
     values: &'a mut [f64],
     stride: usize,
     before: usize,
 }
 
-/// Adds some rows to all outputs that they enter. Rows are read once, while they are in the cache; nothing of them is
-/// kept but these sums.
+/// Adds rows to all outputs whose support contains them. Rows are read once, while they are in the cache.
 struct Convolution<'a> {
     filter: &'a Filter,
     columns: usize,
     panel: &'a [f64],
-    /// Rows of the panel, of which these are at work, and the signal's row that the first of them is.
+    /// Number of rows of the panel, the current range of them, and the signal's row number of the first.
     stride: usize,
     piece: core::ops::Range<usize>,
     first_row: usize,
-    /// Outputs that were complete before.
+    /// Number of outputs that were complete before.
     outputs: usize,
     begun: &'a mut [Block],
     signal: &'a mut Vec<Block>,
@@ -279,7 +276,7 @@ impl Kernel for Convolution<'_> {
     fn run<T: Lane>(mut self) {
         let mut column = 0;
         while column < self.columns {
-            // Each load of coefficients serves all columns of a group, and their sums hide the latency.
+            // Each load of coefficients is used for all columns of a group, and their sums hide the latency.
             column += match self.columns - column {
                 8.. => self.group::<T, 8>(column),
                 4.. => self.group::<T, 4>(column),
@@ -291,13 +288,13 @@ impl Kernel for Convolution<'_> {
 }
 
 impl Convolution<'_> {
-    /// Columns `column .. column + N`; returns their number.
+    /// Processes columns `column .. column + N`; returns their number.
     #[inline(always)]
     fn group<T: Lane, const N: usize>(&mut self, column: usize) -> usize {
         let Filter { length, factor, .. } = *self.filter;
         let (begin, end) = (self.first_row, self.first_row + self.piece.len());
         let first_block = begin / BLOCK;
-        // Rows of the first and the last block that are not in this piece are zero, and add nothing.
+        // Rows of the first and the last block outside this piece are zero.
         let blocks = end.div_ceil(BLOCK) - first_block;
         self.signal.resize(blocks * N, Block::ZERO);
         for n in 0..N {
@@ -315,7 +312,6 @@ impl Convolution<'_> {
             }
         }
         let places = self.begun.len() / self.columns;
-        // All outputs whose support has begun.
         for output in self.outputs..end.div_ceil(factor) {
             let support = output * factor;
             let (phase, base) = (support % BLOCK, support / BLOCK);
@@ -364,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn output_rows_are_the_plain_convolution_however_the_input_is_cut() {
+    fn output_rows_are_the_plain_convolution_for_any_partition() {
         let settings = DecimationSettings { factor: 7, ..DecimationSettings::default() };
         let taps = settings.taps(1000.0).unwrap();
         let n = 1203;
@@ -393,16 +389,16 @@ mod tests {
                 // Sums of about 70 products of order one: rounding below 1e-14.
                 assert!((a - plain).abs() < 1e-13 && (b - 2.0 * plain).abs() < 2e-13, "cut {cut}");
             }
-            // The same to the last bit.
+            // Bit-identical for all partitions.
             let own: Vec<u64> = first.iter().map(|value| value.to_bits()).collect();
             assert_eq!(*bits.get_or_insert_with(|| own.clone()), own, "cut {cut}");
         }
     }
 
     #[test]
-    fn columns_and_signals_do_not_mix_whatever_the_factor() {
-        // Factors around the block of eight, one beyond the filter's length, one of which every row is an output; as
-        // many columns as make groups of every width.
+    fn columns_and_signals_are_independent_for_any_factor() {
+        // Factors around the block length of eight, one longer than the filter and one without decimation; 15 columns
+        // form groups of every width.
         for (factor, settings) in [1, 4, 8, 9, 40].into_iter().flat_map(|factor| {
             let narrow = DecimationSettings { factor, cutoff_hz: Some(100.0), ..DecimationSettings::default() };
             let wide = DecimationSettings { transition_hz: Some(200.0), ..narrow.clone() };
@@ -412,7 +408,7 @@ mod tests {
             let value = |column: usize, row: usize| (column + 1) as f64 * wave(row + 17 * column);
             let mut decimator = Decimator::new(&settings, 1000.0, 1).unwrap().with_columns(columns);
             let mut out = Vec::new();
-            // A signal that is broken off leaves nothing behind.
+            // An interrupted signal does not change the next one.
             decimator.push(&vec![1e6; 13 * columns], 13, &mut out);
             decimator.finish();
             let mut found = vec![Vec::new(); columns];
@@ -452,7 +448,6 @@ mod tests {
                     .map(|(k, tap)| tap * (2.0 * PI * f / rate * (k as f64 - middle)).cos())
                     .sum::<f64>()
             };
-            // The documented figures themselves.
             let ripple = 10_f64.powf(-db / 20.0);
             for i in 0..=100 {
                 let share = f64::from(i) / 100.0;

@@ -1,10 +1,10 @@
-//! Filters that know nothing of joints, and what they are built of.
+//! Filters that are independent of joints, and their components.
 //!
-//! [`Decimator`] is the parallel filter: the same linear-phase low-pass and decimation for every column of the
-//! regressor and the torque. [`cutoff()`] chooses a cut-off from the spectrum of the positions,
-//! [`position_noise()`] reads off what noise is left below it, [`averaged_periods`] folds a periodic record.
-//! Inside: second-order sections of the Butterworth low-pass, orthonormal polynomials, and the bridge over
-//! the ends of a piece that a Fourier transform needs.
+//! [`Decimator`] is the parallel filter: the same linear-phase low-pass and decimation for all columns of the regressor
+//! and for the torque. [`cutoff()`] chooses a cut-off from the spectrum of the positions, [`position_noise()`]
+//! estimates the remaining noise below it, [`averaged_periods`] averages a periodic record. Internal: second-order
+//! sections of the Butterworth low-pass, orthonormal polynomials, and the bridge over the ends of a piece for a Fourier
+//! transform.
 
 pub(crate) mod bridge;
 pub(crate) mod cutoff;
@@ -14,7 +14,7 @@ mod periods;
 mod position_noise;
 pub(crate) mod sections;
 
-pub use cutoff::{CutoffChoice, cutoff};
+pub use cutoff::{CutoffChoice, CutoffSettings, cutoff, cutoff_within};
 pub use decimation::{DecimationSettings, Decimator};
 pub use periods::{AveragedPeriods, averaged_periods};
 pub(crate) use position_noise::NoiseSpectra;

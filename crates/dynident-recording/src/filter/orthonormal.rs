@@ -1,9 +1,8 @@
 //! Polynomials that are orthonormal over equally spaced samples.
 
-/// For each degree from 0 on, a polynomial's values at `samples` equally spaced points and those of its first two
-/// derivatives, over the abscissa `x = (i - h)/h`, h = (samples - 1)/2 (rounded down for even numbers; at least one
-/// half). Sums of products of two of them are 0, of one with itself 1. By `x · p_{k-1}` made orthogonal in two
-/// Gram-Schmidt passes.
+/// For each degree from 0 on, the values of a polynomial at `samples` equally spaced points and those of its first two
+/// derivatives, over the abscissa `x = (i - h)/h`, h = (samples - 1)/2 (rounded down for even numbers; at least 0.5).
+/// The polynomials are orthonormal over the points, by two Gram-Schmidt passes on `x · p_{k-1}`.
 pub(crate) fn orthonormal_polynomials(samples: usize, degree: usize) -> Vec<[Vec<f64>; 3]> {
     let half = half(samples);
     let abscissa: Vec<f64> = (0..samples).map(|i| (i as f64 - half) / half).collect();
@@ -35,7 +34,7 @@ pub(crate) fn orthonormal_polynomials(samples: usize, degree: usize) -> Vec<[Vec
     basis
 }
 
-/// Samples from the middle to where the abscissa is one.
+/// Distance from the centre to abscissa 1, in samples.
 pub(crate) fn half(samples: usize) -> f64 {
     ((samples / 2) as f64).max(0.5)
 }

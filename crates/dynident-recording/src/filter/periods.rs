@@ -1,16 +1,16 @@
-//! Periods of a repeated motion: their mean, and the noise from how they differ.
+//! Averages the periods of a repeated motion and estimates the noise from their differences.
 
 use crate::error::FormatError;
 
-/// The mean period of some channels and the covariance of their noise.
+/// Mean period of several channels and covariance of their noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AveragedPeriods {
-    /// Channel by channel the mean over the periods, `period_samples` numbers each.
+    /// Mean over the periods, `period_samples` values for each channel.
     pub mean: Vec<Vec<f64>>,
-    /// Covariance of a single sample's noise between channels at one instant, row by row; that of the mean is a P-th of
-    /// it.
+    /// Noise covariance of a single sample between channels at one instant, row by row; that of the mean is smaller by
+    /// the factor P.
     pub sample_covariance: Vec<Vec<f64>>,
-    /// Periods P that were averaged.
+    /// Number P of averaged periods.
     pub periods: usize,
 }
 
@@ -26,13 +26,13 @@ impl AveragedPeriods {
 ///     x̄_k = Σ_p x_pk / P,   Σ = Σ_k Σ_p (x_pk − x̄_k)(x_pk − x̄_k)ᵀ / (N (P − 1))
 /// ```
 ///
-/// for N samples in a period and all whole periods P; what is left over at the end is not used. Noise with a period's
-/// memory or drift from period to period counts as noise. Olsen, Swevers and Verdonck, Int. J. Robotics Research 21
-/// (2002) 895.
+/// for N samples per period and P whole periods; samples after the last whole period are not used. Noise correlated
+/// over a period and drift between periods are included in the noise. Source: Olsen, Swevers and Verdonck, Int. J.
+/// Robotics Research 21 (2002) 895.
 ///
 /// # Errors
-/// [`FormatError`] with key `period_samples` when it is zero or channels are shorter than two periods, `channels` when
-/// they differ in length or hold a number that is not finite.
+/// [`FormatError`] with key `period_samples` if it is zero or channels are shorter than two periods, `channels` if they
+/// differ in length or contain a value that is not finite.
 ///
 /// ```
 /// // Two periods of three samples, 0.2 apart everywhere.
@@ -44,14 +44,14 @@ impl AveragedPeriods {
 pub fn averaged_periods(channels: &[&[f64]], period_samples: usize) -> Result<AveragedPeriods, FormatError> {
     let length = channels.first().map_or(0, |channel| channel.len());
     if channels.iter().any(|channel| channel.len() != length) {
-        return Err(FormatError::new("channels", "they differ in length", "give samples of the same instants"));
+        return Err(FormatError::new("channels", "the channels differ in length", "give samples of the same instants"));
     }
     if channels.iter().any(|channel| channel.iter().any(|value| !value.is_finite())) {
         return Err(FormatError::new("channels", "a sample is not finite", "fill or cut gaps before averaging"));
     }
     let periods = length.checked_div(period_samples).unwrap_or(0);
     if periods < 2 {
-        let problem = format!("{length} samples hold {periods} whole period(s) of {period_samples} samples");
+        let problem = format!("{length} samples contain {periods} whole period(s) of {period_samples} samples");
         return Err(FormatError::new("period_samples", problem, "record at least two periods, or give a shorter one"));
     }
     let mean: Vec<Vec<f64>> = channels
@@ -74,7 +74,7 @@ pub fn averaged_periods(channels: &[&[f64]], period_samples: usize) -> Result<Av
 mod tests {
     use super::*;
 
-    /// xorshift with a sum of uniforms: normal enough for a variance.
+    /// Approximately normal noise: a sum of uniform xorshift numbers.
     fn noise(state: &mut u64) -> f64 {
         let mut sum = 0.0;
         for _ in 0..12 {
@@ -87,8 +87,8 @@ mod tests {
     }
 
     #[test]
-    fn noise_of_known_covariance_is_found_again() {
-        // Channel b carries half of channel a's noise and some of its own: covariances 0.04, 0.02, 0.01 + 0.0225.
+    fn noise_of_known_covariance_is_estimated() {
+        // Channel b has half of channel a's noise and independent noise: covariances 0.04, 0.02, 0.01 + 0.0225.
         let (periods, samples) = (20, 200);
         let mut state = 0x1234_5678_9ABC_DEF1;
         let (mut a, mut b) = (Vec::new(), Vec::new());
@@ -100,7 +100,7 @@ mod tests {
         }
         let found = averaged_periods(&[&a, &b], samples).unwrap();
         assert_eq!(found.periods, periods);
-        // A variance from 3800 squares has a relative deviation of √(2/3800) = 2.3 %; four of them.
+        // A variance from 3800 squares has a relative standard deviation of √(2/3800) = 2.3 %; four are allowed.
         for (value, truth) in [
             (found.sample_covariance[0][0], 0.04),
             (found.sample_covariance[0][1], 0.02),
@@ -108,7 +108,8 @@ mod tests {
         ] {
             assert!((value / truth - 1.0).abs() < 0.1, "{value} for {truth}");
         }
-        // The mean's mean square error is a P-th of the variance; 200 squares: 10 %, four of them.
+        // The mean square error of the mean is the variance over P; for 200 squares, 10 % standard deviation; four are
+        // allowed.
         let square: f64 = (0..samples)
             .map(|k| (found.mean[0][k] - (core::f64::consts::TAU * k as f64 / samples as f64).sin()).powi(2))
             .sum();
@@ -117,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_averaged_is_named() {
+    fn invalid_channels_and_periods_are_rejected() {
         let channel = [1.0, 2.0, 3.0];
         assert_eq!(averaged_periods(&[&channel], 2).unwrap_err().key, "period_samples");
         assert_eq!(averaged_periods(&[&channel], 0).unwrap_err().key, "period_samples");

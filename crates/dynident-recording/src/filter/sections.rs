@@ -1,4 +1,4 @@
-//! Second-order sections: design of the digital Butterworth low-pass, and its run over three signals side by side.
+//! Second-order sections: design of the digital Butterworth low-pass, and its run over three signals.
 
 use crate::error::{FilterError, require};
 use core::f64::consts::PI;
@@ -6,18 +6,16 @@ use core::f64::consts::PI;
 /// `H(z) = (b0 + b1 z⁻¹ + b2 z⁻²) / (1 + a1 z⁻¹ + a2 z⁻²)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Section {
-    /// Numerator.
     pub(crate) b: [f64; 3],
-    /// Denominator after the leading one.
     pub(crate) a: [f64; 2],
 }
 
-/// Lowest cut-off as part of the sampling rate: there the gain at zero frequency still holds to seven digits.
-const LOWEST: f64 = 1e-5;
+/// Minimum ratio of the cut-off to the sampling rate: there the gain at zero frequency is accurate to seven digits.
+const MIN_CUTOFF_RATIO: f64 = 1e-5;
 
-/// The digital Butterworth low-pass of `order`: analogue prototype poles `exp(iπ(2k + n + 1) / 2n)`, cut-off
-/// pre-warped, bilinear transform; each section has unit gain at zero frequency. The cascade is that of
-/// `scipy.signal.butter(order, cutoff_hz, fs=rate_hz, output="sos")`, up to how the gain is spread over the sections.
+/// Digital Butterworth low-pass of `order`: analogue prototype poles `exp(iπ(2k + n + 1) / 2n)`, cut-off pre-warped,
+/// bilinear transform; each section has unit gain at zero frequency. Equals `scipy.signal.butter(order, cutoff_hz,
+/// fs=rate_hz, output="sos")` except for the distribution of the gain over the sections.
 /// Source: Oppenheim and Schafer, Discrete-Time Signal Processing, section 7.1.2.
 ///
 /// # Errors
@@ -28,8 +26,8 @@ pub(crate) fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -
     if cutoff_hz.partial_cmp(&(0.5 * rate_hz)) != Some(core::cmp::Ordering::Less) {
         return Err(FilterError::AboveNyquist { cutoff_hz, rate_hz });
     }
-    let fix = "raise it: below 1e-5 of the sampling rate the recursion has no digits left";
-    require(cutoff_hz >= LOWEST * rate_hz, "cutoff_hz", cutoff_hz, fix)?;
+    let fix = "raise it: below 1e-5 of the sampling rate the recursion loses all precision";
+    require(cutoff_hz >= MIN_CUTOFF_RATIO * rate_hz, "cutoff_hz", cutoff_hz, fix)?;
     let warped = (PI * cutoff_hz / rate_hz).tan();
     let mut sections: Vec<Section> = (0..order / 2)
         .map(|k| {
@@ -51,7 +49,7 @@ pub(crate) fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -
     Ok(sections)
 }
 
-/// Largest pole radius of the cascade: transients die as `radiusⁿ`.
+/// Maximum pole radius of the cascade: transients decay as `radiusⁿ`.
 pub(crate) fn pole_radius(sections: &[Section]) -> f64 {
     sections.iter().fold(0.0_f64, |radius, section| {
         let [a1, a2] = section.a;
@@ -61,10 +59,10 @@ pub(crate) fn pole_radius(sections: &[Section]) -> f64 {
     })
 }
 
-/// Three signals side by side: positions, first and second differences go through the same recursion.
+/// Position, first and second difference: three signals that pass through the same recursion.
 pub(crate) type Triple = [f64; 3];
 
-/// Runs the cascade over `signal` in place (in reverse order if asked), transposed direct form II. Each section starts
+/// Runs the cascade over `signal` in place (from the end if `reversed`), transposed direct form II. Each section starts
 /// in its steady state for the constant input `start`, as with `scipy.signal.sosfilt_zi`.
 pub(crate) fn run(sections: &[Section], signal: &mut [Triple], start: Triple, reversed: bool) {
     for some in sections.chunks(2) {
@@ -75,10 +73,9 @@ pub(crate) fn run(sections: &[Section], signal: &mut [Triple], start: Triple, re
     }
 }
 
-/// Some sections in one sweep: the second works on a sample while the first is at the next one, and each waits for
-/// nothing but itself.
+/// Runs N sections in one sweep, so that the processor can overlap their recursions.
 fn run_together<const N: usize>(sections: [Section; N], signal: &mut [Triple], start: Triple, reversed: bool) {
-    // Unit gain: a constant x leaves y = x, so s2 = (b2 - a2) x and s1 = (b1 - a1) x + s2.
+    // Unit gain: for constant x, y = x, so s2 = (b2 - a2) x and s1 = (b1 - a1) x + s2.
     let mut s2 = sections.map(|Section { b: [_, _, b2], a: [_, a2] }| start.map(|x| (b2 - a2) * x));
     let mut s1: [Triple; N] = core::array::from_fn(|k| {
         let Section { b: [_, b1, _], a: [a1, _] } = sections[k];

@@ -1,24 +1,22 @@
-//! The blocks of a log one after another, read here or on a thread of their own.
+//! Reads the blocks of a log one after another, optionally in a separate thread.
 
 use super::reader::{LinesDropped, LogReader, RawBlock};
 use crate::error::RecordingError;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
-/// Blocks that may wait: enough that neither side stands still for the other's longer ones.
-const WAITING: usize = 4;
+/// Capacity of the queue: enough that neither side waits for a slow block of the other.
+const QUEUE_BLOCKS: usize = 4;
 
-/// Where blocks come from.
 #[derive(Debug)]
 enum Source {
-    Here(Box<LogReader>),
-    Beside { blocks: Receiver<Read>, thread: Option<JoinHandle<()>> },
+    Inline(Box<LogReader>),
+    Thread { blocks: Receiver<Read>, thread: Option<JoinHandle<()>> },
 }
 
-/// A block or the end, and what was left out so far.
+/// A block or the end, and the rows left out so far.
 type Read = (Result<Option<RawBlock>, RecordingError>, LinesDropped);
 
-/// The blocks of one pass over a log, the same wherever they are read.
 #[derive(Debug)]
 pub(crate) struct RawBlocks {
     label: String,
@@ -29,34 +27,34 @@ pub(crate) struct RawBlocks {
 impl RawBlocks {
     pub(crate) fn new(reader: LogReader) -> Self {
         let label = reader.label().to_owned();
-        Self { label, source: Source::Here(Box::new(reader)), dropped: LinesDropped::default() }
+        Self { label, source: Source::Inline(Box::new(reader)), dropped: LinesDropped::default() }
     }
 
-    /// The same, read ahead by a thread of its own from now on.
-    pub(crate) fn beside(self) -> Self {
-        let Source::Here(mut reader) = self.source else { return self };
-        let (give, blocks) = sync_channel(WAITING);
+    /// Reads ahead in a separate thread from now on.
+    pub(crate) fn in_thread(self) -> Self {
+        let Source::Inline(mut reader) = self.source else { return self };
+        let (give, blocks) = sync_channel(QUEUE_BLOCKS);
         let thread = std::thread::spawn(move || {
             loop {
                 let read = next_of(&mut reader);
                 let is_last = !matches!(read, Ok(Some(_)));
-                // Nobody listens any more where the pass has ended before the log.
+                // The receiver is gone if the pass ended before the log.
                 if give.send((read, reader.dropped().clone())).is_err() || is_last {
                     return;
                 }
             }
         });
-        Self { source: Source::Beside { blocks, thread: Some(thread) }, ..self }
+        Self { source: Source::Thread { blocks, thread: Some(thread) }, ..self }
     }
 
     /// The next rows; `None` at the end.
     ///
     /// # Errors
-    /// What reading them can give.
+    /// Errors of [`LogReader::next_block`].
     pub(crate) fn next_block(&mut self) -> Result<Option<RawBlock>, RecordingError> {
         let (read, dropped) = match &mut self.source {
-            Source::Here(reader) => (next_of(reader), reader.dropped().clone()),
-            Source::Beside { blocks, thread } => {
+            Source::Inline(reader) => (next_of(reader), reader.dropped().clone()),
+            Source::Thread { blocks, thread } => {
                 let Ok(read) = blocks.recv() else {
                     if let Some(Err(panic)) = thread.take().map(JoinHandle::join) {
                         std::panic::resume_unwind(panic);
@@ -70,12 +68,10 @@ impl RawBlocks {
         read
     }
 
-    /// What messages call the log.
     pub(crate) fn label(&self) -> &str {
         &self.label
     }
 
-    /// Rows and lines left out so far.
     pub(crate) fn dropped(&self) -> &LinesDropped {
         &self.dropped
     }
@@ -92,24 +88,24 @@ mod tests {
     use crate::log::JointSamples;
 
     #[test]
-    fn the_same_blocks_are_read_here_and_beside() {
+    fn a_thread_reads_the_same_blocks() {
         let mut q: Vec<f64> = (0..20_000).map(f64::from).collect();
         q[7] = f64::NAN;
         let samples = JointSamples::at_rate(10.0, vec![q.clone()], vec![q]);
         let mut log = samples.into_log("log", &["elbow".to_owned()]).unwrap();
         log.format.missing = crate::log::Missing::Drop;
         let blocks = || RawBlocks::new(LogReader::open(&log).unwrap());
-        let (mut here, mut beside) = (blocks(), blocks().beside());
+        let (mut here, mut in_thread) = (blocks(), blocks().in_thread());
         loop {
-            let (one, other) = (here.next_block().unwrap(), beside.next_block().unwrap());
+            let (one, other) = (here.next_block().unwrap(), in_thread.next_block().unwrap());
             assert_eq!(one, other);
             if one.is_none() {
                 break;
             }
         }
-        assert_eq!((here.dropped(), here.dropped().missing), (beside.dropped(), 1));
-        assert_eq!(beside.next_block().unwrap(), None);
-        // A pass that ends before the log leaves no thread that waits for ever.
-        drop(blocks().beside());
+        assert_eq!((here.dropped(), here.dropped().missing), (in_thread.dropped(), 1));
+        assert_eq!(in_thread.next_block().unwrap(), None);
+        // A pass that ends before the log does not leave a waiting thread.
+        drop(blocks().in_thread());
     }
 }

@@ -1,6 +1,6 @@
 //! The columns of one quantity of all joints, with unit, sign, scale and matrix.
 
-use super::column_pattern::expanded;
+use super::column_pattern::expand_pattern;
 use super::units::{Quantity, si_factor, unit_names};
 use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub enum ColumnRef {
     /// 0-based index.
     Index(usize),
-    /// Name in the header; a range such as `q{1..7}_rad` stands for several.
+    /// Name in the header; may contain a range such as `q{1..7}_rad`.
     Name(String),
 }
 
@@ -37,14 +37,14 @@ pub enum Columns {
 #[cfg_attr(feature = "schema", schemars(rename = "OneOrMany_{T}"))]
 #[serde(untagged, expecting = "give one value for all columns, or a list with one for each")]
 pub enum OneOrMany<T> {
-    /// The same for all.
+    /// The same value for all.
     One(T),
-    /// One for each.
+    /// One value for each.
     Many(Vec<T>),
 }
 
 impl<T: Clone> OneOrMany<T> {
-    /// The value of number `index`; none where a list is shorter.
+    /// The value for `index`; `None` if a list is shorter.
     pub fn at(&self, index: usize) -> Option<T> {
         match self {
             Self::One(value) => Some(value.clone()),
@@ -64,7 +64,7 @@ impl<T: Clone> OneOrMany<T> {
     }
 }
 
-/// The columns of one quantity and how they become joint values in SI:
+/// The columns of one quantity and their conversion to joint values in SI:
 ///
 /// `joint = M · (scale · sign · unit · column) + offset`
 ///
@@ -88,33 +88,33 @@ impl<T: Clone> OneOrMany<T> {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ChannelGroup {
-    /// Another file of the same log, relative to the main file's folder; its rows pair with the main file's.
+    /// Another file of the same log, relative to the main file's folder, with the same rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// One column for each joint of the study, in the study's joint order (any number if a matrix follows).
+    /// One column for each joint of the study, in the study's joint order (any number with a matrix).
     pub columns: Columns,
     /// Unit of the columns: `rad` `deg` `rev` `m` `mm`; `rad/s` `deg/s` `rpm` ..; `N m` `N` `A` `mA` ..
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<OneOrMany<String>>,
-    /// Factor on top of the unit: current gain, gear ratio.
+    /// Factor in addition to the unit: current gain, gear ratio.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<OneOrMany<f64>>,
     /// +1 or -1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sign: Option<OneOrMany<f64>>,
-    /// Added last, per joint, in SI.
+    /// Offset of the joint value, per joint, in SI.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset: Option<OneOrMany<f64>>,
     /// `joint = matrix · columns`: one row for each joint, one entry for each column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matrix: Option<Vec<Vec<f64>>>,
-    /// `columns = inverse_matrix · joint`: the joint-to-motor matrix as makers give it; square.
+    /// `columns = inverse_matrix · joint`: the joint-to-motor matrix of data sheets; square.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inverse_matrix: Option<Vec<Vec<f64>>>,
 }
 
 impl ChannelGroup {
-    /// Columns that are joint values in SI already, in the main file.
+    /// Columns of joint values in SI, in the main file.
     pub fn new(columns: Columns) -> Self {
         Self {
             file: None,
@@ -128,20 +128,22 @@ impl ChannelGroup {
         }
     }
 
-    /// The columns one by one, ranges expanded.
+    /// The columns with ranges expand_pattern.
     ///
     /// # Errors
-    /// If a range is malformed or absurdly long.
+    /// If a range is malformed or too long.
     pub fn column_list(&self, key: &str) -> Result<Vec<ColumnRef>, FormatError> {
         let key = format!("{key}.columns");
         let mut list = Vec::new();
         match &self.columns {
-            Columns::Pattern(pattern) => list.extend(expanded(&key, pattern)?.into_iter().map(ColumnRef::Name)),
+            Columns::Pattern(pattern) => list.extend(expand_pattern(&key, pattern)?.into_iter().map(ColumnRef::Name)),
             Columns::List(columns) => {
                 for column in columns {
                     match column {
                         ColumnRef::Index(index) => list.push(ColumnRef::Index(*index)),
-                        ColumnRef::Name(name) => list.extend(expanded(&key, name)?.into_iter().map(ColumnRef::Name)),
+                        ColumnRef::Name(name) => {
+                            list.extend(expand_pattern(&key, name)?.into_iter().map(ColumnRef::Name))
+                        }
                     }
                 }
             }

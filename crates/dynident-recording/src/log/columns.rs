@@ -1,4 +1,4 @@
-//! The columns of one table that a log's description asks for, found by name or index.
+//! Selects the columns of a table by name or index.
 
 use super::channels::ColumnRef;
 use super::row_count::RowCount;
@@ -6,16 +6,13 @@ use super::source::{LogSource, LogTable};
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 
-/// A table under way, and the columns of it that are wanted.
 #[derive(Debug)]
 pub(super) struct ColumnSelection {
     pub(super) label: String,
     pub(super) table: Box<dyn LogTable>,
-    /// Column of each slot.
     fields: Vec<usize>,
-    /// The row last read, one value for each slot.
     pub(super) values: Vec<f64>,
-    /// Rows passed so far.
+    /// Number of rows read or skipped so far.
     pub(super) rows: u64,
 }
 
@@ -24,18 +21,18 @@ impl ColumnSelection {
         Self { label, table, fields: Vec::new(), values: Vec::new(), rows: 0 }
     }
 
-    /// Asks for `column`; its values appear at the returned slot of every row.
-    pub(super) fn want(&mut self, key: &str, column: &ColumnRef) -> Result<usize, RecordingError> {
+    /// Requests `column`; returns the slot of its values in every row.
+    pub(super) fn request(&mut self, key: &str, column: &ColumnRef) -> Result<usize, RecordingError> {
         let field = self.field(key, column)?;
-        if let Some(known) = self.fields.iter().position(|wanted| *wanted == field) {
+        if let Some(known) = self.fields.iter().position(|requested| *requested == field) {
             return Ok(known);
         }
         self.fields.push(field);
         Ok(self.fields.len() - 1)
     }
 
-    /// Data rows of the table's source: one pass without a look at the numbers. Which rows there are may hang on
-    /// what is asked for. A pass that was made for `known` is not made again.
+    /// Counts the data rows of the table's source in one pass without parsing numbers. The rows may depend on the
+    /// requested columns. The result is cached in `known`.
     pub(super) fn count_rows(&self, source: &dyn LogSource, known: &RowCount) -> Result<u64, RecordingError> {
         known.of(&self.fields, source.path(), || {
             let (mut table, mut rows) = (source.open()?, 0);
@@ -47,17 +44,16 @@ impl ColumnSelection {
         })
     }
 
-    /// Ends the asking.
-    pub(super) fn ready(&mut self) {
+    pub(super) fn finish_selection(&mut self) {
         self.table.select(&self.fields);
         self.values = vec![0.0; self.fields.len()];
     }
 
     fn field(&self, key: &str, column: &ColumnRef) -> Result<usize, RecordingError> {
-        let unknown = |wanted: String, hint: String| RecordingError::UnknownColumn {
+        let unknown = |requested: String, hint: String| RecordingError::UnknownColumn {
             place: self.table.place(),
             key: key.to_owned(),
-            wanted,
+            wanted: requested,
             hint,
         };
         let width = self.table.width();
@@ -73,7 +69,7 @@ impl ColumnSelection {
                             "the file has no header line: give 0-based indices, or set header = true"
                         }
                         LogPlace::Whole { .. } | LogPlace::Row { .. } => {
-                            "its columns have no names: give 0-based indices"
+                            "the columns have no names: give 0-based indices"
                         }
                     };
                     return Err(unknown(name.clone(), hint.to_owned()));
@@ -93,26 +89,23 @@ impl ColumnSelection {
         }
     }
 
-    /// Reads one row into `values`; false at the end.
     pub(super) fn next_row(&mut self) -> Result<bool, RecordingError> {
         let found = self.table.next_row(&mut self.values)?;
         self.rows += u64::from(found);
         Ok(found)
     }
 
-    /// Passes over one row; false at the end.
     pub(super) fn skip_row(&mut self) -> Result<bool, RecordingError> {
         let found = self.table.skip_row()?;
         self.rows += u64::from(found);
         Ok(found)
     }
 
-    /// Whether the row last read has an empty, NaN or infinite field.
+    /// Whether the current row has an empty, NaN or infinite field.
     pub(super) fn missing(&self) -> bool {
         !self.values.iter().all(|value| value.is_finite())
     }
 
-    /// The error for the missing value in the row last read.
     pub(super) fn missing_error(&self) -> RecordingError {
         let slot = self.values.iter().position(|value| !value.is_finite()).unwrap_or(0);
         let field = self.fields[slot];
@@ -123,13 +116,11 @@ impl ColumnSelection {
         }
     }
 
-    /// Name and index of a wanted column, for messages.
     pub(super) fn label_of_slot(&self, slot: usize) -> String {
         column_label(self.table.names(), self.fields[slot])
     }
 }
 
-/// Name and index of a column, for messages.
 pub(super) fn column_label(names: Option<&[String]>, field: usize) -> String {
     match names.and_then(|names| names.get(field)) {
         Some(name) => format!("`{}` ({field})", name.escape_debug()),
@@ -137,19 +128,21 @@ pub(super) fn column_label(names: Option<&[String]>, field: usize) -> String {
     }
 }
 
-fn existing_names(wanted: &str, names: &[String]) -> String {
-    const SHOWN: usize = 40;
-    // Bounded: a line of a megabyte may hold half a million names.
-    const COMPARED: usize = 1000;
-    let nearest = names.iter().take(COMPARED).min_by_key(|name| edit_distance(wanted, name)).map_or("", String::as_str);
+fn existing_names(requested: &str, names: &[String]) -> String {
+    const MAX_SHOWN: usize = 40;
+    // Bounded, because a line of a megabyte may contain half a million names.
+    const MAX_COMPARED: usize = 1000;
+    let nearest =
+        names.iter().take(MAX_COMPARED).min_by_key(|name| edit_distance(requested, name)).map_or("", String::as_str);
     let cut = |name: &str| name.chars().take(60).flat_map(char::escape_debug).collect::<String>();
-    let list = names.iter().take(SHOWN).map(|name| cut(name)).collect::<Vec<_>>().join(", ");
-    let more = if names.len() > SHOWN { format!(", and {} more", names.len() - SHOWN) } else { String::new() };
+    let list = names.iter().take(MAX_SHOWN).map(|name| cut(name)).collect::<Vec<_>>().join(", ");
+    let more = if names.len() > MAX_SHOWN { format!(", and {} more", names.len() - MAX_SHOWN) } else { String::new() };
     let delimiter = if names.len() == 1 { " (only one column: is `delimiter` right?)" } else { "" };
     format!("did you mean `{}`? There are: {list}{more}{delimiter}", cut(nearest))
 }
 
-/// Levenshtein distance over the first 64 characters; another digit counts three: `tau1` is no misspelling of `tau2`.
+/// Levenshtein distance over the first 64 characters; a changed digit costs three, because `tau1` is not a misspelling
+/// of `tau2`.
 fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().take(64).collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();
@@ -171,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn edit_distance_counts_single_edits() {
+    fn edit_distance_is_the_number_of_edits() {
         assert_eq!(edit_distance("kitten", "sitting"), 3);
         assert_eq!(edit_distance("", "abc"), 3);
         assert_eq!(edit_distance("q1_rad", "q1_rad"), 0);

@@ -1,4 +1,4 @@
-//! A file as a source of rows, whatever its format.
+//! A file of any format as a source of rows.
 
 use super::format::{Header, LogFormat};
 use super::source::{LogGroup, LogSource, LogTable};
@@ -10,11 +10,11 @@ use dynident_formats::{Contents, FileError, FileFormat, Table};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A file that holds rows of numbers, of any format that is read (`docs/src/logs.md`), found out from its content. The
-/// folder of a rosbag2 recording is treated as a file.
+/// A file with rows of numbers in any supported format (`docs/src/logs.md`), detected from its content. The folder of a
+/// rosbag2 recording is treated as a file.
 ///
-/// A log is read several times. Every pass and every clone compares the files' length, time of change and inode with
-/// those of the first pass: a file that was replaced in between is an error.
+/// A log is read several times. Every pass and every clone compares the file's length, modification time and inode with
+/// those of the first pass; a replaced file is an error.
 #[derive(Clone, Debug)]
 pub struct FileLog {
     path: PathBuf,
@@ -24,22 +24,22 @@ pub struct FileLog {
 }
 
 impl FileLog {
-    /// The file at `path`; `header` and `delimiter` of `format` hold for text. Nothing is read yet.
+    /// The file at `path`; `header` and `delimiter` of `format` apply to text. Does not read the file.
     pub fn new(path: &Path, format: &LogFormat) -> Self {
         Self { path: path.to_owned(), header: format.header, delimiter: format.delimiter, seen: Arc::default() }
     }
 
-    /// The file at `path`, whose header and delimiter are found out if it is text.
+    /// The file at `path`; header and delimiter of a text file are detected.
     pub fn described_by_itself(path: &Path) -> Self {
         Self { path: path.to_owned(), header: Header::Auto, delimiter: None, seen: Arc::default() }
     }
 
-    /// What the file is, and a pass over its rows.
+    /// Opens the file for one pass over its rows; also returns its format.
     ///
     /// # Errors
-    /// If it cannot be read, does not hold a table, or changed since the first pass.
+    /// If it cannot be read, does not contain a table, or changed since the first pass.
     pub fn open_with_format(&self) -> Result<(FileFormat, Box<dyn LogTable>), RecordingError> {
-        // Errors of listing and finding a file are reported when it is opened.
+        // Errors in listing files are reported when the file is opened.
         for file in dynident_formats::files(&self.path).unwrap_or_default() {
             if self.seen.is_unchanged(&file).is_ok_and(|unchanged| !unchanged) {
                 return Err(RecordingError::Changed { file });
@@ -67,7 +67,7 @@ impl LogSource for FileLog {
         Some(&self.path)
     }
 
-    /// What the file says; for text, from its size and the length of its first lines.
+    /// Number of rows in the file's metadata; for text, estimated from the file size and the length of the first lines.
     fn estimated_rows(&self) -> Option<u64> {
         use std::io::Read;
         match dynident_formats::open(&self.path).ok()?.contents {
@@ -83,7 +83,6 @@ impl LogSource for FileLog {
     }
 }
 
-/// A table that dynident-formats reads.
 #[derive(Debug)]
 struct FileTable {
     label: String,

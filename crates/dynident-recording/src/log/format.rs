@@ -1,4 +1,4 @@
-//! The description of a log: which column is what. Plain data, read from the study file.
+//! Format of a log: the mapping of columns to quantities, read from the study file.
 
 use super::channels::{ChannelGroup, ColumnRef};
 use super::mapping::Mapping;
@@ -7,7 +7,7 @@ use super::units::Quantity;
 use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
 
-/// Whether the first row names the columns.
+/// Whether the first row contains the column names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(from = "WrittenHeader", into = "WrittenHeader")]
@@ -22,7 +22,7 @@ pub enum Header {
     Absent,
 }
 
-/// [`Header`] as it is written: `true`, `false` or `"auto"`.
+/// Serialised form of [`Header`]: `true`, `false` or `"auto"`.
 #[derive(Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "header must be true, false or \"auto\"")]
@@ -79,7 +79,7 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    /// Seconds in one unit.
+    /// Unit length, s.
     pub fn seconds(self) -> f64 {
         match self {
             Self::Seconds => 1.0,
@@ -100,7 +100,7 @@ pub struct TimeColumn {
     /// Unit of the stamps; seconds by default.
     #[serde(default)]
     pub unit: TimeUnit,
-    /// Further factor on the stamps (a tick length); 1 by default.
+    /// Further factor on the stamps (tick length); 1 by default.
     #[serde(default = "one")]
     pub scale: f64,
 }
@@ -116,20 +116,20 @@ impl TimeColumn {
     }
 }
 
-/// What to do with a row that has an empty, NaN or infinite field.
+/// Treatment of a row with an empty, NaN or infinite field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Missing {
-    /// Stop with an error that names the place.
+    /// Stop with an error.
     #[default]
     Error,
-    /// Leave the row out; the hole is interpolated, or splits the log if it is long.
+    /// Leave the row out; a short hole is interpolated, a long one splits the log.
     Drop,
 }
 
-/// How time stamps are understood.
+/// Interpretation of time stamps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
@@ -138,15 +138,15 @@ pub enum ClockRule {
     /// Decided from the data, see [`Clock`](crate::clock::Clock).
     #[default]
     Auto,
-    /// Samples were taken at equal steps; the stamps only give the mean rate.
+    /// Equal steps; only the mean rate is taken from the stamps.
     Uniform,
-    /// Samples were taken at the stamps; they are interpolated onto a uniform grid.
+    /// Samples at the stamps, interpolated to a uniform grid.
     Stamps,
-    /// Samples were taken at a rate that changes slowly; single stamps jitter and are smoothed.
+    /// A slowly changing rate; the stamps jitter and are smoothed.
     Smoothed,
 }
 
-/// A log, described: part of the study file.
+/// Format of a log; part of the study file.
 ///
 /// ```
 /// let format: dynident_recording::LogFormat = toml::from_str(
@@ -168,13 +168,13 @@ pub struct LogFormat {
     /// Whether the first row names the columns.
     #[serde(default)]
     pub header: Header,
-    /// `","`, `";"`, `"\t"` or `" "` (any run of blanks); found out from the first line by default.
+    /// `","`, `";"`, `"\t"` or `" "` (any number of spaces); detected from the first line by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delimiter: Option<char>,
-    /// The time column; without one, give `rate_hz`.
+    /// The time column; otherwise `rate_hz` is required.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<TimeColumn>,
-    /// Sampling rate of a log without a time column.
+    /// Sampling rate of a log without a time column, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// Joint or motor positions.
@@ -187,42 +187,42 @@ pub struct LogFormat {
     pub acceleration: Option<ChannelGroup>,
     /// Joint torques or motor currents.
     pub torque: ChannelGroup,
-    /// Temperatures of the joints, °C, for friction that depends on them. Any other unit by `scale` and `offset`;
-    /// several joints may name the same column.
+    /// Joint temperatures, °C, for temperature-dependent friction. Convert other units by `scale` and `offset`; several
+    /// joints may use the same column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ChannelGroup>,
-    /// Data rows `[first, end)`, 0-based, header and comments not counted.
+    /// Data rows `[first, end)`, 0-based, without header and comments.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows: Option<[u64; 2]>,
-    /// Part of the data rows, `[0.0, 0.65]` = the first 65 %: rows `[round(a n), round(b n))`.
+    /// Share of the data rows, `[0.0, 0.65]` = the first 65 %: rows `[round(a n), round(b n))`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fraction: Option<[f64; 2]>,
     /// Seconds `[from, to)` after the first data row of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_range_s: Option<[f64; 2]>,
-    /// Data rows `[first, end)`, 0-based, that are left out of what is used, one range or several.
+    /// Ranges of data rows `[first, end)`, 0-based, that are left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drop_rows: Vec<[u64; 2]>,
-    /// Seconds `[from, to)` after the first data row of the file that are left out, one range or several.
+    /// Time ranges `[from, to)`, s after the first data row of the file, that are left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drop_time_s: Vec<[f64; 2]>,
-    /// Rows are left out where one of these rules holds.
+    /// Rows that satisfy one of these rules are left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drop_where: Vec<RowRule>,
-    /// Rows are left out where one of these rules does not hold.
+    /// Rows that violate one of these rules are left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub keep_where: Vec<RowRule>,
-    /// Rows with an empty, NaN or infinite field.
+    /// Treatment of rows with an empty, NaN or infinite field.
     #[serde(default)]
     pub missing: Missing,
-    /// How time stamps are understood.
+    /// Interpretation of time stamps.
     #[serde(default)]
     pub clock: ClockRule,
     /// A step longer than this many median steps splits the log; 1.5 to 1000, 5 by default.
     #[serde(default = "default_max_gap_steps")]
     pub max_gap_steps: f64,
-    /// Whether a longer gap is filled where it is short against the motion (a fifth of the cut-off's period); what
-    /// stands in it counts as no row. True by default.
+    /// Whether to fill a longer gap if it is short compared with the motion (at most a fifth of the cut-off's period).
+    /// The filled samples are not used as rows. True by default.
     #[serde(default = "yes")]
     pub bridge_gaps: bool,
 }
@@ -236,7 +236,7 @@ fn default_max_gap_steps() -> f64 {
 }
 
 impl LogFormat {
-    /// A log with a time column, all else by default: no further channel, every row, a header if there seems to be one.
+    /// A log with a time column; all other keys have their defaults.
     pub fn with_time(time: TimeColumn, position: ChannelGroup, torque: ChannelGroup) -> Self {
         Self {
             header: Header::default(),
@@ -262,20 +262,20 @@ impl LogFormat {
         }
     }
 
-    /// As [`with_time`](Self::with_time), for samples at an even rate and without stamps.
+    /// As [`with_time`](Self::with_time), for samples at an even rate without stamps.
     pub fn at_rate(rate_hz: f64, position: ChannelGroup, torque: ChannelGroup) -> Self {
         let time = TimeColumn::seconds(ColumnRef::Index(0));
         Self { time: None, rate_hz: Some(rate_hz), ..Self::with_time(time, position, torque) }
     }
 
-    /// Checks the description against itself and the study's joints.
+    /// Checks the format, also against the study's joints.
     ///
     /// # Errors
     /// A [`FormatError`] that names the key and the fix.
     pub fn validate(&self, joints: &[String]) -> Result<(), FormatError> {
         let wrong = |key: &str, problem: &str, fix: &str| Err(FormatError::new(key, problem, fix));
         if joints.is_empty() {
-            return wrong("position", "the study names no joints", "list at least one joint");
+            return wrong("position", "the study contains no joints", "list at least one joint");
         }
         match (&self.time, self.rate_hz) {
             (None, None) => {
@@ -285,7 +285,7 @@ impl LogFormat {
             (Some(_), Some(_)) => return wrong("rate_hz", "time and rate_hz are both given", "keep one of them"),
             (None, Some(rate)) if !(rate.is_finite() && rate > 0.0 && rate <= 1e7) => {
                 let fix = "give samples per second, above 0 and at most 1e7";
-                return wrong("rate_hz", &format!("{rate} is not a rate"), fix);
+                return wrong("rate_hz", &format!("{rate} is not a valid rate"), fix);
             }
             (Some(time), None) if !(1e-15..=1e6).contains(&time.scale) => {
                 let problem = format!("{:?} is no length of a tick", time.scale);
@@ -297,7 +297,7 @@ impl LogFormat {
             && !matches!(delimiter, ',' | ';' | '\t' | ' ' | '|' | ':')
         {
             let fix = "use one of \",\" \";\" \"\\t\" \" \" \"|\" \":\"";
-            return wrong("delimiter", &format!("{delimiter:?} is not offered"), fix);
+            return wrong("delimiter", &format!("{delimiter:?} is not supported"), fix);
         }
         if let Some([first, end]) = self.rows
             && first >= end
@@ -311,7 +311,7 @@ impl LogFormat {
             && !(from >= 0.0 && from < to && to <= 1.0)
         {
             let fix = "write [from, to] with 0 <= from < to <= 1";
-            return wrong("fraction", &format!("[{from}, {to}] is no part of a log"), fix);
+            return wrong("fraction", &format!("[{from}, {to}] is not a valid share of a log"), fix);
         }
         if let Some([from, to]) = self.time_range_s
             && !(from.is_finite() && from < to)

@@ -1,10 +1,9 @@
-//! The rows that a log leaves out, with the columns of its rules found.
+//! The rules by which rows are left out, with resolved columns.
 
 use super::channels::ColumnRef;
 use super::format::LogFormat;
 use super::row_rules::RowRule;
 
-/// Rules of a log whose columns are found: each with the place of its value in a row.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FoundRules {
     rows: Vec<[u64; 2]>,
@@ -14,7 +13,7 @@ pub(super) struct FoundRules {
 }
 
 impl FoundRules {
-    /// The rules of `format`; `want` gives the place of a column.
+    /// The rules of `format`; `want` returns the slot of a column.
     pub(super) fn new<E>(
         format: &LogFormat,
         mut want: impl FnMut(&str, &ColumnRef) -> Result<usize, E>,
@@ -31,7 +30,6 @@ impl FoundRules {
         })
     }
 
-    /// Whether the data row with this number, time and values is left out.
     pub(super) fn drops(&self, row: u64, time_s: f64, values: &[f64]) -> bool {
         self.rows.iter().any(|[first, end]| (*first..*end).contains(&row))
             || self.time_s.iter().any(|[from, to]| (*from..*to).contains(&time_s))

@@ -1,4 +1,4 @@
-//! Lines of a text table: capped in length, counted, comments and blanks left out.
+//! Reads the lines of a text table, without comments and blank lines, with a maximum length.
 
 use crate::error::RecordingError;
 use core::ops::Range;
@@ -6,24 +6,23 @@ use memchr::memchr;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-/// Longest line that is read; a humanoid's log row has a few thousand bytes.
+/// Maximum line length; a log row of a humanoid has a few thousand bytes.
 const MAX_LINE_BYTES: usize = 1 << 20;
-/// Bytes of a buffer: as many are asked for at a time as a reader below would copy through one of its own.
+/// Initial buffer size, bytes: reads of this size bypass the buffer of an underlying reader.
 const BUFFER_BYTES: usize = 1 << 19;
 
-/// The lines that matter of one file.
 pub(super) struct Lines {
     path: PathBuf,
     text: Box<dyn Read + Send>,
-    /// What was read and is still needed stands in front: lines are looked at where they lie.
+    /// Unprocessed bytes; the current line is not copied.
     buffer: Vec<u8>,
     filled: usize,
-    /// The line last read, with its newline.
+    /// The current line with its newline.
     line: Range<usize>,
     ended: bool,
-    /// 1-based number of the line last read.
+    /// 1-based number of the current line.
     number: u64,
-    /// Whether the line last read ended with a newline: a last line without one may be cut off.
+    /// Whether the current line ends with a newline; a last line without one may be truncated.
     complete: bool,
 }
 
@@ -34,7 +33,6 @@ impl core::fmt::Debug for Lines {
 }
 
 impl Lines {
-    /// The lines of `text`, which stands in the file at `path`.
     pub(super) fn new(path: &Path, text: Box<dyn Read + Send>) -> Self {
         Self {
             path: path.to_owned(),
@@ -56,7 +54,6 @@ impl Lines {
         self.complete
     }
 
-    /// Whether nothing follows the line last read.
     pub(super) fn at_end(&mut self) -> Result<bool, RecordingError> {
         while self.line.end == self.filled && !self.ended {
             self.read_on()?;
@@ -64,7 +61,7 @@ impl Lines {
         Ok(self.line.end == self.filled)
     }
 
-    /// The line that [`advance`](Self::advance) moved to, without byte-order mark, newline and outer blanks.
+    /// The current line (see [`advance`](Self::advance)) without byte-order mark, newline and carriage return.
     pub(super) fn line(&self) -> &[u8] {
         let line = &self.buffer[self.line.clone()];
         let line = line.strip_suffix(b"\n").unwrap_or(line);
@@ -86,7 +83,7 @@ impl Lines {
         }
     }
 
-    /// Moves to the next line; an empty one, without even a newline, at the end of the file.
+    /// Moves to the next line; the range is empty at the end of the file.
     fn next_line(&mut self) -> Result<(), RecordingError> {
         self.line.start = self.line.end;
         let mut seen = 0;
@@ -108,7 +105,7 @@ impl Lines {
         Ok(())
     }
 
-    /// Reads further bytes behind the line, which moves to the front.
+    /// Moves the current line to the start of the buffer and reads more bytes after it.
     fn read_on(&mut self) -> Result<(), RecordingError> {
         self.buffer.copy_within(self.line.start..self.filled, 0);
         self.filled -= self.line.start;
@@ -133,7 +130,7 @@ impl Lines {
 mod tests {
     use super::*;
 
-    /// A reader that gives a few bytes at a time.
+    /// A reader that returns a few bytes at a time.
     struct Dribble(std::io::Cursor<Vec<u8>>, usize);
 
     impl Read for Dribble {
@@ -154,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_the_same_however_the_bytes_come() {
+    fn lines_are_independent_of_the_read_size() {
         let text = b"\xEF\xBB\xBFa,b\r\n\n  # no\n1,2\n   \n3,4";
         for most in [1, 2, 5, 100] {
             let [first, second, third] = &lines(text, most).unwrap()[..] else { panic!("three lines") };

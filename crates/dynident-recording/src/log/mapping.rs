@@ -1,13 +1,13 @@
-//! From columns to joints: unit, sign, scale, matrix, offset.
+//! Converts columns to joint values: unit, sign, scale, matrix, offset.
 
 use super::channels::ChannelGroup;
 use super::units::{Quantity, si_factor};
 use crate::error::FormatError;
 
-/// `joint = matrix · column + offset`, with unit, sign and scale already in the matrix.
+/// `joint = matrix · column + offset`; the matrix includes unit, sign and scale.
 #[derive(Clone, Debug)]
 pub(crate) struct Mapping {
-    /// Per joint: the columns that enter, with their factors.
+    /// For each joint: the columns with nonzero factors, and the factors.
     terms: Vec<Vec<(usize, f64)>>,
     offset: Vec<f64>,
 }
@@ -71,7 +71,7 @@ impl Mapping {
     }
 }
 
-/// Gauss-Jordan with row pivoting; `None` if a pivot falls below 1e-12 of the largest entry.
+/// Gauss-Jordan inversion with row pivoting; `None` if a pivot is below 1e-12 of the largest entry.
 fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let n = matrix.len();
     if matrix.iter().any(|row| row.len() != n) {

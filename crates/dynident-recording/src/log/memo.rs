@@ -1,4 +1,4 @@
-//! What was found out about a log once for all passes over it.
+//! Caches a result about a log for all passes over it.
 
 use super::Log;
 use super::format::LogFormat;
@@ -6,47 +6,51 @@ use core::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
-/// The last thing that was found, and what it holds for. Its type is the business of those who find it, which stand
-/// above this module.
+/// The last result and its validity. The type of the result is defined by modules above this one.
 #[derive(Debug, Default)]
-pub(super) struct Memo(Mutex<Option<(About, Arc<dyn Any + Send + Sync>)>>);
+pub(super) struct Memo(Mutex<Option<Cached>>);
 
-/// A description may be changed between passes, and a file may be written anew.
+#[derive(Debug)]
+struct Cached {
+    about: About,
+    settings: Box<dyn Any + Send + Sync>,
+    result: Arc<dyn Any + Send + Sync>,
+}
+
+/// The format and the file for which a result is valid; both may change between passes.
 #[derive(Debug, PartialEq)]
 struct About {
     format: LogFormat,
     joints: Vec<String>,
-    keep_outliers: bool,
     file: Option<(u64, Option<SystemTime>)>,
 }
 
 impl Log {
-    /// What `find` finds of this log's times, positions and torques, read with or without outliers; not asked again
-    /// while neither the file nor their description changes. Of clones that are described alike it is found once for
-    /// all.
+    /// Result of `find` for this log's times, positions and torques. The result is cached until the file, the format or
+    /// the `settings` of `find` change; clones with the same format share it.
     ///
     /// # Errors
-    /// Those of `find`, which is asked again then.
-    pub(crate) fn found_once<T: Any + Send + Sync, E>(
+    /// Those of `find`; errors are not cached.
+    pub(crate) fn found_once<K: Any + Clone + PartialEq + Send + Sync, T: Any + Send + Sync, E>(
         &self,
-        keep_outliers: bool,
+        settings: &K,
         find: impl FnOnce() -> Result<T, E>,
     ) -> Result<Arc<T>, E> {
         let file = self.source.path().and_then(|path| path.metadata().ok());
         let about = About {
             format: LogFormat { velocity: None, acceleration: None, ..self.format.clone() },
             joints: self.joints.clone(),
-            keep_outliers,
             file: file.map(|data| (data.len(), data.modified().ok())),
         };
         let mut known = self.memo.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, found)) = known.as_ref().filter(|(known, _)| *known == about)
-            && let Ok(found) = Arc::clone(found).downcast()
+        let is_valid = |known: &&Cached| known.about == about && known.settings.downcast_ref() == Some(settings);
+        if let Some(known) = known.as_ref().filter(is_valid)
+            && let Ok(found) = Arc::clone(&known.result).downcast()
         {
             return Ok(found);
         }
         let found = Arc::new(find()?);
-        *known = Some((about, found.clone()));
+        *known = Some(Cached { about, settings: Box::new(settings.clone()), result: found.clone() });
         Ok(found)
     }
 }
@@ -56,16 +60,16 @@ mod tests {
     use crate::log::JointSamples;
 
     #[test]
-    fn what_was_found_holds_until_the_description_changes() {
+    fn a_result_is_cached_until_the_format_changes() {
         let samples = JointSamples::at_rate(10.0, vec![vec![1.0]], vec![vec![2.0]]);
         let mut log = samples.into_log("log", &["elbow".to_owned()]).unwrap();
-        let of = |log: &super::Log, keep, value: i32| *log.found_once(keep, || Ok::<_, ()>(value)).unwrap();
-        assert!(log.found_once(true, || Err::<i32, _>(())).is_err());
+        let of = |log: &super::Log, keep, value: i32| *log.found_once(&keep, || Ok::<_, ()>(value)).unwrap();
+        assert!(log.found_once(&true, || Err::<i32, _>(())).is_err());
         assert_eq!(
             [of(&log, true, 1), of(&log.clone(), true, 2), of(&log, false, 3), of(&log, false, 4)],
             [1, 1, 3, 3]
         );
-        // Read beside positions and torques, or not.
+        // A velocity group does not invalidate the result.
         log.format.velocity = Some(log.format.position.clone());
         assert_eq!(of(&log, false, 5), 3);
         log.format.bridge_gaps = !log.format.bridge_gaps;

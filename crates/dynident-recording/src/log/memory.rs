@@ -1,4 +1,4 @@
-//! Samples in memory as a log: joint values in SI, or any table of numbers.
+//! Samples in memory as a log: joint values in SI, or a table of numbers.
 
 use super::Log;
 use super::channels::{ChannelGroup, ColumnRef, Columns};
@@ -8,7 +8,7 @@ use crate::error::RecordingError;
 use crate::place::LogPlace;
 use std::sync::Arc;
 
-/// Samples of all joints in SI and in joint order; `q[j]` holds joint j.
+/// Samples of all joints in SI and in joint order; `q[j]` contains joint j.
 ///
 /// ```
 /// use dynident_recording::{JointSamples, MotionBlock, MotionSettings, MotionStream};
@@ -27,7 +27,7 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointSamples {
-    /// When.
+    /// Rate or times of the samples.
     pub clock: SampleClock,
     /// Positions (rad, m).
     pub q: Vec<Vec<f64>>,
@@ -41,13 +41,13 @@ pub struct JointSamples {
     pub temperature_c: Vec<Vec<f64>>,
 }
 
-/// When samples in memory were taken.
+/// Rate or times of samples in memory.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SampleClock {
-    /// At so many samples per second.
+    /// Sampling rate, Hz.
     RateHz(f64),
-    /// At these times, s; what their jitter means is decided as for a file ([`ClockRule`](super::ClockRule)).
+    /// Times, s; their jitter is evaluated as for a file ([`ClockRule`](super::ClockRule)).
     TimesS(Vec<f64>),
 }
 
@@ -68,8 +68,8 @@ impl JointSamples {
         Self { clock: SampleClock::RateHz(rate_hz), q, tau, ..Self::default() }
     }
 
-    /// A log of these samples for `joints`, named `label` in messages. The samples are moved, not copied; ranges,
-    /// missing values and the clock's rule can be set in the [`format`](Log::format) of what is returned.
+    /// Creates a log of these samples for `joints`, named `label` in messages. The samples are moved, not copied.
+    /// Ranges, missing values and the clock rule can be set in the [`format`](Log::format) of the result.
     ///
     /// # Errors
     /// [`RecordingError::Samples`] if the arrays do not have one entry for each joint and one value for each sample.
@@ -103,7 +103,7 @@ impl JointSamples {
     }
 }
 
-/// A table of numbers in memory, its meaning given by a [`LogFormat`] as for a file. Clones share the numbers.
+/// A table of numbers in memory with a [`LogFormat`] as for a file. Clones share the numbers.
 ///
 /// ```
 /// use dynident_recording::{Log, LogFormat, LogReader, MemoryLog, RawBlock};
@@ -137,15 +137,14 @@ pub struct MemoryLog {
 enum Values {
     /// Entry `row * width + column`.
     RowMajor(Vec<f64>),
-    /// One array for each column.
     Columns(Vec<Vec<f64>>),
 }
 
 impl MemoryLog {
-    /// A table whose entry of row i and column k is `values[i * width + k]`.
+    /// A table with `values[i * width + k]` in row i and column k.
     ///
     /// # Errors
-    /// [`RecordingError::Samples`] if the numbers do not fill whole rows, or there is not one name for each column.
+    /// [`RecordingError::Samples`] if the last row is incomplete, or the number of names is not `width`.
     pub fn row_major(
         label: &str,
         names: Option<Vec<String>>,
@@ -153,21 +152,22 @@ impl MemoryLog {
         values: Vec<f64>,
     ) -> Result<Self, RecordingError> {
         if width == 0 || !values.len().is_multiple_of(width) {
-            let problem = format!("{} numbers are no whole rows of {width}", values.len());
+            let problem = format!("{} numbers do not form rows of {width}", values.len());
             return Err(RecordingError::Samples { log: label.to_owned(), problem });
         }
         let rows = values.len() / width;
         Self::new(label, names, width, rows, Values::RowMajor(values))
     }
 
-    /// A table whose column k is `columns[k]`.
+    /// A table with the columns `columns[k]`.
     ///
     /// # Errors
-    /// [`RecordingError::Samples`] if the columns differ in length, or there is not one name for each.
+    /// [`RecordingError::Samples`] if the columns differ in length, or the number of names differs from that of
+    /// columns.
     pub fn columns(label: &str, names: Option<Vec<String>>, columns: Vec<Vec<f64>>) -> Result<Self, RecordingError> {
         let rows = columns.first().map_or(0, Vec::len);
         if let Some((column, other)) = columns.iter().enumerate().find(|(_, column)| column.len() != rows) {
-            let problem = format!("column {column} (0-based) has {} values where the first has {rows}", other.len());
+            let problem = format!("column {column} (0-based) has {} values, but the first has {rows}", other.len());
             return Err(RecordingError::Samples { log: label.to_owned(), problem });
         }
         Self::new(label, names, columns.len(), rows, Values::Columns(columns))
@@ -189,7 +189,7 @@ impl MemoryLog {
         Ok(Self { label: label.into(), names: names.map(Into::into), width, rows, values: Arc::new(values) })
     }
 
-    /// Names of the columns, if they have any.
+    /// Names of the columns, if any.
     pub fn names(&self) -> Option<&[String]> {
         self.names.as_deref()
     }
@@ -212,7 +212,6 @@ impl MemoryLog {
     }
 }
 
-/// Without the numbers.
 impl core::fmt::Debug for MemoryLog {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let mut shown = f.debug_struct("MemoryLog");

@@ -1,11 +1,11 @@
-//! From where a log lies to joint values in SI.
+//! Reads joint values in SI from logs.
 //!
-//! [`LogSource`] is where rows of numbers come from: [`FileLog`] (a file of any format that is read), [`MemoryLog`] and
-//! [`JointSamples`] (arrays), or a type of the caller. [`LogFormat`] says what the columns mean, and a [`Log`] is both
-//! together. [`LogReader`] is one pass over it: it pairs files, applies units, signs, gears and ranges
-//! ([`ChannelGroup`]), deals with missing values, and fills [`RawBlock`]s.
+//! [`LogSource`] provides rows of numbers: [`FileLog`] (a file in any supported format), [`MemoryLog`] and
+//! [`JointSamples`] (arrays), or a type of the caller. [`LogFormat`] maps columns to quantities, and a [`Log`] combines
+//! both. [`LogReader`] is one pass over a log: it pairs files, applies units, signs, gears and ranges
+//! ([`ChannelGroup`]), treats missing values, and fills [`RawBlock`]s.
 //!
-//! What a file holds is the business of dynident-formats, where a further format goes; text becomes a table here.
+//! Binary file formats are read by dynident-formats; add new formats there. Text tables are parsed here.
 
 mod blocks;
 mod channels;
@@ -43,7 +43,7 @@ use row_count::RowCount;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The files that hold what `path` names: itself, or the parts of a rosbag2 recording's folder.
+/// The files of `path`: itself, or the parts in the folder of a rosbag2 recording.
 ///
 /// # Errors
 /// If a folder's list of parts cannot be read.
@@ -51,39 +51,39 @@ pub fn files(path: &Path) -> Result<Vec<std::path::PathBuf>, crate::RecordingErr
     Ok(dynident_formats::files(path)?)
 }
 
-/// A recording: where its rows come from, what its columns mean, and which joints they are of.
+/// A recording: source of rows, mapping of columns, and names of joints.
 ///
-/// Nothing is read before a pass begins, and it can be read as often as wanted, by several threads at once.
+/// Reading starts with a pass. Any number of passes is possible, also by several threads at once.
 #[derive(Clone, Debug)]
 pub struct Log {
     source: Arc<dyn LogSource>,
-    /// For a format that asks for a fraction of them.
+    /// For a format with a fraction of the rows.
     row_count: Arc<RowCount>,
     memo: Arc<Memo>,
-    /// What the columns mean, and which part of the log is asked for.
+    /// Mapping of the columns, and selection of rows.
     pub format: LogFormat,
     /// Names of the joints, in the order of the format's columns.
     pub joints: Vec<String>,
 }
 
 impl Log {
-    /// Rows of `source`, understood as `format` says.
+    /// Rows of `source`, interpreted by `format`.
     pub fn new(source: impl LogSource + 'static, format: LogFormat, joints: &[String]) -> Self {
         Self::shared(Arc::new(source), format, joints)
     }
 
-    /// As [`new`](Self::new), for a source that others hold as well.
+    /// As [`new`](Self::new), for a shared source.
     pub fn shared(source: Arc<dyn LogSource>, format: LogFormat, joints: &[String]) -> Self {
         Self { source, row_count: Arc::default(), memo: Arc::default(), format, joints: joints.to_vec() }
     }
 
-    /// The log whose main file is at `path`; the `file` keys of channel groups are relative to its folder.
+    /// The log with its main file at `path`; the `file` keys of channel groups are relative to its folder.
     pub fn file(path: &Path, format: LogFormat, joints: &[String]) -> Self {
         let source = Arc::new(FileLog::new(path, &format));
         Self::shared(source, format, joints)
     }
 
-    /// Where its rows come from: its label for messages, its estimated number of rows.
+    /// Source of the rows.
     pub fn source(&self) -> &dyn LogSource {
         &*self.source
     }

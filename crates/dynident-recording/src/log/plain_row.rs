@@ -1,16 +1,16 @@
-//! Rows as recorders print them, read in one go: numbers of few digits, no blanks, no quotes.
+//! Fast path for rows in the usual notation: numbers of few digits, no blanks, no quotes.
 //!
-//! What is not like that is left to [`TextTable`](super::text::TextTable), field by field.
+//! [`TextTable`](super::text::TextTable) reads other rows field by field.
 
 use memchr::memchr2;
 
-/// Digits whose number is exact as a double, whatever they are.
-const MOST_DIGITS: usize = 15;
-const POWERS: [f64; MOST_DIGITS + 1] =
+/// Maximum number of digits that is always exact as a double.
+const MAX_DIGITS: usize = 15;
+const POWERS: [f64; MAX_DIGITS + 1] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
-/// Reads the fields of `line` that have a place in `values`, field by field that of `places`; false where the line has
-/// not as many fields, or where one of them is none that is read here.
+/// Reads the fields of `line` that have an index into `values` in `places` (one entry per field); false if the number
+/// of fields differs, or if a field needs the general parser.
 pub(super) fn read_plain_row(line: &[u8], delimiter: u8, places: &[Option<usize>], values: &mut [f64]) -> bool {
     let mut rest = line;
     for (field, place) in places.iter().enumerate() {
@@ -39,38 +39,38 @@ pub(super) fn read_plain_row(line: &[u8], delimiter: u8, places: &[Option<usize>
     true
 }
 
-/// A field that has an exponent or more digits; NaN for an empty one.
+/// A field with an exponent or more digits; NaN for an empty field.
 fn other_number(field: &[u8]) -> Option<f64> {
     let field = field.trim_ascii();
     if field.is_empty() { Some(f64::NAN) } else { core::str::from_utf8(field).ok()?.parse().ok() }
 }
 
-/// The number such as `-12.345678` that `text` begins with, and its length: both the digits as an integer below 2⁵³ and
-/// the power of ten are exact, so that one division rounds correctly.
+/// The number such as `-12.345678` at the start of `text`, and its length. The digits as an integer below 2⁵³ and the
+/// power of ten are exact, so that one division rounds correctly.
 pub(super) fn plain_decimal(text: &[u8]) -> Option<(f64, usize)> {
     let sign = usize::from(text.first() == Some(&b'-'));
     let digits = &text[sign..];
     let digit = |at: usize| digits.get(at).map(|byte| byte.wrapping_sub(b'0')).filter(|digit| *digit < 10);
     let (mut integer, mut count) = (0_u64, 0);
-    while let Some(next) = digit(count).filter(|_| count < MOST_DIGITS) {
+    while let Some(next) = digit(count).filter(|_| count < MAX_DIGITS) {
         integer = 10 * integer + u64::from(next);
         count += 1;
     }
     let whole = count;
     let mut length = whole;
     if digits.get(whole) == Some(&b'.') {
-        let eight = digits[whole + 1..].first_chunk().copied().filter(|_| whole + 8 <= MOST_DIGITS);
+        let eight = digits[whole + 1..].first_chunk().copied().filter(|_| whole + 8 <= MAX_DIGITS);
         if let Some(eight) = eight.and_then(eight_digits) {
             integer = 100_000_000 * integer + eight;
             count += 8;
         }
-        while let Some(next) = digit(count + 1).filter(|_| count < MOST_DIGITS) {
+        while let Some(next) = digit(count + 1).filter(|_| count < MAX_DIGITS) {
             integer = 10 * integer + u64::from(next);
             count += 1;
         }
         length = count + 1;
     }
-    // A digit more is not read here.
+    // More digits need the general parser.
     if count == 0 || digit(length).is_some() {
         return None;
     }
@@ -78,7 +78,7 @@ pub(super) fn plain_decimal(text: &[u8]) -> Option<(f64, usize)> {
     Some((if sign == 1 { -value } else { value }, sign + length))
 }
 
-/// Eight digits at once: pairs, then fours, then all. Source: Lemire, Softw. Pract. Exp. 51 (2021) 1700.
+/// Parses eight digits at once: pairs, then fours, then all. Source: Lemire, Softw. Pract. Exp. 51 (2021) 1700.
 fn eight_digits(text: [u8; 8]) -> Option<u64> {
     let bytes = u64::from_le_bytes(text);
     let upper_halves = 0xF0F0_F0F0_F0F0_F0F0;
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_bits_as_the_standard_library_reads() {
+    fn values_equal_those_of_the_standard_library() {
         let mut state = 1_u64;
         for _ in 0..20_000 {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -119,7 +119,7 @@ mod tests {
             assert_eq!(row(&text, &[Some(0)]), Some(vec![expected]), "{text}");
             assert_eq!(row(&format!("x,{text},1"), &[None, Some(0), None]), Some(vec![expected]), "{text}");
             let digits = text.bytes().filter(u8::is_ascii_digit).count();
-            if digits <= MOST_DIGITS && !text.contains('e') {
+            if digits <= MAX_DIGITS && !text.contains('e') {
                 let plain = plain_decimal(text.as_bytes()).map(|(value, length)| (value.to_bits(), length));
                 assert_eq!(plain, Some((expected, text.len())), "{text}");
             }
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_are_not_plain_are_left_alone() {
+    fn other_rows_are_left_to_the_general_parser() {
         let places = [Some(0), Some(1)];
         for line in ["1", "1,2,3", "1,\"2\"", "1,0x2", "1;2", "\"1,2", "1,2,", ""] {
             assert_eq!(row(line, &places), None, "{line}");

@@ -10,16 +10,15 @@ use super::{FileLog, Log};
 use crate::error::RecordingError;
 use std::path::Path;
 
-/// Largest position or torque: its squares and its second differences per second squared are finite.
-const LARGEST: f64 = 1e60;
+/// Maximum position or torque: its squares and its second differences per second squared are finite.
+const MAX_VALUE: f64 = 1e60;
 
-/// Rows of a [`RawBlock`] at most.
-const BLOCK_ROWS: usize = 4096;
+const MAX_BLOCK_ROWS: usize = 4096;
 
-/// Some successive rows of a log in joint values (SI), as they were logged: no filter, no resampling.
+/// Successive rows of a log in joint values (SI), as logged: no filter, no resampling.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawBlock {
-    /// 0-based data row in the file of each sample; holes where rows were left out.
+    /// 0-based data row in the file of each sample; not contiguous where rows were left out.
     pub row: Vec<u64>,
     /// Seconds after the first data row of the file.
     pub time_s: Vec<f64>,
@@ -42,7 +41,7 @@ impl RawBlock {
     }
 }
 
-/// What the reader left out.
+/// Rows that the reader left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LinesDropped {
@@ -51,7 +50,7 @@ pub struct LinesDropped {
     /// Rows left out by `drop_rows`, `drop_time_s`, `drop_where` and `keep_where`.
     #[serde(default)]
     pub by_rule: u64,
-    /// File and line of a cut-off last row.
+    /// File and line of a truncated last row.
     pub truncated: Option<String>,
 }
 
@@ -64,14 +63,14 @@ struct Group {
     columns: Vec<Vec<f64>>,
 }
 
-/// One pass over a log: raw columns become joint values in SI, ranges and missing values are dealt with.
+/// One pass over a log: converts raw columns to joint values in SI and applies ranges and rules for missing values.
 #[derive(Debug)]
 pub struct LogReader {
     label: String,
     joints: Vec<String>,
     tables: Vec<ColumnSelection>,
     groups: Vec<Group>,
-    /// Slot of the time column in the main table and its factor to seconds.
+    /// Slot of the time column in the main table, and its factor to seconds.
     time: Option<(usize, f64)>,
     period_s: f64,
     first_stamp_s: Option<f64>,
@@ -87,22 +86,22 @@ pub struct LogReader {
 }
 
 impl LogReader {
-    /// Begins a pass over `log`.
+    /// Starts a pass over `log`.
     ///
     /// # Errors
-    /// If the description is wrong, a file is missing or empty, or a column does not exist.
+    /// If the format is invalid, a file is missing or empty, or a column does not exist.
     pub fn open(log: &Log) -> Result<Self, RecordingError> {
         let format = &log.format;
         format.validate(&log.joints)?;
         let main = log.source();
         let mut tables = vec![ColumnSelection::new(main.label(), main.open()?)];
         let time = match &format.time {
-            Some(time) => Some((tables[0].want("time.column", &time.column)?, time.unit.seconds() * time.scale)),
+            Some(time) => Some((tables[0].request("time.column", &time.column)?, time.unit.seconds() * time.scale)),
             None => None,
         };
-        let rules = FoundRules::new(format, |key, column| tables[0].want(key, column))?;
+        let rules = FoundRules::new(format, |key, column| tables[0].request(key, column))?;
         let groups = channel_groups(log, &mut tables)?;
-        tables.iter_mut().for_each(ColumnSelection::ready);
+        tables.iter_mut().for_each(ColumnSelection::finish_selection);
         let rows = match (format.rows, format.fraction) {
             (Some(rows), _) => rows,
             (None, Some([from, to])) => {
@@ -122,7 +121,7 @@ impl LogReader {
             rows,
             time_range_s: format.time_range_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
             rules,
-            selection: selection_in_words(format),
+            selection: describe_selection(format),
             missing: format.missing,
             next_row: 0,
             delivered: 0,
@@ -136,7 +135,7 @@ impl LogReader {
         &self.dropped
     }
 
-    /// What messages call the log.
+    /// Name of the log in messages.
     pub fn label(&self) -> &str {
         &self.label
     }
@@ -146,17 +145,17 @@ impl LogReader {
         self.time.map_or_else(|| "none".to_owned(), |(slot, _)| self.tables[0].label_of_slot(slot))
     }
 
-    /// Reads up to 4096 rows into `block`; false when the log has ended (and `block` is empty).
+    /// Reads up to 4096 rows into `block`; false at the end of the log (with an empty `block`).
     ///
     /// # Errors
-    /// If a row cannot be read, files of one log differ in length, or the selection leaves no row at all.
+    /// If a row cannot be read, files of one log differ in length, or the selection contains no row.
     pub fn next_block(&mut self, block: &mut RawBlock) -> Result<bool, RecordingError> {
         block.row.clear();
         block.time_s.clear();
         for group in &mut self.groups {
             group.columns.iter_mut().for_each(Vec::clear);
         }
-        while !self.finished && block.row.len() < BLOCK_ROWS {
+        while !self.finished && block.row.len() < MAX_BLOCK_ROWS {
             self.next_row_into(block)?;
         }
         for quantity in Quantity::ALL {
@@ -174,7 +173,7 @@ impl LogReader {
             out.resize(self.joints.len(), Vec::new());
             group.mapping.apply(&group.columns, out);
             for (joint, values) in out.iter().enumerate() {
-                if let Some(at) = values.iter().position(|value| !(-LARGEST..=LARGEST).contains(value)) {
+                if let Some(at) = values.iter().position(|value| !(-MAX_VALUE..=MAX_VALUE).contains(value)) {
                     return Err(RecordingError::Overflow {
                         log: self.label.clone(),
                         row: block.row[at],
@@ -208,7 +207,7 @@ impl LogReader {
             self.finished = true;
             return Ok(());
         }
-        // The first row is always read: times count from it.
+        // Always read the first row, because times are relative to it.
         if self.next_row > 0 && self.next_row < self.rows[0] {
             return self.skip_row();
         }
@@ -232,7 +231,7 @@ impl LogReader {
         let time_s = match self.time {
             Some((slot, seconds)) => {
                 let stamp = self.tables[0].values[slot];
-                // The difference of the stamps first: nanoseconds since 1970 do not survive the multiplication.
+                // Subtract stamps before scaling: nanoseconds since 1970 lose precision in the multiplication.
                 (stamp - *self.first_stamp_s.get_or_insert(stamp)) * seconds
             }
             None => row as f64 * self.period_s,
@@ -273,7 +272,7 @@ impl LogReader {
         let values = &self.tables[0].values;
         let since = |stamp: f64| (stamp - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.1);
         let time_s = self.time.map_or(row as f64 * self.period_s, |(slot, _)| since(values[slot]));
-        // Rows that are left out may hold anything.
+        // Rows that a rule leaves out may contain invalid values.
         if self.rules.drops(row, time_s, values) {
             self.dropped.by_rule += u64::from(row >= self.rows[0]);
             return Ok(());
@@ -285,7 +284,7 @@ impl LogReader {
         Ok(())
     }
 
-    /// The files of one log must end together; one cut-off last row is forgiven.
+    /// Checks that the files of one log end together; one truncated last row is tolerated.
     fn check_ends(&mut self, ended: usize) -> Result<(), RecordingError> {
         for table in &self.tables {
             if let Some(place) = table.table.truncated() {
@@ -293,10 +292,10 @@ impl LogReader {
             }
         }
         let (rows, log) = (self.tables[ended].rows, self.tables[ended].label.clone());
-        let forgiven = u64::from(self.dropped.truncated.is_some());
+        let tolerated = u64::from(self.dropped.truncated.is_some());
         for table in &mut self.tables {
             let longer = table.rows > rows;
-            if longer && (table.rows > rows + forgiven || table.skip_row()?) {
+            if longer && (table.rows > rows + tolerated || table.skip_row()?) {
                 return Err(RecordingError::UnequalFiles { log, rows, other: table.label.clone() });
             }
         }
@@ -304,7 +303,7 @@ impl LogReader {
     }
 }
 
-/// The channel groups of a log; opens the files of groups that have their own, each once.
+/// The channel groups of a log. Opens each separate file of a group once.
 fn channel_groups(log: &Log, tables: &mut Vec<ColumnSelection>) -> Result<Vec<Group>, RecordingError> {
     let (format, main) = (&log.format, log.source());
     let mut paths = vec![main.path().map(Path::to_owned)];
@@ -325,7 +324,7 @@ fn channel_groups(log: &Log, tables: &mut Vec<ColumnSelection>) -> Result<Vec<Gr
             paths.push(Some(path.clone()));
         }
         let list = group.column_list(key)?;
-        let slots = list.iter().map(|column| tables[table].want(&format!("{key}.columns"), column));
+        let slots = list.iter().map(|column| tables[table].request(&format!("{key}.columns"), column));
         let slots = slots.collect::<Result<Vec<_>, _>>()?;
         let mapping = Mapping::new(group, quantity, log.joints.len())?;
         groups.push(Group { quantity, table, columns: vec![Vec::new(); slots.len()], slots, mapping });
@@ -333,8 +332,7 @@ fn channel_groups(log: &Log, tables: &mut Vec<ColumnSelection>) -> Result<Vec<Gr
     Ok(groups)
 }
 
-/// The keys of a format that leave out rows, for messages.
-fn selection_in_words(format: &LogFormat) -> String {
+fn describe_selection(format: &LogFormat) -> String {
     let mut selection = Vec::new();
     match (format.rows, format.fraction) {
         (Some(rows), _) => selection.push(format!("rows = {rows:?}")),

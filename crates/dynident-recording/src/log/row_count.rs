@@ -1,15 +1,14 @@
-//! How many rows a source has, counted once for all passes over it.
+//! Caches the number of rows of a source for all passes over it.
 
 use crate::error::RecordingError;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
-/// The last count of a log's rows, and what it was a count of.
 #[derive(Debug, Default)]
 pub(super) struct RowCount(Mutex<Option<(Counted, u64)>>);
 
-/// What a count holds for: which rows there are may hang on the columns, and a file may have been written anew.
+/// Columns and file for which a count is valid: the rows may depend on the columns, and the file may change.
 #[derive(Debug, PartialEq)]
 struct Counted {
     fields: Vec<usize>,
@@ -17,8 +16,7 @@ struct Counted {
 }
 
 impl RowCount {
-    /// What `count` says of these columns of the source, which is the file at `path` if it is one; not asked again
-    /// while neither changes.
+    /// Number of rows of the source with these columns, cached until the columns or the file at `path` change.
     pub(super) fn of(
         &self,
         fields: &[usize],
@@ -42,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_count_holds_for_its_columns_and_its_file() {
+    fn a_count_is_valid_for_its_columns_and_its_file() {
         let path = std::env::temp_dir().join(format!("dynident_row_count_{}", std::process::id()));
         let count = RowCount::default();
         let of = |fields: &[usize], rows| count.of(fields, Some(&path), || Ok(rows)).unwrap();
@@ -51,7 +49,7 @@ mod tests {
         std::fs::write(&path, "one and two").unwrap();
         assert_eq!([of(&[2], 9), of(&[2], 10)], [9, 9]);
         std::fs::remove_file(&path).unwrap();
-        // What could not be counted is asked again.
+        // Errors are not cached.
         let fails = count.of(&[3], None, || Err(RecordingError::NoFolder { log: "log".into(), key: "torque" }));
         assert!(fails.is_err());
         assert_eq!(count.of(&[3], None, || Ok(4)).unwrap(), 4);

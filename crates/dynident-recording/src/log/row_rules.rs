@@ -1,11 +1,11 @@
-//! Rows that are left out by rule: by number, by time, by what a column says.
+//! Rules that leave out rows: by number, by time, by the value of a column.
 
 use super::channels::{ColumnRef, OneOrMany};
 use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
 
-/// What a column of the main file says in some rows, such as a status: equal to one of some values, above one, below
-/// one; all that is given has to hold.
+/// A condition on a column of the main file, such as a status: equal to one of several values, above a value, below a
+/// value. All given conditions must hold.
 ///
 /// ```
 /// let rule: dynident_recording::log::RowRule = toml::from_str("column = \"state\"\nequals = [2, 3]").unwrap();
@@ -15,21 +15,21 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RowRule {
-    /// Name or 0-based index, in the main file; a column of numbers.
+    /// Name or 0-based index of a numeric column in the main file.
     pub column: ColumnRef,
-    /// The value is this one, or one of these.
+    /// Value, or list of values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equals: Option<OneOrMany<f64>>,
-    /// The value is above this one.
+    /// Exclusive lower limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub above: Option<f64>,
-    /// The value is below this one.
+    /// Exclusive upper limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub below: Option<f64>,
 }
 
 impl RowRule {
-    /// Whether the column's value is one that the rule is about; never for a missing one.
+    /// Whether the value satisfies the rule; false for a missing value.
     pub fn holds(&self, value: f64) -> bool {
         let equal = match &self.equals {
             None => true,
@@ -42,7 +42,7 @@ impl RowRule {
     pub(super) fn validate(&self, key: &str) -> Result<(), FormatError> {
         let fix = "write { column = \"state\", equals = 1 }, or above, or below";
         if self.equals.is_none() && self.above.is_none() && self.below.is_none() {
-            return Err(FormatError::new(key, "a rule names a column and no value", fix));
+            return Err(FormatError::new(key, "a rule has no value", fix));
         }
         let equals = match &self.equals {
             None => &[][..],
@@ -54,7 +54,6 @@ impl RowRule {
     }
 }
 
-/// Checks the ranges of rows and of times that are left out.
 pub(super) fn checked_ranges(drop_rows: &[[u64; 2]], drop_time_s: &[[f64; 2]]) -> Result<(), FormatError> {
     for [first, end] in drop_rows {
         if first >= end {

@@ -1,36 +1,35 @@
-//! Whether one log holds samples of another, though its file is another: saved again with fewer digits, a piece with
-//! its time counted from zero, every second row.
+//! Detects samples that two logs share although their files differ: saved with fewer digits, a part with its time
+//! starting at zero, every second row.
 //!
-//! No two runs of a robot give the same numbers: noise differs. So rows that agree in every position and torque to
-//! within the resolution of the coarser log, one after the other, are the same samples.
+//! Noise makes the values of two runs differ. Rows that agree in every position and torque to within the resolution of
+//! the coarser log, one after the other, are therefore the same samples.
 
 use super::{Log, LogReader, RawBlock};
 use crate::error::RecordingError;
 
-/// Rows of a log up to which its samples are compared; of longer logs nothing is said.
-const MOST_ROWS: usize = 400_000;
-/// Places of the second log that are looked for in the first.
-const PLACES: usize = 12;
-/// Rows that have to agree, one after the other, and the least that do where a log has no more.
-const ROWS: usize = 100;
-const LEAST_ROWS: usize = 20;
-/// Rows of one log to a row of the other.
+const MAX_ROWS: usize = 400_000;
+/// Number of places in the second log that are searched in the first.
+const SEARCHED_PLACES: usize = 12;
+/// Number of successive rows that must agree, and the minimum for short logs.
+const MATCHED_ROWS: usize = 100;
+const MIN_MATCHED_ROWS: usize = 20;
+/// Tested ratios of the rows of both logs.
 const STRIDES: [usize; 5] = [1, 2, 4, 5, 10];
-/// Half a step of the coarser log, and a little for what rounding does to the numbers that are rounded.
-const HALF_STEP: f64 = 0.51;
-/// Share of a channel's range within which numbers of single precision agree.
-const SINGLE_PRECISION: f64 = 1e-6;
+/// Tolerance in steps of the coarser log: half a step, and a margin for rounded numbers.
+const STEP_TOLERANCE: f64 = 0.51;
+/// Tolerance for single precision, as a share of a channel's range.
+const RANGE_TOLERANCE: f64 = 1e-6;
 
-/// Two rows, of one log and of another, from which on both hold the same samples.
+/// A row in each of two logs from which on both contain the same samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SharedSamples {
     /// 0-based data row in the first log's file.
     pub row: u64,
-    /// The same of the other log.
+    /// 0-based data row in the other log's file.
     pub other_row: u64,
 }
 
-/// Positions and torques of all rows of a log, for finding samples of another log among them.
+/// Positions and torques of all rows of a log, for the comparison with another log.
 #[derive(Clone, Debug)]
 pub struct LogSamples {
     row: Vec<u64>,
@@ -40,12 +39,12 @@ pub struct LogSamples {
 }
 
 impl LogSamples {
-    /// Reads a log; `None` where it is too long to say (more than 400,000 rows).
+    /// Reads a log; `None` if it has more than 400,000 rows.
     ///
     /// # Errors
-    /// A log that cannot be read.
+    /// If the log cannot be read.
     pub fn read(log: &Log) -> Result<Option<Self>, RecordingError> {
-        if log.source().estimated_rows().is_some_and(|rows| rows > 2 * MOST_ROWS as u64) {
+        if log.source().estimated_rows().is_some_and(|rows| rows > 2 * MAX_ROWS as u64) {
             return Ok(None);
         }
         let values = vec![Vec::new(); 2 * log.joints.len()];
@@ -56,36 +55,36 @@ impl LogSamples {
             for (to, from) in all.values.iter_mut().zip(block.q.iter().chain(&block.tau)) {
                 to.extend_from_slice(from);
             }
-            if all.row.len() > MOST_ROWS {
+            if all.row.len() > MAX_ROWS {
                 return Ok(None);
             }
         }
         Ok(Some(all))
     }
 
-    /// Where both hold the same samples; `None` where they do not, and of robots with other joints. Joints at rest are
-    /// no evidence: a held position repeats.
+    /// First shared samples of both logs; `None` if there are none or the joints differ. Joints at rest are ignored,
+    /// because a constant position repeats.
     pub fn shared_with(&self, other: &Self) -> Option<SharedSamples> {
         let [row, other_row] = if self.joints == other.joints { self.rows_shared_with(other)? } else { return None };
         Some(SharedSamples { row: self.row[row], other_row: other.row[other_row] })
     }
 
-    /// A row of each log from which on both hold the same.
+    /// A row of each log from which on both contain the same samples.
     fn rows_shared_with(&self, other: &Self) -> Option<[usize; 2]> {
         let tolerance: Vec<f64> = self.values.iter().zip(&other.values).map(|(a, b)| agreement(a, b)).collect();
-        let mut places = (0..PLACES).map(|place| place * other.row.len() / PLACES);
+        let mut places = (0..SEARCHED_PLACES).map(|place| place * other.row.len() / SEARCHED_PLACES);
         let of_place = |from: usize| {
-            // From where it moves.
+            // Start where the robot moves.
             let moving =
-                (from..other.row.len().saturating_sub(LEAST_ROWS)).find(|&row| other.moves(row, &tolerance))?;
+                (from..other.row.len().saturating_sub(MIN_MATCHED_ROWS)).find(|&row| other.moves(row, &tolerance))?;
             let agrees = |row: usize, at: usize| {
                 let mut channels = self.values.iter().zip(&other.values).zip(&tolerance);
                 channels.all(|((a, b), tolerance)| (a[row] - b[at]).abs() <= *tolerance)
             };
             let follows = |row: usize, [step, other_step]: [usize; 2]| {
                 let rows = (self.row.len() - row).div_ceil(step);
-                let rows = rows.min((other.row.len() - moving).div_ceil(other_step)).min(ROWS);
-                rows >= LEAST_ROWS && (1..rows).all(|k| agrees(row + k * step, moving + k * other_step))
+                let rows = rows.min((other.row.len() - moving).div_ceil(other_step)).min(MATCHED_ROWS);
+                rows >= MIN_MATCHED_ROWS && (1..rows).all(|k| agrees(row + k * step, moving + k * other_step))
             };
             let steps = || STRIDES.into_iter().flat_map(|stride| [[stride, 1], [1, stride]]);
             let found =
@@ -95,9 +94,9 @@ impl LogSamples {
         places.find_map(of_place)
     }
 
-    /// Whether some joint moves on from a row by far more than what counts as equal.
+    /// Whether a joint moves after a row by more than ten times the tolerance.
     fn moves(&self, row: usize, tolerance: &[f64]) -> bool {
-        let to = row + LEAST_ROWS;
+        let to = row + MIN_MATCHED_ROWS;
         (0..self.joints.len()).any(|joint| {
             let q = &self.values[joint][row..=to];
             let [low, high] = range(q);
@@ -106,14 +105,13 @@ impl LogSamples {
     }
 }
 
-/// By how much numbers of the same sample may differ: half a step of the coarser log.
+/// Maximum difference of the same sample in both logs: half a step of the coarser log.
 fn agreement(a: &[f64], b: &[f64]) -> f64 {
     let [low, high] = range(a);
-    HALF_STEP * step(a).max(step(b)) + SINGLE_PRECISION * (high - low)
+    STEP_TOLERANCE * step(a).max(step(b)) + RANGE_TOLERANCE * (high - low)
 }
 
-/// The smallest step from one row to the next: what a channel's last digit is worth, or less where it has more digits
-/// than its noise needs.
+/// Minimum step between rows: the resolution of the channel, or less if it has more digits than its noise needs.
 fn step(values: &[f64]) -> f64 {
     let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0);
     let least = steps.fold(f64::INFINITY, f64::min);
@@ -129,7 +127,7 @@ mod tests {
     use super::*;
     use crate::log::JointSamples;
 
-    /// Two joints that swing; `run` gives another noise.
+    /// Two joints that swing; `run` selects the noise.
     fn swing(run: u64, rows: usize) -> [Vec<Vec<f64>>; 2] {
         let mut state = run.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
         let mut noise = || {
@@ -161,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_samples_are_found_however_they_were_saved() {
+    fn shared_samples_are_found_for_any_way_of_saving() {
         let samples = swing(1, 1500);
         let rounded =
             |digits: f64| move |values: &[f64]| values.iter().map(|v| (v * digits).round() / digits).collect();
@@ -189,16 +187,16 @@ mod tests {
     }
 
     #[test]
-    fn another_run_of_the_same_motion_is_another() {
+    fn another_run_of_the_same_motion_shares_no_samples() {
         let rounded = |values: &[f64]| values.iter().map(|v| (v * 1e2).round() / 1e2).collect();
         let coarse = |run: u64| log(each(&swing(run, 1500), rounded));
         assert_eq!(log(swing(1, 1500)).shared_with(&log(swing(2, 1500))), None);
-        // Steps as large as the noise.
+        // Quantisation steps as large as the noise.
         assert_eq!(coarse(1).shared_with(&coarse(2)), None);
     }
 
     #[test]
-    fn a_robot_at_rest_repeats_itself() {
+    fn a_robot_at_rest_shares_no_samples() {
         let rest = |rows: usize| log([vec![vec![0.3; rows], vec![0.1; rows]], vec![vec![1.0; rows], vec![2.0; rows]]]);
         assert_eq!(rest(500).shared_with(&rest(300)), None);
     }

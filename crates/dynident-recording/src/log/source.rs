@@ -1,4 +1,4 @@
-//! Where rows of numbers come from: the seam behind which every log format stands.
+//! Interface between log formats and the reader.
 
 use crate::error::RecordingError;
 use crate::place::LogPlace;
@@ -6,17 +6,17 @@ use core::fmt;
 use core::ops::Range;
 use std::path::Path;
 
-/// Where raw rows come from: a file of some format, or samples in memory.
+/// Source of raw rows: a file of some format, or samples in memory.
 ///
-/// A format is one type with this trait and one with [`LogTable`]. They deal in columns of numbers as they were
-/// recorded; what the columns mean (unit, sign, gear, range, missing values) is a [`LogFormat`](crate::LogFormat) and
-/// the business of [`LogReader`](crate::LogReader), which stands behind all of them.
+/// To add a format, implement this trait and [`LogTable`]. Both provide columns of numbers as recorded; a
+/// [`LogFormat`](crate::LogFormat) maps the columns to quantities (unit, sign, gear, range, missing values), and
+/// [`LogReader`](crate::LogReader) applies it.
 ///
 /// ```
 /// use dynident_recording::{Log, LogFormat, LogPlace, LogSource, LogTable, MotionBlock, MotionSettings, MotionStream};
 /// use dynident_recording::RecordingError;
 ///
-/// /// A source of one's own: an encoder at 500 Hz that turns with a constant velocity under a constant torque.
+/// /// A source of the caller: an encoder at 500 Hz with a constant velocity under a constant torque.
 /// #[derive(Debug)]
 /// struct Turntable {
 ///     rows: u64,
@@ -74,21 +74,21 @@ use std::path::Path;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait LogSource: fmt::Debug + Send + Sync {
-    /// What messages and reports call it: the path of a file, or a name that the caller gave.
+    /// Name in messages and reports: the path of a file, or a name from the caller.
     fn label(&self) -> String;
 
-    /// Begins a pass at the first row. Passes know nothing of each other: several may be under way at once.
+    /// Starts a pass at the first row. Passes are independent; several can run at once.
     ///
     /// # Errors
-    /// If it cannot be read, or is no table.
+    /// If the source cannot be read, or is not a table.
     fn open(&self) -> Result<Box<dyn LogTable>, RecordingError>;
 
-    /// Its file, beside which the `file` keys of a format are looked for; `None` for what is no file.
+    /// Path of the file; the `file` keys of a format are relative to its folder. `None` for a source without a file.
     fn path(&self) -> Option<&Path> {
         None
     }
 
-    /// Number of rows, about: for progress bars only.
+    /// Approximate number of rows, for progress bars.
     fn estimated_rows(&self) -> Option<u64> {
         None
     }
@@ -97,11 +97,11 @@ pub trait LogSource: fmt::Debug + Send + Sync {
 /// Columns of a [`LogTable`] that were recorded together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogGroup {
-    /// What messages call it: a topic; `None` where there is only one.
+    /// Name in messages, such as a topic; `None` for a single group.
     pub name: Option<String>,
-    /// Its columns.
+    /// Range of its columns.
     pub columns: Range<usize>,
-    /// Its column of time stamps in seconds, where the format has such a thing.
+    /// Index of its column of time stamps in seconds, if the format has one.
     pub time: Option<usize>,
 }
 
@@ -110,43 +110,43 @@ pub trait LogTable: fmt::Debug + Send {
     /// Number of columns.
     fn width(&self) -> usize;
 
-    /// Names of the columns, one for each; `None` if they can be addressed by 0-based index only.
+    /// Names of the columns, one for each; `None` if columns have 0-based indices only.
     fn names(&self) -> Option<&[String]> {
         None
     }
 
-    /// Which columns were recorded together, each on its own clock; rows are those of the group of the first column
-    /// that is selected. Every column stands in one group.
+    /// Groups of columns that were recorded together, each with a separate clock. Rows are those of the group of the
+    /// first selected column. Every column belongs to one group.
     fn groups(&self) -> Vec<LogGroup> {
         vec![LogGroup { name: None, columns: 0..self.width(), time: None }]
     }
 
-    /// What the source holds beside its columns and why it is none, a sentence each.
+    /// Contents that are not exposed as columns, with the reason for each.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// The columns, each once, that [`next_row`](Self::next_row) is to give, in this order. Called before the first
-    /// row.
+    /// Selects the columns, without duplicates, that [`next_row`](Self::next_row) returns in this order. Called before
+    /// the first row.
     fn select(&mut self, fields: &[usize]);
 
-    /// Reads one row: one number for each selected column, NaN or infinite where it is missing; false at the end.
+    /// Reads one row: one number for each selected column, NaN or infinite if missing; false at the end.
     ///
     /// # Errors
-    /// If the row is no row of numbers.
+    /// If the row does not consist of numbers.
     fn next_row(&mut self, values: &mut [f64]) -> Result<bool, RecordingError>;
 
-    /// Passes over one row; false at the end.
+    /// Skips one row; false at the end.
     ///
     /// # Errors
     /// If it cannot be read.
     fn skip_row(&mut self) -> Result<bool, RecordingError>;
 
-    /// Reads all that is left: `each` row with the number of its group, whose columns it has, in the order in which
-    /// rows lie in the source. Not after [`select`](Self::select). Written anew only where there are several groups.
+    /// Reads all remaining rows in their order in the source and passes each to `each` with its group number and the
+    /// columns of the group. Must not follow [`select`](Self::select). Override it only for several groups.
     ///
     /// # Errors
-    /// If a row is no row of numbers, behind those that were given.
+    /// If a row does not consist of numbers; the rows before it were passed on.
     fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), RecordingError> {
         let columns = self.width();
         self.select(&(0..columns).collect::<Vec<_>>());
@@ -157,16 +157,16 @@ pub trait LogTable: fmt::Debug + Send {
         Ok(())
     }
 
-    /// Where the row last read stands; before the first one, where the columns are named.
+    /// Place of the current row; before the first row, of the column names.
     fn place(&self) -> LogPlace;
 
-    /// The field of a column in the row last read, as it stands there; `None` where there is only the number.
+    /// Text of a column in the current row; `None` if only the number is available.
     fn field_text(&self, field: usize) -> Option<String> {
         let _ = field;
         None
     }
 
-    /// Where a last row was cut off and therefore left out.
+    /// Place of a truncated last row, which is left out.
     fn truncated(&self) -> Option<LogPlace> {
         None
     }

@@ -1,4 +1,4 @@
-//! Text tables (CSV and its kin): delimiter and header found out, rows of numbers read one by one.
+//! Reads text tables (CSV and similar): detects delimiter and header, parses rows of numbers.
 
 use super::columns::column_label;
 use super::format::Header;
@@ -19,7 +19,7 @@ pub(super) struct TextTable {
     width: usize,
     first_row_is_pending: bool,
     wanted: Vec<usize>,
-    /// Of each field its place among those wanted; empty where fields are parted by blanks.
+    /// For each field, its index among the requested fields; empty if the delimiter is blanks.
     places: Vec<Option<usize>>,
     fields: Vec<(usize, usize)>,
     rows: u64,
@@ -27,7 +27,6 @@ pub(super) struct TextTable {
 }
 
 impl TextTable {
-    /// The table in `text`, which stands in the file at `path`.
     pub(super) fn open(
         path: &Path,
         text: Box<dyn Read + Send>,
@@ -184,7 +183,7 @@ impl LogTable for TextTable {
 }
 
 fn guessed_delimiter(line: &[u8]) -> u8 {
-    // Tabs and semicolons first: where they stand, commas are decimal commas.
+    // Tabs and semicolons first, because their files may have decimal commas.
     for delimiter in *b"\t;," {
         if line.contains(&delimiter) {
             return delimiter;
@@ -233,7 +232,7 @@ fn trimmed(line: &[u8], mut from: usize, mut to: usize) -> (usize, usize) {
     (from, to)
 }
 
-/// A number as the standard library reads it, `nan` and `inf` included.
+/// A number in the syntax of the standard library, including `nan` and `inf`.
 fn number(field: &[u8]) -> Option<f64> {
     match plain_decimal(field) {
         Some((value, length)) if length == field.len() => Some(value),

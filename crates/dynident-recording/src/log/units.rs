@@ -1,8 +1,8 @@
-//! Units at the edge: from what a log says to SI.
+//! Conversion of log units to SI.
 
 use serde::{Deserialize, Serialize};
 
-/// What a channel measures.
+/// Physical quantity of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
@@ -10,22 +10,22 @@ use serde::{Deserialize, Serialize};
 pub enum Quantity {
     /// Joint or motor position (rad, m).
     Position,
-    /// Its first derivative (rad/s, m/s).
+    /// Velocity (rad/s, m/s).
     Velocity,
-    /// Its second derivative (rad/s², m/s²).
+    /// Acceleration (rad/s², m/s²).
     Acceleration,
-    /// Torque or force (N m, N), or a current that `scale` turns into one.
+    /// Torque or force (N m, N), or a current that `scale` converts.
     Torque,
     /// Temperature, °C.
     Temperature,
 }
 
 impl Quantity {
-    /// All, in the order of a log's channel groups.
+    /// All quantities, in the order of a log's channel groups.
     pub(crate) const ALL: [Self; 5] =
         [Self::Position, Self::Velocity, Self::Acceleration, Self::Torque, Self::Temperature];
 
-    /// The key of its channel group in a [`LogFormat`](crate::LogFormat), which is also what reports call it.
+    /// Key of its channel group in a [`LogFormat`](crate::LogFormat), also used in reports.
     pub fn key(self) -> &'static str {
         match self {
             Self::Position => "position",
@@ -66,13 +66,13 @@ const UNITS: &[(&str, Quantity, f64)] = &[
     ("degC", Quantity::Temperature, 1.0),
 ];
 
-/// The factor that turns a value in `unit` into SI: rad, m, their rates, N m, N, °C, and A (times `scale` in N m/A).
-/// `None` if `unit` is no unit of `quantity`.
+/// Factor from `unit` to SI: rad, m, their rates, N m, N, °C, and A (times `scale` in N m/A). `None` if `unit` is not a
+/// unit of `quantity`.
 pub fn si_factor(unit: &str, quantity: Quantity) -> Option<f64> {
     UNITS.iter().find(|(name, of, _)| *name == unit && *of == quantity).map(|(_, _, factor)| *factor)
 }
 
-/// The units that exist for `quantity`, for messages.
+/// The units of `quantity`, for messages.
 pub fn unit_names(quantity: Quantity) -> Vec<&'static str> {
     UNITS.iter().filter(|(_, of, _)| *of == quantity).map(|(name, _, _)| *name).collect()
 }

@@ -1,37 +1,57 @@
-//! A motion in blocks, and how a log is to become one.
+//! Blocks of a motion, and the settings for converting a log to a motion.
 
 use super::torque_lag::TorqueShift;
+use crate::cleaning::CleaningSettings;
+use crate::clock::ClockSettings;
 use crate::derivative::DifferentiatorSettings;
 use crate::error::{FilterError, require};
+use crate::filter::CutoffSettings;
 use crate::log::OneOrMany;
+use crate::report::ReportSettings;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
-/// How a log becomes a motion.
+/// Settings for converting a log to a motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionSettings {
-    /// From q to dq and ddq.
+    /// Differentiator from q to dq and ddq.
     pub differentiator: DifferentiatorSettings,
-    /// Also pass the torque through the differentiator's smoothing, as [`MotionBlock::tau_smooth`].
+    /// Whether to smooth the torque like the positions, as [`MotionBlock::tau_smooth`].
     pub smooth_torque: bool,
-    /// Seconds left out at both ends of every uninterrupted piece, where a zero-phase filter has to invent
-    /// samples; 0 to 1,000,000, 0 by default.
+    /// Time left out at both ends of every uninterrupted piece, where a zero-phase filter extrapolates, s; 0 to
+    /// 1,000,000, 0 by default.
     pub trim_s: f64,
-    /// Leave everything as it was logged: by default single torque samples far from their neighbours and torque that is
-    /// repeated while its joint moves do not count, and lone spikes of a position are replaced; see
+    /// Whether to keep all samples as logged. By default single torque samples far from their neighbours and torque
+    /// that is repeated while its joint moves are ignored, and single spikes of a position are replaced; see
     /// [`SetAside`](crate::SetAside).
     pub keep_outliers: bool,
-    /// Seconds by which torque comes after its motion, one for all joints or one for each; it is taken at the time of
-    /// the motion that it belongs to. Negative where it comes before; `identify` allows two and a half own seconds of
-    /// the robot (2.5 s of an arm of 1.2 m). Left out, it is taken as logged: then `identify` estimates it.
+    /// Delay of the torque relative to the motion, s, one value for all joints or one for each; the torque is shifted
+    /// by it. Negative if the torque is early. `identify` allows 2.5 times the time scale of the robot (2.5 s for an
+    /// arm of 1.2 m). Without a value the torque is not shifted here, and `identify` estimates the delay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_lag_s: Option<OneOrMany<f64>>,
+    /// Limits of the decisions on samples, clock and cut-off; not part of a study file.
+    #[serde(skip)]
+    pub limits: ImportLimits,
 }
 
-/// Longest lag that can be stated for any robot, seconds.
-const LONGEST_LAG_S: f64 = 1e4;
+/// Limits of the decisions that are made while a log is read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImportLimits {
+    /// Detection of invalid samples.
+    pub cleaning: CleaningSettings,
+    /// Times of the samples.
+    pub clock: ClockSettings,
+    /// Cut-off.
+    pub cutoff: CutoffSettings,
+    /// Findings in the report.
+    pub report: ReportSettings,
+}
+
+/// Maximum delay for any robot, s.
+const MAX_LAG_S: f64 = 1e4;
 
 impl MotionSettings {
     /// Checks the settings.
@@ -42,21 +62,25 @@ impl MotionSettings {
         require((0.0..=1e6).contains(&self.trim_s), "trim_s", self.trim_s, "give seconds, 0 to 1000000")?;
         for lag_s in self.torque_lag_s.iter().flat_map(OneOrMany::values) {
             let fix = "give seconds, -10000 to 10000";
-            require((-LONGEST_LAG_S..=LONGEST_LAG_S).contains(lag_s), "torque_lag_s", *lag_s, fix)?;
+            require((-MAX_LAG_S..=MAX_LAG_S).contains(lag_s), "torque_lag_s", *lag_s, fix)?;
         }
+        self.limits.cleaning.validate()?;
+        self.limits.clock.validate()?;
+        self.limits.cutoff.validate()?;
+        self.limits.report.validate()?;
         self.differentiator.validate()
     }
 
-    /// The lags of so many joints, none where nothing is stated.
+    /// The delays of the joints, s; empty if not set.
     ///
     /// # Errors
-    /// A list of another length.
+    /// If the list has another length.
     pub(crate) fn torque_lags_s(&self, joints: usize) -> Result<Vec<f64>, FilterError> {
         let Some(stated) = &self.torque_lag_s else { return Ok(Vec::new()) };
         let lags: Vec<f64> = (0..joints).filter_map(|joint| stated.at(joint)).collect();
         let fits = lags.len() == joints && (stated.values().len() == 1 || stated.values().len() == joints);
         let fix = "give one number, or one for each joint of the log";
-        require(fits, "torque_lag_s (how many)", stated.values().len() as f64, fix)?;
+        require(fits, "torque_lag_s (number of values)", stated.values().len() as f64, fix)?;
         Ok(lags)
     }
 }
@@ -64,9 +88,9 @@ impl MotionSettings {
 /// Successive samples of a motion on a uniform clock, joint-major: entry `joint * rows + row`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionBlock {
-    /// Samples per second.
+    /// Sample rate, Hz.
     pub rate_hz: f64,
-    /// Number of the uninterrupted piece: blocks of different pieces must not be filtered together.
+    /// Number of the uninterrupted piece; blocks of different pieces must not be filtered together.
     pub segment: usize,
     /// Time of the first row, in seconds after the first data row of the file.
     pub first_time_s: f64,
@@ -82,33 +106,32 @@ pub struct MotionBlock {
     pub ddq: Vec<f64>,
     /// Torques as logged, on the uniform clock, unfiltered (N m, N).
     pub tau: Vec<f64>,
-    /// Torques smoothed like the positions; empty unless asked for.
+    /// Torques smoothed like the positions; empty unless requested.
     pub tau_smooth: Vec<f64>,
     /// Temperatures of the joints on the uniform clock, unfiltered (°C); empty without a `temperature` group.
     pub temperature_c: Vec<f64>,
-    /// Whether a sample's torque does not count (outlier, held, hole that was filled), laid out as the torques; empty
-    /// if all count. What stands in its place is a straight line; a fit leaves the sample out of torque and regressor
-    /// alike.
+    /// Whether a sample's torque is ignored (outlier, held, filled hole), with the layout of the torques; empty if all
+    /// are valid. Its value is replaced by a straight line; a fit leaves the sample out of torque and regressor.
     pub set_aside: Vec<bool>,
-    /// Rows at the begin and at the end whose motion rests on samples that the filter had to invent at the ends of a
-    /// piece: one and a half periods of the cut-off, as far as the filter reaches and at most a quarter of the piece.
+    /// Number of rows at the start and at the end whose motion depends on samples that the filter extrapolated at the
+    /// ends of a piece: 1.5 periods of the cut-off, at most the filter's length and a quarter of the piece.
     pub unsettled: [usize; 2],
 }
 
 impl MotionBlock {
-    /// The torques to fit to: smoothed like the positions if that was asked for, otherwise as logged.
+    /// The torques for the fit: smoothed like the positions if requested, otherwise as logged.
     pub fn fitted_tau(&self) -> &[f64] {
         if self.tau_smooth.is_empty() { &self.tau } else { &self.tau_smooth }
     }
 
-    /// One joint's part of `values` (one of this block's own fields).
+    /// The values of one joint in one of this block's fields.
     pub fn joint<'a>(&self, values: &'a [f64], joint: usize) -> &'a [f64] {
         &values[joint * self.rows..(joint + 1) * self.rows]
     }
 
-    /// The same with each joint's torque taken at the time of the motion that it belongs to, `lag_s` later (seconds,
-    /// one for all joints or one for each; joints without one keep theirs), as [`MotionSettings::torque_lag_s`] does
-    /// while a log is read. Samples whose torque comes from outside are set aside.
+    /// Shifts the torque of each joint by its delay `lag_s` (s, one value for all joints or one for each; missing
+    /// values are zero), as [`MotionSettings::torque_lag_s`] does while reading a log. Samples without a torque after
+    /// the shift are marked in `set_aside`.
     #[must_use]
     pub fn without_torque_lag(&self, lag_s: &OneOrMany<f64>) -> Self {
         let lags = (0..self.joints).map(|joint| lag_s.at(joint).unwrap_or(0.0));
@@ -129,10 +152,10 @@ impl MotionBlock {
         shifted
     }
 
-    /// Some of its rows.
+    /// The rows `run` of the block.
     ///
     /// # Panics
-    /// If it has fewer.
+    /// If the block has fewer rows.
     #[must_use]
     pub fn part(&self, run: Range<usize>) -> Self {
         let some = |values: &[f64]| -> Vec<f64> {

@@ -1,9 +1,9 @@
-//! Samples that are left out of a block.
+//! Selects the samples of a block that are kept.
 
 use core::ops::Range;
 
-/// The runs of rows of a block that no mark touches. Marks (in any order, overlapping or not) count in a window whose
-/// sample `first` is the block's first row.
+/// The runs of rows of a block without a mark. Marks (in any order, possibly overlapping) are indices in a window;
+/// sample `first` of the window is the first row of the block.
 pub(crate) fn kept_runs(marked: &[Range<usize>], first: usize, rows: usize) -> Vec<Range<usize>> {
     let mut ranges: Vec<Range<usize>> = marked
         .iter()
@@ -30,7 +30,7 @@ mod tests {
     use crate::MotionBlock;
 
     #[test]
-    fn runs_are_what_the_marks_leave() {
+    fn runs_are_the_unmarked_rows() {
         assert_eq!(kept_runs(&[], 5, 10), vec![0..10; 1]);
         assert_eq!(kept_runs(&[12..20, 3..7, 6..8], 5, 10), vec![3..7; 1]);
         assert!(kept_runs(&vec![0..100; 1], 5, 10).is_empty());
@@ -38,7 +38,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_keep_joints_apart() {
+    fn parts_contain_the_rows_of_each_joint() {
         let block = MotionBlock {
             rate_hz: 10.0,
             rows: 3,

@@ -1,7 +1,7 @@
-//! From a log to q, dq, ddq and torque on a uniform clock, block by block.
+//! Converts a log to q, dq, ddq and torque on a uniform clock, block by block.
 //!
-//! [`MotionStream`] pulls rows through everything below: reader, clock, differentiator, checks. [`MotionBlock`] is what
-//! it gives, [`MotionSettings`] is how it is set up.
+//! [`MotionStream`] combines reader, clock, differentiator and checks, and returns [`MotionBlock`]s; [`MotionSettings`]
+//! configures it.
 
 mod block;
 mod marks;
@@ -9,5 +9,5 @@ mod opening;
 mod stream;
 mod torque_lag;
 
-pub use block::{MotionBlock, MotionSettings};
+pub use block::{ImportLimits, MotionBlock, MotionSettings};
 pub use stream::MotionStream;

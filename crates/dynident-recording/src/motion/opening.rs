@@ -1,18 +1,18 @@
-//! What the first rows of a log decide: its clock, the cut-off that its motion asks for, the noise of its positions.
+//! Properties of a log that are estimated from its first rows: clock, cut-off, position noise.
 
+use super::block::{ImportLimits, MotionSettings};
 use crate::cleaning::replace_spikes;
 use crate::clock::segments::{PlacedRows, Segmenter};
 use crate::clock::timeline::Timeline;
 use crate::clock::{Clock, clock};
 use crate::error::RecordingError;
 use crate::filter::NoiseSpectra;
-use crate::filter::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
+use crate::filter::cutoff::{CutoffChoice, MAX_CUTOFF_SAMPLES, cutoff_within};
 use crate::log::{Log, LogReader, RawBlock};
 use crate::quantisation::quantisation_step;
 use crate::report::rows_to_a_value;
 use std::sync::Arc;
 
-/// What the first rows decide, whatever is done with the rows.
 #[derive(Debug)]
 pub(super) struct Opening {
     pub(super) clock: Clock,
@@ -21,27 +21,28 @@ pub(super) struct Opening {
     /// Quantisation steps of positions and torques, joint by joint.
     pub(super) position_steps: Vec<Option<f64>>,
     pub(super) torque_steps: Vec<Option<f64>>,
-    /// Rows to new positions and to new torques, where a recorder repeats them.
+    /// Number of rows per new position and per new torque, if a recorder repeats them.
     pub(super) rows_to_a_value: [Option<u64>; 2],
 }
 
 impl Opening {
-    /// Of `log`: its first rows are read once, however many passes begin.
+    /// Estimates for `log`; its first rows are read once for all passes.
     ///
     /// # Errors
-    /// If they cannot be read, or no rate follows from them.
-    pub(super) fn of(log: &Log, keep_outliers: bool) -> Result<Arc<Self>, RecordingError> {
-        log.found_once(keep_outliers, || Self::read(log, keep_outliers))
+    /// If the rows cannot be read, or do not determine a rate.
+    pub(super) fn of(log: &Log, settings: &MotionSettings) -> Result<Arc<Self>, RecordingError> {
+        let MotionSettings { keep_outliers, limits, .. } = settings;
+        log.found_once(&(*keep_outliers, limits.clone()), || Self::read(log, *keep_outliers, limits))
     }
 
-    fn read(log: &Log, keep_outliers: bool) -> Result<Self, RecordingError> {
+    fn read(log: &Log, keep_outliers: bool, limits: &ImportLimits) -> Result<Self, RecordingError> {
         let format = &log.format;
         let (mut first, time_label) = FirstRows::of(log)?;
         let rows_to_a_value = [&first.q, &first.tau].map(|channels| rows_to_a_value(channels));
         if !keep_outliers {
             for q in &mut first.q {
                 let rows = 0..q.len();
-                replace_spikes(q, rows);
+                replace_spikes(q, rows, &limits.cleaning);
             }
         }
         let clock = match format.rate_hz {
@@ -54,15 +55,15 @@ impl Opening {
                 misfit_stamps: None,
                 drift_steps: None,
                 smoothing_rows: 0,
-                evidence: "even spacing: the rate is given, there are no stamps".to_owned(),
+                evidence: "even spacing: the rate is given, the log has no stamps".to_owned(),
             },
-            None => clock(format.clock, &first.time_s, &first.row, &first.q, format.max_gap_steps)
+            None => clock(format.clock, &first.time_s, &first.row, &first.q, format.max_gap_steps, &limits.clock)
                 .map_err(|reason| RecordingError::NoRate { log: log.source().label(), column: time_label, reason })?,
         };
         let longest = first.longest_segment(Timeline::new(&clock, format.max_gap_steps, 0.0));
         let steps = |columns: &[Vec<f64>]| columns.iter().map(|values| quantisation_step(values)).collect();
         Ok(Self {
-            cutoff: cutoff(&longest, clock.rate_hz),
+            cutoff: cutoff_within(&longest, clock.rate_hz, &limits.cutoff),
             noise: NoiseSpectra::of(&longest, clock.rate_hz),
             position_steps: steps(&first.q),
             torque_steps: steps(&first.tau),
@@ -72,7 +73,7 @@ impl Opening {
     }
 }
 
-/// The first [`CUTOFF_SAMPLES`] rows of a log, or a few more.
+/// The first [`MAX_CUTOFF_SAMPLES`] rows of a log, or a few more.
 struct FirstRows {
     row: Vec<u64>,
     time_s: Vec<f64>,
@@ -81,13 +82,13 @@ struct FirstRows {
 }
 
 impl FirstRows {
-    /// With what messages call the time column.
+    /// The first rows, and the name of the time column for messages.
     fn of(log: &Log) -> Result<(Self, String), RecordingError> {
         let mut reader = LogReader::open(log)?;
         let columns = || vec![Vec::new(); log.joints.len()];
         let mut first = Self { row: Vec::new(), time_s: Vec::new(), q: columns(), tau: columns() };
         let mut raw = RawBlock::default();
-        while first.row.len() < CUTOFF_SAMPLES && reader.next_block(&mut raw)? {
+        while first.row.len() < MAX_CUTOFF_SAMPLES && reader.next_block(&mut raw)? {
             first.row.extend_from_slice(&raw.row);
             first.time_s.extend_from_slice(&raw.time_s);
             for (all, block) in first.q.iter_mut().zip(&raw.q).chain(first.tau.iter_mut().zip(&raw.tau)) {

@@ -1,4 +1,4 @@
-//! From a log file to q, dq, ddq and torque on a uniform clock, block by block.
+//! Converts a log file to q, dq, ddq and torque on a uniform clock, block by block.
 
 mod giving;
 
@@ -14,30 +14,28 @@ use crate::error::{FilterError, RecordingError};
 use crate::filter::CutoffChoice;
 use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
 use crate::reference::Reference;
-use crate::report::ImportReport;
 use crate::report::channels::ChannelCheck;
 use crate::report::comparison::Comparison;
 use crate::report::steps::TimeCheck;
+use crate::report::{ImportReport, ReportSettings};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Periods of the cut-off at an end of a piece after which what the filter invented beyond it has faded: the slowest
-/// poles of a Butterworth filter of order 4 leave 3 % there.
+/// Length of the ends of a piece that depend on extrapolated samples, in periods of the cut-off: there the transients
+/// of a Butterworth filter of order 4 have decayed to 3 %.
 const UNSETTLED_PERIODS: f64 = 1.5;
-/// Longest hole that is filled, as a share of the cut-off's period: a tenth of the period of the motion's highest
-/// frequency. A polynomial of degree 5 through both sides misses a sinusoid of that frequency by less than 1e-4 there.
-const BRIDGED_PERIODS: f64 = 0.2;
-/// Rows of a [`MotionBlock`] at least, but for the last of a segment.
-const CHUNK_ROWS: usize = 8192;
-/// A log without an uninterrupted piece stands in no order of time where more than one row in so many steps back.
-const ROWS_TO_A_STEP_BACK: u64 = 10;
+/// Minimum number of rows of a [`MotionBlock`], except the last of a segment.
+const MIN_CHUNK_ROWS: usize = 8192;
+/// Number of rows per backward step below which a log without an uninterrupted piece is reported as not ordered by
+/// time.
+const MIN_ROWS_PER_BACKWARD_STEP: u64 = 10;
 
-/// A log on its way to a motion; memory does not grow with the log's length, unless the differentiator needs
-/// the whole log.
+/// Conversion of a log to a motion. Memory does not grow with the log's length, unless the differentiator needs the
+/// whole log.
 ///
-/// Opening reads a bounded first part of the log to decide on clock, rate and cut-off, once for all passes over a
-/// [`Log`] and its clones; then the log is read from the start, as [`next_block`](Self::next_block) is called.
+/// Opening reads a limited first part of the log to determine clock, rate and cut-off, once for all passes over a
+/// [`Log`] and its clones. [`next_block`](Self::next_block) then reads the log from the start.
 #[derive(Debug)]
 pub struct MotionStream {
     rows_in: CleanRows,
@@ -46,41 +44,41 @@ pub struct MotionStream {
     joints: Vec<String>,
     clock: Clock,
     cutoff: CutoffChoice,
-    /// The cut-off of the differentiator, Hz.
-    in_force_hz: f64,
+    cutoff_in_use_hz: f64,
     position_noise: Vec<f64>,
     differentiator: Box<dyn Differentiator>,
     smooth_torque: bool,
     torque_shift: TorqueShift,
     trim: usize,
-    /// Samples at the ends of a piece that rest on invented ones.
+    /// Samples at the ends of a piece that depend on extrapolated samples.
     unsettled: usize,
-    /// Samples on either side of a chunk that enter it; `None`: the whole segment.
+    /// Samples needed on either side of a chunk; `None`: the whole segment.
     context: Option<usize>,
     segmenter: Segmenter,
     /// Channels on the uniform clock: positions, torques, logged velocities, logged accelerations, temperatures.
     uniform: Vec<Vec<f64>>,
-    /// Samples of `uniform` that were given out and stay as context.
+    /// Number of samples in `uniform` that were returned and remain as context.
     done: usize,
-    /// Samples of the segment before those in `uniform`.
+    /// Number of samples of the segment before those in `uniform`.
     passed: u64,
-    /// Samples of the segment whose torque does not count: number in the segment and joint, ascending.
+    /// Samples of the segment whose torque is ignored: index in the segment and joint, ascending.
     set_aside: VecDeque<(u64, usize)>,
     ended: bool,
     segments: usize,
     short_segments: [u64; 2],
     longest_short: usize,
     rows: u64,
-    /// Of positions and of torques.
+    /// For positions and for torques.
     rows_to_a_value: [Option<u64>; 2],
     time_check: TimeCheck,
+    report_limits: ReportSettings,
     checks: Vec<ChannelCheck>,
     velocity: Vec<Comparison>,
     acceleration: Vec<Comparison>,
     window: [Vec<f64>; 4],
-    /// Blocks that wait because samples between them were left out.
+    /// Blocks between samples that were left out.
     waiting: VecDeque<MotionBlock>,
-    /// How often a piece was cut where the differentiator does not apply, and whether the last sample was left out.
+    /// Number of cuts where the differentiator does not apply, and whether the last sample was left out.
     cuts: usize,
     in_cut: bool,
     unmapped: u64,
@@ -88,7 +86,7 @@ pub struct MotionStream {
 }
 
 impl MotionStream {
-    /// Begins a pass over the log whose main file is `file`: [`new`](Self::new) of [`Log::file`].
+    /// Starts a pass over the log with the main file `file`: [`new`](Self::new) of [`Log::file`].
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -101,19 +99,19 @@ impl MotionStream {
         Self::new(&Log::file(file, format.clone(), joints), settings)
     }
 
-    /// Begins a pass over `log` and decides on clock and cut-off.
+    /// Starts a pass over `log` and determines clock and cut-off.
     ///
     /// # Errors
-    /// If settings or description are wrong, the log cannot be read, or no rate follows from it.
+    /// If settings or format are invalid, the log cannot be read, or it does not determine a rate.
     pub fn new(log: &Log, settings: &MotionSettings) -> Result<Self, RecordingError> {
         Self::following(log, settings, None)
     }
 
     /// As [`new`](Self::new), with the commanded motion for a differentiator that needs it, its joints in the order of
-    /// the log's.
+    /// the log.
     ///
-    /// Where the differentiator does not apply to a joint, the samples of all joints are left out, the piece is cut
-    /// there, and the report says how many.
+    /// Where the differentiator does not apply to a joint, the samples of all joints are left out and the piece is cut;
+    /// the report contains their number.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -126,12 +124,12 @@ impl MotionStream {
         Self::begin(log, settings, |cutoff| settings.differentiator.build_following(cutoff.cutoff_hz, reference))
     }
 
-    /// As [`new`](Self::new), with a differentiator of the caller's own in place of the one that the settings name.
+    /// As [`new`](Self::new), with a differentiator of the caller instead of that in the settings.
     ///
-    /// `build` gets the cut-off that the data suggest.
+    /// `build` gets the cut-off that is estimated from the data.
     ///
     /// # Errors
-    /// As [`new`](Self::new), and what `build` refuses.
+    /// As [`new`](Self::new), and errors of `build`.
     pub fn with_differentiator(
         log: &Log,
         settings: &MotionSettings,
@@ -146,12 +144,11 @@ impl MotionStream {
         settings: &MotionSettings,
         build: impl FnOnce(&CutoffChoice) -> Result<Box<dyn Differentiator>, FilterError>,
     ) -> Result<Self, RecordingError> {
-        let opening = Opening::of(log, settings.keep_outliers)?;
+        let opening = Opening::of(log, settings)?;
         let differentiator = build(&opening.cutoff)?;
         Self::opened(log, settings, &opening, differentiator)
     }
 
-    /// The stream of an opened log, before its first row.
     fn opened(
         log: &Log,
         settings: &MotionSettings,
@@ -160,8 +157,9 @@ impl MotionStream {
     ) -> Result<Self, RecordingError> {
         let Log { format, joints, .. } = log;
         let (clock, cutoff) = (opening.clock.clone(), opening.cutoff.clone());
-        let in_force_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
-        let bridged = if format.bridge_gaps { BRIDGED_PERIODS * clock.rate_hz / cutoff.cutoff_hz } else { 0.0 };
+        let cutoff_in_use_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
+        let limits = &settings.limits.cleaning;
+        let bridged = if format.bridge_gaps { limits.hole_periods * clock.rate_hz / cutoff.cutoff_hz } else { 0.0 };
         let timeline = Timeline::new(&clock, format.max_gap_steps, bridged);
         let comparisons = |group: bool| -> Vec<Comparison> {
             joints.iter().filter(|_| group).map(|joint| Comparison::new(joint)).collect()
@@ -171,10 +169,15 @@ impl MotionStream {
         let temperature = if format.temperature.is_some() { joints.len() } else { 0 };
         let torque_shift = TorqueShift::new(settings.torque_lags_s(joints.len())?.into_iter(), clock.rate_hz);
         let context = differentiator.context_samples(clock.rate_hz);
-        let unsettled = ((UNSETTLED_PERIODS * clock.rate_hz / in_force_hz) as usize).min(context.unwrap_or(0));
+        let unsettled = ((UNSETTLED_PERIODS * clock.rate_hz / cutoff_in_use_hz) as usize).min(context.unwrap_or(0));
         let channels = 2 * joints.len() + velocity.len() + acceleration.len() + temperature;
         Ok(Self {
-            rows_in: CleanRows::new(LogReader::open(log)?, timeline, joints, settings.keep_outliers),
+            rows_in: CleanRows::new(
+                LogReader::open(log)?,
+                timeline,
+                joints,
+                (!settings.keep_outliers).then(|| limits.clone()),
+            ),
             clean: CleanBlock::default(),
             clean_at: 0,
             joints: joints.clone(),
@@ -182,10 +185,10 @@ impl MotionStream {
             context: context.map(|samples| samples.max(torque_shift.reach())),
             unsettled,
             segmenter: Segmenter::new(channels),
-            in_force_hz,
+            cutoff_in_use_hz,
             time_check: TimeCheck::new(clock.median_step_s),
-            position_noise: opening.noise.beyond(in_force_hz),
-            // Rows that come twice are left out, and what remains repeats nothing.
+            position_noise: opening.noise.beyond(cutoff_in_use_hz),
+            // Copied rows are left out, so the remaining rows do not repeat values.
             rows_to_a_value: if clock.repeats_rows { [None; 2] } else { opening.rows_to_a_value },
             clock,
             cutoff,
@@ -201,7 +204,8 @@ impl MotionStream {
             short_segments: [0; 2],
             longest_short: 0,
             rows: 0,
-            checks: channel_checks(log, opening),
+            report_limits: settings.limits.report,
+            checks: channel_checks(log, opening, settings.limits.report),
             velocity,
             acceleration,
             window: Default::default(),
@@ -213,30 +217,29 @@ impl MotionStream {
         })
     }
 
-    /// The same, its rows read ahead by a thread of their own: the motion does not differ by a bit.
+    /// Reads rows ahead in a separate thread; the result is bit-identical.
     #[must_use]
     pub fn read_beside(self) -> Self {
-        Self { rows_in: self.rows_in.read_beside(), ..self }
+        Self { rows_in: self.rows_in.read_in_thread(), ..self }
     }
 
-    /// The same whose [`report`](Self::report) says nothing of single channels: for a pass that nobody asks about
-    /// them.
+    /// Omits the channels from the [`report`](Self::report), for passes that do not use them.
     #[must_use]
     pub fn without_channels(self) -> Self {
         Self { checks: Vec::new(), ..self }
     }
 
-    /// Samples per second of the motion.
+    /// Sample rate of the motion, Hz.
     pub fn rate_hz(&self) -> f64 {
         self.clock.rate_hz
     }
 
-    /// The cut-off that the data suggest; in force unless the settings name one.
+    /// The cut-off estimated from the data; used unless the settings contain one.
     pub fn cutoff(&self) -> &CutoffChoice {
         &self.cutoff
     }
 
-    /// Standard deviation of the white noise of one sample of each joint's position: see
+    /// Standard deviation of the white position noise per sample, for each joint: see
     /// [`position_noise()`](crate::position_noise()).
     pub fn position_noise(&self) -> &[f64] {
         &self.position_noise
@@ -279,7 +282,7 @@ impl MotionStream {
     fn finish(&self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
         *block = MotionBlock { rate_hz: self.clock.rate_hz, joints: self.joints.len(), ..MotionBlock::default() };
         let backward = self.time_check.backward;
-        if self.segments == 0 && ROWS_TO_A_STEP_BACK * backward > self.rows {
+        if self.segments == 0 && MIN_ROWS_PER_BACKWARD_STEP * backward > self.rows {
             let log = self.rows_in.reader().label().to_owned();
             return Err(RecordingError::Unordered { log, backward, rows: self.rows });
         }
@@ -301,13 +304,13 @@ impl MotionStream {
         Ok(false)
     }
 
-    /// Shortest piece that gives at least one sample.
+    /// Minimum length of a piece, samples.
     fn needed(&self) -> usize {
         self.differentiator.minimum_samples().max(2 * self.trim + 1)
     }
 
     fn chunk(&self) -> usize {
-        CHUNK_ROWS.max(3 * self.context.unwrap_or(0))
+        MIN_CHUNK_ROWS.max(3 * self.context.unwrap_or(0))
     }
 
     /// Moves raw rows to the uniform clock until the raw block or the segment ends.
@@ -319,7 +322,7 @@ impl MotionStream {
                 *rows += raw.rows() as u64;
                 let mut gaps = Vec::new();
                 for (place, (row, time_s)) in raw.row.iter().zip(&raw.time_s).enumerate() {
-                    if time_check.see(*row, *time_s) {
+                    if time_check.add(*row, *time_s) {
                         gaps.push(place);
                     }
                 }
@@ -328,11 +331,11 @@ impl MotionStream {
                 for (check, values) in checks.iter_mut().zip(logged) {
                     let mut from = 0;
                     for &gap in &gaps {
-                        check.see(&values[from..gap]);
+                        check.add(&values[from..gap]);
                         check.begin_piece();
                         from = gap;
                     }
-                    check.see(&values[from..]);
+                    check.add(&values[from..]);
                 }
             };
             let next = rows_in.next_block(&mut read)?;
@@ -366,7 +369,6 @@ impl MotionStream {
         Ok(())
     }
 
-    /// Gives out what remains of the segment and starts the next.
     fn close_segment(&mut self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
         let available = self.uniform[0].len();
         let total = self.passed + available as u64;
@@ -391,9 +393,9 @@ impl MotionStream {
         Ok(given)
     }
 
-    /// What was found so far; complete once [`next_block`](Self::next_block) has returned false.
+    /// The findings so far; complete once [`next_block`](Self::next_block) has returned false.
     pub fn report(&self) -> ImportReport {
-        let cutoff_hz = self.in_force_hz;
+        let cutoff_hz = self.cutoff_in_use_hz;
         let mut report = ImportReport {
             file: self.rows_in.reader().label().to_owned(),
             rows: self.rows,
@@ -420,17 +422,16 @@ impl MotionStream {
             position_noise: self.position_noise.clone(),
             findings: Vec::new(),
         };
-        report.find();
+        report.find(&self.report_limits);
         report
     }
 }
 
-/// A check for each channel, in the order of [`LogFormat::groups`].
-fn channel_checks(log: &Log, opening: &Opening) -> Vec<ChannelCheck> {
+fn channel_checks(log: &Log, opening: &Opening, limits: ReportSettings) -> Vec<ChannelCheck> {
     let mut checks = Vec::new();
     for (quantity, _) in log.format.groups() {
         for (index, joint) in log.joints.iter().enumerate() {
-            let mut check = ChannelCheck::new(quantity, joint);
+            let mut check = ChannelCheck::new(quantity, joint, limits);
             check.quantisation_step = match quantity {
                 Quantity::Position => opening.position_steps[index],
                 Quantity::Torque => opening.torque_steps[index],

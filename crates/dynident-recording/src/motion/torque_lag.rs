@@ -1,42 +1,42 @@
-//! Torque that was logged late (or early): taken at the time of the motion that it belongs to.
+//! Compensates the delay of the torque relative to the motion.
 
 use core::ops::Range;
 
-/// Samples that a torque between samples is made from: the polynomial of degree five through them, which misses a
-/// sinusoid of a tenth of the sampling rate by less than 1e-3.
+/// Number of samples for the interpolation of torque: the polynomial of degree five has an error below 1e-3 for a
+/// sinusoid of a tenth of the sampling rate.
 const NODES: usize = 6;
 
-/// By how many samples each joint's torque comes late: `τ(t_k)` is taken from the log at `t_k + lag`.
+/// Torque delay of each joint in samples: `τ(t_k)` is taken from the log at `t_k + lag`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TorqueShift {
-    /// Samples, joint by joint.
     samples: Vec<f64>,
 }
 
 impl TorqueShift {
     pub(crate) fn new(lag_s: impl Iterator<Item = f64>, rate_hz: f64) -> Self {
-        // What is below a billionth of a sample is rounding of the key's value.
+        // Less than 1e-9 samples is a rounding error of the setting.
         let samples = lag_s.map(|lag_s| lag_s * rate_hz).map(|shift| if shift.abs() < 1e-9 { 0.0 } else { shift });
         Self { samples: samples.collect() }
     }
 
-    /// Samples on either side of a row that its torque may come from.
+    /// Maximum distance of the samples that determine a row's torque.
     pub(crate) fn reach(&self) -> usize {
         let longest = self.samples.iter().fold(0.0_f64, |longest, shift| longest.max(shift.abs()));
         if longest > 0.0 { longest.ceil() as usize + NODES / 2 } else { 0 }
     }
 
-    /// The rows that a mark on the torque at `place` of a piece falls on: the two beside it, or the one on it.
+    /// The rows affected by a mark on the torque at `place` of a piece: the two adjacent rows, or the row at this
+    /// place.
     pub(crate) fn rows_of_mark(&self, joint: usize, place: f64) -> impl Iterator<Item = u64> + use<> {
         let place = place - self.samples.get(joint).copied().unwrap_or(0.0);
-        // A sample on the grid is copied, one beside it enters the points before and after it.
+        // A sample on the grid is copied, one between grid points contributes to both.
         let on_grid = (place - place.round()).abs() <= 1e-6;
         let rows = if on_grid { [place.round(), place.round()] } else { [place.floor(), place.ceil()] };
         rows.into_iter().filter(|row| *row >= 0.0).map(|row| row as u64)
     }
 
-    /// Appends the torques of `rows` of a joint's `signal`, and tells which of the rows the signal does not reach:
-    /// these stand at its first or last value.
+    /// Appends the shifted torques of `rows` of a joint's `signal`. Returns the indices of rows outside the signal;
+    /// they get its first or last value.
     pub(crate) fn append(&self, joint: usize, signal: &[f64], rows: Range<usize>, out: &mut Vec<f64>) -> Vec<usize> {
         let shift = self.samples.get(joint).copied().unwrap_or(0.0);
         if shift == 0.0 {
@@ -59,7 +59,7 @@ impl TorqueShift {
             out.push(if let Some(nodes) = nodes {
                 nodes.iter().zip(weights).map(|(value, weight)| value * weight).sum()
             } else {
-                // At the very ends of a piece a straight line.
+                // Linear interpolation at the ends of a piece.
                 let at = place as usize;
                 let next = signal[(at + 1).min(signal.len() - 1)];
                 signal[at] + (place - at as f64) * (next - signal[at])
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn marks_go_with_the_torque() {
+    fn marks_are_shifted_with_the_torque() {
         let lag = TorqueShift::new([0.02, 0.025].into_iter(), 100.0);
         assert_eq!(lag.rows_of_mark(0, 5.0).collect::<Vec<_>>(), [3, 3]);
         assert_eq!(lag.rows_of_mark(1, 5.0).collect::<Vec<_>>(), [2, 3]);

@@ -1,15 +1,15 @@
-//! The paper's spliced logistic function as a path that position determines velocity and acceleration on.
+//! The paper's spliced logistic function, a path on which the position determines velocity and acceleration.
 
 use super::stroke::{Stroke, share_rests};
 use crate::error::FilterError;
 use serde::{Deserialize, Serialize};
 
-/// One joint's spliced logistic function, there and back:
+/// The spliced logistic function of one joint, there and back:
 ///
 /// `q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4))` in the first half of each period, `h + A/(1 + e^(ω rem(t, T) - 3ωT/4))`
 /// in the second;
 ///
-/// after the last period it stands where it began. A joint with A = 0 stands still.
+/// After the last period the joint is at its initial position. A joint with A = 0 does not move.
 /// Source: the paper's Eqs. 12 to 14.
 ///
 /// ```
@@ -30,7 +30,7 @@ pub struct LogisticPath {
     pub omega: f64,
     /// Offset h, rad (m).
     pub offset: f64,
-    /// Period T, s: once there and back.
+    /// Period T of the motion there and back, s.
     pub period_s: f64,
     /// Number of periods; 1 by default.
     #[serde(default = "one")]
@@ -42,11 +42,11 @@ fn one() -> u32 {
 }
 
 impl LogisticPath {
-    /// Checks the numbers.
+    /// Checks the parameters.
     ///
     /// # Errors
-    /// [`FilterError::Reference`]: numbers that are not finite, ω or T not positive, ωT below 20 (the strokes would not
-    /// come to rest: 1 % of the peak velocity would be left) or beyond 1e4, repetitions not 1 to 1000.
+    /// [`FilterError::Reference`]: values that are not finite, ω or T not positive, ωT below 20 (the strokes would end
+    /// with 1 % of the peak velocity) or above 1e4, repetitions not 1 to 1000.
     pub fn validate(&self) -> Result<(), FilterError> {
         let wrong = |problem: String| Err(FilterError::Reference { problem });
         let Self { amplitude, omega, offset, period_s, repetitions } = *self;
@@ -65,11 +65,11 @@ impl LogisticPath {
         Ok(())
     }
 
-    /// q, dq and ddq at a time in seconds after the start; at rest before it and after the last period.
+    /// q, dq and ddq at a time after the start, s; at rest before the start and after the last period.
     pub fn at(&self, time_s: f64) -> [f64; 3] {
         let end = f64::from(self.repetitions) * self.period_s;
         if !(time_s >= 0.0 && time_s < end) {
-            // Where it begins, which is not quite its asymptote h.
+            // The initial position differs slightly from the asymptote h.
             return [self.on(-0.25 * self.period_s * self.omega, 1.0)[0], 0.0, 0.0];
         }
         let rest = time_s.rem_euclid(self.period_s);
@@ -80,7 +80,7 @@ impl LogisticPath {
         }
     }
 
-    /// q, dq, ddq by the argument of the logistic function and the direction.
+    /// q, dq, ddq from the argument of the logistic function and the direction.
     fn on(&self, argument: f64, sign: f64) -> [f64; 3] {
         let e = (-argument.abs()).exp();
         let d = 1.0 / (1.0 + e);
@@ -93,8 +93,8 @@ impl LogisticPath {
         ]
     }
 
-    /// Velocity and acceleration by position alone, Eqs. 15 and 16: `dq = ±(ω/A)(q - h)(A - q + h)`, plus on the way
-    /// `there`, `ddq = (ω²/A²)(q - h)(A - q + h)(A - 2q + 2h)`. `None` outside the stroke, where the formulas give the
+    /// Velocity and acceleration from the position, Eqs. 15 and 16: `dq = ±(ω/A)(q - h)(A - q + h)`, positive for
+    /// `there`, `ddq = (ω²/A²)(q - h)(A - q + h)(A - 2q + 2h)`. `None` outside the stroke, where the formulas have the
     /// wrong sign.
     pub fn rates(&self, q: f64, there: bool) -> Option<[f64; 2]> {
         let Self { amplitude, omega, offset, .. } = *self;
@@ -108,7 +108,7 @@ impl LogisticPath {
         Some([if there { dq } else { -dq }, ddq])
     }
 
-    /// Whether the joint goes there (or back) at a time: the branch of Eq. 15.
+    /// Whether the joint moves there (not back) at a time: the branch of Eq. 15.
     pub fn goes_there(&self, time_s: f64) -> bool {
         time_s.rem_euclid(self.period_s) < 0.5 * self.period_s
     }
@@ -119,8 +119,8 @@ impl LogisticPath {
         [0.25 * size, size * self.omega / (6.0 * 3.0_f64.sqrt())]
     }
 
-    /// Two strokes a period, none if A = 0. They move where the velocity is above 1e-3 of its peak: up to ln(4000)/ω
-    /// from the middle.
+    /// Two strokes per period; empty if A = 0. They cover the times with a velocity above 1e-3 of its peak: up to
+    /// ln(4000)/ω from the middle.
     pub(crate) fn strokes(&self) -> Vec<Stroke> {
         if self.amplitude == 0.0 {
             return Vec::new();
@@ -152,7 +152,7 @@ mod tests {
         LogisticPath { amplitude: 2.094, omega: 0.996, offset: -0.3, period_s: 40.0 / 0.996, repetitions: 2 };
 
     #[test]
-    fn speed_and_acceleration_are_the_derivatives_and_the_map() {
+    fn velocity_and_acceleration_equal_the_derivatives_and_the_map() {
         let h = 1e-4;
         for i in 1..800 {
             let t = f64::from(i) * 0.1 + 0.013;

@@ -1,7 +1,7 @@
-//! The motion that a robot was commanded to make: the seam through which differentiators that need it get it.
+//! The commanded motion, for differentiators that need it.
 //!
-//! [`Reference`] is that motion at any time: samples, or the closed form of [`LogisticPath`]s. It knows its
-//! [`Stroke`]s, the pieces between rests. [`ReferenceSettings`] is how a study file names it.
+//! [`Reference`] is that motion at any time: samples, or the closed form of [`LogisticPath`]s. It contains its
+//! [`Stroke`]s, the pieces between rests. [`ReferenceSettings`] is its form in a study file.
 
 mod logistic_path;
 mod settings;
@@ -18,15 +18,12 @@ use crate::log::{
 use std::path::Path;
 use stroke::{between, share_rests, strokes_of};
 
-/// Most samples of a sampled reference.
-const MOST_SAMPLES: usize = 10_000_000;
-/// A joint rests where its velocity and its acceleration are below these parts of their peaks.
-const RESTING: [f64; 2] = [1e-3, 1e-2];
+const MAX_SAMPLES: usize = 10_000_000;
+/// Maximum velocity and acceleration of a joint at rest, as shares of their peaks.
+const MAX_REST_SHARES: [f64; 2] = [1e-3, 1e-2];
 
-/// Position, velocity and acceleration of every joint as commanded, at any time.
-///
-/// Nothing here knows how the motion was designed: it is either samples (what `design` writes as `trajectory.csv`), or
-/// the closed form of the paper's logistic strokes.
+/// Position, velocity and acceleration of every joint as commanded, at any time: from samples (the `trajectory.csv` of
+/// `design`), or from the closed form of the paper's logistic strokes.
 #[derive(Clone, Debug)]
 pub struct Reference {
     joints: Vec<JointReference>,
@@ -36,7 +33,7 @@ pub struct Reference {
 #[derive(Clone, Debug)]
 struct JointReference {
     path: JointPath,
-    /// Largest velocity and acceleration.
+    /// Maximum velocity and acceleration.
     peak: [f64; 2],
     strokes: Vec<Stroke>,
 }
@@ -47,7 +44,7 @@ enum JointPath {
     Logistic(LogisticPath),
 }
 
-/// Samples of one joint; between them the quintic that has both ends' position, velocity and acceleration.
+/// Samples of one joint, interpolated by the quintic through position, velocity and acceleration at both ends.
 #[derive(Clone, Debug)]
 struct ReferenceTable {
     times_s: std::sync::Arc<[f64]>,
@@ -56,18 +53,18 @@ struct ReferenceTable {
 }
 
 impl Reference {
-    /// From samples: `joints[j]` holds q, dq and ddq of joint j at `times_s` (rad, rad/s, rad/s²; m for sliding
-    /// joints), which increase.
+    /// From samples: `joints[j]` contains q, dq and ddq of joint j at the increasing times `times_s` (rad, rad/s,
+    /// rad/s²; m for prismatic joints).
     ///
-    /// Between samples it is the quintic through both ends' q, dq and ddq: for a smooth motion exact to `h⁶/46080` of
-    /// its sixth derivative. Before the first and after the last sample the joint stands still.
+    /// Interpolation by the quintic through q, dq and ddq at both ends: for a smooth motion the error is `h⁶/46080` of
+    /// its sixth derivative. Before the first and after the last sample the joint is at rest.
     ///
     /// # Errors
     /// [`FilterError::Reference`] for fewer than two samples, lists of unequal length, times that do not increase, or
-    /// numbers that are not finite.
+    /// values that are not finite.
     pub fn sampled(times_s: &[f64], joints: &[[Vec<f64>; 3]]) -> Result<Self, FilterError> {
         let wrong = |problem: String| FilterError::Reference { problem };
-        if times_s.len() < 2 || times_s.len() > MOST_SAMPLES || joints.is_empty() {
+        if times_s.len() < 2 || times_s.len() > MAX_SAMPLES || joints.is_empty() {
             return Err(wrong(format!(
                 "{} samples of {} joints: give two samples or more",
                 times_s.len(),
@@ -75,7 +72,7 @@ impl Reference {
             )));
         }
         if times_s.windows(2).any(|pair| pair[1] <= pair[0]) || times_s.iter().any(|t| !t.is_finite()) {
-            return Err(wrong("its times do not increase from row to row".to_owned()));
+            return Err(wrong("the times do not increase from row to row".to_owned()));
         }
         let times: std::sync::Arc<[f64]> = times_s.into();
         let joints = joints
@@ -83,7 +80,9 @@ impl Reference {
             .enumerate()
             .map(|(joint, columns)| {
                 if columns.iter().any(|column| column.len() != times.len() || column.iter().any(|x| !x.is_finite())) {
-                    return Err(wrong(format!("joint {joint} (0-based): q, dq and ddq need one finite number a time")));
+                    return Err(wrong(format!(
+                        "joint {joint} (0-based): q, dq and ddq need one finite number per time"
+                    )));
                 }
                 let [q, dq, ddq] = columns;
                 let values: Vec<[f64; 3]> = (0..times.len()).map(|i| [q[i], dq[i], ddq[i]]).collect();
@@ -104,7 +103,7 @@ impl Reference {
     /// From the paper's spliced logistic functions, one for each joint.
     ///
     /// # Errors
-    /// [`FilterError::Reference`] for a path without meaning ([`LogisticPath::validate`]).
+    /// [`FilterError::Reference`] for an invalid path ([`LogisticPath::validate`]).
     pub fn logistic(paths: &[LogisticPath]) -> Result<Self, FilterError> {
         let joints = paths
             .iter()
@@ -117,8 +116,8 @@ impl Reference {
         Ok(Self { joints, start_s: 0.0 })
     }
 
-    /// Reads a table as `design` writes it: columns `t_s`, `q1..`, `dq1..`, `ddq1..`, numbers from 1 to `joints`, SI
-    /// units. Time counts from its first row.
+    /// Reads a table in the format of `design`: columns `t_s`, `q1..`, `dq1..`, `ddq1..`, with numbers from 1 to
+    /// `joints`, SI units. Time is relative to its first row.
     ///
     /// # Errors
     /// As [`LogReader`], and as [`sampled`](Self::sampled).
@@ -134,7 +133,7 @@ impl Reference {
             clock: ClockRule::Stamps,
             max_gap_steps: 1000.0,
             bridge_gaps: false,
-            // A log has a torque; a reference has none, and its positions stand in.
+            // A log needs a torque; use the positions, because a reference has no torque.
             ..LogFormat::with_time(time, columns("q"), columns("q"))
         };
         let names: Vec<String> = (1..=joints).map(|j| format!("joint {j}")).collect();
@@ -148,7 +147,7 @@ impl Reference {
                     column.extend_from_slice(&values[joint]);
                 }
             }
-            if times.len() > MOST_SAMPLES {
+            if times.len() > MAX_SAMPLES {
                 break;
             }
         }
@@ -158,15 +157,15 @@ impl Reference {
         })
     }
 
-    /// The same, begun `start_s` after the log's first row.
+    /// Sets the start of the motion, s after the log's first row.
     #[must_use]
     pub fn starting_at(mut self, start_s: f64) -> Self {
         self.start_s = start_s;
         self
     }
 
-    /// The same with strokes between successive `boundaries_s` (seconds after its own start) in place of those between
-    /// rests: for motions that turn without resting. Joints that never move keep none.
+    /// Replaces the strokes by those between successive `boundaries_s` (s after the start of the motion), for motions
+    /// that turn without resting. Joints that never move have no strokes.
     ///
     /// # Errors
     /// [`FilterError::Reference`] for fewer than two boundaries, or boundaries that are not finite or do not increase.
@@ -185,20 +184,20 @@ impl Reference {
         Ok(self)
     }
 
-    /// The same for joints in another order: joint `j` of the new reference is joint `order[j]` of this one; `None` if
-    /// there is no such joint.
+    /// Reorders the joints: joint `j` of the new reference is joint `order[j]` of this one; `None` for an invalid
+    /// index.
     pub fn reordered(&self, order: &[usize]) -> Option<Self> {
         let joints = order.iter().map(|&joint| self.joints.get(joint).cloned()).collect::<Option<Vec<_>>>()?;
         Some(Self { joints, start_s: self.start_s })
     }
 
-    /// How many joints it moves.
+    /// Number of joints.
     pub fn joints(&self) -> usize {
         self.joints.len()
     }
 
-    /// After how many seconds it begins anew if it is run again and again: the length of its table, or the period that
-    /// all closed forms share; none where their periods differ.
+    /// Period of a repeated motion, s: the length of its table, or the period of all closed forms; `None` if their
+    /// periods differ.
     pub fn period_s(&self) -> Option<f64> {
         let period = |joint: &JointReference| match &joint.path {
             JointPath::Sampled(sampled) => sampled.times_s[sampled.times_s.len() - 1] - sampled.times_s[0],
@@ -208,15 +207,15 @@ impl Reference {
         self.joints.iter().all(|joint| period(joint) == first).then_some(first)
     }
 
-    /// When it begins, in seconds after the log's first row.
+    /// Start of the motion, s after the log's first row.
     pub fn start_s(&self) -> f64 {
         self.start_s
     }
 
-    /// q, dq and ddq of a joint at a time in seconds after the log's first row.
+    /// q, dq and ddq of a joint at a time in s after the log's first row.
     ///
     /// # Panics
-    /// If there is no such joint.
+    /// If the joint does not exist.
     pub fn at(&self, joint: usize, time_s: f64) -> [f64; 3] {
         let time_s = time_s - self.start_s;
         match &self.joints[joint].path {
@@ -225,35 +224,35 @@ impl Reference {
         }
     }
 
-    /// Whether the joint (as good as) rests there: velocity at most 1e-3 and acceleration at most 1e-2 of their peaks.
+    /// Whether the joint is at rest: velocity at most 1e-3 and acceleration at most 1e-2 of their peaks.
     ///
     /// # Panics
-    /// If there is no such joint.
+    /// If the joint does not exist.
     pub fn rests(&self, joint: usize, time_s: f64) -> bool {
         rests(&self.at(joint, time_s), self.joints[joint].peak)
     }
 
-    /// The joint's strokes: from rest to rest, in seconds after the log's first row; one for the whole motion if it
-    /// never rests, none if it never moves.
+    /// The strokes of the joint from rest to rest, in s after the log's first row. A joint that never rests has one
+    /// stroke; a joint that never moves has none.
     ///
     /// # Panics
-    /// If there is no such joint.
+    /// If the joint does not exist.
     pub fn strokes(&self, joint: usize) -> Vec<Stroke> {
         let moved = |stroke: &Stroke| stroke.later_by(self.start_s);
         self.joints[joint].strokes.iter().map(moved).collect()
     }
 
-    /// Largest velocity of the joint, rad/s or m/s.
+    /// Maximum velocity of the joint, rad/s or m/s.
     pub(crate) fn peak_velocity(&self, joint: usize) -> f64 {
         self.joints[joint].peak[0]
     }
 
-    /// Whether a joint with a closed form is on its way there at this time: the branch of Eq. 15.
+    /// Whether a joint with a closed form moves there (not back) at this time: the branch of Eq. 15.
     pub fn goes_there(&self, joint: usize, time_s: f64) -> bool {
         self.logistic_path(joint).is_some_and(|path| path.goes_there(time_s - self.start_s))
     }
 
-    /// The closed form behind it, if there is one.
+    /// The closed form, if available.
     pub fn logistic_path(&self, joint: usize) -> Option<&LogisticPath> {
         match &self.joints[joint].path {
             JointPath::Logistic(path) => Some(path),
@@ -261,11 +260,11 @@ impl Reference {
         }
     }
 
-    /// Whether the motion is known at this time (seconds after the log's first row): inside its samples, or at an end
-    /// at which it stands still.
+    /// Whether the motion is known at this time (s after the log's first row): within its samples, or beyond an end at
+    /// which the joint is at rest.
     ///
     /// # Panics
-    /// If there is no such joint.
+    /// If the joint does not exist.
     pub fn covers(&self, joint: usize, time_s: f64) -> bool {
         let time_s = time_s - self.start_s;
         let JointReference { path, peak, .. } = &self.joints[joint];
@@ -276,17 +275,16 @@ impl Reference {
     }
 }
 
-/// Two times or more that increase.
 pub(crate) fn check_boundaries(boundaries_s: &[f64]) -> Result<(), FilterError> {
     let finite = boundaries_s.iter().all(|t| t.is_finite());
     if boundaries_s.len() >= 2 && finite && boundaries_s.windows(2).all(|pair| pair[1] > pair[0]) {
         return Ok(());
     }
-    Err(FilterError::Reference { problem: "strokes_s needs two times or more, in seconds, that increase".to_owned() })
+    Err(FilterError::Reference { problem: "strokes_s needs two or more increasing times in seconds".to_owned() })
 }
 
 fn rests(value: &[f64; 3], peak: [f64; 2]) -> bool {
-    value[1].abs() <= RESTING[0] * peak[0] && value[2].abs() <= RESTING[1] * peak[1]
+    value[1].abs() <= MAX_REST_SHARES[0] * peak[0] && value[2].abs() <= MAX_REST_SHARES[1] * peak[1]
 }
 
 impl ReferenceTable {
@@ -340,13 +338,12 @@ mod tests {
         for i in 0..500 {
             let t = f64::from(i) * 0.01;
             let [q, dq, ddq] = reference.at(0, t + 1.0);
-            // h⁶ w⁶ / 46080 = 2e-11 in q; orders h⁵ and h⁴ below it in dq and ddq, with constants below 1/1000 and
-            // 1/100.
+            // h⁶ω⁶/46080 = 2e-11 in q; errors of order h⁵ in dq and h⁴ in ddq, with constants below 1/1000 and 1/100.
             assert!((q - (w * t).sin()).abs() < 5e-11, "{t}");
             assert!((dq - w * (w * t).cos()).abs() < 2e-8, "{t}");
             assert!((ddq + w * w * (w * t).sin()).abs() < 5e-6, "{t}");
         }
-        // It moves at both ends, so nothing is known beyond them.
+        // The motion beyond both ends is unknown, because the joint moves there.
         assert!(!reference.covers(0, 0.5) && reference.covers(0, 1.0) && !reference.covers(0, 6.5));
     }
 
@@ -356,7 +353,7 @@ mod tests {
         let (times, columns) = sine(401, 0.01, w);
         let reference = Reference::sampled(&times, &[columns]).unwrap();
         assert_eq!(reference.strokes(0).len(), 1);
-        // The sine turns at 0.5, 1.5, ..: between turns it goes one way.
+        // The sine turns at 0.5, 1.5, ..: it is monotone in between.
         let cut = reference.clone().with_boundaries(&[0.5, 1.5, 2.5]).unwrap().starting_at(2.0);
         let strokes = cut.strokes(0);
         assert_eq!(

@@ -1,4 +1,4 @@
-//! How a study file names the commanded motion.
+//! Settings of the commanded motion in a study file.
 
 use super::logistic_path::LogisticPath;
 use super::{Reference, check_boundaries};
@@ -6,8 +6,8 @@ use crate::error::{FilterError, require};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Where the commanded motion comes from: the table that `design` wrote, or the closed form of the paper's strokes. A
-/// text alone is the table's file.
+/// Source of the commanded motion: a table written by `design`, or the closed form of the paper's strokes. A string is
+/// the file name of the table.
 ///
 /// ```
 /// use dynident_recording::DifferentiatorSettings;
@@ -21,27 +21,27 @@ use std::path::PathBuf;
 /// )
 /// .unwrap();
 /// assert!(closed.build(1.0).is_ok());
-/// assert!(table.validate().is_ok() && table.build(1.0).is_err()); // the table has still to be read
+/// assert!(table.validate().is_ok() && table.build(1.0).is_err()); // the table was not read yet
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(from = "WrittenReference")]
 pub struct ReferenceSettings {
-    /// Table with columns `t_s, q1.., dq1.., ddq1..` (SI), the joints in the order of the robot's description.
+    /// Table with columns `t_s, q1.., dq1.., ddq1..` (SI), joints in the order of the robot description.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// In place of a table: one spliced logistic function for each joint, in the same order.
+    /// Alternative to a table: one spliced logistic function for each joint, in the same order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<LogisticPath>,
-    /// Where strokes begin and end, seconds after the motion's start, for all joints; by default they are what lies
-    /// between rests.
+    /// Boundaries of the strokes, s after the start of the motion, for all joints; by default the strokes are the
+    /// pieces between rests.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub strokes_s: Vec<f64>,
-    /// When it begins, in seconds after the log's first row; 0 by default.
+    /// Start of the motion, s after the log's first row; 0 by default.
     pub start_s: f64,
 }
 
-/// [`ReferenceSettings`] as they are written: a file's name, or a table.
+/// Serialised form of [`ReferenceSettings`]: a file name, or a table.
 #[derive(Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(
@@ -75,11 +75,11 @@ impl From<WrittenReference> for ReferenceSettings {
 }
 
 impl ReferenceSettings {
-    /// Checks what can be checked without the table.
+    /// Checks the settings without the table.
     ///
     /// # Errors
-    /// [`FilterError::Reference`] if file and joints are both given or a path has no meaning; [`FilterError::Setting`]
-    /// if the start is not finite.
+    /// [`FilterError::Reference`] if file and joints are both given or a path is invalid; [`FilterError::Setting`] if
+    /// the start is not finite.
     pub fn validate(&self) -> Result<(), FilterError> {
         require(self.start_s.is_finite() && self.start_s.abs() <= 1e6, "start_s", self.start_s, "give seconds")?;
         if self.file.is_some() && !self.joints.is_empty() {
@@ -105,10 +105,10 @@ impl ReferenceSettings {
         self.placed(Reference::logistic(&self.joints)?).map(Some)
     }
 
-    /// A motion with the strokes and the start that the settings name.
+    /// Applies the strokes and the start of the settings to a motion.
     ///
     /// # Errors
-    /// [`FilterError::Reference`] if the strokes' boundaries do not increase.
+    /// [`FilterError::Reference`] if the boundaries of the strokes do not increase.
     pub fn placed(&self, reference: Reference) -> Result<Reference, FilterError> {
         let reference =
             if self.strokes_s.is_empty() { reference } else { reference.with_boundaries(&self.strokes_s)? };

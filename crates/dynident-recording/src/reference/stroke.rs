@@ -1,19 +1,19 @@
-//! From rest to rest: the strokes of a motion.
+//! Splits a motion into strokes from rest to rest.
 
 use serde::{Deserialize, Serialize};
 
-/// One stretch of a joint's motion, from rest to rest.
+/// A part of a joint's motion from rest to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stroke {
-    /// It owns the samples from here, the middle of the rest before it, ..
+    /// Start of its samples: the middle of the rest before it, s.
     pub owns_from_s: f64,
-    /// .. to here, the middle of the rest after it.
+    /// End of its samples: the middle of the rest after it, s.
     pub owns_to_s: f64,
-    /// The joint moves from here, seconds ..
+    /// Start of the motion, s.
     pub from_s: f64,
-    /// .. to here.
+    /// End of the motion, s.
     pub to_s: f64,
-    /// Whether it goes one way only, so that position determines velocity.
+    /// Whether the motion is monotone, so that the position determines the velocity.
     pub monotone: bool,
 }
 
@@ -29,10 +29,10 @@ impl Stroke {
     }
 }
 
-/// The strokes of sampled q, dq, ddq: what lies between phases of rest of two samples or more.
+/// The strokes of sampled q, dq, ddq, separated by rests of at least two samples.
 pub(crate) fn strokes_of(times_s: &[f64], values: &[[f64; 3]], resting: &[bool]) -> Vec<Stroke> {
     let n = times_s.len();
-    // A single sample "at rest" is a turn, not a rest.
+    // A single sample at rest is a reversal, not a rest.
     let rest = |i: usize| resting[i] && (i == 0 || resting[i - 1] || (i + 1 < n && resting[i + 1]));
     let mut moving: Vec<[usize; 2]> = Vec::new();
     for i in (0..n).filter(|&i| !rest(i)) {
@@ -44,7 +44,7 @@ pub(crate) fn strokes_of(times_s: &[f64], values: &[[f64; 3]], resting: &[bool])
     let mut strokes: Vec<Stroke> = moving
         .iter()
         .map(|&[first, last]| {
-            // From the last sample at rest to the first one at rest again.
+            // From the last sample at rest to the next one at rest.
             let (from, to) = (first.saturating_sub(1), (last + 1).min(n - 1));
             let sign = values[first..=last].iter().map(|value| value[1]).sum::<f64>().signum();
             let monotone = values[first..=last].iter().all(|value| value[1] * sign > 0.0);
@@ -61,19 +61,20 @@ pub(crate) fn strokes_of(times_s: &[f64], values: &[[f64; 3]], resting: &[bool])
     strokes
 }
 
-/// Samples of a given stroke that are looked at for turns.
-const LOOKS: u32 = 500;
+/// Number of samples of a stroke that are tested for reversals.
+const TESTED_SAMPLES: u32 = 500;
 
-/// The stroke between two given times; `motion` tells velocity and rest at a time.
+/// The stroke between two given times; `motion` returns the velocity and whether the joint rests at a time.
 pub(crate) fn between(from_s: f64, to_s: f64, motion: impl Fn(f64) -> (f64, bool)) -> Stroke {
-    let looks = (0..LOOKS).map(|k| motion(from_s + (to_s - from_s) * (f64::from(k) + 0.5) / f64::from(LOOKS)));
-    let speeds: Vec<f64> = looks.filter(|(_, rests)| !rests).map(|(speed, _)| speed).collect();
-    let sign = speeds.iter().sum::<f64>().signum();
-    let monotone = speeds.iter().all(|speed| speed * sign > 0.0);
+    let samples = (0..TESTED_SAMPLES)
+        .map(|k| motion(from_s + (to_s - from_s) * (f64::from(k) + 0.5) / f64::from(TESTED_SAMPLES)));
+    let velocities: Vec<f64> = samples.filter(|(_, rests)| !rests).map(|(speed, _)| speed).collect();
+    let sign = velocities.iter().sum::<f64>().signum();
+    let monotone = velocities.iter().all(|speed| speed * sign > 0.0);
     Stroke { owns_from_s: f64::NEG_INFINITY, owns_to_s: f64::INFINITY, from_s, to_s, monotone }
 }
 
-/// Cuts the rests between strokes at their middles.
+/// Divides the rests between strokes at their middles.
 pub(crate) fn share_rests(strokes: &mut [Stroke]) {
     for i in 1..strokes.len() {
         let middle = 0.5 * (strokes[i - 1].to_s + strokes[i].from_s);
@@ -86,12 +87,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rests_divide_and_turns_do_not() {
+    fn rests_separate_strokes_and_reversals_do_not() {
         let times: Vec<f64> = (0..10).map(f64::from).collect();
         // Rest, forward, rest, forward and back with a turn, rest.
-        let speeds = [0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0];
-        let values = speeds.map(|dq| [0.0, dq, 0.0]);
-        let strokes = strokes_of(&times, &values, &speeds.map(|dq| dq == 0.0));
+        let velocities = [0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0];
+        let values = velocities.map(|dq| [0.0, dq, 0.0]);
+        let strokes = strokes_of(&times, &values, &velocities.map(|dq| dq == 0.0));
         assert_eq!(strokes.len(), 2);
         assert_eq!((strokes[0].from_s, strokes[0].to_s, strokes[0].monotone), (0.0, 3.0, true));
         assert_eq!((strokes[1].from_s, strokes[1].to_s, strokes[1].monotone), (4.0, 8.0, false));

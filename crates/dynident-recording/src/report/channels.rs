@@ -1,19 +1,20 @@
-//! What a channel looks like: its range, whether it is alive, quantised, saturated. Accumulated block by block.
+//! Statistics of a channel: range, dead, quantised, saturated. Accumulated block by block.
 
-use super::jumps::{Jump, JumpCheck, LoneSample, RUN};
+use super::jumps::{BATCH, Jump, JumpCheck, LoneSample};
+use super::settings::ReportSettings;
 use crate::log::Quantity;
 use serde::{Deserialize, Serialize};
 
-/// Samples in a row at an extreme value from which a torque counts as saturated.
-const SATURATED_RUN: u64 = 20;
+/// Minimum number of successive samples at an extreme value for a saturated torque.
+const MIN_SATURATED_RUN: u64 = 20;
 
-/// What was seen of one channel of one joint.
+/// Statistics of one channel of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ChannelReport {
-    /// What it measures.
+    /// Channel.
     pub channel: Quantity,
-    /// The joint.
+    /// Joint name.
     pub joint: String,
     /// Smallest value (SI).
     pub min: f64,
@@ -23,35 +24,35 @@ pub struct ChannelReport {
     pub zero_share: f64,
     /// Longest run of successive samples at the smallest or largest value.
     pub longest_run_at_extreme: u64,
-    /// Quantisation step, if nine tenths of the steps of the first rows are its multiples.
+    /// Quantisation step, if 90 % of the steps of the first rows are multiples of it.
     pub quantisation_step: Option<f64>,
-    /// Steps of a whole turn from one sample to the next (positions): angles that wrap.
+    /// Number of steps of a whole turn between samples (positions): angles that wrap.
     #[serde(default)]
     pub turns: u64,
-    /// Single samples far from both of their neighbours.
+    /// Number of single samples far from both of their neighbours.
     #[serde(default)]
     pub lone_samples: u64,
-    /// The one that stands off farthest.
+    /// The one that deviates most.
     #[serde(default)]
     pub worst_lone_sample: Option<LoneSample>,
-    /// Steps far larger than all others, to a place where the channel stays (positions): rows that are missing, an
-    /// encoder that stood still.
+    /// Number of steps far larger than all others, after which the channel stays (positions): missing rows, or a stuck
+    /// encoder.
     #[serde(default)]
     pub jumps: u64,
-    /// The largest of them.
+    /// The largest jump.
     #[serde(default)]
     pub worst_jump: Option<Jump>,
 }
 
 impl ChannelReport {
-    /// Whether the channel never changes.
+    /// Whether the channel is constant.
     pub fn constant(&self) -> bool {
         self.min >= self.max
     }
 
-    /// Whether the channel sits at a limit for long.
+    /// Whether the torque is at a limit for many samples.
     pub fn saturated(&self) -> bool {
-        self.channel == Quantity::Torque && !self.constant() && self.longest_run_at_extreme >= SATURATED_RUN
+        self.channel == Quantity::Torque && !self.constant() && self.longest_run_at_extreme >= MIN_SATURATED_RUN
     }
 }
 
@@ -80,18 +81,17 @@ impl Extreme {
         Self { value: f64::NEG_INFINITY, run: 0, longest: 0 }
     }
 
-    /// Takes values of which `largest` is the largest.
     #[inline]
-    fn see_all(&mut self, largest: f64, values: impl Iterator<Item = f64>) {
+    fn add_all(&mut self, largest: f64, values: impl Iterator<Item = f64>) {
         if largest < self.value {
             self.run = 0;
         } else {
-            values.for_each(|value| self.see(value));
+            values.for_each(|value| self.add(value));
         }
     }
 
     #[inline]
-    fn see(&mut self, value: f64) {
+    fn add(&mut self, value: f64) {
         if value < self.value {
             self.run = 0;
         } else {
@@ -105,7 +105,7 @@ impl Extreme {
 }
 
 impl ChannelCheck {
-    pub(crate) fn new(quantity: Quantity, joint: &str) -> Self {
+    pub(crate) fn new(quantity: Quantity, joint: &str, limits: ReportSettings) -> Self {
         Self {
             quantity,
             joint: joint.to_owned(),
@@ -113,37 +113,36 @@ impl ChannelCheck {
             high: Extreme::new(),
             zeros: 0,
             samples: 0,
-            jumps: JumpCheck::new((quantity == Quantity::Position).then_some(core::f64::consts::TAU)),
+            jumps: JumpCheck::new((quantity == Quantity::Position).then_some(core::f64::consts::TAU), limits),
             quantisation_step: None,
         }
     }
 
-    pub(crate) fn see(&mut self, values: &[f64]) {
-        // Where no value of a run is an extreme, one look is enough for all of them.
-        for run in values.chunks(RUN) {
+    pub(crate) fn add(&mut self, values: &[f64]) {
+        // If no value of a run is an extreme, one comparison replaces many.
+        for run in values.chunks(BATCH) {
             let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
             for &value in run {
                 low = if value < low { value } else { low };
                 high = if value > high { value } else { high };
             }
-            self.high.see_all(high, run.iter().copied());
-            self.low.see_all(-low, run.iter().map(|value| -value));
+            self.high.add_all(high, run.iter().copied());
+            self.low.add_all(-low, run.iter().map(|value| -value));
             if low <= 0.0 && high >= 0.0 {
                 self.zeros += run.iter().filter(|value| **value == 0.0).count() as u64;
             }
-            self.jumps.see_all(run);
+            self.jumps.add_all(run);
         }
         self.samples += values.len() as u64;
     }
 
-    /// The next sample comes after a gap of the stamps.
     pub(crate) fn begin_piece(&mut self) {
         self.jumps.begin_piece();
     }
 
     pub(crate) fn report(&self) -> ChannelReport {
         let (lone_samples, worst_lone_sample) = self.jumps.lone();
-        // Torques and derivatives may step.
+        // Torques and derivatives may have steps.
         let (jumps, worst_jump) = if self.quantity == Quantity::Position { self.jumps.jumps() } else { (0, None) };
         ChannelReport {
             channel: self.quantity,
@@ -151,7 +150,7 @@ impl ChannelCheck {
             min: -self.low.value,
             max: self.high.value,
             zero_share: self.zeros as f64 / self.samples.max(1) as f64,
-            // A channel's extreme is a run at zero only if it is dead, which is reported as such.
+            // A run at zero indicates a dead channel, which is reported separately.
             longest_run_at_extreme: [&self.low, &self.high]
                 .map(|extreme| if extreme.value == 0.0 { 0 } else { extreme.longest })
                 .into_iter()
@@ -172,15 +171,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clipping_and_death_are_seen_across_blocks() {
-        let mut check = ChannelCheck::new(Quantity::Torque, "elbow");
+    fn clipped_and_dead_channels_are_detected_across_blocks() {
+        let mut check = ChannelCheck::new(Quantity::Torque, "elbow", ReportSettings::default());
         let clipped: Vec<f64> = (0..200).map(|i| (f64::from(i) * 0.05).sin().clamp(-0.5, 0.8)).collect();
-        clipped.chunks(7).for_each(|block| check.see(block));
+        clipped.chunks(7).for_each(|block| check.add(block));
         let report = check.report();
         assert!(report.saturated() && !report.constant(), "{report:?}");
         assert_eq!((report.min, report.max), (-0.5, 0.8));
-        let mut dead = ChannelCheck::new(Quantity::Torque, "wrist");
-        dead.see(&[0.0; 50]);
+        let mut dead = ChannelCheck::new(Quantity::Torque, "wrist", ReportSettings::default());
+        dead.add(&[0.0; 50]);
         assert!(dead.report().constant() && dead.report().zero_share == 1.0);
     }
 }

@@ -1,69 +1,63 @@
-//! A logged derivative against the derivative of the position.
+//! Compares a logged derivative with the derivative of the position.
 
 use super::lag::{Lag, best_lag};
+use super::settings::ReportSettings;
 use crate::log::{Quantity, si_factor};
 use serde::{Deserialize, Serialize};
 
-/// Samples kept for the lag, at most.
-const KEPT: usize = 1 << 13;
+const MAX_LAG_SAMPLES: usize = 1 << 13;
 
-/// How a logged velocity (or acceleration) relates to the derivative of the position, both filtered alike.
+/// Comparison of a logged velocity (or acceleration) with the derivative of the position, both filtered alike.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DerivativeComparison {
-    /// The joint.
+    /// Joint name.
     pub joint: String,
     /// RMS of the difference over the RMS of the derivative of the position.
     pub relative_rms_difference: f64,
     /// `Σ a b / √(Σ a² Σ b²)` of derivative a and logged signal b over the whole log, -1 to 1: close to -1 if the sign
-    /// is reversed. Not centred, so that a joint at constant velocity says as much as one that swings, and samples
-    /// count by how fast they are. Zero where either signal is.
+    /// is reversed. Not centred, so that a joint at constant velocity is evidence as well, and fast samples have more
+    /// weight. Zero if one of the signals is zero.
     #[serde(default)]
     pub correlation: f64,
-    /// `Σ a b / Σ a²`: how many times the derivative the logged signal is; none where the derivative is nothing beside
-    /// it, as that of a dead position.
+    /// `Σ a b / Σ a²`: factor from the derivative to the logged signal; `None` if the derivative is negligible, as for
+    /// a dead position.
     #[serde(default)]
     pub ratio: Option<f64>,
-    /// Shift of the logged signal behind the derivative, where the derivative varies most.
+    /// Lag of the logged signal behind the derivative, in the piece where the derivative varies most.
     pub lag: Option<Lag>,
 }
 
-/// Correlation from which the logged signal is the derivative times a number.
-const PROPORTIONAL: f64 = 0.98;
-/// How far that number is from 1 where it is another unit, or another rate of the log.
-const OTHER: f64 = 0.05;
-/// Share of the logged signal's squares below which the derivative is nothing.
-const NOTHING: f64 = 1e-12;
-/// Units of velocity that are taken for rad/s.
-const UNITS: [&str; 2] = ["deg/s", "rpm"];
-/// Share by which such a number may differ from a unit's.
-const UNIT_SHARE: f64 = 0.02;
+/// Maximum share of the logged signal's power for a negligible derivative.
+const NEGLIGIBLE_POWER_SHARE: f64 = 1e-12;
+/// Units of velocity that are often mistaken for rad/s.
+const COMMON_UNITS: [&str; 2] = ["deg/s", "rpm"];
 
 impl DerivativeComparison {
-    /// How many times the derivative the logged signal is, where it is that throughout and not once.
-    pub(crate) fn times(&self) -> Option<f64> {
-        let is_other = |ratio: &f64| *ratio > 0.0 && ratio.ln().abs() > OTHER;
-        self.ratio.filter(is_other).filter(|_| self.correlation > PROPORTIONAL)
+    /// Factor from the derivative to the logged signal, if they are proportional and it differs from 1.
+    pub(crate) fn times(&self, limits: &ReportSettings) -> Option<f64> {
+        let is_other = |ratio: &f64| *ratio > 0.0 && ratio.ln().abs() > limits.min_log_factor;
+        self.ratio.filter(is_other).filter(|_| self.correlation > limits.proportional_correlation)
     }
 
-    /// What a velocity that is `times` the derivative may be, of a log at `rate_hz`.
-    pub(crate) fn velocity_in_words(times: f64, rate_hz: f64) -> String {
-        let is_it =
-            |unit: &&str| si_factor(unit, Quantity::Velocity).is_some_and(|si| (times * si - 1.0).abs() < UNIT_SHARE);
-        match UNITS.into_iter().find(is_it) {
+    /// Explains a velocity that is `times` the derivative, in a log at `rate_hz`.
+    pub(crate) fn describe_velocity(times: f64, rate_hz: f64, limits: &ReportSettings) -> String {
+        let is_it = |unit: &&str| {
+            si_factor(unit, Quantity::Velocity).is_some_and(|si| (times * si - 1.0).abs() < limits.unit_tolerance)
+        };
+        match COMMON_UNITS.into_iter().find(is_it) {
             Some(unit) => format!(
-                "is {times:.4} times the position's derivative throughout: write `unit = \"{unit}\"` under velocity"
+                "is {times:.4} times the position's derivative throughout: set `unit = \"{unit}\"` under velocity"
             ),
             None => format!(
-                "is {times:.4} times the position's derivative throughout: it is in another unit, or, where it is so of \
-                 every joint, the rate is {:.4} Hz in place of {rate_hz:.4}",
+                "is {times:.4} times the position's derivative throughout: it has another unit, or, if this applies to \
+                 every joint, the rate is {:.4} Hz instead of {rate_hz:.4}",
                 times * rate_hz
             ),
         }
     }
 }
 
-/// Accumulates a [`DerivativeComparison`].
 #[derive(Clone, Debug)]
 pub(crate) struct Comparison {
     joint: String,
@@ -71,8 +65,8 @@ pub(crate) struct Comparison {
     power: f64,
     logged_power: f64,
     product: f64,
-    /// How much the derivative varies over the samples that are kept.
-    varies: f64,
+    /// Sum of the squared deviations of the derivative over the kept samples.
+    variation: f64,
     derived: Vec<f64>,
     logged: Vec<f64>,
 }
@@ -85,35 +79,34 @@ impl Comparison {
             power: 0.0,
             logged_power: 0.0,
             product: 0.0,
-            varies: 0.0,
+            variation: 0.0,
             derived: Vec::new(),
             logged: Vec::new(),
         }
     }
 
-    /// Samples of one piece.
-    pub(crate) fn see(&mut self, derived: &[f64], logged: &[f64]) {
+    pub(crate) fn add(&mut self, derived: &[f64], logged: &[f64]) {
         for (derived, logged) in derived.iter().zip(logged) {
             self.difference += (derived - logged).powi(2);
             self.power += derived * derived;
             self.logged_power += logged * logged;
             self.product += derived * logged;
         }
-        // One piece, as a lag across a seam means nothing: the one that tells most.
-        let some = &derived[..derived.len().min(KEPT)];
+        // Use a single piece, because a lag across a gap is undefined: the piece with the largest variation.
+        let some = &derived[..derived.len().min(MAX_LAG_SAMPLES)];
         let mean = some.iter().sum::<f64>() / some.len().max(1) as f64;
-        let varies: f64 = some.iter().map(|x| (x - mean).powi(2)).sum();
-        if self.derived.is_empty() || varies > self.varies {
-            self.varies = varies;
+        let variation: f64 = some.iter().map(|x| (x - mean).powi(2)).sum();
+        if self.derived.is_empty() || variation > self.variation {
+            self.variation = variation;
             self.derived = some.to_vec();
             self.logged = logged[..some.len()].to_vec();
         }
     }
 
-    /// The lag is looked for within a period of the cut-off: what is later is none of this motion.
+    /// The lag is searched within one period of the cut-off; a longer lag belongs to another motion.
     pub(crate) fn report(&self, rate_hz: f64, cutoff_hz: f64) -> DerivativeComparison {
-        let tells = self.power > NOTHING * self.logged_power;
-        let difference = if tells { (self.difference / self.power).sqrt() } else { 0.0 };
+        let is_valid = self.power > NEGLIGIBLE_POWER_SHARE * self.logged_power;
+        let difference = if is_valid { (self.difference / self.power).sqrt() } else { 0.0 };
         let reach = ((rate_hz / cutoff_hz).ceil() as usize).clamp(3, 100).min(self.derived.len() / 4);
         DerivativeComparison {
             joint: self.joint.clone(),
@@ -121,7 +114,7 @@ impl Comparison {
                 let correlation = self.product / (self.power * self.logged_power).sqrt();
                 if correlation.is_finite() { correlation } else { 0.0 }
             },
-            ratio: Some(self.product / self.power).filter(|ratio| tells && ratio.is_finite()),
+            ratio: Some(self.product / self.power).filter(|ratio| is_valid && ratio.is_finite()),
             relative_rms_difference: if difference.is_finite() { difference } else { 0.0 },
             lag: best_lag(&self.derived, &self.logged, reach, rate_hz),
         }
@@ -135,42 +128,43 @@ mod tests {
     fn compared(pieces: &[(Vec<f64>, Vec<f64>)]) -> DerivativeComparison {
         let mut comparison = Comparison::new("arm");
         for (derived, logged) in pieces {
-            comparison.see(derived, logged);
+            comparison.add(derived, logged);
         }
         comparison.report(1000.0, 10.0)
     }
 
-    /// Velocities of another unit, or of a log whose rate is stated wrongly, are a number times the derivative; noise
-    /// is not, nor is what a dead position leaves.
+    /// Velocities in another unit, or of a log with a wrong rate, are proportional to the derivative; noise and the
+    /// derivative of a dead position are not.
     #[test]
-    fn another_unit_is_told_from_noise() {
+    fn another_unit_is_distinguished_from_noise() {
         let swing = |times: f64| -> (Vec<f64>, Vec<f64>) {
             (0..2000).map(|i| (f64::from(i) * 0.01).sin()).map(|x| (x, times * x)).unzip()
         };
         for (times, words) in
             [(9.5493, "unit = \"rpm\""), (57.3, "unit = \"deg/s\""), (1.25, "the rate is 125.0000 Hz")]
         {
-            let found = compared(&[swing(times)]).times().unwrap();
+            let found = compared(&[swing(times)]).times(&ReportSettings::default()).unwrap();
             assert!((found / times - 1.0).abs() < 1e-9);
-            let said = DerivativeComparison::velocity_in_words(found, 100.0);
-            assert!(said.contains(words), "{said}");
+            let message = DerivativeComparison::describe_velocity(found, 100.0, &ReportSettings::default());
+            assert!(message.contains(words), "{message}");
         }
-        assert_eq!(compared(&[swing(1.02)]).times(), None);
+        assert_eq!(compared(&[swing(1.02)]).times(&ReportSettings::default()), None);
         let noisy: Vec<f64> = (0..2000).map(|i| (f64::from(i) * f64::from(i) * 0.37).sin()).collect();
-        assert_eq!(compared(&[(swing(1.0).0, noisy.clone())]).times(), None);
+        assert_eq!(compared(&[(swing(1.0).0, noisy.clone())]).times(&ReportSettings::default()), None);
         let dead = compared(&[(vec![1e-17; 2000], noisy)]);
         assert_eq!((dead.ratio, dead.relative_rms_difference), (None, 0.0));
     }
 
-    /// A short first piece at nearly constant velocity, in which noise decides the sign of a centred correlation.
+    /// The short first piece has a nearly constant velocity, so that noise determines the sign of a centred
+    /// correlation.
     #[test]
-    fn a_piece_at_constant_velocity_does_not_speak_for_the_log() {
+    fn a_piece_at_constant_velocity_does_not_reverse_the_sign() {
         let wobble = |i: usize| 1e-3 * (i as f64 * 0.7).sin();
         let steady: (Vec<f64>, Vec<f64>) = (0..357).map(|i| (0.5 + wobble(i), 0.5 - wobble(i))).unzip();
         let swing: (Vec<f64>, Vec<f64>) = (0..5000).map(|i| (f64::from(i) * 0.01).sin()).map(|x| (x, x + 0.02)).unzip();
         let found = compared(&[steady.clone(), swing.clone()]);
         assert!(found.correlation > 0.99 && found.lag.is_some_and(|lag| lag.correlation > 0.99), "{found:?}");
-        // Alone it says the same, and its mirror the opposite.
+        // The piece alone has the same sign, and its mirror image the opposite one.
         assert!(compared(core::slice::from_ref(&steady)).correlation > 0.99);
         let reversed = (swing.0, swing.1.iter().map(|x| -x).collect());
         assert!(compared(&[(steady.0, steady.1.iter().map(|x| -x).collect()), reversed]).correlation < -0.99);

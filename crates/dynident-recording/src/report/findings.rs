@@ -1,11 +1,8 @@
-//! The findings of an [`ImportReport`], as sentences.
+//! Writes the findings of an [`ImportReport`] as sentences.
 
-use super::{ChannelReport, DerivativeComparison, Finding, ImportReport, Jump, Level};
+use super::{ChannelReport, DerivativeComparison, Finding, ImportReport, Jump, Level, ReportSettings};
 use crate::cleaning::{Reason, SetAside};
 use crate::log::Quantity;
-
-/// Share of samples set aside below which they are only information.
-const FEW: f64 = 5e-3;
 
 /// `2nd`, `3rd`, `4th`, ..
 fn ordinal(number: u64) -> String {
@@ -19,7 +16,6 @@ fn ordinal(number: u64) -> String {
     format!("{number}{ending}")
 }
 
-/// Findings in the order in which they were found.
 #[derive(Default)]
 struct Findings(Vec<Finding>);
 
@@ -29,7 +25,7 @@ impl Findings {
     }
 }
 
-/// Name of a channel in findings, and whether it is one that every log has.
+/// Name of a channel in findings, and whether every log has this channel.
 struct Channel {
     name: String,
     measured: bool,
@@ -43,32 +39,31 @@ impl Channel {
 }
 
 impl ImportReport {
-    /// Writes the findings that follow from the other fields, the gravest first.
-    pub(crate) fn find(&mut self) {
+    /// Derives the findings from the other fields, most severe first.
+    pub(crate) fn find(&mut self, limits: &ReportSettings) {
         let mut findings = Findings::default();
-        self.find_in_clock(&mut findings);
-        self.find_in_pieces(&mut findings);
-        self.find_in_stamps(&mut findings);
-        self.find_repeated_values(&mut findings);
-        self.find_left_out(&mut findings);
+        self.check_clock(&mut findings);
+        self.check_pieces(&mut findings);
+        self.check_stamps(&mut findings);
+        self.check_repeated_values(&mut findings);
+        self.check_left_out(&mut findings, limits);
         for channel in &self.channels {
-            self.find_dead_or_saturated(channel, &mut findings);
-            self.find_jumps(channel, &mut findings);
+            self.check_dead_or_saturated(channel, &mut findings);
+            self.check_jumps(channel, &mut findings);
         }
         if let Some((joints, message)) = self.position_jumps() {
             findings.add(Level::Problem, &format!("position {joints}"), message);
         }
         for (quantity, comparisons) in [("velocity", &self.velocity), ("acceleration", &self.acceleration)] {
             for comparison in comparisons {
-                self.find_difference(quantity, comparison, &mut findings);
+                self.check_difference(quantity, comparison, &mut findings, limits);
             }
         }
         findings.0.sort_by_key(|finding| core::cmp::Reverse(finding.level));
         self.findings = findings.0;
     }
 
-    /// Rate and gaps.
-    fn find_in_clock(&self, findings: &mut Findings) {
+    fn check_clock(&self, findings: &mut Findings) {
         findings.add(
             Level::Info,
             "time",
@@ -83,16 +78,13 @@ impl ImportReport {
         }
     }
 
-    /// Pieces between gaps, and samples left out of them.
-    fn find_in_pieces(&self, findings: &mut Findings) {
+    fn check_pieces(&self, findings: &mut Findings) {
         if self.segments > 1 {
             findings.add(Level::Info, "time", format!("split at gaps into {} pieces", self.segments));
         }
         if self.bridged[0] > 0 {
             let [gaps, samples] = self.bridged;
-            let message = format!(
-                "{gaps} gaps, short against the motion, were bridged; the {samples} samples in them count as no rows"
-            );
+            let message = format!("{gaps} short gaps were filled; the {samples} samples in them are not used as rows");
             findings.add(Level::Info, "time", message);
         }
         if self.short_segments[0] > 0 {
@@ -109,14 +101,13 @@ impl ImportReport {
         }
     }
 
-    /// Stamps that are equal, go backwards or lie too close.
-    fn find_in_stamps(&self, findings: &mut Findings) {
+    fn check_stamps(&self, findings: &mut Findings) {
         if self.duplicate_stamps > 0 {
             let what = if self.clock.repeats_rows {
                 "rows repeat the one before, stamp and positions; they are left out, and the rate is that of the others"
             } else {
-                "stamps equal the one before; if they are rounded that does no harm, for the rate is that of all rows \
-                 over the time they span"
+                "stamps equal the one before; rounded stamps are harmless, because the rate is the number of all rows \
+                 over the time span"
             };
             findings.add(Level::Warning, "time", format!("{} {what}", self.duplicate_stamps));
         }
@@ -128,19 +119,17 @@ impl ImportReport {
             );
         }
         if self.crowded_samples > 0 {
-            let message =
-                format!("{} samples stand too close to the one before and were left out", self.crowded_samples);
+            let message = format!("{} samples are too close to the one before and were left out", self.crowded_samples);
             findings.add(Level::Info, "time", message);
         }
     }
 
-    /// Values that the recorder repeats for several rows.
-    fn find_repeated_values(&self, findings: &mut Findings) {
+    fn check_repeated_values(&self, findings: &mut Findings) {
         for (quantity, every) in [("position", self.rows_to_a_position), ("torque", self.rows_to_a_torque)] {
             let Some(every) = every else { continue };
             let message = format!(
-                "new values come at every {} row only ({:.4} Hz), the rows between repeat them, which makes steps of the \
-                 motion and a lag: log at the robot's own rate, or keep one row in {every}",
+                "values change only at every {} row ({:.4} Hz); the repeated rows cause steps in the motion and a lag: \
+                 log at the robot's sample rate, or keep one row in {every}",
                 ordinal(every),
                 self.rate_hz / every as f64
             );
@@ -148,8 +137,7 @@ impl ImportReport {
         }
     }
 
-    /// Rows and samples left out.
-    fn find_left_out(&self, findings: &mut Findings) {
+    fn check_left_out(&self, findings: &mut Findings, limits: &ReportSettings) {
         if self.dropped.missing > 0 {
             findings.add(
                 Level::Warning,
@@ -158,20 +146,19 @@ impl ImportReport {
             );
         }
         if self.dropped.by_rule > 0 {
-            findings.add(Level::Info, "rows", format!("{} rows were left out as asked", self.dropped.by_rule));
+            findings.add(Level::Info, "rows", format!("{} rows were left out by the rules", self.dropped.by_rule));
         }
         if let Some(place) = &self.dropped.truncated {
-            findings.add(Level::Info, "rows", format!("the cut-off last line was left out ({place})"));
+            findings.add(Level::Info, "rows", format!("the truncated last line was left out ({place})"));
         }
         for found in &self.set_aside {
             let name = format!("{} {}", found.channel.key(), found.joint);
-            let few = found.share < FEW && matches!(found.reason, Reason::Outlier | Reason::Spike);
+            let few = found.share < limits.max_info_share && matches!(found.reason, Reason::Outlier | Reason::Spike);
             findings.add(if few { Level::Info } else { Level::Warning }, &name, found.sentence());
         }
     }
 
-    /// A channel that is dead or saturated.
-    fn find_dead_or_saturated(&self, channel: &ChannelReport, findings: &mut Findings) {
+    fn check_dead_or_saturated(&self, channel: &ChannelReport, findings: &mut Findings) {
         let Channel { name, measured } = Channel::of(channel);
         if channel.constant() {
             let level = if measured { Level::Problem } else { Level::Warning };
@@ -193,13 +180,12 @@ impl ImportReport {
         }
     }
 
-    /// Whole turns, outliers and steps of a channel.
-    fn find_jumps(&self, channel: &ChannelReport, findings: &mut Findings) {
+    fn check_jumps(&self, channel: &ChannelReport, findings: &mut Findings) {
         let Channel { name, measured } = Channel::of(channel);
         if channel.turns > 0 {
             let message = format!(
-                "jumps by a whole turn {} times: the angles wrap, and a motion cannot be made of them; unwrap them \
-                 (numpy.unwrap) before they are read",
+                "jumps by a whole turn {} times: the angles wrap, so the motion cannot be determined; unwrap them \
+                 (numpy.unwrap) before reading",
                 channel.turns
             );
             findings.add(Level::Problem, &name, message);
@@ -208,8 +194,8 @@ impl ImportReport {
             && !self.sets_aside(channel)
         {
             let message = format!(
-                "{} samples stand alone, the worst in row {} of those used: {:.6e} after {:.6e}; empty the field \
-                 and write `missing = \"drop\"`",
+                "{} samples are isolated, the worst in row {} of those used: {:.6e} after {:.6e}; empty the field and \
+                 set `missing = \"drop\"`",
                 channel.lone_samples, worst.row, worst.value, worst.before
             );
             findings.add(if measured { Level::Problem } else { Level::Warning }, &name, message);
@@ -221,7 +207,7 @@ impl ImportReport {
         }
     }
 
-    /// The joints whose positions jump, and what to do about it.
+    /// The joints with jumps in their positions, and the advice.
     fn position_jumps(&self) -> Option<(String, String)> {
         let jumping = |channel: &ChannelReport| Some((channel.joint.clone(), channel.jumps, channel.worst_jump?));
         let all: Vec<(String, u64, Jump)> = self.channels.iter().filter_map(jumping).collect();
@@ -232,38 +218,43 @@ impl ImportReport {
         let wrap = all.iter().find_map(|(joint, _, jump)| Some((joint, jump, jump.period?)));
         if let Some((joint, jump, period)) = wrap {
             let message = format!(
-                "jumps from one end of its range to the other, {:.6} to {:.6} at row {} of those used: it wraps around with a \
-                 period of about {period:.4}, as a counter does that overflows; unwrap it (numpy.unwrap with that `period`) \
-                 before it is read",
+                "jumps from one end of its range to the other, {:.6} to {:.6} at row {} of those used: it wraps around \
+                 with a period of about {period:.4}, like a counter that overflows; unwrap it (numpy.unwrap with that \
+                 `period`) before reading",
                 jump.before, jump.after, jump.row
             );
             return Some((joint.clone(), message));
         }
         let joints = all.iter().map(|(joint, ..)| &joint[..]).collect::<Vec<_>>().join(", ");
         let cause = if all.iter().filter(|(.., jump)| jump.row == worst.row).count() > 1 {
-            "rows are missing there without a gap of the stamps, or the log is put together from pieces"
+            "rows are missing there without a gap in the stamps, or the log is composed of pieces"
         } else {
             "the encoder stood still or lost counts, or rows are missing there"
         };
         let message = format!(
-            "jumps {most} times, the farthest from {:.6} to {:.6} at row {} of those used, where no other step is larger \
-             than {:.2e}: {cause}; read what lies before and after as logs of their own (`rows`)",
+            "jumps {most} times, the farthest from {:.6} to {:.6} at row {} of those used, where no other step is \
+             larger than {:.2e}: {cause}; read the parts before and after as separate logs (`rows`)",
             worst.before, worst.after, worst.row, worst.largest_other
         );
         Some((joints, message))
     }
 
-    /// A logged derivative that differs from the position's.
-    fn find_difference(&self, quantity: &str, comparison: &DerivativeComparison, findings: &mut Findings) {
+    fn check_difference(
+        &self,
+        quantity: &str,
+        comparison: &DerivativeComparison,
+        findings: &mut Findings,
+        limits: &ReportSettings,
+    ) {
         let name = format!("{quantity} {}", comparison.joint);
         let difference = 100.0 * comparison.relative_rms_difference;
-        if comparison.correlation < -0.5 {
+        if comparison.correlation < limits.opposite_correlation {
             let message = "the logged signal has the opposite sign of the position's derivative";
             findings.add(Level::Problem, &name, message.to_owned());
-        } else if let Some(times) = comparison.times().filter(|_| quantity == "velocity") {
-            let message = DerivativeComparison::velocity_in_words(times, self.rate_hz);
+        } else if let Some(times) = comparison.times(limits).filter(|_| quantity == "velocity") {
+            let message = DerivativeComparison::describe_velocity(times, self.rate_hz, limits);
             findings.add(Level::Warning, &name, message);
-        } else if difference > 20.0 && comparison.lag.is_some() {
+        } else if difference > limits.min_difference_percent && comparison.lag.is_some() {
             let message = format!(
                 "differs from the position's derivative by {difference:.1} % RMS (correlation {:.3})",
                 comparison.correlation
@@ -273,7 +264,7 @@ impl ImportReport {
             && lag.matters()
             && lag.samples.abs() > 0.5
         {
-            findings.add(Level::Info, &name, format!("comes {:.4} s after the position's derivative", lag.seconds));
+            findings.add(Level::Info, &name, format!("is {:.4} s behind the position's derivative", lag.seconds));
         }
     }
 }

@@ -1,20 +1,20 @@
-//! Channels that a recorder repeats: new values at every few rows only.
+//! Detects channels that a recorder repeats, with new values at every few rows only.
 
-/// Rows that are looked at, at least, in which something moves.
-const LEAST_CHANGES: usize = 40;
-/// Share of the changes that come as many rows after the one before as most do.
-const EVEN: f64 = 0.8;
-/// Share of the rows with a change in which every moving channel changes.
-const TOGETHER: f64 = 0.8;
+/// Minimum number of changes of a moving channel.
+const MIN_CHANGES: usize = 40;
+/// Minimum share of changes at the usual distance, rows.
+const MIN_EVEN_SHARE: f64 = 0.8;
+/// Minimum share of the rows with a change in which most moving channels change.
+const MIN_COMMON_SHARE: f64 = 0.8;
 
-/// How many rows a new set of values comes after the one before, where `channels` (one vector for each joint) change
-/// together and evenly, and not at every row; `None` where they do not. What is quantised and slow repeats as well,
-/// but each joint at moments of its own.
+/// Number of rows per new set of values, if the `channels` (one vector for each joint) change together, at even
+/// distances, and not at every row; otherwise `None`. Quantised slow channels also repeat, but each joint changes at
+/// different rows.
 pub(crate) fn rows_to_a_value(channels: &[Vec<f64>]) -> Option<u64> {
     let rows = channels.first()?.len();
     let moving: Vec<&Vec<f64>> =
-        channels.iter().filter(|values| changes(values).take(LEAST_CHANGES).count() == LEAST_CHANGES).collect();
-    // One channel alone may be quantised.
+        channels.iter().filter(|values| changes(values).take(MIN_CHANGES).count() == MIN_CHANGES).collect();
+    // A single channel may be quantised.
     if moving.len() < 2 {
         return None;
     }
@@ -25,16 +25,15 @@ pub(crate) fn rows_to_a_value(channels: &[Vec<f64>]) -> Option<u64> {
     let at: Vec<usize> = (0..rows).filter(|&row| changing[row] > 0).collect();
     let together = at.iter().filter(|&&row| 2 * changing[row] > moving.len()).count();
     let mut steps: Vec<usize> = at.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if steps.is_empty() || (together as f64) < TOGETHER * at.len() as f64 {
+    if steps.is_empty() || (together as f64) < MIN_COMMON_SHARE * at.len() as f64 {
         return None;
     }
     let middle = steps.len() / 2;
     let usual = *steps.select_nth_unstable(middle).1;
     let even = steps.iter().filter(|&&step| step == usual).count();
-    (usual > 1 && even as f64 >= EVEN * steps.len() as f64).then_some(usual as u64)
+    (usual > 1 && even as f64 >= MIN_EVEN_SHARE * steps.len() as f64).then_some(usual as u64)
 }
 
-/// The rows at which a channel is not what it was the row before.
 fn changes(values: &[f64]) -> impl Iterator<Item = usize> {
     (1..values.len()).filter(|&row| values[row] != values[row - 1])
 }
@@ -53,15 +52,15 @@ mod tests {
     }
 
     #[test]
-    fn values_that_a_recorder_repeats_are_counted() {
+    fn repeated_values_are_detected() {
         assert_eq!(rows_to_a_value(&swing(1000, 5, 0.0)), Some(5));
         assert_eq!(rows_to_a_value(&swing(1000, 5, 1e-3)), Some(5));
         assert_eq!(rows_to_a_value(&swing(1000, 1, 0.0)), None);
     }
 
     #[test]
-    fn coarse_steps_are_no_repetition() {
-        // At half its speed a joint stays on one step for several rows.
+    fn coarse_quantisation_is_not_repetition() {
+        // At half its velocity a joint stays on one step for several rows.
         assert_eq!(rows_to_a_value(&swing(2000, 1, 0.02)), None);
         assert_eq!(rows_to_a_value(&[vec![1.0; 500], vec![2.0; 500]]), None);
         assert_eq!(rows_to_a_value(&[]), None);

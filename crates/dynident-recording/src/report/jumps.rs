@@ -1,67 +1,58 @@
-//! Samples that no motion makes: angles that wrap after a turn, single values far from their neighbours, and steps to
-//! another place.
+//! Detects samples that no motion causes: angles that wrap after a turn, single values far from their neighbours, and
+//! jumps.
 
+use super::settings::ReportSettings;
 use serde::{Deserialize, Serialize};
 
-/// How far from a whole turn a step may be and still count as a wrapped angle, as a share of the turn: what the joint
-/// moves meanwhile.
+/// Maximum difference of a wrapped step from a whole turn, as a share of the turn; it covers the motion of one sample.
 const TURN_TOLERANCE: f64 = 0.1;
-/// Times the largest step nearby that a lone sample must stand off, on both sides.
-const TIMES_NEARBY: f64 = 20.0;
-/// What remains of the largest step nearby from one sample to the next: it is forgotten within some hundred samples.
-const MEMORY: f64 = 0.99;
-/// A lone sample counts only if it stands off by this share of the range of all others.
-const SHARE_OF_RANGE: f64 = 0.25;
-/// Steps to learn from before a sample can stand out.
-const LEARN: u64 = 20;
-/// The largest steps that are kept: more jumps than one less are the nature of the signal.
-const LARGEST: usize = 8;
-/// Times the largest step that a motion makes that a jump is at least.
-const TIMES_OTHERS: f64 = 5.0;
-/// A jump goes by this share of the channel's range at least: encoders flicker at rest.
-const JUMP_SHARE_OF_RANGE: f64 = 0.01;
+/// Decay of the largest step nearby per sample: it is negligible after some hundred samples.
+const DECAY: f64 = 0.99;
+/// Number of steps before the detection starts.
+const MIN_SAMPLES: u64 = 20;
+/// Number of largest steps that are kept. If all of them were jumps, they would belong to the signal.
+const KEPT_STEPS: usize = 8;
 
-/// Samples that are looked at together.
-pub(super) const RUN: usize = 64;
-/// Less than `MEMORY` to the power of `RUN`: what remains at least of the largest step nearby at the end of a run.
-const LEFT_AFTER_RUN: f64 = 0.5;
+pub(super) const BATCH: usize = 64;
+/// Less than `DECAY` to the power of `BATCH`: minimum remaining share of the largest step nearby at the end of a run.
+const MIN_DECAY_PER_BATCH: f64 = 0.5;
 
-/// A sample that stands alone.
+/// A sample far from both of its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LoneSample {
-    /// Its number among the rows used, from 0.
+    /// 0-based number among the rows used.
     pub row: u64,
-    /// Its value (SI).
+    /// Value (SI).
     pub value: f64,
-    /// The value before it.
+    /// Previous value (SI).
     pub before: f64,
 }
 
-/// A step that no motion makes, to a place where the channel stays.
+/// A step that no motion causes, after which the channel stays.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Jump {
-    /// Number of the sample after it among the rows used, from 0.
+    /// 0-based number of the sample after the step among the rows used.
     pub row: u64,
-    /// The value before (SI).
+    /// Value before (SI).
     pub before: f64,
-    /// The value after (SI).
+    /// Value after (SI).
     pub after: f64,
-    /// The largest step that is no jump (SI).
+    /// Largest step that is not a jump (SI).
     pub largest_other: f64,
-    /// The period with which the channel wraps around, to within a step, where every jump leads from one end of its
-    /// range to the other (SI).
+    /// Period with which the channel wraps around, accurate to one step, if every jump leads from one end of its range
+    /// to the other (SI).
     #[serde(default)]
     pub period: Option<f64>,
 }
 
-/// What was seen of one channel's steps.
 #[derive(Clone, Debug)]
 pub(super) struct JumpCheck {
+    limits: ReportSettings,
     turn: Option<f64>,
     samples: u64,
-    /// Samples since the stamps had a gap.
+    /// Samples since the last gap of the stamps.
     since_gap: u64,
     last: [f64; 2],
     nearby: f64,
@@ -76,9 +67,10 @@ pub(super) struct JumpCheck {
 }
 
 impl JumpCheck {
-    /// For a channel whose angles may wrap at `turn`, if any.
-    pub(super) fn new(turn: Option<f64>) -> Self {
+    /// For a channel whose angles may wrap at `turn`.
+    pub(super) fn new(turn: Option<f64>, limits: ReportSettings) -> Self {
         Self {
+            limits,
             turn,
             samples: 0,
             since_gap: 0,
@@ -94,31 +86,31 @@ impl JumpCheck {
         }
     }
 
-    /// The next sample comes after a gap of the stamps: what happened meanwhile is no jump.
+    /// Marks a gap of the stamps before the next sample; the change over the gap is not a jump.
     pub(super) fn begin_piece(&mut self) {
         self.since_gap = 0;
     }
 
-    /// Takes the next samples, at most [`RUN`]: as [`see`](Self::see) one by one does.
-    pub(super) fn see_all(&mut self, values: &[f64]) {
+    /// Adds the next samples, at most [`BATCH`], with the same result as [`add`](Self::add) for each.
+    pub(super) fn add_all(&mut self, values: &[f64]) {
         let [before, middle] = self.last;
-        let [first, .., next_to_last, last] = *values else { return values.iter().for_each(|value| self.see(*value)) };
+        let [first, .., next_to_last, last] = *values else { return values.iter().for_each(|value| self.add(*value)) };
         let step = |pair: &[f64]| (pair[1] - pair[0]).abs();
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let begun = [(middle - before).abs(), (first - middle).abs()];
         let largest = values.windows(2).map(step).fold(larger(begun[0], begun[1]), larger);
-        // None of them is alone, wraps, or is one of the largest: what is left to do is little.
+        // Fast path: no sample is isolated, wraps, or has one of the largest steps.
         let is_usual = self.since_gap >= 2
-            && largest < TIMES_NEARBY * LEFT_AFTER_RUN * self.nearby
+            && largest < self.limits.isolated_step_ratio * MIN_DECAY_PER_BATCH * self.nearby
             && self.turn.is_none_or(|turn| largest < 0.5 * turn)
-            && self.largest.len() == LARGEST
-            && self.largest[LARGEST - 1].0 >= largest;
+            && self.largest.len() == KEPT_STEPS
+            && self.largest[KEPT_STEPS - 1].0 >= largest;
         if !is_usual {
-            return values.iter().for_each(|value| self.see(*value));
+            return values.iter().for_each(|value| self.add(*value));
         }
         let passed = &values[..values.len() - 1];
         let steps = begun.into_iter().chain(passed.windows(2).map(step));
-        self.nearby = steps.fold(self.nearby, |nearby, step| larger(MEMORY * nearby, step));
+        self.nearby = steps.fold(self.nearby, |nearby, step| larger(DECAY * nearby, step));
         self.low = passed.iter().fold(self.low.min(middle), |low, value| if *value < low { *value } else { low });
         self.high = passed.iter().fold(self.high.max(middle), |high, value| larger(high, *value));
         self.last = [next_to_last, last];
@@ -127,19 +119,23 @@ impl JumpCheck {
     }
 
     #[inline]
-    pub(super) fn see(&mut self, value: f64) {
+    pub(super) fn add(&mut self, value: f64) {
         let [before, middle] = self.last;
         if self.since_gap >= 2 {
             let (to, from) = (middle - before, value - middle);
             let least = to.abs().min(from.abs());
-            // A lone sample is known for one once its successor is back.
-            if to * from < 0.0 && least > TIMES_NEARBY * self.nearby && self.samples > LEARN && self.nearby > 0.0 {
+            // The next sample shows whether the previous one was isolated.
+            if to * from < 0.0
+                && least > self.limits.isolated_step_ratio * self.nearby
+                && self.samples > MIN_SAMPLES
+                && self.nearby > 0.0
+            {
                 self.alone += 1;
                 if least > self.worst_by {
                     self.worst_by = least;
                     self.worst = Some(LoneSample { row: self.samples - 1, value: middle, before });
                 }
-                // As if it had not been there.
+                // Ignore the isolated sample.
                 self.last = [before, value];
                 self.samples += 1;
                 self.since_gap += 1;
@@ -151,7 +147,7 @@ impl JumpCheck {
             {
                 self.wraps += 1;
             } else {
-                self.nearby = (MEMORY * self.nearby).max(to.abs());
+                self.nearby = (DECAY * self.nearby).max(to.abs());
                 self.keep(to.abs(), [before, middle]);
             }
             self.low = self.low.min(middle);
@@ -164,41 +160,42 @@ impl JumpCheck {
 
     #[inline]
     fn keep(&mut self, size: f64, values: [f64; 2]) {
-        if self.largest.len() == LARGEST && self.largest[LARGEST - 1].0 >= size {
+        if self.largest.len() == KEPT_STEPS && self.largest[KEPT_STEPS - 1].0 >= size {
             return;
         }
         let place = self.largest.partition_point(|kept| kept.0 >= size);
         self.largest.insert(place, (size, self.samples - 1, values));
-        self.largest.truncate(LARGEST);
+        self.largest.truncate(KEPT_STEPS);
     }
 
-    /// Steps far larger than all others, and the largest of them.
+    /// Number of steps far larger than all others, and the largest of them.
     pub(super) fn jumps(&self) -> (u64, Option<Jump>) {
         let range = self.high - self.low;
         let is_apart = |pair: &[(f64, u64, [f64; 2])]| {
             let [larger, smaller] = [pair[0].0, pair[1].0];
-            smaller > 0.0 && larger > TIMES_OTHERS * smaller && larger > JUMP_SHARE_OF_RANGE * range
+            smaller > 0.0
+                && larger > self.limits.jump_step_ratio * smaller
+                && larger > self.limits.jump_range_share * range
         };
-        let apart = self.largest.windows(2).rposition(is_apart).filter(|_| self.largest.len() == LARGEST);
+        let apart = self.largest.windows(2).rposition(is_apart).filter(|_| self.largest.len() == KEPT_STEPS);
         let Some(last) = apart else { return (0, None) };
         let (_, row, [before, after]) = self.largest[0];
         let largest_other = self.largest[last + 1].0;
-        // A counter that overflows is a step from either end then.
+        // A counter that overflows steps from one end of its range to the other.
         let is_whole_range = |kept: &(f64, u64, [f64; 2])| kept.0 >= range - 2.0 * largest_other;
         let period = self.largest[..=last].iter().all(is_whole_range).then_some(range);
         (last as u64 + 1, Some(Jump { row, before, after, largest_other, period }))
     }
 
-    /// Steps of a whole turn.
     pub(super) fn wraps(&self) -> u64 {
         self.wraps
     }
 
-    /// Lone samples and the worst of them, where it stands off far enough.
+    /// Number of isolated samples and the worst of them, if it deviates far enough.
     pub(super) fn lone(&self) -> (u64, Option<LoneSample>) {
         let range = self.high - self.low;
         match self.worst {
-            Some(worst) if self.worst_by > SHARE_OF_RANGE * range => (self.alone, Some(worst)),
+            Some(worst) if self.worst_by > self.limits.isolated_range_share * range => (self.alone, Some(worst)),
             _ => (0, None),
         }
     }
@@ -208,9 +205,13 @@ impl JumpCheck {
 mod tests {
     use super::*;
 
+    fn check_for(turn: Option<f64>) -> JumpCheck {
+        JumpCheck::new(turn, ReportSettings::default())
+    }
+
     fn seen(turn: Option<f64>, values: impl IntoIterator<Item = f64>) -> JumpCheck {
-        let mut check = JumpCheck::new(turn);
-        values.into_iter().for_each(|value| check.see(value));
+        let mut check = check_for(turn);
+        values.into_iter().for_each(|value| check.add(value));
         check
     }
 
@@ -228,47 +229,47 @@ mod tests {
     }
 
     #[test]
-    fn a_step_to_another_place_is_a_jump_and_one_over_a_gap_is_none() {
+    fn a_lasting_step_is_a_jump_unless_it_is_over_a_gap() {
         let angle = |i: usize| 1.5 * (i as f64 * 0.01).sin() + 1e-4 * noise(i);
         assert_eq!(seen(None, (0..2000).map(angle)).jumps(), (0, None));
-        // Two hundred rows are missing.
+        // Two hundred missing rows.
         let cut = |i: usize| angle(if i < 700 { i } else { i + 200 });
         let (count, jump) = seen(None, (0..1500).map(cut)).jumps();
         let jump = jump.unwrap();
         assert_eq!((count, jump.row, jump.before, jump.after), (1, 700, angle(699), angle(900)));
-        let mut paused = JumpCheck::new(None);
-        (0..700).for_each(|i| paused.see(angle(i)));
+        let mut paused = check_for(None);
+        (0..700).for_each(|i| paused.add(angle(i)));
         paused.begin_piece();
-        (900..2000).for_each(|i| paused.see(angle(i)));
+        (900..2000).for_each(|i| paused.add(angle(i)));
         assert_eq!(paused.jumps(), (0, None));
-        // An encoder that stands still for a while.
+        // An encoder that is stuck for a while.
         let frozen = |i: usize| angle(if (700..900).contains(&i) { 700 } else { i });
         assert_eq!(seen(None, (0..2000).map(frozen)).jumps().0, 1);
         assert_eq!(seen(None, (0..2000).map(frozen)).jumps().1.unwrap().period, None);
-        // Repeated samples, an encoder's counts, rest.
+        // Repeated samples, encoder counts, rest.
         assert_eq!(seen(None, (0..2000).map(|i| angle(i / 6 * 6))).jumps().0, 0);
         assert_eq!(seen(None, (0..2000).map(|i| (angle(i) / 0.01).round() * 0.01)).jumps().0, 0);
         assert_eq!(seen(None, (0..2000).map(|i| angle(i.clamp(600, 1400)))).jumps().0, 0);
     }
 
     #[test]
-    fn samples_seen_together_are_seen_as_one_by_one() {
+    fn samples_added_together_equal_single_samples() {
         let pi = core::f64::consts::PI;
         let moving = |i: usize| 2.5 + 1.5 * (i as f64 * 0.01).sin() + 1e-4 * noise(i);
         let wrapped = |i: usize| if moving(i) > pi { moving(i) - 2.0 * pi } else { moving(i) };
         let spoilt = |i: usize| wrapped(i) + if i % 517 == 3 { 0.7 } else { 0.0 } + if i > 1500 { 0.2 } else { 0.0 };
         for turn in [None, Some(2.0 * pi)] {
-            for run in [1, 2, 3, 7, RUN] {
+            for run in [1, 2, 3, 7, BATCH] {
                 let samples: Vec<f64> = (0..3000).map(spoilt).collect();
-                let mut together = JumpCheck::new(turn);
-                samples.chunks(run).for_each(|run| together.see_all(run));
+                let mut together = check_for(turn);
+                samples.chunks(run).for_each(|run| together.add_all(run));
                 assert_eq!(format!("{together:?}"), format!("{:?}", seen(turn, samples)), "{turn:?} {run}");
             }
         }
     }
 
     #[test]
-    fn wrapped_angles_are_counted_and_fast_ones_are_not() {
+    fn wrapped_angles_are_distinguished_from_fast_ones() {
         let angle = |i: usize| 2.5 + 1.5 * (i as f64 * 0.01).sin();
         let pi = core::f64::consts::PI;
         let wrapped = |i: usize| if angle(i) > pi { angle(i) - 2.0 * pi } else { angle(i) };
@@ -278,8 +279,8 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_that_overflows_is_told_with_its_period() {
-        // Half a turn of sixteen bits.
+    fn a_counter_that_overflows_is_reported_with_its_period() {
+        // Half a turn over sixteen bits.
         let period = core::f64::consts::PI;
         let counter = |i: usize| {
             let angle = 2.0 * (i as f64 * 0.003).sin();
@@ -292,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn a_channel_at_rest_with_single_flickers_of_its_last_digit_is_not_absurd() {
+    fn flicker_of_the_last_digit_at_rest_is_not_isolated() {
         let check = seen(
             None,
             (0..2000)

@@ -1,28 +1,27 @@
-//! By how much one signal comes after another.
+//! Estimates the lag between two signals.
 
 use serde::{Deserialize, Serialize};
 
-/// The shift at which two signals match best.
+/// The shift with the maximum correlation of two signals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Lag {
-    /// Seconds by which the second signal comes after the first; negative if before.
+    /// Lag of the second signal behind the first, s; negative if it is ahead.
     pub seconds: f64,
-    /// The same in samples, between samples by a parabola through the three best correlations.
+    /// Lag in samples, interpolated by a parabola through the three best correlations.
     pub samples: f64,
-    /// Correlation there, -1 to 1: the one of largest magnitude; negative if the second signal is reversed.
+    /// Correlation at the lag, -1 to 1, of the largest magnitude; negative if the second signal is reversed.
     pub correlation: f64,
     /// Correlation without a shift.
     pub correlation_unshifted: f64,
-    /// Whether the largest correlation was found at the end of the search: the true lag may be longer, or there is
-    /// none.
+    /// Whether the maximum is at the limit of the search: the true lag may be longer, or undefined.
     pub at_limit: bool,
 }
 
-/// The lag of `b` behind `a`, searched up to `max_lag_samples` either way: the shift `k` of largest
+/// The lag of `b` behind `a`, searched up to `max_lag_samples` in both directions: the shift `k` with the maximum
 /// `|corr(a[i], b[i + k])|` (Pearson's correlation, the same samples of `a` for every shift), refined by a parabola.
-/// `None` for signals that are constant, not finite, or not at least three times as long as the largest lag. Filter
-/// both signals alike before.
+/// `None` for signals that are constant, not finite, or shorter than three times the maximum lag. Filter both signals
+/// alike before.
 pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> Option<Lag> {
     let n = a.len().min(b.len());
     if n < 3 * max_lag_samples.max(1) || !(rate_hz.is_finite() && rate_hz > 0.0) {
@@ -31,9 +30,9 @@ pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> O
     let limit = max_lag_samples as isize;
     let still = &a[max_lag_samples..n - max_lag_samples];
     let mut correlations = Vec::with_capacity(2 * max_lag_samples + 1);
-    for first in (0..=2 * max_lag_samples).step_by(SIDE_BY_SIDE) {
-        let lags = SIDE_BY_SIDE.min(2 * max_lag_samples + 1 - first);
-        correlations.extend_from_slice(&side_by_side(still, &b[first..n])[..lags]);
+    for first in (0..=2 * max_lag_samples).step_by(PARALLEL_LAGS) {
+        let lags = PARALLEL_LAGS.min(2 * max_lag_samples + 1 - first);
+        correlations.extend_from_slice(&correlations_from(still, &b[first..n])[..lags]);
     }
     if !correlations.iter().all(|correlation| correlation.is_finite()) {
         return None;
@@ -58,37 +57,36 @@ pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> O
 }
 
 impl Lag {
-    /// Whether shifting explains at least half of what differs between the signals: slow signals match at any small
-    /// shift, and then the best one means nothing.
+    /// Whether the shift explains at least half of the difference between the signals. Slow signals match at any small
+    /// shift, so that the best one has no meaning.
     pub fn matters(&self) -> bool {
         let unexplained = |correlation: f64| 1.0 - correlation * correlation;
         !self.at_limit && unexplained(self.correlation) < 0.5 * unexplained(self.correlation_unshifted)
     }
 }
 
-/// Lags that are computed side by side.
-const SIDE_BY_SIDE: usize = 8;
+const PARALLEL_LAGS: usize = 8;
 
 /// Pearson's correlation of `a` with `b` from its samples 0, 1, ... on; not finite if a signal is constant or not
-/// finite, of no meaning where `b` is too short. The loops over lags become vector instructions; each lag's own sums
-/// keep their order.
-fn side_by_side(a: &[f64], b: &[f64]) -> [f64; SIDE_BY_SIDE] {
+/// finite, meaningless if `b` is too short. The compiler vectorises the loops over lags; the sums of each lag keep
+/// their order.
+fn correlations_from(a: &[f64], b: &[f64]) -> [f64; PARALLEL_LAGS] {
     let n = a.len() as f64;
     let mut padded = b.to_vec();
-    padded.resize(a.len() + SIDE_BY_SIDE - 1, 0.0);
+    padded.resize(a.len() + PARALLEL_LAGS - 1, 0.0);
     let mean_a = a.iter().sum::<f64>() / n;
-    let mut mean_b = [0.0; SIDE_BY_SIDE];
-    for b in padded.windows(SIDE_BY_SIDE) {
-        for k in 0..SIDE_BY_SIDE {
+    let mut mean_b = [0.0; PARALLEL_LAGS];
+    for b in padded.windows(PARALLEL_LAGS) {
+        for k in 0..PARALLEL_LAGS {
             mean_b[k] += b[k];
         }
     }
     let mean_b = mean_b.map(|sum| sum / n);
-    let (mut aa, mut bb, mut ab) = (0.0, [0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
-    for (a, b) in a.iter().zip(padded.windows(SIDE_BY_SIDE)) {
+    let (mut aa, mut bb, mut ab) = (0.0, [0.0; PARALLEL_LAGS], [0.0; PARALLEL_LAGS]);
+    for (a, b) in a.iter().zip(padded.windows(PARALLEL_LAGS)) {
         let a = a - mean_a;
         aa += a * a;
-        for k in 0..SIDE_BY_SIDE {
+        for k in 0..PARALLEL_LAGS {
             let b = b[k] - mean_b[k];
             bb[k] += b * b;
             ab[k] += a * b;
@@ -109,7 +107,7 @@ mod tests {
         for (shift, sign) in [(0.0234, 1.0), (-0.05, -1.0), (0.0, 1.0)] {
             let b: Vec<f64> = (0..1000).map(|i| sign * signal(f64::from(i) / rate - shift)).collect();
             let lag = best_lag(&a, &b, 20, rate).unwrap();
-            // The parabola misses a smooth peak by a few thousandths of a sample.
+            // The error of the parabola at a smooth peak is a few thousandths of a sample.
             assert!((lag.seconds - shift).abs() < 2e-4, "{lag:?}");
             assert!((lag.correlation - sign).abs() < 1e-3, "{lag:?}");
         }

@@ -1,8 +1,8 @@
-//! What was found in a log, for people and for robots.
+//! Findings in a log, for people and programs.
 //!
-//! `ChannelCheck` looks at every channel (dead, saturated, quantised), `TimeCheck` at the steps of the stamps,
-//! `Comparison` holds logged velocities and accelerations against the derivatives of the position, shifted by
-//! [`best_lag`]. [`ImportReport`] is all of it, with [`Finding`]s as sentences where something matters.
+//! `ChannelCheck` tests every channel (dead, saturated, quantised), `TimeCheck` the steps of the stamps, and
+//! `Comparison` compares logged velocities and accelerations with the derivatives of the position, shifted by
+//! [`best_lag`]. [`ImportReport`] contains all results, and the important ones as [`Finding`]s in sentences.
 
 pub(crate) mod channels;
 pub(crate) mod comparison;
@@ -10,6 +10,7 @@ mod findings;
 mod held_rows;
 mod jumps;
 mod lag;
+mod settings;
 pub(crate) mod steps;
 
 pub use channels::ChannelReport;
@@ -17,6 +18,7 @@ pub use comparison::DerivativeComparison;
 pub(crate) use held_rows::rows_to_a_value;
 pub use jumps::{Jump, LoneSample};
 pub use lag::{Lag, best_lag};
+pub use settings::ReportSettings;
 
 use crate::cleaning::{Reason, SetAside};
 use crate::clock::Clock;
@@ -24,28 +26,28 @@ use crate::filter::CutoffChoice;
 use crate::log::LinesDropped;
 use serde::{Deserialize, Serialize};
 
-/// How much a finding matters.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
-    /// Good to know.
+    /// Information.
     Info,
-    /// May harm the result.
+    /// May degrade the result.
     Warning,
-    /// Harms the result.
+    /// Degrades the result.
     Problem,
 }
 
-/// One thing that was found.
+/// A finding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Finding {
-    /// How much it matters.
+    /// Severity.
     pub level: Level,
-    /// Where: `time`, `rows`, or a quantity and joint such as `torque arm_5`.
+    /// Place: `time`, `rows`, or a quantity and joint such as `torque arm_5`.
     pub channel: String,
-    /// What, in a sentence.
+    /// Description in one sentence.
     pub message: String,
 }
 
@@ -55,9 +57,9 @@ pub struct Finding {
 pub struct Gap {
     /// 0-based data row before the gap.
     pub row: u64,
-    /// Seconds after the first row of the file at which it begins.
+    /// Start of the gap, s after the first row of the file.
     pub time_s: f64,
-    /// Its length in seconds.
+    /// Length, s.
     pub length_s: f64,
 }
 
@@ -65,80 +67,79 @@ pub struct Gap {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Steps {
-    /// Shortest, in seconds.
+    /// Minimum, s.
     pub min_s: f64,
-    /// Median over the first rows, in seconds.
+    /// Median over the first rows, s.
     pub median_s: f64,
-    /// Longest, in seconds.
+    /// Maximum, s.
     pub max_s: f64,
-    /// Standard deviation, in seconds.
+    /// Standard deviation, s.
     pub std_s: f64,
 }
 
-/// Everything the importer found in a log.
+/// Results of reading a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ImportReport {
     /// The main file.
     pub file: String,
-    /// Rows used.
+    /// Number of rows used.
     pub rows: u64,
-    /// Sampling rate of the motion that was made of them.
+    /// Sample rate of the motion, Hz.
     pub rate_hz: f64,
-    /// How stamps were understood, and why.
+    /// The clock, with its evidence.
     pub clock: Clock,
     /// Time steps; all equal without a time column.
     pub steps: Steps,
     /// Number of [`Gap`]s.
     pub gap_count: u64,
-    /// The first hundred of them.
+    /// The first hundred gaps.
     pub gaps: Vec<Gap>,
-    /// Stamps that are not later than the one before: equal ones.
+    /// Number of stamps equal to the previous one.
     pub duplicate_stamps: u64,
-    /// Stamps that are earlier than the one before.
+    /// Number of stamps earlier than the previous one.
     pub backward_stamps: u64,
-    /// Samples left out for standing too close to the one before.
+    /// Number of samples left out because they are too close to the previous one.
     pub crowded_samples: u64,
-    /// Lines left out.
+    /// Rows and lines that were left out.
     pub dropped: LinesDropped,
-    /// Uninterrupted pieces that were used.
+    /// Number of uninterrupted pieces used.
     pub segments: usize,
-    /// Pieces too short for the filter, and the samples in them.
+    /// Number of pieces too short for the filter, and of samples in them.
     pub short_segments: [u64; 2],
-    /// Samples left out because the differentiator does not apply there.
+    /// Number of samples left out because the differentiator does not apply there.
     pub unmapped_samples: u64,
-    /// Rows to a new set of positions, where the recorder repeats them; none where every row may have new ones.
+    /// Number of rows per new set of positions, if the recorder repeats positions.
     #[serde(default)]
     pub rows_to_a_position: Option<u64>,
-    /// The same of torques.
+    /// Number of rows per new set of torques, if the recorder repeats torques.
     #[serde(default)]
     pub rows_to_a_torque: Option<u64>,
-    /// Samples whose torque does not count, and positions that were replaced, by joint.
+    /// Samples whose torque is ignored, and replaced positions, by joint.
     #[serde(default)]
     pub set_aside: Vec<SetAside>,
-    /// Gaps that were filled because they are short against the motion, and the samples in them, which count as no
-    /// rows.
+    /// Number of gaps that were filled because they are short compared with the motion, and of samples in them; these
+    /// are not used as rows.
     #[serde(default)]
     pub bridged: [u64; 2],
-    /// Every channel of every joint.
+    /// Statistics of every channel of every joint.
     pub channels: Vec<ChannelReport>,
-    /// Logged velocities against the derivative of the position.
+    /// Comparison of logged velocities with the derivative of the position.
     pub velocity: Vec<DerivativeComparison>,
-    /// Logged accelerations against the second derivative of the position.
+    /// Comparison of logged accelerations with the second derivative of the position.
     pub acceleration: Vec<DerivativeComparison>,
-    /// The cut-off that the data suggest (in force unless the settings name one).
+    /// The cut-off estimated from the data (used unless the settings contain one).
     pub cutoff: CutoffChoice,
-    /// For every joint the standard deviation of one sample's position noise (rad, m), taken for white, as far as it
-    /// stands below the cut-off in force: see [`position_noise()`](crate::position_noise()). Zero for a channel that
-    /// never changes.
+    /// For every joint, the standard deviation of the position noise per sample (rad, m), taken as white, in the pass
+    /// band: see [`position_noise()`](crate::position_noise()). Zero for a channel that never changes.
     #[serde(default)]
     pub position_noise: Vec<f64>,
-    /// All of this as sentences, where it matters.
+    /// The important results in sentences.
     pub findings: Vec<Finding>,
 }
 
 impl ImportReport {
-    /// Whether the lone samples of a channel were set aside: left out, or replaced by what their neighbours say.
+    /// Whether the isolated samples of a channel were left out or replaced.
     pub fn sets_aside(&self, channel: &ChannelReport) -> bool {
         self.set_aside.iter().any(|found| {
             found.channel == channel.channel

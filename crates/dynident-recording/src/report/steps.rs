@@ -2,8 +2,7 @@
 
 use super::{Gap, Steps};
 
-/// Gaps that are listed one by one.
-const LISTED_GAPS: usize = 100;
+const MAX_LISTED_GAPS: usize = 100;
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TimeCheck {
@@ -25,8 +24,8 @@ impl TimeCheck {
         Self { median_s, min: f64::INFINITY, max: f64::NEG_INFINITY, ..Self::default() }
     }
 
-    /// Takes the next row; whether there is a gap before it.
-    pub(crate) fn see(&mut self, row: u64, time_s: f64) -> bool {
+    /// Adds the next row; returns whether there is a gap before it.
+    pub(crate) fn add(&mut self, row: u64, time_s: f64) -> bool {
         let mut is_gap = false;
         if let Some((before, last_s)) = self.last {
             let step = time_s - last_s;
@@ -35,13 +34,13 @@ impl TimeCheck {
             is_gap = step > 3.0 * self.median_s;
             if is_gap {
                 self.gap_count += 1;
-                if self.gaps.len() < LISTED_GAPS {
+                if self.gaps.len() < MAX_LISTED_GAPS {
                     self.gaps.push(Gap { row: before, time_s: last_s, length_s: step });
                 }
             }
             self.min = self.min.min(step);
             self.max = self.max.max(step);
-            // Welford's recursion: no loss of digits for steps that hardly vary.
+            // Welford's recursion keeps precision for nearly constant steps.
             self.count += 1.0;
             let difference = step - self.mean;
             self.mean += difference / self.count;

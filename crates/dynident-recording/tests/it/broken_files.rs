@@ -1,9 +1,9 @@
-//! Broken logs: each gives an error that names the file, the place and the fix, and never a panic.
+//! Broken logs: each causes an error that names the file, the place and the fix, and never a panic.
+use super::file_with;
 use dynident_recording::{ImportReport, LogFormat, MotionBlock, MotionSettings, MotionStream, RecordingError};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// File in `tests/broken`, and what the message has to contain.
+/// File in `tests/broken`, and a part of its message.
 const BROKEN: &[(&str, &str)] = &[
     ("empty.csv", "no data rows"),
     ("only_newlines.csv", "no data rows"),
@@ -33,8 +33,8 @@ const BROKEN: &[(&str, &str)] = &[
     ("fortran_exponent.csv", "`1.5D-3` is not a number"),
     ("thousands_separator.csv", "decimal points instead"),
     ("clock_time.csv", ":2, column `t` (0): `12:00:01`"),
-    ("duplicate_names.csv", "stands at columns 1 and 2"),
-    ("duplicate_time.csv", "stands at columns 0 and 1"),
+    ("duplicate_names.csv", "duplicate column name `q1` (columns 1 and 2)"),
+    ("duplicate_time.csv", "duplicate column name `t` (columns 0 and 1)"),
     ("missing_column.csv", "no column `q2`"),
     ("other_case.csv", "no column `t`"),
     ("misspelt.csv", "did you mean `tau_2`"),
@@ -49,13 +49,13 @@ const BROKEN: &[(&str, &str)] = &[
     ("pipes.csv", "is `delimiter` right"),
     ("decimal_commas.csv", "decimal points instead"),
     ("decimal_commas_and_commas.csv", "decimal commas?"),
-    ("one_row.csv", "no sampling rate"),
+    ("one_row.csv", "does not determine a sampling rate"),
     ("two_rows.csv", "filter needs 16"),
-    ("standing_clock.csv", "no sampling rate"),
-    ("backward_clock.csv", "no sampling rate"),
-    ("clock_of_infinitesimal_steps.csv", "no sampling rate"),
+    ("standing_clock.csv", "does not determine a sampling rate"),
+    ("backward_clock.csv", "does not determine a sampling rate"),
+    ("clock_of_infinitesimal_steps.csv", "does not determine a sampling rate"),
     ("huge_positions.csv", "beyond 1e60 or not finite after scaling"),
-    ("huge_time.csv", "no sampling rate"),
+    ("huge_time.csv", "does not determine a sampling rate"),
     ("gaps_everywhere.csv", "filter needs 16"),
     ("html.csv", "no column `t`"),
     ("json.csv", "no column"),
@@ -94,7 +94,7 @@ fn every_broken_file_has_its_message() {
         let message = import(&folder().join(name), FORMAT).expect_err(name).to_string();
         assert!(message.contains(words), "{name}: {message}");
         assert!(message.contains(name), "{name}: {message}");
-        // The fix stands behind a semicolon or in brackets.
+        // The fix follows a semicolon or is in brackets.
         assert!(message.contains(';') || message.contains('('), "{name}: {message}");
     }
 }
@@ -115,16 +115,14 @@ fn missing_files_folders_and_endless_lines_are_named() {
     assert!(message.contains("absent.csv: cannot be read"), "{message}");
     let message = import(&folder(), FORMAT).unwrap_err().to_string();
     assert!(message.contains("cannot be read"), "{message}");
-    let mut file = tempfile::NamedTempFile::new().unwrap();
-    file.write_all(b"t,q1,q2,tau1,tau2\n0,0,0,0,0\n").unwrap();
-    file.write_all(&vec![b'1'; (1 << 20) + 10]).unwrap();
+    let file = file_with([&b"t,q1,q2,tau1,tau2\n0,0,0,0,0\n"[..], &vec![b'1'; (1 << 20) + 10]].concat());
     let message = import(file.path(), FORMAT).unwrap_err().to_string();
     assert!(message.contains(":3: the line is longer than"), "{message}");
 }
 
 #[test]
 fn absurd_filters_and_values_are_refused_and_large_ones_stay_finite() {
-    let file = written(&rows(200));
+    let file = file_with(&rows(200));
     let format: LogFormat = toml::from_str(FORMAT).unwrap();
     for (settings, words) in [
         ("trim_s = -1.0", "trim_s"),
@@ -144,15 +142,9 @@ fn absurd_filters_and_values_are_refused_and_large_ones_stay_finite() {
         assert!(message.contains(words), "{message}");
     }
     let lines = (0..200).map(|i| format!("{},{}e59,-1e60,1e60,1e-300\n", f64::from(i) * 0.01, f64::from(i % 7)));
-    let large = written(&lines.fold("t,q1,q2,tau1,tau2\n".to_owned(), |text, line| text + &line));
+    let large = file_with(&lines.fold("t,q1,q2,tau1,tau2\n".to_owned(), |text, line| text + &line));
     let format = FORMAT.replace("rev", "rad");
     assert!(import(large.path(), &format).is_ok());
-}
-
-fn written(text: &str) -> tempfile::NamedTempFile {
-    let mut file = tempfile::NamedTempFile::new().unwrap();
-    file.write_all(text.as_bytes()).unwrap();
-    file
 }
 
 fn rows(n: usize) -> String {
@@ -168,13 +160,13 @@ fn rows(n: usize) -> String {
 #[test]
 fn a_cut_off_last_line_is_left_out_and_reported() {
     for tail in ["0.50,0.1", "0.50,0.1\n", "0.50,0.1,0.2,0.3,-", "0.50,0.1,0.2,1.2e"] {
-        let file = written(&(rows(50) + tail));
+        let file = file_with(&(rows(50) + tail));
         let (samples, report) = import(file.path(), FORMAT).unwrap();
         assert_eq!((samples, report.rows), (50, 50), "{tail:?}");
         assert!(report.dropped.truncated.unwrap().ends_with(":52"), "{tail:?}");
     }
-    // A missing last newline alone is no damage.
-    let (samples, report) = import(written(rows(50).trim_end()).path(), FORMAT).unwrap();
+    // A missing newline at the end is valid.
+    let (samples, report) = import(file_with(rows(50).trim_end()).path(), FORMAT).unwrap();
     assert_eq!((samples, report.dropped.truncated), (50, None));
 }
 
@@ -182,16 +174,16 @@ fn a_cut_off_last_line_is_left_out_and_reported() {
 fn rows_with_missing_values_can_be_dropped() {
     let text = rows(50).replace("\n0.20,", "\n0.20,nan,").replace("\n0.30,", "\n0.30,,");
     let cut = text.lines().map(|line| line.split(',').take(5).collect::<Vec<_>>().join(",") + "\n").collect::<String>();
-    let file = written(&cut);
+    let file = file_with(&cut);
     assert!(import(file.path(), FORMAT).unwrap_err().to_string().contains("set missing = \"drop\""));
     let (samples, report) = import(file.path(), &format!("missing = \"drop\"\n{FORMAT}")).unwrap();
-    // The two holes are bridged by interpolation.
+    // The two holes are interpolated.
     assert_eq!((samples, report.rows, report.dropped.missing), (50, 48, 2));
 }
 
 #[test]
 fn selections_pick_rows_and_refuse_nothing() {
-    let file = written(&rows(100));
+    let file = file_with(&rows(100));
     for (selection, expected, first) in [
         ("rows = [10, 60]", 50, 10),
         ("fraction = [0.0, 0.65]", 65, 0),
@@ -218,7 +210,7 @@ fn selections_pick_rows_and_refuse_nothing() {
 }
 
 #[test]
-fn paired_files_must_hold_the_same_rows() {
+fn paired_files_must_contain_the_same_rows() {
     let folder = tempfile::tempdir().unwrap();
     let format = r#"
         rate_hz = 100.0
@@ -232,14 +224,14 @@ fn paired_files_must_hold_the_same_rows() {
         let result = import(&main, format);
         assert_eq!(result.is_ok(), fits, "{result:?}");
         if let Err(error) = result {
-            assert!(error.to_string().contains("must hold the same samples"), "{error}");
+            assert!(error.to_string().contains("must contain the same samples"), "{error}");
         }
     }
 }
 
 #[test]
 fn formats_are_checked_key_by_key() {
-    let file = written(&rows(50));
+    let file = file_with(&rows(50));
     for (format, key) in [
         ("position = { columns = \"q{1..2}\" }\ntorque = { columns = \"tau{1..2}\" }", "`time`"),
         ("rate_hz = -5.0\nposition = { columns = \"q{1..2}\" }\ntorque = { columns = \"tau{1..2}\" }", "`rate_hz`"),

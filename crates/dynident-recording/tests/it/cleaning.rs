@@ -1,8 +1,7 @@
-//! What a log holds that no motion and no torque is, and what becomes of it.
+//! Detection and treatment of invalid samples in a log.
 
 use dynident_recording::{JointSamples, Level, Log, MotionBlock, MotionSettings, MotionStream, Reason};
 
-/// Numbers from a linear congruential generator.
 struct Random(u64);
 
 impl Random {
@@ -20,7 +19,6 @@ impl Random {
     }
 }
 
-/// Position, velocity, acceleration and torque of a joint at `t`.
 fn truth(t: f64) -> [f64; 4] {
     let parts = [(0.6, 1.3, 0.2), (0.25, 3.1, 1.0), (0.1, 5.3, 2.0)];
     let sum = |f: &dyn Fn(f64, f64, f64) -> f64| parts.iter().map(|(a, w, p)| f(*a, *w, *p)).sum::<f64>();
@@ -32,7 +30,7 @@ fn truth(t: f64) -> [f64; 4] {
 
 const NAMES: [&str; 2] = ["shoulder", "elbow"];
 
-/// A log of two joints at `times`, stamped `stamps`.
+/// A log of two joints sampled at `times` with the time stamps `stamps`.
 fn log(times: &[f64], stamps: &[f64], sigma: [f64; 2]) -> (Log, Vec<Vec<f64>>) {
     let mut random = Random::new(17);
     let mut q = vec![Vec::new(); 2];
@@ -58,7 +56,7 @@ fn blocks(log: &Log, settings: &MotionSettings) -> (Vec<MotionBlock>, MotionStre
     (blocks, stream)
 }
 
-/// Errors of velocity and acceleration (RMS over that of the truth), two seconds off the ends.
+/// Relative RMS errors of velocity and acceleration, without two seconds at the ends.
 fn derivative_errors(blocks: &[MotionBlock], end_s: f64, at: impl Fn(f64) -> f64) -> [f64; 2] {
     let (mut squares, mut powers) = ([0.0; 2], [0.0; 2]);
     for block in blocks {
@@ -86,8 +84,8 @@ fn even(n: usize) -> Vec<f64> {
 
 #[test]
 fn a_drifting_rate_is_followed_and_jitter_does_not_leak() {
-    // Blocks of 400 rows at 895 to 1014 Hz under stamps that jitter by a fifth of a step, and noise of an encoder that
-    // hides all of it from neighbours.
+    // Blocks of 400 rows at 895 to 1014 Hz with stamps that jitter by a fifth of a step, and encoder noise that hides
+    // the jitter from the prediction by neighbours.
     let mut times = vec![0.0];
     for i in 1..21_000_usize {
         let rate_hz = 955.0 + 59.0 * ((i / 400) as f64 * 2.4).sin();
@@ -101,10 +99,10 @@ fn a_drifting_rate_is_followed_and_jitter_does_not_leak() {
     let clock = stream.report().clock;
     assert!(!clock.uniform && clock.drift_steps.is_some_and(|steps| steps > 20.0), "{clock:?}");
     let [dq, ddq] = derivative_errors(&found, end_s, |t| t);
-    // What the cut-off takes and the noise leave stays below half a percent; an even grid would be off by 6 and 12 %.
+    // The attenuation by the cut-off and the noise are below 0.5 %; an even grid would cause errors of 6 and 12 %.
     assert!(dq < 0.005 && ddq < 0.02, "{dq} {ddq}: {}", clock.evidence);
 
-    // The same jitter about an even grid: nothing is interpolated.
+    // The same jitter about an even grid: samples are not interpolated.
     let times = even(21_000);
     let stamps: Vec<f64> = times.iter().map(|t| t + 2e-4 * (random.uniform() - 0.5)).collect();
     let (even, clean) = log(&times, &stamps, [1e-5, 0.05]);
@@ -114,7 +112,7 @@ fn a_drifting_rate_is_followed_and_jitter_does_not_leak() {
 }
 
 #[test]
-fn a_short_gap_is_bridged_and_counts_as_no_rows() {
+fn a_short_gap_is_filled_and_not_used_as_rows() {
     let times: Vec<f64> = even(10_000).into_iter().filter(|t| !(5.0005..5.0075).contains(t)).collect();
     assert_eq!(times.len(), 10_000 - 7);
     let (mut gap, _) = log(&times, &times, [1e-5, 0.05]);
@@ -143,7 +141,7 @@ fn a_short_gap_is_bridged_and_counts_as_no_rows() {
     gap.format.bridge_gaps = false;
     let (_, stream) = blocks(&gap, &MotionSettings::default());
     assert_eq!((stream.report().segments, stream.report().bridged), (2, [0, 0]));
-    // A second is no short gap.
+    // A gap of one second is not short.
     let times: Vec<f64> = even(10_000).into_iter().filter(|t| !(5.0..6.0).contains(t)).collect();
     let (gap, _) = log(&times, &times, [1e-5, 0.05]);
     let (_, stream) = blocks(&gap, &MotionSettings::default());
@@ -151,7 +149,7 @@ fn a_short_gap_is_bridged_and_counts_as_no_rows() {
 }
 
 #[test]
-fn outliers_held_torque_and_spikes_are_named_and_clean_logs_are_not_touched() {
+fn outliers_held_torque_and_spikes_are_reported_and_clean_logs_are_unchanged() {
     let times = even(30_000);
     let (clean, torque) = log(&times, &times, [1e-5, 0.05]);
     let (found, stream) = blocks(&clean, &MotionSettings::default());
@@ -168,7 +166,7 @@ fn outliers_held_torque_and_spikes_are_named_and_clean_logs_are_not_touched() {
     for &i in &outliers {
         spoilt[0][i] += if random.uniform() < 0.5 { 1.0 } else { -1.0 };
     }
-    // Held for 0.2 s, once across the border of two blocks of rows.
+    // Held for 0.2 s, once across the boundary of two blocks of rows.
     for from in [4000, 17_000] {
         let value = spoilt[1][from];
         spoilt[1][from + 1..from + 200].fill(value);
@@ -186,7 +184,7 @@ fn outliers_held_torque_and_spikes_are_named_and_clean_logs_are_not_touched() {
     assert_eq!((held.places, held.samples, spike.samples, spike.row), (2, 2 * 199, 1, 22_222), "{held:?}");
     let warnings = report.findings.iter().filter(|finding| finding.level == Level::Warning).count();
     assert!(warnings >= 2 && report.findings.iter().all(|finding| finding.level != Level::Problem), "{report:?}");
-    // Nothing good is lost, nearly nothing bad stays.
+    // No valid sample is lost, and few invalid ones remain.
     let left_out: Vec<bool> = found
         .iter()
         .flat_map(|block| (0..block.rows).map(|row| block.set_aside.get(row).copied().unwrap_or(false)))
@@ -232,9 +230,9 @@ fn rows_are_left_out_by_number_time_and_status() {
     ] {
         let report = read(keys).unwrap();
         assert_eq!(report.rows, rows, "{keys}");
-        assert!(report.findings.iter().any(|finding| finding.message.contains("left out as asked")), "{keys}");
+        assert!(report.findings.iter().any(|finding| finding.message.contains("left out by the rules")), "{keys}");
     }
-    for (keys, told) in [
+    for (keys, words) in [
         ("drop_rows = [[5, 5]]", "`drop_rows`"),
         ("drop_time_s = [[2.0, 1.0]]", "`drop_time_s`"),
         ("drop_where = [{ column = \"fault\" }]", "no value"),
@@ -242,6 +240,6 @@ fn rows_are_left_out_by_number_time_and_status() {
         ("drop_rows = [[0, 4000]]", "leaves no row"),
     ] {
         let refused = read(keys).unwrap_err().to_string();
-        assert!(refused.contains(told), "{keys}: {refused}");
+        assert!(refused.contains(words), "{keys}: {refused}");
     }
 }

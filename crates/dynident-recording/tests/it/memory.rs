@@ -1,4 +1,5 @@
-//! Samples in memory: the same motion, bit by bit, as from a file of the same numbers.
+//! Samples in memory give the same motion, bit by bit, as a file with the same numbers.
+use super::file_with;
 use dynident_recording::{
     ImportReport, JointSamples, Log, LogFormat, MemoryLog, MotionBlock, MotionSettings, MotionStream, RecordingError,
 };
@@ -9,7 +10,6 @@ fn joints() -> Vec<String> {
     vec!["shoulder".to_owned(), "elbow".to_owned()]
 }
 
-/// All blocks of a log and what was found in it.
 fn motion(log: &Log, settings: &MotionSettings) -> Result<(Vec<MotionBlock>, ImportReport), RecordingError> {
     let mut stream = MotionStream::new(log, settings)?;
     let (mut block, mut blocks) = (MotionBlock::default(), Vec::new());
@@ -37,12 +37,10 @@ fn column(rows: &[[f64; 8]], k: usize) -> Vec<f64> {
 fn file(rows: &[[f64; 8]]) -> tempfile::NamedTempFile {
     let mut text = "t,q1,q2,v1,v2,tau1,tau2,temp\n".to_owned();
     for row in rows {
-        // The shortest text that reads back to the same bits.
+        // The shortest text that is parsed to the same bits.
         writeln!(text, "{}", row.map(|x| format!("{x:?}")).join(",")).unwrap();
     }
-    let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), text).unwrap();
-    file
+    file_with(text)
 }
 
 const CHANNELS: &str = r#"
@@ -54,7 +52,7 @@ const CHANNELS: &str = r#"
 "#;
 
 #[test]
-fn arrays_give_the_bits_of_the_file_with_the_same_numbers() {
+fn arrays_are_bit_identical_to_a_file_with_the_same_numbers() {
     let rows = rows(20_000);
     let file = file(&rows);
     let arrays = JointSamples {
@@ -121,7 +119,7 @@ fn errors_name_the_label_and_the_place() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
 
-    /// Whatever the numbers, arrays end in a result, and in the one of the file with the same numbers.
+    /// For any numbers, arrays give the same result as a file with the same numbers.
     #[test]
     fn arrays_and_file_agree(
         steps in prop::collection::vec(-0.2_f64..4.0, 1..80),
@@ -147,7 +145,7 @@ proptest! {
         match (found, expected) {
             (Ok(found), Ok(expected)) => prop_assert_eq!(found.0, expected.0),
             (Err(found), Err(expected)) => {
-                // The same error, but for the label.
+                // The same error, except for the label.
                 prop_assert_eq!(core::mem::discriminant(&found), core::mem::discriminant(&expected));
             }
             (found, expected) => prop_assert!(false, "{:?}\n{:?}", found.is_ok(), expected.is_ok()),
@@ -155,7 +153,6 @@ proptest! {
     }
 }
 
-/// What was found is stored beside a result as JSON, and read back.
 #[test]
 fn a_report_survives_json() {
     let rows = rows(3000);

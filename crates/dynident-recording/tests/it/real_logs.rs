@@ -1,5 +1,5 @@
-//! Every public recording that is at hand, from its description in TOML to motion and findings.
-#![allow(clippy::print_stdout, reason = "helpers of tests; what was found is worth reading")]
+//! Every available public recording, from its format in TOML to motion and findings.
+#![allow(clippy::print_stdout, reason = "helpers of tests; the findings are printed for inspection")]
 
 use dynident_recording::{ImportReport, Level, LogFormat, MotionBlock, MotionSettings, MotionStream};
 use dynident_testing::recordings;
@@ -11,7 +11,6 @@ fn joints(n: usize) -> Vec<String> {
 struct Import {
     report: ImportReport,
     rows: usize,
-    /// Largest velocity and acceleration.
     dq: f64,
     ddq: f64,
 }
@@ -61,17 +60,17 @@ fn kuka_lwr4plus() {
             acceleration = { columns = "qdd{1..7}_rad_s2" }
             torque = { columns = "tau{1..7}_Nm", unit = "N m" }
         "#;
-        // The source's own filter has left its mark on the first and last second.
+        // The source's filter has distorted the first and last second.
         let Some(import) = import_trimmed(&format!("kuka_lwr4plus/{file}"), 7, format, 1.0) else { return };
         assert_eq!(import.report.rows, 5027);
         // The even grid may differ from the rows by the rounding of the rate.
         assert!(import.rows.abs_diff(4627) <= 1, "{}", import.rows);
         assert!((import.report.rate_hz - 200.0).abs() < 0.1);
         assert!(import.report.clock.uniform, "{}", import.report.clock.evidence);
-        // The three logs together jitter from 3.2 to 6.8 ms.
+        // The steps of the three logs range from 3.2 to 6.8 ms.
         assert!((0.00315..0.0047).contains(&import.report.steps.min_s), "{:?}", import.report.steps);
         assert!((0.0053..0.00685).contains(&import.report.steps.max_s), "{:?}", import.report.steps);
-        // The source filtered at 8 Hz.
+        // The source was filtered at 8 Hz.
         assert!((1.0..16.0).contains(&import.report.cutoff.cutoff_hz));
         assert!(import.dq < 2.0 && import.ddq < 6.0, "{} {}", import.dq, import.ddq);
         for comparison in &import.report.velocity {
@@ -93,7 +92,7 @@ fn ur10() {
     assert_eq!((import.report.rows, import.rows), (3441, 3441));
     assert!((import.report.rate_hz - 125.0).abs() < 1e-3);
     assert_eq!(import.report.gap_count, 0);
-    // Nothing above 2 Hz in the source.
+    // The source contains nothing above 2 Hz.
     assert!((0.5..6.0).contains(&import.report.cutoff.cutoff_hz));
 }
 

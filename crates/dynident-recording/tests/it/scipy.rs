@@ -1,4 +1,4 @@
-//! Filters against SciPy and NumPy (`golden/scipy_filters.py`).
+//! Comparison of filters with SciPy and NumPy (`golden/scipy_filters.py`).
 use dynident_recording::derivative::{
     ButterworthZeroPhase, CentralDifferences, Ends, FivePointCubic, FourierFit, FrequencyDomain, LowPass,
     SavitzkyGolay, SmoothedDifferences,
@@ -25,7 +25,7 @@ fn derivatives(filter: &dyn Differentiator, rate_hz: f64, x: &[f64]) -> [Vec<f64
     out
 }
 
-/// Within `tolerance` of the largest golden value.
+/// Checks agreement within `tolerance` of the largest golden value.
 fn agree(ours: &[f64], golden: &[f64], tolerance: f64, what: &str) {
     assert_eq!(ours.len(), golden.len(), "{what}");
     let scale = golden.iter().fold(0.0_f64, |max, x| max.max(x.abs()));
@@ -44,8 +44,8 @@ fn butterworth_is_sosfiltfilt_and_its_central_differences() {
         let filter = ButterworthZeroPhase::new(order as usize, cutoff).unwrap();
         let [q, dq, ddq] = derivatives(&filter, rate, &x);
         let what = format!("order {order}, {cutoff} Hz");
-        // Rounding of the recursion (condition up to 1e3); the golden differences lose rate · 2e-16 and rate² · 2e-15
-        // more.
+        // Rounding of the recursion (condition up to 1e3); the golden differences have additional errors of rate ·
+        // 2e-16 and rate² · 2e-15.
         agree(&q, &numbers(&case["q"]), 1e-12, &what);
         agree(&dq, &numbers(&case["dq"]), 1e-11, &what);
         agree(&ddq, &numbers(&case["ddq"]), 1e-9, &what);
@@ -64,7 +64,7 @@ fn savitzky_golay_is_savgol_filter_with_its_ends() {
         let filter = SavitzkyGolay::new(window as usize, degree as usize).unwrap();
         let ours = derivatives(&filter, number(&case["rate_hz"]), &x);
         for (d, ours) in ours.iter().enumerate() {
-            // SciPy solves with powers of the sample number, which costs it digits at degree 8.
+            // SciPy solves with powers of the sample number and loses precision at degree 8.
             agree(ours, &numbers(&case["derivatives"][d]), 1e-8, &format!("{window} {degree} derivative {d}"));
         }
     }
@@ -105,7 +105,7 @@ fn the_causal_low_pass_is_sosfilt_and_its_delay_the_group_delay() {
         agree(&q, &numbers(&case["q"]), 1e-12, &what);
         agree(&dq, &numbers(&case["dq"]), 1e-11, &what);
         agree(&ddq, &numbers(&case["ddq"]), 1e-9, &what);
-        // SciPy takes it at 1e-6 rad a sample, from the polynomials' quotient: some digits go.
+        // SciPy evaluates the delay at 1e-6 rad per sample from the quotient of polynomials, with lower precision.
         assert!((filter.delay_s(rate).unwrap() / number(&case["delay_s"]) - 1.0).abs() < 1e-6, "{what}");
     }
 }
@@ -119,7 +119,7 @@ fn the_fourier_fit_is_lstsq() {
         let fit = FourierFit::new(base, harmonics, case["trend"].as_bool().unwrap()).unwrap();
         let ours = derivatives(&fit, number(&case["rate_hz"]), &x);
         for (ours, key) in ours.iter().zip(["q", "dq", "ddq"]) {
-            // Condition of the basis up to 1e3 (half a period with a line), twice.
+            // Condition of the basis up to 1e3 (half a period with a line), squared.
             agree(ours, &numbers(&case[key]), 1e-10, &format!("fit at {base} Hz, {key}"));
         }
     }
@@ -134,7 +134,7 @@ fn the_frequency_domain_is_numpys_transform() {
         let differentiator = FrequencyDomain::new(number(&case["cutoff_hz"]), ends).unwrap();
         let ours = derivatives(&differentiator, number(&case["rate_hz"]), &x);
         for (ours, key) in ours.iter().zip(["q", "dq", "ddq"]) {
-            // A transform's rounding, times the frequency against the signal's own: two digits.
+            // Rounding of the transform, times the ratio of the cut-off to the signal's frequency.
             agree(ours, &numbers(&case[key]), 1e-12, &format!("{ends:?} {key}"));
         }
     }

@@ -1,4 +1,5 @@
-//! Streams: the same motion as from the whole log at once, whatever the file looks like; random files never panic.
+//! Streams give the same motion as the whole log for any file layout; random files never cause a panic.
+use super::file_with;
 use dynident_recording::{
     Derivatives, DifferentiatorSettings, Log, LogFormat, LogReader, LogisticPath, MotionBlock, MotionSettings,
     MotionStream, RawBlock, ReferenceSettings,
@@ -10,14 +11,8 @@ fn format(text: &str) -> LogFormat {
     toml::from_str(text).unwrap()
 }
 
-fn file(bytes: &[u8]) -> tempfile::NamedTempFile {
-    let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), bytes).unwrap();
-    file
-}
-
 #[test]
-fn pieces_give_what_the_whole_log_gives() {
+fn pieces_equal_the_whole_log() {
     let (rate, n) = (1000.0, 60_000_usize);
     let mut text = String::new();
     let mut q = Vec::new();
@@ -28,7 +23,7 @@ fn pieces_give_what_the_whole_log_gives() {
         q.push(x);
         writeln!(text, "{x},{}", -x).unwrap();
     }
-    let file = file(text.as_bytes());
+    let file = file_with(&text);
     let format = format("rate_hz = 1000.0\nposition = { columns = [0] }\ntorque = { columns = [1] }");
     for differentiator in [
         DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(8.0) },
@@ -50,7 +45,7 @@ fn pieces_give_what_the_whole_log_gives() {
             for (ours, whole) in [(&block.q, &y), (&block.dq, &dq), (&block.ddq, &ddq)] {
                 let scale = whole.iter().fold(0.0_f64, |max, x| max.max(x.abs()));
                 for (i, value) in ours.iter().enumerate() {
-                    // The contract of the trait, with three digits for rounding.
+                    // The documented accuracy of the trait, with a margin of three digits for rounding.
                     assert!((value - whole[at + i]).abs() < 1e-9 * scale, "{settings:?}, sample {}", at + i);
                 }
             }
@@ -77,7 +72,7 @@ fn gaps_split_the_log_and_trimming_cuts_both_ends() {
         let t = f64::from(i) * 0.01 + if i < 150 { 0.0 } else { 3.0 };
         writeln!(text, "{t};{};{}", t.sin(), t).unwrap();
     }
-    let file = file(text.as_bytes());
+    let file = file_with(&text);
     let format = format("time = { column = \"t\" }\nposition = { columns = \"q\" }\ntorque = { columns = \"tau\" }");
     let settings = MotionSettings {
         differentiator: DifferentiatorSettings::SavitzkyGolay { window: 11, degree: 4 },
@@ -90,7 +85,7 @@ fn gaps_split_the_log_and_trimming_cuts_both_ends() {
         for i in 0..block.rows {
             let t = block.first_time_s + i as f64 / block.rate_hz;
             assert!((block.tau[i] - t).abs() < 1e-9);
-            // A quartic over eleven samples follows a sine to 1e-8; nothing is differentiated across the gap.
+            // A quartic over eleven samples follows a sine to 1e-8; samples on both sides of the gap are not combined.
             assert!((block.dq[i] - t.cos()).abs() < 1e-6 && (block.ddq[i] + t.sin()).abs() < 1e-4, "{t}");
         }
         seen.push((block.segment, block.rows));
@@ -100,8 +95,8 @@ fn gaps_split_the_log_and_trimming_cuts_both_ends() {
     assert_eq!((report.gap_count, report.gaps[0].row, report.segments), (1, 149, 2));
 }
 
-/// One joint on the paper's stroke with a lag, one that overshoots by a tenth: where the second is off its stroke, both
-/// are left out, and what remains are pieces of their own.
+/// One joint follows the paper's stroke with a lag, the other overshoots by 10 %. Where the second joint is off its
+/// stroke, the samples of both are left out, and the remaining samples form separate pieces.
 #[test]
 fn samples_off_the_stroke_are_cut_out_and_counted() {
     let path = LogisticPath { amplitude: 1.5, omega: 2.0, offset: 0.2, period_s: 20.0, repetitions: 1 };
@@ -111,7 +106,7 @@ fn samples_off_the_stroke_are_cut_out_and_counted() {
         let second = path.offset + 1.1 * (path.at(t)[0] - path.offset);
         writeln!(text, "{t},{},{second},{i},0", path.at(t - 0.05)[0]).unwrap();
     }
-    let file = file(text.as_bytes());
+    let file = file_with(&text);
     let format =
         format("time = { column = \"t\" }\nposition = { columns = \"q{1..2}\" }\ntorque = { columns = \"tau{1..2}\" }");
     let reference = ReferenceSettings { joints: vec![path; 2], ..ReferenceSettings::default() };
@@ -129,7 +124,7 @@ fn samples_off_the_stroke_are_cut_out_and_counted() {
             let t = block.first_time_s + i as f64 / block.rate_hz;
             assert!((block.joint(&block.tau, 0)[i] / 100.0 - t).abs() < 1e-9, "the torque of another sample");
             let exact = path.at(t - 0.05)[1];
-            // At the splice the velocity is 1e-3 of its peak of 0.75 or less.
+            // At the splice the velocity is at most 1e-3 of its peak of 0.75.
             assert!((block.joint(&block.dq, 0)[i] - exact).abs() < 1.5e-3, "{t}");
         }
     }
@@ -139,7 +134,7 @@ fn samples_off_the_stroke_are_cut_out_and_counted() {
     assert_eq!(rows as u64 + report.unmapped_samples, 2000);
     assert!(report.findings.iter().any(|finding| finding.message.contains("off the stroke")));
 
-    // A start that is ten seconds out: refused by name.
+    // A start that is far off causes an error that names `start_s`.
     let far = ReferenceSettings { start_s: -500.0, ..reference };
     let mut stream = MotionStream::open(&format, file.path(), &names, &settings(far)).unwrap();
     let error = loop {
@@ -152,7 +147,7 @@ fn samples_off_the_stroke_are_cut_out_and_counted() {
     assert!(error.contains("position-map") && error.contains("start_s"), "{error}");
 }
 
-/// A differentiator whose pieces the stream cuts for memory sees the reference at the right times.
+/// A differentiator that processes pieces gets the reference at the right times.
 #[test]
 fn a_deviation_is_the_same_in_pieces_as_at_once() {
     let (rate, n) = (500.0, 40_000_usize);
@@ -162,7 +157,7 @@ fn a_deviation_is_the_same_in_pieces_as_at_once() {
     for x in &q {
         writeln!(text, "{x},0").unwrap();
     }
-    let file = file(text.as_bytes());
+    let file = file_with(&text);
     let format = format("rate_hz = 500.0\nposition = { columns = [0] }\ntorque = { columns = [1] }");
     let differentiator = DifferentiatorSettings::Deviation {
         reference: ReferenceSettings { joints: vec![path], start_s: 1.0, ..ReferenceSettings::default() },
@@ -189,14 +184,14 @@ fn a_deviation_is_the_same_in_pieces_as_at_once() {
 }
 
 #[test]
-fn jittered_stamps_are_interpolated_when_the_data_say_so() {
+fn samples_at_jittered_stamps_are_interpolated() {
     let mut text = "t,q,tau\n".to_owned();
     for i in 0..2000 {
         let jitter = 0.6 * ((f64::from(i) * 0.754_877_666).fract() - 0.5);
         let t = (f64::from(i) + jitter) * 0.005;
         writeln!(text, "{t},{},{}", (3.0 * t).sin(), (5.0 * t).cos()).unwrap();
     }
-    let file = file(text.as_bytes());
+    let file = file_with(&text);
     let format = format("time = { column = \"t\" }\nposition = { columns = \"q\" }\ntorque = { columns = \"tau\" }");
     let mut stream =
         MotionStream::open(&format, file.path(), &["joint".to_owned()], &MotionSettings::default()).unwrap();
@@ -207,13 +202,13 @@ fn jittered_stamps_are_interpolated_when_the_data_say_so() {
     let origin = 0.6 * -0.5 * 0.005;
     for i in 0..block.rows {
         let t = origin + first + i as f64 / block.rate_hz;
-        // Error of the local cubic: a few h^4/60 of the fourth derivative.
+        // Error of the local cubic: a few h⁴/60 of the fourth derivative.
         assert!((block.tau[i] - (5.0 * t).cos()).abs() < 1e-7, "{i}: {} {}", block.tau[i], (5.0 * t).cos());
     }
 }
 
-/// Stamps that are far too late are no late packet: the samples up to them would be invented, a million of them and
-/// more, until memory ends. Nor do the rows behind lose their places, or two such stamps end in a loop.
+/// Stamps that are far too late are not a late packet; filling the gap would need millions of samples. Rows after such
+/// stamps keep their places, and two such stamps do not cause an endless loop.
 #[test]
 fn absurd_stamps_are_not_bridged() {
     let (rows, absurd) = (220_u32, 82);
@@ -228,7 +223,7 @@ fn absurd_stamps_are_not_bridged() {
             let stamp = if (absurd..absurd + count).contains(&i) { size } else { t };
             writeln!(text, "{stamp:e},{},{}", (3.0 * t).sin(), (5.0 * t).cos()).unwrap();
         }
-        let file = file(text.as_bytes());
+        let file = file_with(&text);
         let format =
             format("time = { column = \"t\" }\nposition = { columns = \"q\" }\ntorque = { columns = \"tau\" }");
         let mut stream =
@@ -237,7 +232,7 @@ fn absurd_stamps_are_not_bridged() {
         while stream.next_block(&mut block).unwrap() {
             given += block.rows;
         }
-        // At most the absurd rows and some at their sides are missing.
+        // At most the rows with wrong stamps and some adjacent rows are missing.
         let least = (rows - count) as usize - 10;
         assert!((least..=rows as usize).contains(&given), "{count} of {size:e}, {wandering}: {given}");
     }
@@ -246,7 +241,7 @@ fn absurd_stamps_are_not_bridged() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Any table of numbers is read back bit by bit, whatever the delimiter, newline, header and byte-order mark.
+    /// Any table of numbers is read back bit by bit, for any delimiter, newline, header and byte-order mark.
     #[test]
     fn tables_round_trip(
         rows in prop::collection::vec(prop::array::uniform3(-1e12_f64..1e12), 1..40),
@@ -273,7 +268,7 @@ proptest! {
         if last_newline {
             text += newline;
         }
-        let file = file(text.as_bytes());
+        let file = file_with(&text);
         let format = format("rate_hz = 10.0\nposition = { columns = [2, 0] }\ntorque = { columns = [1, 1] }");
         let joints = ["x".to_owned(), "y".to_owned()];
         let mut reader = LogReader::open(&Log::file(file.path(), format, &joints)).unwrap();
@@ -287,7 +282,7 @@ proptest! {
         prop_assert!(!reader.next_block(&mut block).unwrap());
     }
 
-    /// Random bytes and random near-tables end in a result: no panic, no value that is not finite.
+    /// Random bytes and random near-tables give a result or an error: no panic, no value that is not finite.
     #[test]
     fn no_file_panics(
         bytes in prop_oneof![
@@ -297,7 +292,7 @@ proptest! {
         ],
         drop_missing: bool,
     ) {
-        let file = file(&bytes);
+        let file = file_with(&bytes);
         let missing = if drop_missing { "missing = \"drop\"" } else { "" };
         let format = format(&format!(
             "{missing}\ntime = {{ column = 0 }}\nposition = {{ columns = [1] }}\ntorque = {{ columns = [2] }}"

@@ -1,4 +1,4 @@
-//! Differentiates samples on the uniform clock and gives them out as blocks.
+//! Differentiates samples on the uniform clock and returns them as blocks.
 
 use super::MotionStream;
 use crate::derivative::{Derivatives, Place, SampleRanges};
@@ -7,33 +7,30 @@ use crate::motion::block::MotionBlock;
 use crate::motion::marks::kept_runs;
 use core::ops::Range;
 
-/// The samples that a block gives out and those around them that the differentiator uses, as places in `uniform`.
+/// The samples of a block, and the window that the differentiator needs, as indices in `uniform`.
 struct Span {
     given: Range<usize>,
     window: Range<usize>,
-    /// Whether the segment ends with it.
+    /// Whether the segment ends with this span.
     is_last: bool,
 }
 
 impl Span {
-    /// Samples that are given out.
     fn rows(&self) -> usize {
         self.given.len()
     }
 
-    /// Place of the first of them in the window.
     fn first_in_window(&self) -> usize {
         self.given.start - self.window.start
     }
 
-    /// Their places in the window.
     fn in_window(&self) -> Range<usize> {
         self.first_in_window()..self.given.end - self.window.start
     }
 }
 
 impl MotionStream {
-    /// Differentiates and gives out the samples from the first not yet given to `end`; false if trimming leaves none.
+    /// Differentiates and returns the samples from the first new one to `end`; false if trimming removes all of them.
     pub(super) fn give(&mut self, block: &mut MotionBlock, end: usize, last: bool) -> Result<bool, RecordingError> {
         let context = self.context.unwrap_or(usize::MAX);
         let window_end = if last { self.uniform[0].len() } else { end + context };
@@ -63,7 +60,6 @@ impl MotionStream {
         Ok(false)
     }
 
-    /// Empties a block and gives it the place of the span.
     fn begin_block(&self, block: &mut MotionBlock, span: &Span) {
         let (from, rows) = (span.given.start, span.rows());
         let rate = self.clock.rate_hz;
@@ -87,7 +83,6 @@ impl MotionStream {
         }
     }
 
-    /// Marks the samples of a block whose torque is set aside.
     fn set_torques_aside(&mut self, block: &mut MotionBlock, span: &Span) {
         let (joints, rows) = (self.joints.len(), span.rows());
         let first = self.passed + span.given.start as u64;
@@ -103,8 +98,8 @@ impl MotionStream {
         }
     }
 
-    /// Adds a joint's motion, torque and temperature to a block; the samples to which the differentiator does not
-    /// apply, as places in the window.
+    /// Adds a joint's motion, torque and temperature to a block. Returns the samples where the differentiator does not
+    /// apply, as indices in the window.
     fn differentiate(
         &mut self,
         block: &mut MotionBlock,
@@ -137,24 +132,22 @@ impl MotionStream {
         Ok(marked)
     }
 
-    /// Compares a joint's logged velocity and acceleration with the derivatives in the window.
     fn compare(&mut self, span: &Span, joint: usize) -> Result<(), RecordingError> {
         let rate = self.clock.rate_hz;
         let [_, dq, ddq, other] = &mut self.window;
         let channel = 2 * self.joints.len() + joint;
         if let Some(comparison) = self.velocity.get_mut(joint) {
             self.differentiator.smooth(rate, &self.uniform[channel][span.window.clone()], other)?;
-            comparison.see(&dq[span.in_window()], &other[span.in_window()]);
+            comparison.add(&dq[span.in_window()], &other[span.in_window()]);
         }
         if let Some(comparison) = self.acceleration.get_mut(joint) {
             let channel = channel + self.velocity.len();
             self.differentiator.smooth(rate, &self.uniform[channel][span.window.clone()], other)?;
-            comparison.see(&ddq[span.in_window()], &other[span.in_window()]);
+            comparison.add(&ddq[span.in_window()], &other[span.in_window()]);
         }
         Ok(())
     }
 
-    /// Drops the samples before the context of the next block.
     fn forget(&mut self, context: usize) {
         let unneeded = self.done.saturating_sub(context);
         if unneeded > 0 {
@@ -172,7 +165,7 @@ impl MotionStream {
         self.unmapped += (block.rows - kept) as u64;
         self.given -= (block.rows - kept) as u64;
         for run in &runs {
-            // A run at the block's start goes on with the piece before it.
+            // A run at the block's start continues the previous piece.
             self.cuts += usize::from(run.start > 0 || self.in_cut);
             let mut kept = block.part(run.clone());
             kept.segment = self.segments + self.cuts;
