@@ -1,5 +1,4 @@
-//! What makes a motion good: functions of the information `D` with their derivatives. Smaller is better for all of
-//! them.
+//! Optimality criteria: functions of the information matrix `D` with their derivatives. Smaller is better.
 
 mod a_optimal;
 mod condition_number;
@@ -17,8 +16,8 @@ pub use worst_directions::WorstDirections;
 
 use nalgebra::DMatrix;
 
-/// A value and its symmetric derivative by `D`; `None` where `D` is not positive definite (some parameter is not
-/// excited at all).
+/// Value of a criterion and its symmetric derivative with respect to `D`; `None` if `D` is not positive definite, that
+/// is if some parameter is not excited.
 pub type ValueAndGradient = Option<(f64, DMatrix<f64>)>;
 
 /// A criterion on the information matrix.
@@ -26,34 +25,35 @@ pub trait Criterion: core::fmt::Debug + Send + Sync {
     /// The name in study files and results.
     fn name(&self) -> &'static str;
 
-    /// Value and derivative of the smooth form that optimisers use.
+    /// Value and derivative of the smooth form that the optimisers minimise.
     fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient;
 
-    /// About how much the value changes when a motion of so many columns is made larger by half: what searches measure
-    /// penalties and steps with.
+    /// Approximate change of the value when a motion with this number of columns becomes 1.5 times as large. Searches
+    /// scale penalties and steps by it.
     fn scale(&self, _columns: usize) -> f64 {
         1.0
     }
 
-    /// What searches measure gradients by. Not the value itself: to a logarithm the unit of every parameter adds.
+    /// Scale of the gradients. It differs from the value, because the units of the parameters add a constant to a
+    /// logarithm.
     fn gradient_scale(&self, columns: usize) -> f64 {
         self.scale(columns)
     }
 
-    /// Whether other units of the columns change the value by a constant only, the same for all informations.
+    /// Whether other units of the columns only add a constant to the value, equal for all information matrices.
     fn is_free_of_units(&self) -> bool {
         false
     }
 
-    /// Whether many short searches find more than few long ones.
+    /// Whether the criterion has many local optima, so that many short searches are better than few long ones.
     fn has_many_optima(&self) -> bool {
         false
     }
 
-    /// The figure to report: the criterion itself, without smoothing.
+    /// Reported value: the criterion without smoothing.
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64>;
 
-    /// A positive form of the figure, smaller is better, for optimisers that choose by 1/H.
+    /// Positive form of the reported value, smaller is better, for optimisers that select by 1/H.
     fn fitness(&self, information: &DMatrix<f64>) -> Option<f64> {
         self.figure(information)
     }
