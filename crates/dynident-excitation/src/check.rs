@@ -122,7 +122,7 @@ fn checked_steps(limits: &Limits, model: &Model, duration_s: f64, rate_hz: f64) 
     Ok(steps as usize)
 }
 
-/// A check in progress: the largest ratio of each limit so far, and work arrays.
+/// A check in progress: the largest ratios of the processed samples, and work arrays.
 struct Check<'a> {
     limits: &'a Limits,
     model: &'a Model,

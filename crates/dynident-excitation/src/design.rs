@@ -146,6 +146,7 @@ pub struct Design {
 /// Progress of a design.
 #[derive(Clone, Copy, Debug)]
 pub struct DesignProgress {
+    /// Name of the round.
     pub round: &'static str,
     /// Best smooth value of the criterion of the round; infinite before the first evaluation.
     pub value: f64,

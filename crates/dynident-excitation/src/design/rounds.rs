@@ -39,8 +39,8 @@ const PARTIAL_RUN_SHARE: f64 = 0.45;
 const MIN_COMPARED_STARTS: usize = 4;
 /// One of this number of starts runs until convergence.
 pub(super) const STARTS_PER_FOLLOWED: usize = 4;
-/// [`PARTIAL_RUN_SHARE`] of restarts around a known motion, for a criterion whose starts end close to each other. Log det of the
-/// same arms, 24 seeds, equals that without comparison.
+/// [`PARTIAL_RUN_SHARE`] of restarts around a known motion, for a criterion whose starts end close to each other. Log
+/// det of the same arms, 24 seeds, equals that without comparison.
 const PARTIAL_RESTART_SHARE: f64 = 0.3;
 /// Minimum number of restarts for a comparison, and the number of them that continue.
 const MIN_COMPARED_RESTARTS: usize = 4;

@@ -83,7 +83,7 @@ mod tests {
         }
         let (outside, inside, far) = (scaled(1.001 * above), scaled(0.5 * below), scaled(2.0 * above));
         assert!(outside.violation > 0.0 && inside.violation <= 0.0 && far.violation > MAX_VIOLATION);
-        let between = way(&outside, &inside).expect("a hair of the way is enough");
+        let between = way(&outside, &inside).expect("a small share is sufficient");
         assert!(between.violation <= 0.0);
         // Share 1/256 of a change by half of the motion, squared in 36 columns: 36 · 2 · 0.5 / 256 nats, and as much
         // again for the previous step.

@@ -1,4 +1,4 @@
-//! Machines, limits and motions that the tests share.
+//! Robots, limits and motions that the tests share.
 
 use dynident_excitation::Motion;
 use dynident_excitation::limits::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits, LinkPoint, SelfCollision};
@@ -11,7 +11,7 @@ pub(crate) fn ur10() -> Model {
     dynident_model::load_robot(path).expect("the repository holds robots/ur10.urdf").model
 }
 
-/// A palletising arm with its two closed chains: four joints that follow others, with limits of their own.
+/// A palletising arm with two closed chains: four joints follow others and have separate limits.
 pub(crate) fn palletizer() -> Model {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/robots/palletizer.urdf");
     let tree = dynident_model::load_robot(path).expect("the repository holds the arm").model;
