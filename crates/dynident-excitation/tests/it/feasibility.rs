@@ -1,7 +1,7 @@
 //! A hundred random problems (in the long run; forty every day). Each ends with a motion that keeps every limit by the
 //! independent check at 10 kHz, with the violated limits, or with an error before any search.
 //!
-//! Three in five are built limits_around a motion of the family: its peaks plus 5 % are the limits, so that a feasible
+//! Three in five are built around a motion of the family: its peaks plus 5 % are the limits, so that a feasible
 //! motion exists and must be found. The others have random limits.
 
 use core::ops::ControlFlow;
