@@ -91,6 +91,7 @@ impl JoinedFamily {
         self.pieces().into_iter().filter(|(piece, _)| matches!(piece, Piece::Member(_))).map(|(_, span)| span).collect()
     }
 
+    /// The members, in order.
     pub fn members(&self) -> &[Box<dyn Family>] {
         &self.members
     }

@@ -9,6 +9,7 @@ use nalgebra::DMatrix;
 
 /// Basis functions of time B_c(t) of one joint, q(t) = Σ_c p_c B_c(t), of a [`LinearFamily`].
 pub trait Basis: core::fmt::Debug + Send + Sync {
+    /// Name of the family.
     const NAME: &'static str;
 
     /// Number of functions, equal to the number of parameters per joint.

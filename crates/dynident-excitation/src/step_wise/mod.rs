@@ -83,6 +83,7 @@ pub struct StepWiseJoint {
 /// All strokes, in the order of the joint motions; the variables are A, ω, δ of each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepWiseProblem {
+    /// The joints.
     pub joints: Vec<StepWiseJoint>,
 }
 

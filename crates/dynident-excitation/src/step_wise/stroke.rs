@@ -62,6 +62,7 @@ pub struct StrokeLimit {
 }
 
 impl StrokeLimit {
+    /// Whether the limit is kept.
     pub fn kept(&self) -> bool {
         self.value < self.limit
     }
