@@ -1,7 +1,7 @@
 //! Closed loop of a controller and a simulated robot along a reference.
 
 use crate::controllers::{Controller, Measured};
-use crate::error::{SimulationError, require, require_length};
+use crate::error::{SimulationError, require_length};
 use crate::feedback::Feedback;
 use crate::motion_buffer::{Arrays, MotionBuffer, ReferenceBuffer, Row};
 use crate::per_joint::PerJoint;
@@ -11,6 +11,9 @@ use crate::run::{Divergence, LimitedQuantity, Run, RunStatus};
 use crate::sensors::SensorSettings;
 use dynident_model::Model;
 use serde::{Deserialize, Serialize};
+
+/// Velocity above which a run has diverged, rad/s (m/s) of a usual arm; no robot reaches it.
+const DIVERGENCE_SPEED: f64 = 1e4;
 
 /// Initial state of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -32,7 +35,7 @@ pub enum Start {
 }
 
 /// Limits that stop a run, and limits of its torques. None by default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RunLimits {
@@ -51,16 +54,6 @@ pub struct RunLimits {
     /// Maximum distance from the reference, rad (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_error: Option<PerJoint>,
-    /// Velocity above which a run has diverged, rad/s (m/s) for a usual arm; no robot reaches the default of 1e4. Not
-    /// part of study files.
-    #[serde(skip)]
-    pub divergence_speed: f64,
-}
-
-impl Default for RunLimits {
-    fn default() -> Self {
-        Self { torque: None, lower: None, upper: None, speed: None, tracking_error: None, divergence_speed: 1e4 }
-    }
 }
 
 impl RunLimits {
@@ -75,7 +68,7 @@ impl RunLimits {
             lower: each(|limits| limits.lower, f64::MIN),
             upper: each(|limits| limits.upper, f64::MAX),
             speed: each(|limits| limits.velocity, f64::MAX),
-            ..Self::default()
+            tracking_error: None,
         }
     }
 
@@ -88,10 +81,6 @@ impl RunLimits {
     }
 
     fn values(&self, joints: usize) -> Result<Limits, SimulationError> {
-        let divergence_speed = self.divergence_speed;
-        let fix = "give a finite positive number";
-        let is_valid = divergence_speed > 0.0 && divergence_speed.is_finite();
-        require(is_valid, "limits.divergence_speed", divergence_speed, fix)?;
         let positive = |what: &str, limit: &Option<PerJoint>| match limit {
             Some(limit) => limit.values(what, joints, "give a positive number", |x| x > 0.0),
             None => Ok(vec![f64::INFINITY; joints]),
@@ -170,12 +159,8 @@ impl LoopStart {
         let joints = plant.dof();
         settings.validate(joints)?;
         let own = plant.model().own_scale();
-        let divergence_speed = plant
-            .model()
-            .joints()
-            .iter()
-            .map(|joint| own.velocity(joint.turns(), settings.limits.divergence_speed))
-            .collect();
+        let divergence_speed =
+            plant.model().joints().iter().map(|joint| own.velocity(joint.turns(), DIVERGENCE_SPEED)).collect();
         let limits = Limits { divergence_speed, ..settings.limits.values(joints)? };
         require_length("joints of the reference", joints, reference.joints())?;
         require_length("joints of the controller", joints, controller.joints())?;

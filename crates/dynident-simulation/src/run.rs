@@ -73,7 +73,7 @@ pub enum Divergence {
         /// Index of the joint.
         joint: usize,
     },
-    /// A velocity above [`divergence_speed`](crate::RunLimits::divergence_speed).
+    /// A velocity that no robot reaches.
     Speed {
         /// Index of the joint.
         joint: usize,
