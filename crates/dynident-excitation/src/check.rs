@@ -27,7 +27,6 @@ pub const CHECK_RATE_HZ: f64 = 10_000.0;
 /// Maximum number of samples of a check. Bounds the time (some minutes), not the memory.
 const MAX_SAMPLES: f64 = 1e8;
 
-/// Samples that are requested from the motion at once.
 const BLOCK_SAMPLES: usize = 1000;
 
 /// Worst ratio of a motion to one limit.
@@ -149,7 +148,6 @@ impl<'a> Check<'a> {
         })
     }
 
-    /// Compares the samples of the block with all limits.
     fn take_block(&mut self, times: &[f64]) {
         let Self { limits, model, probes, block, dynamics, kinematics, state, torque } = self;
         for (sample, &at_s) in times.iter().enumerate() {

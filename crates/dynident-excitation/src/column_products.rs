@@ -155,7 +155,6 @@ impl Kernel for Times<'_> {
     }
 }
 
-/// Computes `W` registers of samples for four target columns.
 #[inline(always)]
 fn strip<T: Lane, const W: usize>(
     panel: &[f64],

@@ -125,7 +125,6 @@ fn searched(
     seed: u64,
     watched: &Watched<'_>,
 ) -> Result<Found, OptimiserError> {
-    // After an interruption the rest of a generation is not evaluated.
     let fitness = |parameters: &[f64]| if watched.is_ended() { f64::INFINITY } else { objective.fitness(parameters) };
     match optimiser {
         DerivativeFree::Genetic(own) => {
@@ -151,7 +150,6 @@ fn searched(
 struct Watched<'a> {
     watch: &'a DesignWatch<'a>,
     late: &'a (dyn Fn() -> bool + Sync),
-    /// Evaluations of the previous searches.
     before: usize,
     best_so_far: Mutex<f64>,
     stopped: AtomicBool,
@@ -175,7 +173,6 @@ impl<'a> Watched<'a> {
         self.is_stopped()
     }
 
-    /// Whether the search ends before the next evaluation.
     fn is_ended(&self) -> bool {
         let value = *self.best_so_far.lock().unwrap_or_else(PoisonError::into_inner);
         self.report(value, self.before)
@@ -188,10 +185,8 @@ impl<'a> Watched<'a> {
     }
 }
 
-/// Box of the search.
 struct SearchBox {
     bounds: Vec<[f64; 2]>,
-    /// Random start of the family.
     start: Vec<f64>,
 }
 

@@ -104,7 +104,6 @@ impl Kernel for AddSquare<'_> {
     #[inline(always)]
     fn run<T: Lane>(self) {
         for (i, row) in self.out.chunks_exact_mut(self.stride).enumerate().take(self.size) {
-            // The lower triangle, rounded up to whole registers.
             let end = (i + 1).next_multiple_of(LANE_WIDTH);
             add_times::<T>(&mut row[..end], self.weight * self.vector[i], &self.vector[..end]);
         }
@@ -171,7 +170,6 @@ impl Kernel for Decompose<'_> {
             }
         }
         let q = product_of_reflections::<T>(&reflections, &factors, &mut product);
-        // Transposed, so that rotations act on rows.
         for i in 0..n {
             for j in 0..n {
                 rows[j * stride + i] = q[i * stride + j];
@@ -240,7 +238,6 @@ fn ql<T: Lane>(diagonal: &mut [f64], off_diagonal: &mut [f64], vectors: &mut [f6
                 let radius = (f * f + g * g).sqrt();
                 off_diagonal[i + 1] = radius;
                 if radius == 0.0 {
-                    // The block has split.
                     diagonal[i + 1] -= moved;
                     off_diagonal[last] = 0.0;
                     whole = false;

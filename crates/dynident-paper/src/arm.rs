@@ -13,10 +13,8 @@ pub(crate) const DESIGN: (&str, &str) = ("study/design_paper.toml", include_str!
 pub(crate) const A1: f64 = 1.0;
 pub(crate) const GRAVITY: f64 = 9.8;
 
-/// True parameters θ of the paper's section 3.
 pub(crate) const TRUTH: [f64; 6] = [2.0, 2.0, 0.0, 1.0, 1.0, 0.0];
 
-/// The arm and the paths of its files.
 pub(crate) struct Arm {
     pub(crate) model: Model,
     pub(crate) description: PathBuf,

@@ -16,7 +16,6 @@ use serde::{Deserialize, Serialize};
 /// The paper's Table 6.
 const PAPER: [f64; 6] = [1.98, 2.0, 0.0, 1.007, 1.00, 0.009];
 
-/// Factor by which plotted samples are reduced.
 const PLOT_DECIMATION: usize = 4;
 
 /// Comparison of both methods under equal conditions.
@@ -127,7 +126,6 @@ impl PaperComparison {
         )
     }
 
-    /// Table of all cases.
     pub(crate) fn table(&self) -> Table {
         let columns = [
             "differentiator",
@@ -166,7 +164,6 @@ impl PaperComparison {
     }
 }
 
-/// Title of the table of all cases.
 pub(crate) const EQUAL_TABLE: &str = "Errors of parameters and torques, both methods";
 
 /// The paper's claim, and the conclusion from these results.

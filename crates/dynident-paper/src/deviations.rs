@@ -105,7 +105,6 @@ const DEVIATIONS: &[[&str; 3]] = &[
     ["Eq. 25", "the verification motion sin t violates (18)", "kept as the paper's verification, with a note"],
 ];
 
-/// All deviations, in the order of the paper.
 pub(crate) fn deviations() -> Vec<Deviation> {
     let one = |&[place, trouble, here]: &[&str; 3]| Deviation {
         place: place.to_owned(),

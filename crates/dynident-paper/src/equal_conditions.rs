@@ -26,9 +26,7 @@ pub(crate) const LOGISTIC: (&str, &str) = ("study/design_logistic.toml", include
 pub(crate) const RATE_HZ: f64 = 100.0;
 /// Duration of either motion, s.
 pub(crate) const DURATION_S: f64 = 40.0;
-/// Number of runs of an iteration, as in the paper.
 pub(crate) const RUNS: usize = 3;
-/// Number of noisy iterations of each method and differentiator.
 pub(crate) const SEEDS: u64 = 16;
 /// Cut-off of smoothers and of the filter for torque and columns, Hz; the power of both motions ends at 0.5 Hz.
 pub(crate) const CUTOFF_HZ: f64 = 6.0;
@@ -42,7 +40,6 @@ pub(crate) const FITTED_HARMONICS: usize = 15;
 pub(crate) const POSITION_STD_RAD: f64 = 1.745_329_251_994_33e-5;
 pub(crate) const TORQUE_STD_NM: f64 = 0.05;
 
-/// Family of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Method {
     Logistic,
@@ -64,7 +61,6 @@ impl Differentiation {
     pub(crate) const ALL: [Self; 3] = [Self::Deviation, Self::Filter, Self::Own];
 }
 
-/// A designed motion.
 pub(crate) struct DesignedMotion {
     method: Method,
     pub(crate) reference: Reference,
@@ -87,7 +83,6 @@ pub(crate) struct Trial {
     pub(crate) runs: Vec<Run>,
 }
 
-/// Trials of a method with one differentiator.
 pub(crate) struct Trials {
     pub(crate) method: Method,
     pub(crate) way: Differentiation,
@@ -96,7 +91,6 @@ pub(crate) struct Trials {
     pub(crate) noisy: Vec<Trial>,
 }
 
-/// Both methods with all differentiators.
 pub(crate) struct Comparison {
     pub(crate) motions: [DesignedMotion; 2],
     pub(crate) trials: Vec<Trials>,
@@ -109,7 +103,6 @@ impl Comparison {
 }
 
 impl Trial {
-    /// The six parameters after the last run.
     pub(crate) fn last(&self) -> [f64; 6] {
         self.theta.last().copied().unwrap_or([f64::NAN; 6])
     }

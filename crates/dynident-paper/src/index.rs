@@ -5,14 +5,12 @@ use crate::comparison::EQUAL_TABLE;
 use crate::piece::{PaperCell, PaperFigure, PaperTable, rough, shown};
 use dynident_report::{Cell, Table};
 
-/// Titles of the chapters that the index links to.
 pub(crate) const EQUAL: &str = "Both methods under equal conditions";
 pub(crate) const STATEMENTS: &str = "Reproduced and not reproduced statements";
 pub(crate) const DEVIATION_TITLE: &str = "Deviations from the paper, with reasons";
 pub(crate) const REFERENCES: &str = "The paper's references [7] to [20] in this project";
 pub(crate) const TORQUES: &str = "Verification on another motion";
 
-/// Builds the index.
 pub(crate) fn index(file: &PaperFile, tables: &[PaperTable]) -> Table {
     let mut index =
         Table::new("Index of tables, figures and equations", ["in the paper", "what", "the paper's number", "here"])
@@ -51,12 +49,10 @@ impl<'a> Numbers<'a> {
         }
     }
 
-    /// Value of a figure.
     fn value(&self, number: usize, name: &str) -> f64 {
         self.figure(number).and_then(|figure| figure.values.get(name)).copied().unwrap_or(f64::NAN)
     }
 
-    /// Value of a goal.
     fn reached(&self, goal: usize) -> f64 {
         self.file.reached.get(goal).map_or(f64::NAN, |goal| goal.value)
     }
@@ -74,7 +70,6 @@ impl<'a> Numbers<'a> {
         last.filter_map(|row| row.get(4)).map(PaperCell::shown).collect::<Vec<_>>().join(", ")
     }
 
-    /// Reproduced number of a row.
     fn here(&self, entry: &Entry) -> String {
         match entry.place {
             "Table 3" | "Fig. 7" => format!(
@@ -121,7 +116,6 @@ impl<'a> Numbers<'a> {
     }
 }
 
-/// Target of the link of a row.
 #[derive(Clone, Copy)]
 enum At {
     Table(usize),

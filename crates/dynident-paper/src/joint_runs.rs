@@ -19,7 +19,6 @@ use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, R
 use std::path::Path;
 use std::sync::Arc;
 
-/// Results of the runs.
 pub(crate) struct JointRuns {
     pub(crate) tables: Vec<PaperTable>,
     pub(crate) figures: Vec<PaperFigure>,
@@ -30,7 +29,6 @@ pub(crate) struct JointRuns {
     pub(crate) own_errors: [f64; 3],
 }
 
-/// Settings of the runs of a joint.
 struct Protocol {
     rate_hz: f64,
     steps_per_sample: usize,
@@ -42,7 +40,6 @@ struct Protocol {
 pub(crate) struct Runs {
     /// The three parameters of the joint after each run.
     pub(crate) values: Vec<[f64; 3]>,
-    /// The first three runs.
     pub(crate) runs: Vec<Run>,
 }
 
@@ -153,7 +150,6 @@ fn one_joint(arm: &Arm, protocol: &Protocol, joint: usize, known: &[(usize, f64)
     Ok(Runs { values: values.collect(), runs })
 }
 
-/// Eq. 23 with its gains.
 pub(crate) fn model_based() -> ControllerSettings {
     let [kp, kd] = [0, 1].map(|gain| GAINS.map(|gains| gains[gain]).to_vec());
     ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(kp, kd))
@@ -227,11 +223,9 @@ fn table(number: usize, joint: usize, as_paper: &Runs, own: &Runs) -> PaperTable
     table
 }
 
-/// Columns of the tables that Figs. 9 to 14 show.
 const COLUMN_NOTE: &str =
     "The runs of the columns \"as in the paper\" (Table 3's stroke, the literal map, 100 Hz, without noise)";
 
-/// Reason for the agreement of Fig. 12.
 const GAIN_NOTE: &str = ". The first error agrees because the gains of the first run's joint PD (16 and 8), which the paper does not state, were chosen for it; the second and third result from the first";
 
 /// Figs. 9 to 14, of the runs as in the paper.

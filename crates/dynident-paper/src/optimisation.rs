@@ -13,7 +13,6 @@ use dynident_report::LinePlot;
 /// Rate at which the paper's δ is interpreted as a number of samples, Hz.
 const DELTA_RATE_HZ: f64 = 100.0;
 
-/// Solution of the paper's design problem.
 pub(crate) struct OptimumMotion {
     pub(crate) figure_7: PaperFigure,
     pub(crate) table_3: PaperTable,

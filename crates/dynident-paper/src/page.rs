@@ -8,9 +8,7 @@ use dynident_report::{Cell, Heading, KeyFigures, LinePlot, Report, Section, Tabl
 
 /// Content of the page in addition to the paper's tables and figures.
 pub(crate) struct Extras {
-    /// Plots of the compared motions and their tracking.
     pub(crate) comparison_plots: Vec<LinePlot>,
-    /// Plots next to Figs. 16 and 17.
     pub(crate) noisy_plots: Vec<LinePlot>,
     /// Largest parameter error of our variant after one, three and six runs.
     pub(crate) own_errors: [f64; 3],
@@ -83,7 +81,6 @@ fn key_figures(file: &PaperFile) -> KeyFigures {
     )
 }
 
-/// Statements of the paper with their results.
 fn statements(file: &PaperFile) -> Table {
     let mut statements = Table::new("Statements of the paper", ["place", "the paper states", "here", "reproduced"]);
     for statement in &file.statements {
@@ -94,7 +91,6 @@ fn statements(file: &PaperFile) -> Table {
     statements
 }
 
-/// Deviations from the paper.
 fn deviations(file: &PaperFile) -> Table {
     let mut deviations = Table::new("Deviations", ["place", "in the paper", "here"]);
     for deviation in &file.deviations {
@@ -103,7 +99,6 @@ fn deviations(file: &PaperFile) -> Table {
     deviations
 }
 
-/// References of the paper.
 fn references(file: &PaperFile) -> Table {
     let mut references = Table::new("References", ["number", "authors", "idea", "here"])
         .note("names as in the paper's text; keys of a study, pages of the book");

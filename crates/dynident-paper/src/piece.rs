@@ -66,7 +66,6 @@ impl PaperTable {
         Self { number, title: title.to_owned(), columns, rows: Vec::new(), note: note.to_owned() }
     }
 
-    /// Heading on the page.
     pub(crate) fn heading(&self) -> String {
         format!("Table {}: {}", self.number, self.title)
     }
@@ -148,12 +147,10 @@ impl PaperFigure {
         Self { number, file, title, values, caption, note: note.to_owned(), picture }
     }
 
-    /// Heading on the page.
     pub(crate) fn heading(&self) -> String {
         format!("Fig. {}: {}", self.number, self.title)
     }
 
-    /// Sets the values for comparison as a sentence.
     pub(crate) fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self
@@ -205,7 +202,6 @@ pub struct Deviation {
     pub here: String,
 }
 
-/// A number, formatted for reading.
 pub(crate) fn shown(value: f64) -> String {
     PaperCell::from(value).shown()
 }

@@ -81,7 +81,6 @@ const REFERENCES: &[(usize, &str, &str, &str)] = &[
     ),
 ];
 
-/// All references, in the paper's order.
 pub(crate) fn references() -> Vec<PaperReference> {
     let one = |&(number, source, idea, here): &(usize, &str, &str, &str)| PaperReference {
         number,

@@ -5,7 +5,6 @@ use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
 use dynident_excitation::{Family, Motion, grid};
 use dynident_report::LinePlot;
 
-/// Number of points of a curve.
 const POINTS: usize = 801;
 
 fn logistic(t: f64) -> f64 {

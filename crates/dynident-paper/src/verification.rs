@@ -17,7 +17,6 @@ use dynident_simulation::{ControllerModel, Integrator, LoopSettings, Plant, Refe
 /// Duration of the motion, s, and sampling rate, Hz.
 const DURATION_S: f64 = 10.0;
 const RATE_HZ: f64 = 1000.0;
-/// Factor by which plotted samples are reduced.
 const PLOT_DECIMATION: usize = 10;
 /// Samples omitted at either end, where differences of order 8 exceed the motion.
 const END_SAMPLES: usize = 8;
@@ -167,7 +166,6 @@ impl Verification {
     }
 }
 
-/// Largest of the six errors.
 pub(crate) fn worst(theta: &[f64; 6]) -> f64 {
     theta.iter().zip(TRUTH).map(|(value, truth)| (value - truth).abs()).fold(0.0, f64::max)
 }

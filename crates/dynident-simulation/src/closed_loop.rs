@@ -128,7 +128,6 @@ impl LoopSettings {
     }
 }
 
-/// Limits of every joint; infinite without limit.
 #[derive(Clone, Debug)]
 pub(crate) struct Limits {
     pub(crate) torque: Vec<f64>,
@@ -136,11 +135,9 @@ pub(crate) struct Limits {
     pub(crate) upper: Vec<f64>,
     pub(crate) speed: Vec<f64>,
     pub(crate) error: Vec<f64>,
-    /// Velocity above which the run has diverged, rad/s (m/s).
     pub(crate) divergence_speed: Vec<f64>,
 }
 
-/// Limits and initial state of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct LoopStart {
     pub(crate) limits: Limits,
@@ -149,7 +146,6 @@ pub(crate) struct LoopStart {
 }
 
 impl LoopStart {
-    /// Checks the parts of a loop.
     pub(crate) fn of(
         plant: &Plant,
         controller: &dyn Controller,
@@ -245,7 +241,6 @@ pub fn closed_loop(
     Ok(run)
 }
 
-/// A loop during its run.
 struct RunningLoop<'a> {
     plant: &'a mut Plant,
     controller: &'a mut dyn Controller,
@@ -254,14 +249,12 @@ struct RunningLoop<'a> {
     target: ReferenceBuffer<'a>,
     /// Sensors; `None` if the controller measures the true state.
     feedback: Option<Feedback<'a>>,
-    /// Time between samples, s.
     step_s: f64,
     samples: usize,
     tau: Vec<f64>,
     ddq: Vec<f64>,
     buffer: MotionBuffer,
     run: Run,
-    /// Number of completed samples.
     completed: usize,
 }
 
@@ -276,7 +269,6 @@ impl RunningLoop<'_> {
         if let Some(status) = stop_status(plant.q(), plant.dq(), limits, target.target().q, time_s, &run.joints) {
             return Err(status);
         }
-        // Sensors, control law, saturation of the drives.
         let sensed = self.feedback.as_mut().map(|feedback| {
             feedback.read(plant.q(), plant.dq());
             feedback.measured()
@@ -295,7 +287,6 @@ impl RunningLoop<'_> {
             run.max_error[joint] = run.max_error[joint].max(error);
             run.rms_error[joint] += error * error;
         }
-        // Record the sample and advance to the next.
         if self.buffer.push(Row { q: plant.q(), dq: plant.dq(), tau, measured: sensed }) {
             self.buffer.flush(arrays(run), self.samples);
         }

@@ -8,7 +8,6 @@ use crate::reference::Reference;
 /// Samples in a block: with 35 numbers per sample nine kilobytes.
 const BLOCK_SAMPLES: usize = 32;
 
-/// Values of one sample.
 #[derive(Clone, Copy)]
 pub(crate) struct Row<'a> {
     pub(crate) q: &'a [f64],
@@ -24,7 +23,6 @@ pub(crate) type Arrays<'a> = [&'a mut Vec<f64>; 5];
 #[derive(Debug)]
 pub(crate) struct MotionBuffer {
     joints: usize,
-    /// Values of each joint in a row.
     kinds: usize,
     rows: Vec<f64>,
     filled: usize,
@@ -71,7 +69,6 @@ impl MotionBuffer {
     }
 }
 
-/// Reads a reference block by block.
 #[derive(Debug)]
 pub(crate) struct ReferenceBuffer<'a> {
     reference: &'a Reference,

@@ -121,7 +121,6 @@ impl SensorSettings {
     }
 }
 
-/// Cubic Hermite interpolation of samples with their derivatives; constant before the first sample.
 fn interpolate(q: &[f64], dq: &[f64], rate_hz: f64, time_s: f64) -> f64 {
     let place = (time_s * rate_hz).max(0.0);
     let from = (place.floor() as usize).min(q.len().saturating_sub(2));

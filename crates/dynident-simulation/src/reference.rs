@@ -12,7 +12,6 @@ const MAX_SAMPLES: f64 = 1e8;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     rate_hz: f64,
-    /// Shared with the runs of this reference.
     motion: Arc<Motion>,
 }
 

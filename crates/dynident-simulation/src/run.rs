@@ -242,7 +242,6 @@ impl Run {
         part
     }
 
-    /// Removes all samples after the first `samples`.
     pub(crate) fn cut(&mut self, samples: usize) {
         let (before, joints) = (self.samples, self.joints.len());
         if samples == before {

@@ -139,7 +139,6 @@ impl SensorSettings {
             && self.feedback_delay_samples == 0
     }
 
-    /// Encoder reading of a position.
     #[inline]
     pub(crate) fn position(&self, joint: usize, q: f64, turns: bool, random: &mut Random) -> f64 {
         let std = self.position_std.of(joint);

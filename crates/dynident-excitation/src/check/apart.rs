@@ -21,7 +21,6 @@ pub(super) struct Link {
     reach_m: f64,
 }
 
-/// Two links and their last computed distance.
 pub(super) struct Pair {
     pub(super) links: [Link; 2],
     pub(super) clearance_m: f64,

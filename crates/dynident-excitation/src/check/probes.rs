@@ -5,7 +5,6 @@ use super::apart::{Hull, Link, Pair};
 use crate::limits::{FloorLimit, JointLimit, LimitError, LimitKind, Limits, LinkPoint, LinkShape, SelfCollision};
 use dynident_model::{Body, Model, Transform, Vec3};
 
-/// A limit that is checked at each sample.
 pub(super) enum Probe {
     Band { array: usize, joint: usize, lower: f64, upper: f64 },
     Follower { array: usize, sources: Vec<(usize, f64)>, offset: f64, range: [f64; 2] },
@@ -24,7 +23,6 @@ pub(super) struct Point {
     radius_m: f64,
 }
 
-/// Probes of all limits, in the order of the report.
 pub(super) fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, LimitReport)>, LimitError> {
     let mut probes = Probes(Vec::new());
     for limit in &limits.joints {
@@ -68,7 +66,6 @@ impl Probes {
         self.0.push((probe, report));
     }
 
-    /// Adds position, rates, torque and power of a driven joint.
     fn add_joint(&mut self, joint: usize, limit: &JointLimit) {
         let JointLimit { position, speed, acceleration, jerk, torque, torque_margin, power_w, .. } = limit;
         let name = || limit.joint.clone();
@@ -89,7 +86,6 @@ impl Probes {
         }
     }
 
-    /// Adds position and speed of joints that follow others.
     fn add_followers(&mut self, model: &Model) {
         for (index, joint) in model.followers() {
             let Some(coupling) = model.coupling() else { continue };
@@ -200,7 +196,6 @@ fn links(model: &Model, shapes: &[LinkShape]) -> Vec<(String, Link)> {
     found.into_iter().map(|(name, body, hulls)| (name, Link::new(body, hulls))).collect()
 }
 
-/// Position of a point of a body in the base frame, m.
 fn place(placements: &[Transform], body: Option<usize>, at: Vec3) -> Vec3 {
     body.map_or(at, |body| placements[body].rotation.mul_vec(at) + placements[body].translation)
 }
@@ -246,7 +241,6 @@ impl Probe {
                 let at = at(point);
                 let distance = ((at[0] - *x) * (at[0] - *x) + (at[1] - *y) * (at[1] - *y)).sqrt();
                 let least = *radius_m + point.radius_m;
-                // The larger of the distances from the side and from the top of the column.
                 (2.0 - distance / least).min(1.0 + (*top_m + point.radius_m - at[2]) / least)
             }
             Self::Pair(pair) => pair.ratio(placements, worst),

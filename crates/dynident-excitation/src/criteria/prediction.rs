@@ -33,7 +33,6 @@ impl Criterion for Prediction {
         let (_, inverse) = log_det_and_inverse(information)?;
         let spread = &inverse * &self.task;
         let trace = spread.trace();
-        // The criterion is undefined for a task without torque.
         (trace > 0.0 && trace.is_finite()).then(|| (trace.ln(), -(spread * inverse) / trace))
     }
 
@@ -47,12 +46,8 @@ impl Criterion for Prediction {
 mod tests {
     use super::*;
     use crate::criteria::AOptimal;
+    use crate::criteria::testing::{check_derivative, random_definite};
     use dynident_model::sample::Random;
-
-    fn random_definite(random: &mut Random, size: usize) -> DMatrix<f64> {
-        let root = DMatrix::from_fn(3 * size, size, |_, _| random.normal());
-        root.transpose() * root
-    }
 
     /// With M = 1 the criterion is A-optimality; with M = D the result is the number of parameters.
     #[test]
@@ -69,22 +64,14 @@ mod tests {
         assert!(Prediction::new(DMatrix::zeros(9, 9)).value_and_derivative(&information).is_none());
     }
 
-    /// Compares the derivative with central differences of fourth order. Step 1e-3: truncation error 1e-12, rounding
-    /// error 1e-13.
     #[test]
     fn derivative_is_the_slope() {
         let mut random = Random::new(8);
         let (information, task) = (random_definite(&mut random, 7), random_definite(&mut random, 7));
         let criterion = Prediction::new(task);
-        let root = DMatrix::from_fn(7, 7, |_, _| random.normal());
-        let direction = &root + root.transpose();
-        let (_, derivative) = criterion.value_and_derivative(&information).unwrap();
-        let at = |step: f64| criterion.value_and_derivative(&(&information + &direction * step)).unwrap().0;
-        let step = 1e-3;
-        let slope = (8.0 * (at(step) - at(-step)) - (at(2.0 * step) - at(-2.0 * step))) / (12.0 * step);
-        let expected = derivative.component_mul(&direction).sum();
-        assert!((slope - expected).abs() < 1e-8 * expected.abs().max(1.0), "{slope} {expected}");
-        let (value, figure) = (at(0.0), criterion.figure(&information).unwrap());
+        check_derivative(&criterion, &information, &mut random);
+        let (value, _) = criterion.value_and_derivative(&information).unwrap();
+        let figure = criterion.figure(&information).unwrap();
         assert!((value.exp() - figure).abs() < 1e-12 * figure.max(1.0));
     }
 }

@@ -57,13 +57,9 @@ impl Criterion for WorstDirections {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::criteria::testing::{check_derivative, random_definite};
     use crate::criteria::{EOptimal, Prediction};
     use dynident_model::sample::Random;
-
-    fn random_definite(random: &mut Random, size: usize) -> DMatrix<f64> {
-        let root = DMatrix::from_fn(3 * size, size, |_, _| random.normal());
-        root.transpose() * root
-    }
 
     /// Order 1 in units of a task equals the torque prediction, order 40 the smooth E-optimality.
     #[test]
@@ -80,21 +76,11 @@ mod tests {
         assert!(WorstDirections::new(DMatrix::identity(8, 8), 2.0).figure(&information).is_none());
     }
 
-    /// Compares the derivative with central differences of fourth order. Step 1e-3: truncation error 1e-12, rounding
-    /// error 1e-13.
     #[test]
     fn derivative_is_the_slope() {
         let mut random = Random::new(8);
         let information = random_definite(&mut random, 7);
         let units = DMatrix::from_fn(7, 7, |_, _| random.normal());
-        let criterion = WorstDirections::new(units, 2.0);
-        let root = DMatrix::from_fn(7, 7, |_, _| random.normal());
-        let direction = &root + root.transpose();
-        let (_, derivative) = criterion.value_and_derivative(&information).unwrap();
-        let at = |step: f64| criterion.value_and_derivative(&(&information + &direction * step)).unwrap().0;
-        let step = 1e-3;
-        let slope = (8.0 * (at(step) - at(-step)) - (at(2.0 * step) - at(-2.0 * step))) / (12.0 * step);
-        let expected = derivative.component_mul(&direction).sum();
-        assert!((slope - expected).abs() < 1e-8 * expected.abs().max(1.0), "{slope} {expected}");
+        check_derivative(&WorstDirections::new(units, 2.0), &information, &mut random);
     }
 }

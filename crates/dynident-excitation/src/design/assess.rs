@@ -7,10 +7,8 @@ use crate::limits::{PeakSettings, peaks};
 use crate::motion::Motion;
 use nalgebra::DMatrix;
 
-/// Minimum number of samples of the search for extremes.
 const MIN_PEAK_SAMPLES: usize = 1001;
 
-/// Assessment of a trajectory.
 #[derive(Clone)]
 pub(crate) struct Assessment {
     pub(crate) parameters: Vec<f64>,
@@ -51,7 +49,6 @@ pub(crate) fn assess(
     Assessment { figure: criterion.figure(&information), parameters, information, violation, extremes }
 }
 
-/// Largest value of each row of limits, refined between samples.
 pub(super) fn extremes(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> Vec<f64> {
     let mut workspace = task.limits.workspace();
     let found = peaks(task.limits, &mut workspace, times, PeakSettings::default(), |times, out| {

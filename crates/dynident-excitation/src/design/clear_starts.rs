@@ -28,7 +28,6 @@ pub(super) struct Starts<'a> {
 }
 
 impl<'a> Starts<'a> {
-    /// Creates starts that are tested at `times`.
     pub(super) fn new(task: &'a DesignTask<'a>, times: &'a [f64]) -> Self {
         let (positions, speeds) = ranges(task.limits);
         let mut workspace = task.limits.workspace();
@@ -36,7 +35,6 @@ impl<'a> Starts<'a> {
         Self { task, times, positions, speeds, workspace, motion: Motion::default(), values: Vec::new() }
     }
 
-    /// Draws `count` starts; after `stop` returns true it draws no more, but returns at least one.
     pub(super) fn several(
         &mut self,
         count: usize,
@@ -92,7 +90,6 @@ impl<'a> Starts<'a> {
         best
     }
 
-    /// Largest violation of places.
     fn broken_places(&mut self, parameters: &[f64]) -> f64 {
         self.task.family.motion(parameters, self.times, &mut self.motion);
         self.worst()

@@ -15,7 +15,6 @@ const SEED: u64 = 1;
 pub(super) struct ColumnUnits(Vec<f64>);
 
 impl ColumnUnits {
-    /// Computes the units from a random motion at `times`.
     pub(super) fn new(task: &DesignTask<'_>, times: &[f64], weight: f64) -> Self {
         let (positions, speeds) = ranges(task.limits);
         let parameters = task.family.random(&positions, &speeds, &mut Random::new(SEED));

@@ -4,13 +4,11 @@
 use super::{DesignSettings, DesignTask};
 use crate::limits::LimitKind;
 
-/// Number of searches and the evaluations of each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Effort {
     pub(super) starts: usize,
     pub(super) rounds: usize,
     pub(super) evaluations_per_start: usize,
-    /// Evaluations of a restart around the best.
     pub(super) evaluations_per_restart: usize,
 }
 
@@ -28,7 +26,6 @@ impl Effort {
     const LONG_RESTARTS: Self =
         Self { starts: 2, rounds: 8, evaluations_per_start: 2_000, evaluations_per_restart: 2_000 };
 
-    /// Budget from the settings, or the default for criterion and family.
     pub(super) fn of(task: &DesignTask<'_>, settings: &DesignSettings, samples: usize) -> Self {
         let many_optima = task.criteria.last().is_some_and(|criterion| criterion.has_many_optima());
         let each = task.family.parameters() / task.family.joints().max(1);
@@ -64,14 +61,12 @@ impl Effort {
         self
     }
 
-    /// Maximum number of evaluations of all searches.
     fn evaluations(&self) -> usize {
         let followed = |starts: usize| starts + starts.div_ceil(super::rounds::STARTS_PER_FOLLOWED);
         followed(self.starts) * self.evaluations_per_start
             + self.rounds * followed(1 + self.restarts()) * self.evaluations_per_restart
     }
 
-    /// Number of restarts around the best in a round.
     pub(super) fn restarts(&self) -> usize {
         (self.starts / 2).max(2)
     }
@@ -98,7 +93,6 @@ const CHANGES_SHARE: f64 = 0.15;
 /// Includes a share of the check between samples after a search.
 const PRODUCTS_PER_PAIR: f64 = 4000.0;
 
-/// Whether the settings leave the length of the search open.
 fn is_open(settings: &DesignSettings) -> bool {
     settings.starts.is_none()
         && settings.rounds.is_none()
@@ -110,7 +104,6 @@ fn is_open(settings: &DesignSettings) -> bool {
 /// the result does not depend on the computer.
 fn affordable_evaluations(task: &DesignTask<'_>, samples: usize, share: f64) -> usize {
     let columns = task.layout.columns().len() as f64;
-    // Information and its reverse sweep.
     let panels: f64 =
         (0..task.layout.dof()).map(|joint| 2.0 * (task.layout.joint_columns(joint).len() as f64).powi(2)).sum();
     let pairs = task.limits.constraints().iter().filter(|row| row.kind == LimitKind::SelfCollision).count() as f64;
@@ -147,7 +140,6 @@ mod tests {
                 assert!(less.evaluations() <= most, "{less:?} for {most}");
                 assert!(less.starts >= MIN_STARTS && less.evaluations_per_start >= MIN_EVALUATIONS);
             }
-            // The minimum applies to the most expensive robot.
             assert_eq!(usual.within(0).evaluations_per_start, MIN_EVALUATIONS);
         }
     }

@@ -9,9 +9,7 @@ use nalgebra::DMatrix;
 
 /// `L` with `L Lᵀ = P A Pᵀ`, where P reverses the order.
 pub(super) struct EnvelopeFactor {
-    /// Rows of `L`, each `size` long.
     rows: Vec<f64>,
-    /// First nonzero column of each row.
     first: Vec<usize>,
 }
 
@@ -87,7 +85,6 @@ mod tests {
             factor.solve(&mut found);
             assert!(found.iter().zip(&expected).all(|(found, expected)| (found - expected).abs() < 1e-14), "{size}");
             if size == 30 {
-                // The rows of the band stay short; only the last is long.
                 assert!((0..29).all(|row| row - factor.first[row] <= band));
             }
         }

@@ -74,17 +74,14 @@ impl<'a> Interruption<'a> {
         self.ended().is_finite()
     }
 
-    /// Whether the search was ended and its grace time is over.
     pub(super) fn is_overdue(&self) -> bool {
         self.is_ended() && (self.elapsed_s)() > self.ended() + GRACE_S
     }
 
-    /// Whether this share of the time limit has passed.
     pub(super) fn is_past(&self, share: f64) -> bool {
         self.time_limit_s.is_some_and(|limit| (self.elapsed_s)() > share * limit)
     }
 
-    /// Whether the search was ended or its share of the time has passed.
     pub(super) fn search_is_over(&self) -> bool {
         self.is_ended() || self.search_is_late()
     }

@@ -18,10 +18,8 @@ pub(super) struct Metric {
     factors: Vec<EnvelopeFactor>,
     size_weights: Motion,
     weights: Motion,
-    /// Whether `size` is computed.
     sized: bool,
     share: f64,
-    /// Parameters per joint.
     each: usize,
 }
 

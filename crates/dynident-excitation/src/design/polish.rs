@@ -65,7 +65,6 @@ pub(super) fn polished(
         interruption.count(found.evaluations);
         left = left.saturating_sub(found.evaluations);
         state = found.best.state;
-        // The last iterate, and the best that kept the limits on the samples.
         let ended = run.assess(state.x.clone());
         let on_samples = run.assess(found.best.feasible);
         let whole = ended.violation <= 0.0;
@@ -94,9 +93,7 @@ fn keep_better(kept: &mut Assessment, other: Assessment) {
     }
 }
 
-/// Budget of one polish.
 struct Polish {
-    /// Maximum number of evaluations.
     budget: usize,
     /// Whether the search was ended before: the polish then only returns inside the limits, within some tenths of a
     /// second.
@@ -104,7 +101,6 @@ struct Polish {
 }
 
 impl Polish {
-    /// The next polish, where `left` evaluations remain for all of them.
     fn next(run: &DesignRun<'_>, left: usize) -> Self {
         let after_end = run.interruption.search_is_over();
         let most = match (run.interruption.is_ended(), after_end) {
@@ -116,7 +112,6 @@ impl Polish {
         Self { budget: most.min(left.div_ceil(2).max(1)), after_end }
     }
 
-    /// Reports an evaluation; returns whether the polish ends there.
     fn is_stopped(&self, run: &DesignRun<'_>, value: f64, violation: f64) -> bool {
         let interruption = &run.interruption;
         (interruption.report("polish", value, violation) && !self.after_end)

@@ -20,7 +20,6 @@ const PLACE_WEIGHT: f64 = 5.0;
 /// of 0.1 stopped descents early.
 const MAX_PLACE_VIOLATION: f64 = 0.16;
 
-/// Criterion and limits of one trajectory as functions of the family's parameters.
 pub(super) struct Problem<'a> {
     task: &'a DesignTask<'a>,
     /// Margins that are added to every value of each row, so that limits are also kept between samples.
@@ -31,13 +30,11 @@ pub(super) struct Problem<'a> {
     weight: f64,
     information: Information<'a>,
     workspace: LimitWorkspace,
-    /// Factor on the values of each row.
     scales: Vec<f64>,
     scaled_weights: Vec<f64>,
     /// Maximum violation of places: [`MAX_PLACE_VIOLATION`], or that of the first motion if larger.
     max_place_violation: Option<f64>,
     parameters: Vec<f64>,
-    /// Parameters of the last gradient; a rejected trial may have followed.
     at_gradient: Vec<f64>,
     motion: Motion,
     adjoint: Motion,

@@ -30,7 +30,6 @@ const MIN_ROUNDS_LEFT: usize = 4;
 const MIN_ROUNDS_TO_RELOCATE: usize = 16;
 
 pub(super) struct Neighbourhood {
-    /// Whether the search has enough rounds to change the neighbourhood.
     can_relocate: bool,
     /// Best motion of the neighbourhood and its score; `None` before the first round.
     best: Option<(AugmentedLagrangianState, f64)>,
@@ -39,12 +38,10 @@ pub(super) struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    /// The empty neighbourhood of a search with this number of rounds.
     pub(super) fn of_search(rounds: usize) -> Self {
         Self { can_relocate: rounds >= MIN_ROUNDS_TO_RELOCATE, best: None, stale: 0 }
     }
 
-    /// Score of the best motion; `None` before the first round.
     pub(super) fn score(&self) -> Option<f64> {
         self.best.as_ref().map(|(_, score)| *score)
     }

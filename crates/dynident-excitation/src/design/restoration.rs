@@ -22,7 +22,6 @@ const MIN_EVALUATIONS: usize = 400;
 const MAX_DESCENTS: usize = 4;
 const MAX_MARGIN_STEP: f64 = 0.02;
 
-/// Initial margin at the samples, as a share of each limit.
 const INITIAL_MARGIN: f64 = 0.003;
 
 /// Zero objective: only feasibility is optimised.
@@ -124,7 +123,6 @@ pub(crate) fn restored(
 
 struct NextStart {
     parameters: Vec<f64>,
-    /// Whether this motion keeps all limits between samples.
     whole: bool,
 }
 

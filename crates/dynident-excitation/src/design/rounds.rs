@@ -35,14 +35,12 @@ const COMPARISON_TOLERANCE: f64 = 3e-3;
 /// UR10, Panda and iiwa14, 40 starts each, the ranks after 270 to 300 of 700 evaluations correlate with the final ranks
 /// by 0.7 to 0.9, after 170 by 0.4 to 0.6.
 const PARTIAL_RUN_SHARE: f64 = 0.45;
-/// Minimum number of starts for a comparison.
 const MIN_COMPARED_STARTS: usize = 4;
 /// One of this number of starts runs until convergence.
 pub(super) const STARTS_PER_FOLLOWED: usize = 4;
 /// [`PARTIAL_RUN_SHARE`] of restarts around a known motion, for a criterion whose starts end close to each other. Log
 /// det of the same arms, 24 seeds, equals that without comparison.
 const PARTIAL_RESTART_SHARE: f64 = 0.3;
-/// Minimum number of restarts for a comparison, and the number of them that continue.
 const MIN_COMPARED_RESTARTS: usize = 4;
 const FOLLOWED_RESTARTS: usize = 2;
 /// Scores that differ by less, in the criterion's scale, belong to the same motion.
@@ -53,10 +51,8 @@ const VIOLATION_WEIGHT: f64 = 10.0;
 /// Returns whether a descent ends after an evaluation with this value and violation; called from any thread.
 pub(super) type Stop<'a> = dyn Fn(f64, f64) -> bool + Sync + 'a;
 
-/// Conditions that end a round early.
 #[derive(Clone, Copy)]
 pub(super) struct RoundEnd<'a> {
-    /// Ends all descents.
     pub(super) stop: &'a Stop<'a>,
     /// Ends the partial runs of all starts; the best ones continue.
     pub(super) race_is_over: &'a (dyn Fn() -> bool + Sync),
@@ -71,7 +67,6 @@ pub(super) struct Rounds<'a> {
     units: ColumnUnits,
 }
 
-/// End of a start.
 pub(super) struct Candidate {
     pub(super) state: AugmentedLagrangianState,
     /// Best point that kept the limits on the samples, or the least violating one.
@@ -85,7 +80,6 @@ pub(super) struct Candidate {
 /// Selects the starts of a round that run until convergence.
 #[derive(Clone, Copy)]
 pub(super) enum FollowPolicy {
-    /// The best ones.
     Always,
     /// The best ones if their score is below this one; other descents return to a known motion.
     IfBelow(f64),
@@ -170,12 +164,10 @@ impl Rounds<'_> {
         if ahead.is_empty() { Err(OptimiserError::Start) } else { Ok((ahead, evaluations)) }
     }
 
-    /// Scores that differ by less belong to the same motion.
     pub(super) fn same(&self, criterion: &dyn Criterion) -> f64 {
         SAME_SCORE_TOLERANCE * criterion.scale(self.task.layout.columns().len())
     }
 
-    /// Runs from one point until convergence.
     pub(super) fn polish(
         &self,
         criterion: &dyn Criterion,

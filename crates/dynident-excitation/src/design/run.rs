@@ -6,17 +6,13 @@ use super::{DesignSettings, DesignTask, DesignWatch, grid};
 use crate::criteria::Criterion;
 use crate::optimisers::OptimiserError;
 
-/// Task, grids and interruption of one design.
 pub(super) struct DesignRun<'a> {
     pub(super) task: &'a DesignTask<'a>,
     pub(super) settings: &'a DesignSettings,
     /// Last criterion, which ranks the results.
     pub(super) criterion: &'a dyn Criterion,
-    /// Sample times of the search, s.
     pub(super) coarse: Vec<f64>,
-    /// Sample times of the polish, s.
     pub(super) fine: Vec<f64>,
-    /// Logged sample times, s.
     pub(super) logged: Vec<f64>,
     pub(super) interruption: Interruption<'a>,
 }
@@ -46,7 +42,6 @@ impl<'a> DesignRun<'a> {
         vec![0.0; self.task.limits.constraints().len()]
     }
 
-    /// Assesses a trajectory by the last criterion.
     pub(super) fn assess(&self, parameters: Vec<f64>) -> Assessment {
         assess(self.task, self.criterion, parameters, &self.fine, &self.logged)
     }

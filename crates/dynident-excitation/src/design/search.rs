@@ -61,7 +61,6 @@ pub(super) fn searched(run: &DesignRun<'_>) -> Result<Candidate, OptimiserError>
     best.ok_or(OptimiserError::Start)
 }
 
-/// Selects the starts of a round that run until convergence.
 fn follow_policy(run: &DesignRun<'_>, neighbourhood: &Neighbourhood, effort: &Effort, round: usize) -> FollowPolicy {
     match neighbourhood.score() {
         // Restarts near the best motion find a better one sooner than this search converges.

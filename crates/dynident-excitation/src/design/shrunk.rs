@@ -10,13 +10,11 @@ use crate::criteria::Criterion;
 use crate::motion::Motion;
 use dynident_model::sample::Random;
 
-/// Maximum shrinkage; a search that ends in its first steps is far outside.
 const MAX_SHRINK: f64 = 0.9;
 
 /// Added to each share against violations of 10⁻¹⁶ by rounding.
 const ROUNDING_MARGIN: f64 = 1e-9;
 
-/// Maximum number of doublings of an insufficient share.
 const MAX_DOUBLINGS: usize = 8;
 
 /// First share if all joints keep their own limits but torques or places are violated.
@@ -93,7 +91,6 @@ fn standing_still(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> V
         *range = [middle - half, middle + half];
         speeds[joint] *= STANDSTILL_SHARE;
     }
-    // The choice among these motions has no visible effect.
     task.family.random(&positions, &speeds, &mut Random::new(1))
 }
 

@@ -12,19 +12,15 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 use dynident_model::sample::Random;
 use std::collections::BTreeMap;
 
-/// Evaluations of one search.
 const SEARCH_EVALUATIONS: usize = 300;
 
 /// Maximum number of doublings of a widening; a limit that needs more is not sufficient alone.
 const MAX_WIDENINGS: usize = 3;
 
-/// Bisection steps between sufficient and insufficient widening.
 const BISECTIONS: usize = 5;
 
-/// Number of random starts in addition to the best motion.
 const RANDOM_STARTS: usize = 1;
 
-/// Maximum number of single limits, or of kinds of limits, that are tried.
 const MAX_GROUPS: usize = 6;
 
 /// Violation on samples that a search accepts, and margin of the other limits; the result is then checked between
@@ -151,7 +147,6 @@ fn motion_with_wider(
     let search = Rounds::new(task, fine, fine.len(), false);
     let mut random = Random::new(settings.seed ^ 0x51a6);
     let (positions, speeds) = ranges(task.limits);
-    // The margin at the samples covers most peaks between them.
     let mut margins = vec![SAMPLE_MARGIN; task.limits.constraints().len()];
     for &row in rows {
         margins[row] = -wide;

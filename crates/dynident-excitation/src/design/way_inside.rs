@@ -75,7 +75,6 @@ mod tests {
         let (positions, speeds) = ranges(&limits);
         let start = family.random(&positions, &speeds, &mut Random::new(3));
         let scaled = |by: f64| judged(start.iter().map(|p| by * p).collect());
-        // The size at which the first limit is reached, by bisection.
         let (mut below, mut above) = (0.0, 64.0);
         for _ in 0..60 {
             let middle = 0.5 * (below + above);

@@ -69,7 +69,6 @@ pub enum ExportError {
 }
 
 impl Sampled<'_> {
-    /// Checks that the lengths of names, times and motion match and that every number is finite.
     fn check(&self) -> Result<(), ExportError> {
         let Motion { samples, joints, .. } = *self.motion;
         for (what, expected, found) in

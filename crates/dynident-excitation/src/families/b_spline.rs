@@ -187,7 +187,6 @@ mod tests {
                 .iter()
                 .enumerate()
         {
-            // Rounding of numbers up to 120.
             assert!((motion.q[sample] - value).abs() < 1e-12 && (motion.dq[sample] - slope).abs() < 1e-12);
         }
     }
@@ -204,7 +203,6 @@ mod tests {
             assert!((sum - 1.0).abs() < 1e-14, "{time_s} {sum}");
             let acting = row.iter().filter(|function| function.iter().any(|value| *value != 0.0)).count();
             assert!(acting <= 6, "{time_s}: {acting}");
-            // The functions of the ends act on three spans of 10/75 s.
             assert!(row[0] == [0.0; 4] || !(0.41..9.59).contains(&time_s), "{time_s}");
         }
     }

@@ -6,7 +6,6 @@ use crate::motion::Motion;
 use dynident_model::sample::Random;
 use nalgebra::{DMatrix, DVector};
 
-/// Random start for joints with unequal ranges and velocities.
 pub(crate) fn start(family: &dyn Family, seed: u64) -> Vec<f64> {
     let joints = family.joints();
     let ranges: Vec<_> = (0..joints).map(|joint| [-1.5 - joint as f64 * 0.2, 2.0]).collect();
@@ -85,12 +84,10 @@ pub(crate) fn gradient(family: &dyn Family, seed: u64) {
     gradient_at(family, &start(family, seed), seed);
 }
 
-/// [`gradient`] at given parameters.
 pub(crate) fn gradient_at(family: &dyn Family, parameters: &[f64], seed: u64) {
     gradient_on(family, parameters, &times(family, &mut Random::new(seed ^ 0xaa)), seed);
 }
 
-/// [`gradient`] at given parameters and times.
 pub(crate) fn gradient_on(family: &dyn Family, parameters: &[f64], times: &[f64], seed: u64) {
     let mut random = Random::new(seed ^ 0x77);
     let mut adjoint = Motion::default();
@@ -165,7 +162,6 @@ pub(crate) fn curvature(family: &dyn Family, seed: u64) {
                 expected.ger(weights[sample], &row, &row, 1.0);
             }
         }
-        // Sums of at most 20 squares in another order.
         let error = (&found - &expected).amax();
         assert!(error <= 1e-12 * expected.amax(), "{}: curvature off by {error:e}", family.name());
     }

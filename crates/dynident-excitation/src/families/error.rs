@@ -42,7 +42,6 @@ pub enum FamilyError {
 /// Maximum number of joints, strokes, harmonics, points and postures; a larger number is a typing error.
 pub(crate) const MAX_COUNT: usize = 1000;
 
-/// Returns an error with the setting and its fix unless `ok`.
 pub(crate) fn require(
     ok: bool,
     family: &'static str,
@@ -53,7 +52,6 @@ pub(crate) fn require(
     if ok { Ok(()) } else { Err(FamilyError::Setting { family, setting, value, fix }) }
 }
 
-/// Checks of all families: the number of joints, and a duration for which rates can be computed.
 pub(crate) fn require_frame(family: &'static str, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
     require((1..=MAX_COUNT).contains(&joints), family, "joints", joints as f64, "give between 1 and 1000 joints")?;
     let fix = "give between a millisecond and 1e7 seconds";

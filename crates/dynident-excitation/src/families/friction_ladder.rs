@@ -233,7 +233,6 @@ mod tests {
             family.motion(&parameters, &times, &mut motion);
             let own = &motion.q[motion.of(0)];
             let [low, high] = own.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], q| [l.min(*q), h.max(*q)]);
-            // The turning point is between two samples: q̈ dt²/8.
             assert!((0.5 * (low + high) - 0.3).abs() < 1e-5 && (own[0] - own[20_000]).abs() < 1e-12);
         }
     }

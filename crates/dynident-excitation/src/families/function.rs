@@ -19,9 +19,7 @@ const RELATIVE_STEP: f64 = 6e-6;
 const LINEARITY_TOLERANCE: f64 = 1e-9;
 /// Largest deviation from 1 of a constant motion.
 const CONSTANT_TOLERANCE: f64 = 1e-6;
-/// Seed of the parameters for the linearity test.
 const SEED: u64 = 33;
-/// Maximum number of parameters per joint.
 const MAX_PARAMETERS: usize = 1000;
 
 /// Motion of all joints as a function of their parameters, for many times at once.
@@ -57,12 +55,10 @@ pub struct FunctionFamily {
     function: Arc<dyn MotionFunction>,
     joints: usize,
     duration_s: f64,
-    /// Parameters per joint.
     parameters: usize,
     linear: Option<Linear>,
 }
 
-/// Data of a linear family.
 #[derive(Debug)]
 struct Linear {
     grids: GridCache,
@@ -114,13 +110,11 @@ impl FunctionFamily {
         Ok(family)
     }
 
-    /// Motion computed by the user's function.
     fn called(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
         out.reset(self.joints, times_s.len());
         self.function.motion(parameters, times_s, out);
     }
 
-    /// Motion of each parameter alone.
     fn columns(&self, times_s: &[f64]) -> Vec<Motion> {
         let of = |column: usize| {
             let mut one = vec![0.0; self.joints * self.parameters];
@@ -280,7 +274,6 @@ mod tests {
     use super::*;
     use crate::families::{Fourier, FourierSettings, check};
 
-    /// The built-in series as a user's function.
     #[derive(Debug)]
     struct Series(Fourier);
 
@@ -306,7 +299,6 @@ mod tests {
         let ranges = [[-2.0, 1.0]; 3];
         let start = |family: &dyn Family| family.random(&ranges, &[3.0; 3], &mut Random::new(8));
         let parameters = start(&fourier);
-        // The constant is computed by least squares, with an error of about 1e-15.
         assert!(parameters.iter().zip(start(&linear)).all(|(a, b)| (a - b).abs() < 1e-12));
         let times: Vec<f64> = (0..50).map(|k| 0.14 * f64::from(k)).collect();
         let mut adjoint = Motion::default();

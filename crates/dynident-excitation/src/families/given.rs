@@ -135,7 +135,6 @@ mod tests {
         let duration = 8.0;
         let series = Fourier::new(2, duration, &FourierSettings::default()).unwrap();
         let parameters = check::start(&series, 4);
-        // Unequal steps, from a time other than zero.
         let own: Vec<f64> = (0..=160).map(|k| f64::from(k) * 0.05 - 0.02 * f64::from(k % 2)).collect();
         let mut samples = Motion::default();
         series.motion(&parameters, &own, &mut samples);

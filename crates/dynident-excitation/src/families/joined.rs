@@ -115,7 +115,6 @@ impl JoinedFamily {
         pieces
     }
 
-    /// Samples of each piece, with times from its start.
     fn split(&self, times_s: &[f64]) -> Vec<(Piece, Vec<usize>, Vec<f64>)> {
         let pieces = self.pieces();
         let mut split: Vec<_> = pieces.iter().map(|(piece, _)| (*piece, Vec::new(), Vec::new())).collect();
@@ -128,7 +127,6 @@ impl JoinedFamily {
         split
     }
 
-    /// Index range of each member's parameters.
     fn ranges(&self) -> Vec<Range<usize>> {
         let mut from = 0;
         self.members
@@ -255,7 +253,6 @@ impl Family for JoinedFamily {
                             let pull = |weight: usize| -> f64 {
                                 functions[weight].iter().zip(arrays).map(|(f, array)| f * array[from]).sum()
                             };
-                            // The move leaves the end of one member and arrives at the start of the next.
                             for (member, weight, at) in
                                 [(index.checked_sub(1), 0, 2 * joint + 1), (Some(index), 3, 2 * joint)]
                             {
@@ -346,7 +343,6 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(12))]
         #[test]
         fn exact(seed in any::<u64>(), open in any::<bool>()) {
-            // Moves long enough for the velocities of the checks.
             let end = (!open).then(|| vec![0.2, -0.1]);
             let mut list = members();
             if let Some(member) = list.get_mut(1) {

@@ -55,7 +55,6 @@ impl<B: Basis> LinearFamily<B> {
         &self.basis
     }
 
-    /// Number of different sets of functions.
     fn sets(&self) -> usize {
         if self.basis.differs_by_joint() { self.joints } else { 1 }
     }

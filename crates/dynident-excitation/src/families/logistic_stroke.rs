@@ -184,7 +184,6 @@ mod tests {
         let stroke = LogisticStroke { amplitude: 2.0, centre_s: 0.0, half_duration_s: 1e5, sharpness: 1e5 };
         for time in [-8.0_f64, -2.0, 0.0, 1.0, 5.0] {
             let gone = 2.0 / (1.0 + (-time).exp());
-            // Derivative by the amplitude, order by order the stroke itself, over 2 rad.
             let [q, dq, ddq, _] = stroke.derivatives_by_shape(time).map(|row| 2.0 * row[0]);
             assert!((q - gone).abs() < 1e-7);
             assert!((dq - 0.5 * gone * (2.0 - gone)).abs() < 1e-7);

@@ -12,7 +12,6 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "logistic_strokes";
-/// Maximum sharpness κ of spliced strokes.
 const MAX_SHARPNESS: f64 = 40.0;
 /// Bound of the logarithm of the length of a slot relative to the last slot.
 const MAX_LOG_SLOT: f64 = 3.0;
@@ -145,7 +144,6 @@ impl LogisticStrokes {
         self.settings.strokes - usize::from(self.settings.returns)
     }
 
-    /// Parameters per joint.
     fn parameters_per_joint(&self) -> usize {
         let slots = self.settings.strokes - usize::from(self.settings.order == StrokeOrder::Spliced);
         1 + self.free_amplitudes() + self.settings.strokes + slots
@@ -199,7 +197,6 @@ impl LogisticStrokes {
     }
 }
 
-/// Position of a chunk of samples relative to a stroke.
 enum Chunk<T> {
     Before,
     After,
@@ -380,7 +377,6 @@ impl Family for LogisticStrokes {
             };
             parameters.extend((1 + free + count..self.parameters_per_joint()).map(|_| random.uniform(low, high)));
         }
-        // Fine enough to sample every stroke.
         let coarse = grid(self.duration_s);
         let times: Vec<f64> = coarse
             .windows(2)

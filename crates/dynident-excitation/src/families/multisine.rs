@@ -84,7 +84,6 @@ impl Multisine {
 }
 
 impl MultisineBasis {
-    /// The unit multisine and its first three derivatives.
     fn wave(&self, time_s: f64) -> [f64; 4] {
         let count = self.settings.harmonics as f64;
         let turn = (time_s / self.period_s).rem_euclid(1.0);
@@ -101,7 +100,6 @@ impl MultisineBasis {
         sum
     }
 
-    /// The fade factor and its first three derivatives.
     fn fade(&self, time_s: f64) -> [f64; 4] {
         let ramp = self.settings.ramp_s;
         let (edge, sign) =

@@ -38,7 +38,6 @@ pub(crate) fn smooth_ramp(x: f64) -> [f64; 4] {
 /// Quintic polynomial with given position, velocity and acceleration at both ends; Craig, Introduction to Robotics,
 /// section 7.3.
 pub(crate) fn quintic_hermite(time_s: f64, span_s: f64) -> [[f64; 4]; 6] {
-    // Coefficients of 1, x, .. x⁵ for a unit span.
     const START: [[f64; 6]; 3] =
         [[1.0, 0.0, 0.0, -10.0, 15.0, -6.0], [0.0, 1.0, 0.0, -6.0, 8.0, -3.0], [0.0, 0.0, 0.5, -1.5, 1.5, -0.5]];
     // Each end is computed from its own side, so that both are exact.

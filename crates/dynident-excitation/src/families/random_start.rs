@@ -29,7 +29,6 @@ pub(crate) fn scale_and_shift(q: &[f64], dq: &[f64], range: [f64; 2], speed: f64
     [scale, from + place * (to - from)]
 }
 
-/// Equidistant times over the duration, on which starts are scaled.
 pub(crate) fn grid(duration_s: f64) -> Vec<f64> {
     const SAMPLES: usize = 128;
     (0..=SAMPLES).map(|sample| duration_s * (sample as f64 / SAMPLES as f64)).collect()

@@ -24,19 +24,16 @@ struct Columns {
 }
 
 impl Columns {
-    /// Values of one block.
     #[inline(always)]
     fn cells(&self, columns: usize, block: usize) -> &[f64] {
         &self.values.as_slice()[block * columns * CELL..(block + 1) * columns * CELL]
     }
 }
 
-/// The basis functions of a family and their first three derivatives at given times.
 #[derive(Debug)]
 pub(crate) struct SampledBasis {
     times_s: Vec<f64>,
     columns: usize,
-    /// One entry if all joints share the basis, else one per joint.
     sets: Vec<Columns>,
 }
 
@@ -80,7 +77,6 @@ impl SampledBasis {
         dispatch(Level::detect(), Forward { basis: self, parameters, from, out });
     }
 
-    /// Adds the derivative of a cost with respect to the parameters.
     pub(crate) fn apply_adjoint(&self, from: usize, adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         dispatch(Level::detect(), Backward { basis: self, from, adjoint, gradient });
     }
@@ -198,7 +194,6 @@ fn place<T: Lane, const J: usize>(
     }
 }
 
-/// Stores the first `count` lanes to `array` from `at`.
 #[inline(always)]
 pub(crate) fn store_some<T: Lane>(value: T, array: &mut [f64], at: usize, count: usize) {
     if count == T::LANES {

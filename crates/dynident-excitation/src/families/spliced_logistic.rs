@@ -84,7 +84,6 @@ pub struct SplicedLogistic {
     duration_s: f64,
 }
 
-/// State of a joint on its logistic function.
 struct Phase {
     argument: f64,
     by_omega: f64,
@@ -111,7 +110,6 @@ impl SplicedLogistic {
         self.period(joint, parameters[joint * self.parameters_per_joint() + 1])
     }
 
-    /// Parameters per joint.
     fn parameters_per_joint(&self) -> usize {
         if self.settings.offsets.is_some() { 2 } else { 3 }
     }
@@ -250,7 +248,6 @@ impl Family for SplicedLogistic {
                 let orders = if phase.frozen { 1 } else { 4 };
                 let mut power = 1.0;
                 for (order, pull) in pulls.into_iter().enumerate().take(orders) {
-                    // d/dω of ω^n f_n(argument).
                     let by_omega = order as f64 / omega * f[order] + f[order + 1] * phase.by_omega;
                     sum[0] += pull * power * f[order];
                     sum[1] += pull * power * amplitude * by_omega;

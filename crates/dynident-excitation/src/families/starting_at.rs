@@ -36,7 +36,6 @@ impl StartingAt {
         Ok(Self { inner, start })
     }
 
-    /// Joints with a given start, and their positions.
     fn given(&self) -> impl Iterator<Item = (usize, f64)> {
         self.start.iter().enumerate().filter_map(|(joint, start)| start.map(|start| (joint, start)))
     }
@@ -80,7 +79,6 @@ impl Family for StartingAt {
 
     fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
         self.inner.motion(parameters, times_s, out);
-        // The grids of searches begin at the start.
         let first = (times_s.first() != Some(&0.0)).then(|| {
             let mut first = Motion::default();
             self.inner.motion(parameters, &[0.0], &mut first);

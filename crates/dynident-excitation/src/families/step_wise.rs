@@ -157,7 +157,6 @@ mod tests {
             assert!((0..3).filter(|joint| motion.dq[joint * 6001 + sample] != 0.0).count() <= 1);
             assert_eq!(motion.q[2 * 6001 + sample], 0.3);
         }
-        // Aω/4 at T/4, which is on the grid.
         assert!((motion.dq[6001 + 1000] - 0.5).abs() < 1e-12 && (motion.dq[4500] - 0.75).abs() < 1e-12);
     }
 

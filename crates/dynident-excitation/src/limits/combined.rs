@@ -8,17 +8,16 @@ use crate::motion::Motion;
 const GRID_POINTS: usize = 24;
 const GOLDEN_STEPS: usize = 24;
 
-/// Minimum slowdown that is reported as a change.
 const MIN_SLOWDOWN: f64 = 1e-3;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Slows the run down by a factor s and widens each limit that is still violated by the necessary amount. The factor
 /// minimises the sum of relative changes, `s - 1 + Σ c_i(s)`.
 ///
-/// `c` is the constraint's value: the violation as a share of the limit, for the floor in metres. A slower run reduces
-/// velocity, acceleration, jerk and the part of the torque that is not gravity, so the sum falls before it rises. It is
-/// evaluated on a grid up to the s whose `s - 1` alone exceeds the sum at s = 1, then refined by golden section. `None`
-/// if a motion is not finite or `stop` returns true.
+/// `c` is the constraint's value: the violation as a share of the limit, for the floor of the arm's length. A slower
+/// run reduces velocity, acceleration, jerk and the part of the torque that is not gravity, so the sum falls before it
+/// rises. It is evaluated on a grid up to the s whose `s - 1` alone exceeds the sum at s = 1, then refined by golden
+/// section. `None` if a motion is not finite or `stop` returns true.
 pub(super) fn smallest_combination(
     set: &LimitSet,
     times_s: &[f64],
@@ -70,7 +69,6 @@ pub(super) fn smallest_combination(
             }
         }
     }
-    // A negligible slowdown is replaced by wider limits.
     if best.1 - 1.0 < MIN_SLOWDOWN {
         best = at(1.0);
     }

@@ -6,14 +6,12 @@
 use super::segments::segment_distance;
 use dynident_model::{Transform, Vec3};
 
-/// Corners in the frame of a body, and the placement of the body.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placed<'a> {
     pub(crate) corners: &'a [Vec3],
     pub(crate) at: &'a Transform,
 }
 
-/// Distance of two hulls and where it is attained.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HullDistance {
     /// Distance, m; 0 if they overlap. Beyond the requested distance a lower bound.
@@ -27,10 +25,8 @@ pub(crate) struct HullDistance {
 /// Maximum number of iterations; a dozen are usual.
 const MAX_ITERATIONS: usize = 48;
 
-/// Relative tolerance of the squared distance.
 const RELATIVE_TOLERANCE: f64 = 1e-12;
 
-/// A corner of the Minkowski difference, and the two corners that it results from.
 #[derive(Clone, Copy)]
 struct Corner {
     difference: Vec3,
@@ -39,7 +35,6 @@ struct Corner {
 }
 
 impl Placed<'_> {
-    /// Corner farthest along a direction of the base frame.
     fn farthest(&self, direction: Vec3) -> Vec3 {
         let local = self.at.rotation.transpose_mul_vec(direction);
         let mut best = (f64::NEG_INFINITY, Vec3::ZERO);
@@ -127,7 +122,6 @@ pub(crate) fn hull_distance(first: Placed<'_>, second: Placed<'_>, beyond: f64, 
     HullDistance { distance_m, points, direction: towards.scale(1.0 / towards.norm()) }
 }
 
-/// Best result so far.
 struct Nearest {
     square: f64,
     points: [Vec3; 2],
@@ -141,7 +135,6 @@ fn overlapping(first: Placed<'_>, second: Placed<'_>) -> HullDistance {
     HullDistance { distance_m: 0.0, points, direction }
 }
 
-/// Point of a simplex nearest to the origin.
 struct SimplexPoint {
     point: Vec3,
     square: f64,
@@ -171,7 +164,6 @@ fn of_shares(simplex: &[Corner], shares: [f64; 4]) -> SimplexPoint {
     SimplexPoint { point, square: point.dot(point), shares }
 }
 
-/// Barycentric shares at the point of a segment nearest to the origin.
 fn on_segment(a: Vec3, b: Vec3) -> [f64; 2] {
     let along = b - a;
     let length2 = along.dot(along);
@@ -296,7 +288,6 @@ mod tests {
             let other = Placed { corners: &second, at: &Transform::IDENTITY };
             let placed: Vec<Vec3> = first.iter().map(|corner| at.point(*corner)).collect();
             let [below, above] = by_shares(&placed, &second);
-            // The result does not depend on the guess.
             let mut guess = if case % 2 == 0 { Vec3::ZERO } else { random.direction() };
             let found = hull_distance(one, other, f64::INFINITY, &mut guess);
             // The oracle's bounds differ by at most 1e-7 for separate hulls.

@@ -101,7 +101,6 @@ fn smallest_stretch(set: &LimitSet, motion: &Motion, stop: &dyn Fn() -> bool) ->
     Some(kept)
 }
 
-/// Describes the violation of a limit.
 pub(super) fn amount(constraint: &Constraint, c: f64) -> String {
     let Constraint { kind, middle, size, unit, .. } = constraint;
     let found = constraint.quantity(c);

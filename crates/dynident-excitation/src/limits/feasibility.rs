@@ -130,7 +130,6 @@ mod tests {
 
     #[test]
     fn each_regime_is_the_integrated_bang_bang_profile() {
-        // (jerking, steady, cruise): all phases, no steady acceleration, no cruise, jerk only.
         for (jerking, steady, cruise) in [(0.2, 0.3, 0.5), (0.4, 0.0, 0.7), (0.3, 0.6, 0.0), (0.5, 0.0, 0.0)] {
             let (distance, speed, acceleration) = profile(7.0, jerking, steady, cruise);
             let duration = 4.0 * jerking + 2.0 * steady + cruise;
@@ -148,7 +147,6 @@ mod tests {
         assert_eq!(shortest_duration_s(1.0, Some(2.0), None, None), 0.5);
         assert_eq!(shortest_duration_s(1.0, None, Some(4.0), None), 1.0);
         assert_eq!(shortest_duration_s(4.0, None, None, Some(2.0)), 4.0);
-        // Top velocity not reached, and reached.
         assert_eq!(shortest_duration_s(1.0, Some(2.0), Some(4.0), None), 1.0);
         assert_eq!(shortest_duration_s(1.0, Some(1.0), Some(4.0), None), 1.25);
     }

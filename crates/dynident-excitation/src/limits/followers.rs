@@ -43,7 +43,6 @@ fn follower_bands(model: &Model) -> Vec<FollowerBand> {
     bands
 }
 
-/// Bands of all followers.
 #[derive(Clone, Debug)]
 pub(crate) struct FollowerLimits(Vec<FollowerBand>);
 

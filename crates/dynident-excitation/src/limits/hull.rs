@@ -12,7 +12,6 @@ const MAX_EXACT_CORNERS: usize = 32;
 /// Directions in which the outermost corners are selected.
 const DIRECTIONS: usize = 40;
 
-/// Maximum number of corners of a closer shape.
 const MAX_CLOSE_CORNERS: usize = 80;
 
 impl LinkShape {
@@ -66,7 +65,6 @@ impl LinkShape {
     }
 }
 
-/// Outermost corners in evenly distributed directions, without duplicates.
 fn outermost(corners: &[Vec3]) -> Vec<Vec3> {
     let mut found: Vec<usize> = Vec::new();
     for direction in spiral(DIRECTIONS) {
@@ -84,7 +82,6 @@ fn outermost(corners: &[Vec3]) -> Vec<Vec3> {
     found.into_iter().map(|index| corners[index]).collect()
 }
 
-/// Largest distance of a point from a hull.
 fn farthest_from(hull: &[Vec3], points: &[Vec3]) -> f64 {
     let at = Transform::IDENTITY;
     let mut farthest = 0.0_f64;
@@ -104,7 +101,6 @@ mod tests {
     #[test]
     fn the_coarser_shape_contains_the_finer_one() {
         let mut random = Random::new(5);
-        // Points on an ellipsoid, so that all are corners.
         let corners_m: Vec<Vec3> = (0..2000)
             .map(|_| {
                 let [x, y, z] = random.direction().0;

@@ -17,7 +17,6 @@ struct Band {
     constraint: Constraint,
 }
 
-/// Bands of all joints.
 #[derive(Clone, Debug)]
 pub(crate) struct JointMotionLimits(Vec<Band>);
 

@@ -41,7 +41,6 @@ impl LimitKind {
         matches!(self, Self::Box | Self::Floor | Self::Column | Self::SelfCollision)
     }
 
-    /// Whether the limit is a minimum distance instead of a maximum magnitude.
     pub(crate) fn is_clearance(self) -> bool {
         matches!(self, Self::Floor | Self::Column | Self::SelfCollision)
     }

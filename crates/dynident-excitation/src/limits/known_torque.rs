@@ -135,7 +135,6 @@ impl KnownTorque {
 
 const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
 
-/// Torque of one unit of a term on one joint at one sample.
 fn column(term: &TorqueTerm, joint: usize, motion: &JointMotion<'_>) -> f64 {
     let mut out = [0.0];
     let mut input = TermInput { load: None, temperature_c: None, memory: &mut HysteresisState::default() };
@@ -184,7 +183,6 @@ mod tests {
         known.range(&[10.0, 20.0], [&[0.0; 2], &dq, &ddq], &mut low, &mut high);
         assert_eq!(low, high);
         assert!((low[0] - (10.0 + 2.0 * of_third)).abs() < 1e-12 && (low[1] - (20.0 - of_third)).abs() < 1e-12);
-        // Either sign at rest.
         known.range(&[0.0; 2], [&[0.0; 2], &[0.0; 2], &[0.0; 2]], &mut low, &mut high);
         assert_eq!((low, high), ([-8.0, -4.0], [8.0, 4.0]));
     }

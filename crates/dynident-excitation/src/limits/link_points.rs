@@ -23,13 +23,11 @@ pub struct LinkPoint {
 #[derive(Clone, Debug)]
 pub(crate) struct BodyPoint {
     pub(crate) body: Option<usize>,
-    /// Place in the body's frame, m.
     pub(crate) at: Vec3,
     pub(crate) radius_m: f64,
     pub(crate) name: String,
 }
 
-/// The body that carries the link `name`, and `body_from_link`.
 pub(crate) fn link_place(model: &Model, name: &str, what: &str) -> Result<(Option<usize>, Transform), LimitError> {
     let bodies = core::iter::once((None, model.base()))
         .chain(model.bodies().iter().enumerate().map(|(index, body)| (Some(index), body)));

@@ -7,7 +7,6 @@ use dynident_dynamics::{Workspace, body_placements};
 use dynident_model::sample::Random;
 use dynident_model::{Model, Transform};
 
-/// Links of a robot as solids, and the pairs that must keep a distance.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct SolidPairs {
     pub solids: Vec<LinkSolid>,
@@ -20,7 +19,6 @@ pub(crate) struct SolidPairs {
     pub close: Vec<[String; 2]>,
 }
 
-/// Two solids that must keep a distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SolidPair {
     /// Indices of the solids.
@@ -31,7 +29,6 @@ pub(crate) struct SolidPair {
     pub size_m: f64,
 }
 
-/// Number of random postures in which overlapping links are searched for.
 const POSTURES: usize = 256;
 
 /// Minimum scale of a missing distance, as a share of the arm's length.

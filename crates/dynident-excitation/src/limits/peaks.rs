@@ -32,12 +32,10 @@ impl Default for PeakSettings {
     }
 }
 
-/// A local maximum in refinement.
 struct Bracket {
     row: usize,
     from: f64,
     to: f64,
-    /// The two inner times and their values.
     inner: [(f64, f64); 2],
     best: (f64, f64),
 }
@@ -119,7 +117,6 @@ fn peaks_of(
     found
 }
 
-/// Largest sample of a row.
 fn sampled_peak(row: usize, values: &[f64], times_s: &[f64]) -> Peak {
     let mut peak = Peak { row, value: f64::NEG_INFINITY, sampled: f64::NEG_INFINITY, at_s: times_s[0] };
     for (&value, &at_s) in values.iter().zip(times_s) {
@@ -137,7 +134,6 @@ fn bracket_maxima(peak: &Peak, values: &[f64], times_s: &[f64], band: f64, brack
     for (sample, &value) in values.iter().enumerate() {
         let before = sample.saturating_sub(1);
         let after = (sample + 1).min(values.len() - 1);
-        // A constant section has no maximum.
         let stands_out = value > values[before] || value > values[after];
         if value.is_finite() && stands_out && value >= worth && value >= values[before] && value >= values[after] {
             let (from, to) = (times_s[before], times_s[after]);

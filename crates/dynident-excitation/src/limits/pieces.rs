@@ -19,7 +19,6 @@ const MIN_RELATIVE_GAIN: f64 = 0.02;
 
 type Triangle = [Vec3; 3];
 
-/// A part of the surface and its best cut.
 struct Piece {
     triangles: Vec<Triangle>,
     cut: Option<Cut>,
@@ -55,7 +54,6 @@ pub(super) fn convex_pieces(triangles: Vec<Triangle>, most: usize) -> Vec<Vec<Ve
     pieces.into_iter().map(|piece| distinct(piece.triangles)).collect()
 }
 
-/// Corners of triangles, without duplicates.
 fn distinct(triangles: Vec<Triangle>) -> Vec<Vec3> {
     let mut corners: Vec<[u64; 3]> = triangles.into_iter().flatten().map(|corner| corner.0.map(f64::to_bits)).collect();
     corners.sort_unstable();
@@ -75,7 +73,6 @@ pub(super) fn spiral(count: usize) -> Vec<Vec3> {
     (0..count).map(direction).collect()
 }
 
-/// Outermost points of a set in all directions.
 #[derive(Clone)]
 struct Outermost(Vec<(f64, Vec3)>);
 
@@ -112,7 +109,6 @@ impl Outermost {
     }
 }
 
-/// Volume of the hull of a piece, and its best cut.
 fn best_cut(triangles: &[Triangle], directions: &[Vec3]) -> (f64, Option<Cut>) {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for corner in triangles.iter().flatten() {
@@ -174,7 +170,6 @@ fn best_cut(triangles: &[Triangle], directions: &[Vec3]) -> (f64, Option<Cut>) {
     (whole, best)
 }
 
-/// Part of the triangles below (`side` -1) or above a plane, as triangles.
 fn half(triangles: &[Triangle], cut: Cut, side: f64) -> Vec<Triangle> {
     let mut kept = Vec::with_capacity(triangles.len() / 2);
     for triangle in triangles {
@@ -261,7 +256,6 @@ mod tests {
     use dynident_model::Transform;
     use dynident_model::sample::Random;
 
-    /// Surface of a box as triangles.
     fn block(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
         let corner =
             |k: usize| Vec3(core::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] }));
@@ -277,7 +271,6 @@ mod tests {
         let tetrahedron = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Vec3);
         assert!((hull_volume(&tetrahedron) - 1.0 / 6.0).abs() < 1e-15);
         assert_eq!(hull_volume(&tetrahedron[..3]), 0.0);
-        // Points inside do not change the volume.
         let mut random = Random::new(3);
         let mut more = corners;
         more.extend((0..50).map(|_| Vec3([1.0, 2.0, 3.0].map(|high| random.uniform(0.0, high)))));
@@ -302,7 +295,6 @@ mod tests {
         let sum: f64 = pieces.iter().map(|piece| volume(piece)).sum();
         // The legs have 0.019 m³, their hull 0.06.
         assert!(sum < 0.024, "{sum}");
-        // Every point of the surface is in the hull of a piece.
         let mut random = Random::new(4);
         for triangle in &angle {
             for _ in 0..20 {

@@ -9,7 +9,6 @@ use super::term::{Adjoint, Inputs, Term};
 use super::validate::middle_and_half;
 use dynident_model::{Model, Vec3};
 
-/// Region that a point must not leave.
 #[derive(Clone, Debug)]
 enum AllowedRegion {
     /// `|p[axis] - middle| / half - 1`.
@@ -72,12 +71,10 @@ fn path(inputs: &Inputs<'_>, point: &BodyPoint, sample: usize) -> (Vec3, Option<
     (at(sample), follows.then(|| at(sample + 1)))
 }
 
-/// Rows of points with their regions.
 #[derive(Clone, Debug)]
 pub(crate) struct PlaceLimits(Vec<(BodyPoint, AllowedRegion, Constraint)>);
 
 impl PlaceLimits {
-    /// Box limits: one row per point and limited axis.
     pub(crate) fn boxed(model: &Model, limit: &BoxLimit) -> Result<Self, LimitError> {
         let mut rows = Vec::new();
         for point in body_points(model, &limit.points, "a box")? {
@@ -108,7 +105,6 @@ impl PlaceLimits {
         Ok(Self(body_points(model, &limit.points, "the floor")?.into_iter().map(row).collect()))
     }
 
-    /// Column limits: one row per point.
     pub(crate) fn column(model: &Model, limit: &ColumnLimit) -> Result<Self, LimitError> {
         let row = |point: BodyPoint| {
             let least = limit.radius_m + point.radius_m;

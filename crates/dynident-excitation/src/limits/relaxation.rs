@@ -7,7 +7,6 @@ use crate::motion::Motion;
 /// Value above which a limit is violated, as in the final check.
 pub(super) const TOLERANCE: f64 = 1e-6;
 
-/// Largest considered factor on the duration.
 pub(super) const MAX_STRETCH: f64 = 1000.0;
 
 /// A limit that the best motion found violates.
@@ -59,7 +58,6 @@ pub enum Relaxation {
     },
 }
 
-/// Limits that a motion violates, worst first.
 pub(super) fn broken_limits(
     set: &LimitSet,
     workspace: &mut LimitWorkspace,
@@ -81,7 +79,6 @@ pub(super) fn broken_limits(
     broken
 }
 
-/// Change of one limit that allows the motion.
 pub(super) fn change(broken: &BrokenLimit) -> LimitChange {
     let Constraint { kind, subject, middle, size, unit } = &broken.constraint;
     let needed = broken.constraint.quantity(broken.value);

@@ -89,7 +89,6 @@ mod tests {
     /// Minimum of a convex function on 0 to 1 by ternary search: an independent oracle without derivatives.
     fn least(of: &dyn Fn(f64) -> f64) -> f64 {
         let (mut low, mut high) = (0.0, 1.0);
-        // (2/3)^90 = 1e-16
         for _ in 0..90 {
             let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
             if of(a) < of(b) { high = b } else { low = a }

@@ -116,7 +116,6 @@ impl SelfCollision {
         Ok(())
     }
 
-    /// Whether capsules are fitted because no shape is given.
     pub(crate) fn fitted(&self) -> bool {
         self.capsules.is_empty() && self.shapes.is_empty()
     }

@@ -37,7 +37,6 @@ pub struct LimitSet {
 pub struct LimitWorkspace {
     batch: BatchWorkspace,
     single: Workspace,
-    /// Motion of the stored torques and placements.
     motion: Motion,
     /// Torque of the rigid bodies.
     tau: Vec<f64>,
@@ -108,7 +107,6 @@ impl LimitSet {
         &self.constraints
     }
 
-    /// Rows that limit the motion of a single joint.
     pub(crate) fn bands(&self) -> &[JointBand] {
         &self.bands
     }

@@ -11,7 +11,6 @@ use dynident_model::{Model, Transform, Vec3};
 pub(crate) struct BodyShape {
     pub corners: Vec<Vec3>,
     pub radius_m: f64,
-    /// Mean of the corners.
     centre: Vec3,
     /// Radius of a sphere around the centre that contains the shape, m.
     reach_m: f64,
@@ -29,7 +28,6 @@ pub(crate) struct LinkSolid {
     pub reach_m: f64,
 }
 
-/// Distance between two links.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolidDistance {
     /// Distance between the surfaces, m; negative if they overlap, then a measure of the depth. Beyond the requested
@@ -54,7 +52,6 @@ impl BodyShape {
     }
 }
 
-/// Mean of the points, and the largest distance of a point from it.
 fn ball(points: &[Vec3]) -> (Vec3, f64) {
     let sum = points.iter().fold(Vec3::ZERO, |sum, point| sum + *point);
     let centre = sum.scale(1.0 / points.len().max(1) as f64);
@@ -162,7 +159,6 @@ pub(crate) fn solid_distance(
     if nearest.surface_m.is_finite() { nearest } else { bound.unwrap_or(nearest) }
 }
 
-/// Distance between two balls.
 fn by_balls(first: Vec3, first_reach: f64, second: Vec3, second_reach: f64) -> SolidDistance {
     let apart = first - second;
     let length = apart.norm();

@@ -4,19 +4,16 @@ use super::convex::{Placed, hull_distance};
 use dynident_model::collision::Solid;
 use dynident_model::{Transform, Vec3};
 
-/// Maximum number of elements of a leaf.
 const MAX_LEAF_ELEMENTS: usize = 4;
 
 /// Convex element of a surface: a triangle, or a convex shape with its radius.
 #[derive(Clone, Debug)]
 struct Element {
-    /// Index range of its corners.
     first: usize,
     end: usize,
     radius_m: f64,
 }
 
-/// Axis-aligned box that contains elements.
 #[derive(Clone, Debug)]
 struct Node {
     centre: Vec3,
@@ -68,7 +65,6 @@ impl Surface {
         }
     }
 
-    /// Bounding box of some elements.
     fn node(&self, elements: &[usize]) -> Node {
         let (mut low, mut high) = (Vec3([f64::INFINITY; 3]), Vec3([f64::NEG_INFINITY; 3]));
         for place in elements {
@@ -170,7 +166,6 @@ mod tests {
     use dynident_model::Mat3;
     use dynident_model::sample::Random;
 
-    /// A rough sheet of triangles.
     fn sheet(random: &mut Random, steps: u32) -> Solid {
         let corner = |random: &mut Random, i: u32, j: u32| {
             Vec3([f64::from(i), f64::from(j), random.uniform(0.0, 1.5)]).scale(1.0 / f64::from(steps))

@@ -14,7 +14,6 @@ pub(crate) struct Inputs<'a> {
     pub(crate) motion: &'a Motion,
     pub(crate) torque: &'a TorqueRange,
     pub(crate) placements: &'a [Transform],
-    /// Number of placements of one sample.
     pub(crate) bodies: usize,
     /// Whether samples are consecutive times of one motion, so that obstacles are also tested between them.
     pub(crate) swept: bool,
@@ -44,12 +43,9 @@ impl Adjoint<'_> {
     }
 }
 
-/// Constraints of one kind.
 pub(crate) trait Term: Debug + Send + Sync {
-    /// The rows, in the order of the values.
     fn constraints(&self) -> Vec<Constraint>;
 
-    /// Writes `rows × samples` values.
     fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]);
 
     /// Adds the derivatives of a cost, given its derivatives `weights` with respect to the values.

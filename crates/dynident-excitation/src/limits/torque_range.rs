@@ -34,7 +34,6 @@ impl TorqueRange {
     }
 }
 
-/// Known torque of a robot, prepared for a search.
 #[derive(Clone, Debug)]
 pub(crate) struct SmoothTorque {
     terms: Vec<SmoothTerm>,

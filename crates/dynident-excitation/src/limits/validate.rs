@@ -104,7 +104,6 @@ fn validate_joint(limit: &JointLimit) -> Result<(), LimitError> {
     Ok(())
 }
 
-/// Middle and half width of a range, without overflow.
 pub(super) fn middle_and_half(range: [f64; 2]) -> (f64, f64) {
     let [lower, upper] = range;
     (0.5 * lower + 0.5 * upper, 0.5 * upper - 0.5 * lower)

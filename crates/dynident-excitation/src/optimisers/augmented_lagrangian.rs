@@ -10,11 +10,9 @@ use super::{OptimiserError, Progress, Step, Watch, check_bounds, check_length, s
 /// together, reusing the intermediate values. Constraints should be scaled to order one (limit reached = 0, limit
 /// exceeded by its own size = 1).
 pub(crate) trait ConstrainedProblem {
-    /// Number of variables.
     fn variables(&self) -> usize;
     /// Lower and upper bound of each variable; infinite without bound.
     fn bounds(&self) -> Vec<[f64; 2]>;
-    /// Number of constraints.
     fn constraints(&self) -> usize;
     /// Number of equalities, which are the first constraints.
     fn equalities(&self) -> usize {
@@ -52,7 +50,6 @@ pub(crate) struct CurvatureFacts<'a> {
     pub last: Option<Step<'a>>,
 }
 
-/// Settings of [`augmented_lagrangian()`].
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AugmentedLagrangianSettings {
     /// Maximum violation of a feasible point. Default 1e-8.
@@ -129,22 +126,18 @@ impl From<Vec<f64>> for AugmentedLagrangianState {
     }
 }
 
-/// Reason for the end of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum AugmentedLagrangianStatus {
     /// Feasible and stationary within the tolerances.
     Converged,
     /// Feasible, and no lower value exists in double precision, although the gradient exceeds its tolerance.
     PrecisionLimit,
-    /// Outer iterations or evaluations are used up.
     IterationLimit,
     /// The maximum penalty is reached and constraints are still violated: no feasible point nearby.
     Infeasible,
-    /// The callback stopped the search.
     Stopped,
 }
 
-/// Result of [`augmented_lagrangian()`].
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AugmentedLagrangianResult {
     pub status: AugmentedLagrangianStatus,
@@ -201,7 +194,6 @@ pub(crate) fn augmented_lagrangian(
     Ok(search.result(x, status))
 }
 
-/// Checks the bounds of a problem together with its initial state.
 fn checked_bounds(
     problem: &impl ConstrainedProblem,
     state: &AugmentedLagrangianState,
@@ -316,12 +308,10 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         AugmentedLagrangianStatus::IterationLimit
     }
 
-    /// Result of a search that ended at `x`.
     fn result(mut self, x: Vec<f64>, mut status: AugmentedLagrangianStatus) -> AugmentedLagrangianResult {
         if self.stopped {
             status = AugmentedLagrangianStatus::Stopped;
         }
-        // The last evaluation may have been a rejected trial.
         self.objective = self.problem.values(&x, &mut self.c);
         let end_violation = (0..self.c.len()).fold(0.0, |worst: f64, i| worst.max(self.violation_of(i)));
         // Only violated constraints: the multipliers of an unconverged search can be wrong for slack ones.

@@ -239,7 +239,6 @@ mod tests {
                 lowest = lowest.min(generation.best);
                 assert_eq!(generation.best_so_far, lowest);
                 assert!(generation.best <= generation.mean);
-                // With an elite no generation is worse than the previous one.
                 assert!(!elite || generation.best == lowest);
             }
         }

@@ -157,7 +157,6 @@ fn minimised(
     for run in 0..=settings.restarts {
         let population = smallest << run;
         if run > 0 && population > settings.max_evaluations.saturating_sub(search.result.evaluations) {
-            // The evaluations do not suffice for another generation.
             search.result.status = CmaEsStatus::EvaluationLimit;
             break;
         }
@@ -192,7 +191,6 @@ fn check_input(
     Ok(())
 }
 
-/// Nearest point inside the bounds.
 fn clamped(x: &[f64], bounds: &[[f64; 2]]) -> Vec<f64> {
     x.iter().zip(bounds).map(|(x, b)| x.clamp(b[0], b[1])).collect()
 }
@@ -326,7 +324,6 @@ impl Strategy {
         y.iter().zip(&self.steps).map(|(y, step)| y * step).collect()
     }
 
-    /// Values by which candidates are ranked.
     fn penalised(&self, candidates: &[DVector<f64>], inside: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
         let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         finite.sort_by(f64::total_cmp);

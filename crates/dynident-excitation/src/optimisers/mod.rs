@@ -42,7 +42,6 @@ pub struct Progress<'a> {
 /// Callback after every step: `Break` ends the search with the best point so far.
 pub type Watch<'a> = dyn FnMut(&Progress<'_>) -> ControlFlow<()> + 'a;
 
-/// An objective without derivatives, evaluated from any thread.
 type Objective<'a> = dyn Fn(&[f64]) -> f64 + Sync + 'a;
 
 /// Invalid input of an optimiser.

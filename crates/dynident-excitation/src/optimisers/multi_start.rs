@@ -9,7 +9,6 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
-/// Result of [`multi_start()`].
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MultiStartResult {
     /// Index of the best start: lowest objective among the feasible ones, else smallest violation.
@@ -19,12 +18,10 @@ pub(crate) struct MultiStartResult {
 }
 
 impl MultiStartResult {
-    /// Result of the best start; `None` if the problem is undefined at all starts.
     pub(crate) fn best(&self) -> Option<&AugmentedLagrangianResult> {
         self.runs.get(self.best_start)?.as_ref().ok()
     }
 
-    /// Evaluations of all starts.
     pub(crate) fn evaluations(&self) -> usize {
         self.runs.iter().flatten().map(|run| run.evaluations).sum()
     }

@@ -8,7 +8,6 @@ use std::collections::VecDeque;
 pub(crate) trait Smooth {
     /// Value at `x`; not finite where the function is undefined.
     fn value(&mut self, x: &[f64]) -> f64;
-    /// The gradient at the point of the last [`value`](Smooth::value).
     fn gradient(&mut self, gradient: &mut [f64]);
     /// Prepares a model of the curvature at the point of the last [`gradient`](Smooth::gradient), from the gradient and
     /// the last step with its change of the gradient; false without a model.
@@ -17,24 +16,19 @@ pub(crate) trait Smooth {
     }
     /// Multiplies by the inverse of that model.
     fn divide_by_metric(&self, _vector: &mut [f64]) {}
-    /// Whether the search must end now.
     fn halted(&self) -> bool;
 }
 
-/// Reason for the end of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum End {
     /// The projected gradient is below the tolerance.
     Stationary,
-    /// The iterations are used up.
     IterationLimit,
     /// No lower value along the steepest descent in double precision.
     NoDescent,
-    /// The function stopped the search.
     Halted,
 }
 
-/// Stopping criteria and memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
     pub(crate) tolerance: f64,
@@ -42,7 +36,6 @@ pub(crate) struct Effort {
     pub(crate) memory: usize,
 }
 
-/// A step of a search, and the resulting change of the gradient.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Step<'a> {
     /// Difference of the points.

@@ -25,7 +25,6 @@ use thiserror::Error;
 /// Minimum share of gravity normal to an axis; below it the joint torque depends only on the inertia.
 const MIN_GRAVITY_SHARE: f64 = 1e-6;
 
-/// Variables of one stroke: A, ω, δ.
 const VARIABLES_PER_STROKE: usize = 3;
 
 /// Reason why a joint cannot be designed separately.

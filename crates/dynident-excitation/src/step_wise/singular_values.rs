@@ -1,6 +1,5 @@
 //! Singular values of a tall matrix with three columns.
 
-/// The singular values, largest first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Singular3([f64; 3]);
 

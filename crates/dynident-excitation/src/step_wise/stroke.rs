@@ -19,7 +19,6 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// A, ω, δ.
     pub(super) fn of(x: &[f64]) -> Self {
         Self { amplitude_rad: x[0], steepness_per_s: x[1], window_s: x[2] }
     }

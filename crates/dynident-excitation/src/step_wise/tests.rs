@@ -27,7 +27,6 @@ fn level() -> StrokeConstants {
     }
 }
 
-/// The planar arm, tip first.
 fn planar() -> StepWiseProblem {
     StepWiseProblem { joints: [1, 0].map(|joint| StepWiseJoint { joint, constants: level() }).to_vec() }
 }

@@ -107,7 +107,6 @@ fn limits_around(model: &Model, family: &dyn Family, parameters: &[f64], floor: 
     limits
 }
 
-/// Random limits, feasible or not.
 fn random_limits(model: &Model, index: usize, random: &mut Random) -> Limits {
     let mut some = |low: f64, high: f64, chance: f64| {
         let value = low * (high / low).powf(random.uniform(0.0, 1.0));

@@ -15,7 +15,6 @@ use dynident_model::Model;
 use dynident_model::sample::{Random, planar_2r};
 use nalgebra::DMatrix;
 
-/// Counts evaluations and draws, and those after `ended`.
 #[derive(Debug, Default)]
 struct Counter {
     ended: AtomicBool,
@@ -34,7 +33,6 @@ impl Counter {
     }
 }
 
-/// D-optimality that counts evaluations.
 #[derive(Debug)]
 struct Counted<'a>(&'a Counter);
 
@@ -67,7 +65,6 @@ impl Criterion for Counted<'_> {
     }
 }
 
-/// A family that counts random motions.
 #[derive(Debug)]
 struct Drawn<'a>(Fourier, &'a Counter);
 

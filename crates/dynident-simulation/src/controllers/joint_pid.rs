@@ -38,7 +38,6 @@ impl JointPidSettings {
 pub struct JointPid {
     gains: [Vec<f64>; 3],
     limit: Vec<f64>,
-    /// Torque of the integral, Nm (N).
     integral: Vec<f64>,
     last_error: Vec<f64>,
     last_time_s: Option<f64>,

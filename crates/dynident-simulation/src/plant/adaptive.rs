@@ -88,7 +88,6 @@ impl Solout<f64, Vec<f64>> for Watch<'_> {
     }
 }
 
-/// Integrates the state over `duration_s` with constant torques.
 pub(super) fn advance(
     equations: &mut Equations,
     state: &mut State,

@@ -75,7 +75,6 @@ pub enum Disturbance {
     },
 }
 
-/// A disturbance with the index of its joint.
 #[derive(Clone, Debug)]
 pub(super) struct JointDisturbance {
     joint: usize,

@@ -11,11 +11,8 @@ use dynident_model::terms::{HysteresisState, JointMotion, TermAction, TermInput,
 pub(super) struct Drives {
     /// Entries (row, column, value) that drives add to the mass matrix.
     pub(super) inertia: Vec<(usize, usize, f64)>,
-    /// Constant torques.
     pub(super) constant: Vec<f64>,
-    /// Entries of the viscous matrix.
     pub(super) viscous: Vec<(usize, usize, f64)>,
-    /// Friction that depends on velocities.
     pub(super) units: Vec<FrictionUnit>,
     springs: Vec<SlippingSpring>,
     states: Vec<StateTorque>,
@@ -30,7 +27,6 @@ struct SlippingSpring {
     memory: HysteresisState,
 }
 
-/// A torque of one joint that depends on positions and velocities.
 #[derive(Clone, Debug)]
 struct StateTorque {
     joint: usize,
@@ -125,14 +121,12 @@ impl Drives {
         }
     }
 
-    /// Updates the springs to the positions `q`.
     pub(super) fn follow(&mut self, q: &[f64]) {
         for spring in &mut self.springs {
             deflection(&spring.term, spring.joint, q, &mut spring.memory);
         }
     }
 
-    /// Resets the springs to zero deflection at `q`.
     pub(super) fn restart(&mut self, q: &[f64]) {
         for spring in &mut self.springs {
             spring.memory.restart();

@@ -10,7 +10,6 @@ use super::friction_unit::FrictionUnit;
 use dynident_dynamics::{Workspace, mass_matrix_and_bias};
 use dynident_model::Model;
 
-/// State of a friction unit during an explicit step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mode {
     /// Moving, or unable to hold: friction of this branch.
@@ -20,7 +19,6 @@ pub(super) enum Mode {
     Held,
 }
 
-/// State of the robot for integrators.
 #[derive(Clone, Copy)]
 pub(super) struct StateView<'a> {
     pub(super) time_s: f64,
@@ -49,14 +47,12 @@ pub(super) struct Equations {
     free: Vec<f64>,
     pub(super) solver: FrictionSolver,
     pub(super) modes: Vec<Mode>,
-    /// Indices of the chosen units.
     chosen: Vec<usize>,
     /// Number of steps without convergence of the friction torques.
     pub(super) unsettled: usize,
 }
 
 impl Clone for Equations {
-    /// Clones the robot with separate scratch.
     fn clone(&self) -> Self {
         Self {
             workspace: Workspace::with_level(&self.model, self.workspace.level()),
@@ -223,7 +219,6 @@ impl Equations {
         self.subtract_friction_response();
     }
 
-    /// Subtracts the effect of the chosen units' torques from the accelerations.
     fn subtract_friction_response(&mut self) {
         let n = self.acceleration.len();
         for place in 0..self.chosen.len() {
@@ -242,7 +237,6 @@ impl Equations {
         }
     }
 
-    /// Accelerations with every unit in its mode.
     pub(super) fn in_modes(&mut self, at: StateView<'_>) -> Result<(), PlantFault> {
         self.assemble(at, 0.0);
         if self.drives.units.is_empty() {

@@ -186,7 +186,6 @@ fn solve_all_of<const N: usize>(l: &[f64], b: &mut [f64]) {
     let Ok(l) = <&[[f64; N]; N]>::try_from(rows) else { return };
     let (sides, _) = b.as_chunks_mut::<N>();
     for sides in sides.chunks_mut(N) {
-        // Entry by entry, each of all right-hand sides.
         let mut x = [[0.0; N]; N];
         for (at, side) in sides.iter().enumerate() {
             for i in 0..N {

@@ -12,7 +12,6 @@
 use super::factor::eliminate;
 use super::friction_unit::{FrictionParts, FrictionUnit};
 
-/// Maximum number of rounds. Newton's method has always converged in two or three.
 const MAX_ROUNDS: usize = 400;
 /// Tolerance of the velocity change, relative to the largest velocity.
 const RELATIVE_TOLERANCE: f64 = 1e-13;
@@ -22,7 +21,6 @@ const MIN_SPEED: f64 = 1e-250;
 /// Torques and scratch. The last solution is the start of the next step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrictionSolver {
-    /// Torques of the units.
     pub(super) torque: Vec<f64>,
     /// Velocities (accelerations) of the units; exactly zero for held units.
     pub(super) speed: Vec<f64>,

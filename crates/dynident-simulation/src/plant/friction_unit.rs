@@ -8,7 +8,6 @@ struct Term {
     kind: TorqueTerm,
     value: f64,
     by_load: bool,
-    /// Velocity and exponent of the Stribeck effect.
     fading: Option<[f64; 2]>,
     /// For a sign function (which at rest holds any torque up to the level): the directions in which it acts.
     step: Option<[bool; 2]>,
@@ -30,7 +29,6 @@ pub(super) struct FrictionUnit {
     pub(super) by_load: bool,
 }
 
-/// Velocity and friction of a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FrictionParts {
     pub(super) speed: f64,
@@ -65,7 +63,6 @@ impl FrictionUnit {
         self.add(term, &friction, value);
     }
 
-    /// Whether the unit can hold a joint at rest.
     pub(super) fn holds(&self) -> bool {
         self.steps
     }
@@ -96,7 +93,6 @@ impl FrictionUnit {
         self.level
     }
 
-    /// Value and slope of the smooth part.
     fn smooth(&self, speed: f64) -> [f64; 2] {
         let mut sum = [0.0; 2];
         if self.smooth {
@@ -163,7 +159,6 @@ impl FrictionUnit {
         FrictionParts { speed: r - c * torque, torque, slope: Some(0.0) }
     }
 
-    /// Velocity of the unit from the joint velocities.
     #[inline]
     pub(super) fn speed(&self, dq: &[f64]) -> f64 {
         self.joints.iter().map(|&(joint, ratio)| ratio * dq[joint]).sum()
@@ -197,7 +192,6 @@ mod tests {
             for r in [-50.0, -1.0, -1e-3, 0.0, 1e-9, 0.2, 4.0, 900.0] {
                 let found = unit.resolve(r, c);
                 assert!((found.speed + c * found.torque - r).abs() <= 1e-12 * (1.0 + r.abs()), "{r} {c} {found:?}");
-                // Friction is dissipative.
                 assert!(found.speed * found.torque >= 0.0);
                 if found.slope.is_none() {
                     assert!(found.torque.abs() <= 0.9 + 1e-12);

@@ -43,7 +43,6 @@ pub enum PlantFault {
     StepSize,
 }
 
-/// Time, positions and velocities.
 #[derive(Clone, Debug, PartialEq)]
 struct State {
     time_s: f64,

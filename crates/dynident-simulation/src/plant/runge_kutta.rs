@@ -10,14 +10,12 @@ use super::{PlantFault, State, euler};
 /// Maximum number of stops in one step; the rest is integrated by the implicit step.
 const MAX_STOPS: usize = 16;
 
-/// Stages of a step, allocated once.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stages {
     q: Vec<f64>,
     dq: Vec<f64>,
     speeds: [Vec<f64>; 3],
     accelerations: [Vec<f64>; 4],
-    /// State after the step.
     q_next: Vec<f64>,
     dq_next: Vec<f64>,
 }

@@ -151,7 +151,6 @@ fn perfect_sensors_record_the_truth() {
         let (fine, own) = (&fine.q[fine.of(joint)], &run.q[run.of(joint)]);
         for k in 100..9900 {
             assert!((fine[2 * k] - own[k]).abs() < 1e-14);
-            // Middle of four neighbours, of fourth order.
             let middle = (9.0 * (own[k] + own[k + 1]) - own[k - 1] - own[k + 2]) / 16.0;
             assert!((fine[2 * k + 1] - middle).abs() < 1e-9);
         }
@@ -192,7 +191,6 @@ fn encoders_quantise_and_noise_has_its_size() {
     let (plant, run, sensors) = sine_run(sensors);
     let record = sensors.record(plant.model(), &run).unwrap();
     assert_eq!(record, sensors.record(plant.model(), &run).unwrap());
-    // The same instants as the controller's readings.
     assert_eq!(record.q, run.measured_q);
     let step = core::f64::consts::TAU / 4096.0;
     assert!(record.q.iter().all(|q| (q / step - (q / step).round()).abs() < 1e-6));

@@ -30,7 +30,6 @@ fn terms() -> (Vec<TorqueTerm>, Vec<f64>) {
     (terms, vec![0.5, 0.4, 0.3, 0.2, 0.1, -0.1, 0.6, 0.5])
 }
 
-/// Exact sines of both joints.
 fn sines(rate_hz: f64, duration_s: f64) -> Reference {
     let samples = (rate_hz * duration_s) as usize + 1;
     let mut motion = Motion::default();
@@ -142,7 +141,6 @@ fn gravity_and_integrals_remove_the_sag() {
     // About (2 cos 0.3 + cos 0.7) g / K_p.
     assert!((sag - 9.8 * (2.0 * 0.3_f64.cos() + 0.7_f64.cos()) / 400.0).abs() < 0.1 * sag);
     assert!(last(&ControllerSettings::PdGravity(pd())).abs() < 1e-9);
-    // The time constant of the integral is a second.
     assert!(last(&ControllerSettings::JointPid(pid)).abs() < 1e-4);
 }
 

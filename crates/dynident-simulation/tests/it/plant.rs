@@ -110,7 +110,6 @@ fn a_flywheel_runs_down_and_rests() {
             plant.advance(&[tau, 0.0], 1e-3, integrator).unwrap();
             assert_eq!((plant.q()[0], plant.dq()[0]), (at, 0.0));
         }
-        // Above the friction: I a = τ - F.
         for _ in 0..100 {
             plant.advance(&[-0.9, 0.0], 1e-3, integrator).unwrap();
         }

@@ -12,7 +12,6 @@ use dynident_dynamics::{Workspace, body_placements};
 use dynident_model::collision::Solid;
 use dynident_model::{Model, Transform, Vec3};
 
-/// Number of random postures that are tested in addition to the neutral one.
 const POSTURES: usize = 256;
 
 /// Maximum distance of the pieces beyond the mesh, as a share of the clearance.

@@ -10,7 +10,6 @@ use super::shapes::ShapesOfLinks;
 use dynident_dynamics::{Workspace, body_placements};
 use dynident_model::{Model, Transform};
 
-/// Number of random postures for the highest position of a link.
 const POSTURES: usize = 256;
 
 /// Assumed floor below a machine on its base: at z = 0 of the base frame, or at the lowest point of the base's
@@ -42,7 +41,7 @@ pub(super) fn assumed_floor(
     let solids = LinkSolid::gather(model, &shapes.shapes, "the floor")?;
     let at = Transform::IDENTITY;
     let base = solids.iter().filter(|solid| solid.body.is_none());
-    // A capsule that replaces the shapes of the base has a radius that does not touch the ground.
+    // A capsule that replaces the shapes of the base ends at its frame; its radius is not part of the base.
     let real = |solid: &&LinkSolid| !shapes.stand_ins.contains(&solid.link);
     let plane_m = base.filter(real).map(|solid| solid.lowest(&at).0).fold(0.0, f64::min);
     let mut workspace = Workspace::new(model);

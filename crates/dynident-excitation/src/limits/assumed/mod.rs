@@ -159,7 +159,6 @@ impl LimitsInForce {
     }
 }
 
-/// Minimum distance between links, and its description.
 fn assumed_self_collision(
     model: &Model,
     shapes: &ShapesOfLinks,
@@ -221,7 +220,6 @@ fn run_up(joint: &Joint, range: Option<[f64; 2]>, thresholds: &AssumptionThresho
     range.map(|[lower, upper]| thresholds.run_up_stroke_share * (upper - lower)).filter(|run_up| *run_up > 0.0)
 }
 
-/// Cases that self-collision does not cover.
 fn self_collision_gaps(model: &Model, shapes: &ShapesOfLinks, limits: &Limits) -> Result<Vec<String>, LimitError> {
     let Some(limit) = &limits.self_collision else {
         return Ok(vec!["self-collision (no shapes, or defaults.self_collision is off)".to_owned()]);
@@ -258,7 +256,6 @@ fn follower_gaps(model: &Model) -> Option<String> {
         .then(|| format!("torque of springs and friction at joints that follow several others: {}", listed(&joints)))
 }
 
-/// Joints without one of the limits.
 fn joint_gaps(model: &Model, limits: &Limits) -> Vec<String> {
     let none = JointLimit::default();
     let lacking = |has: &dyn Fn(&JointLimit) -> bool| -> Vec<String> {

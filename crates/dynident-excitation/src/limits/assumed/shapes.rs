@@ -27,9 +27,7 @@ pub struct ShapesOfLinks {
     pub without: Vec<String>,
     /// Unusable shapes, each with its link, file and reason.
     pub dropped: Vec<String>,
-    /// Shapes of the robot description in full detail, with their links.
     solids: Vec<(String, Solid)>,
-    /// Whether the robot description has shapes.
     described: bool,
 }
 
