@@ -52,12 +52,18 @@
 //!     joint.torque = None;
 //! }
 //!
-//! // The most informative Fourier series of 6 s with rest at both ends. let family = Fourier::new(2, 6.0,
-//! &FourierSettings { harmonics: 3, ..FourierSettings::default() })?; let task = DesignTask { family: &family,
-//! criteria: &[&DOptimal], limits: &LimitSet::new(&limits, robot.model())?, layout: robot.layout(), torque_std_nm:
-//! &[0.5, 0.5], prior: None, }; let settings = DesignSettings { starts: Some(2), rounds: Some(0),
-//! evaluations_per_start: Some(300), ..DesignSettings::default() }; let best = design(&task, &settings, |_|
-//! ControlFlow::Continue(()))?;
+//! // The most informative Fourier series of 6 s with rest at both ends.
+//! let family = Fourier::new(2, 6.0, &FourierSettings { harmonics: 3, ..FourierSettings::default() })?;
+//! let task = DesignTask {
+//!     family: &family,
+//!     criteria: &[&DOptimal],
+//!     limits: &LimitSet::new(&limits, robot.model())?,
+//!     layout: robot.layout(),
+//!     torque_std_nm: &[0.5, 0.5],
+//!     prior: None,
+//! };
+//! let settings = DesignSettings { starts: Some(2), rounds: Some(0), evaluations_per_start: Some(300), ..DesignSettings::default() };
+//! let best = design(&task, &settings, |_| ControlFlow::Continue(()))?;
 //!
 //! // Every limit, 10,000 times a second.
 //! let reports = check_limits(&limits, robot.model(), family.duration_s(), CHECK_RATE_HZ, |times, motion| {
