@@ -68,7 +68,7 @@ const DEVIATIONS: &[[&str; 3]] = &[
     ],
     [
         "Eq. 23",
-        "with e = q_d - q the signs of K_p and K_d result in positive feedback",
+        "the signs of K_p and K_d result in positive feedback for e = q_d - q",
         "plus signs; the literal law is available under its own name and diverges",
     ],
     [

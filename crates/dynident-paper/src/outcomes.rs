@@ -96,7 +96,7 @@ fn parameters(runs: &JointRuns) -> Vec<PaperStatement> {
         ),
         statement(
             "section 3",
-            "with more iterations the parameters become more accurate",
+            "more iterations make the parameters more accurate",
             format!(
                 "largest error {} after three and {} after six runs of the paper's own loop",
                 rough(three),
