@@ -69,7 +69,7 @@ impl<'a> Information<'a> {
 
     /// Adds the derivatives of a cost with respect to the motion of the last [`of`](Information::of), given its
     /// symmetric derivative `by_information = ∂f/∂D`: the adjoint of the regressor is `2 W_j G / σ_j²`, and one reverse
-    /// sweep takes it to the motion.
+    /// sweep propagates it to the motion.
     pub fn apply_adjoint(
         &mut self,
         motion: &Motion,

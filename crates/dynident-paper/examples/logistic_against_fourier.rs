@@ -64,7 +64,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Result of a family.
 struct Outcome {
     log_det: f64,
     /// Root mean square error of every base parameter over the seeds.

@@ -58,7 +58,6 @@ pub(crate) fn figure_1() -> PaperFigure {
         drawing = drawing.line(&points.into_iter().map(rounded).collect::<Vec<_>>(), style);
     }
     drawing = drawing.ring(first, 9.0).ring(rounded(second), 9.0);
-    // Next to the middle of the rod.
     let [middle_x, middle_y] = along(first, one, 0.5 * reach);
     for (at, text) in [
         (along(first, 0.0, 156.0), "x₀"),

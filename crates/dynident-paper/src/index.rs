@@ -40,7 +40,6 @@ impl<'a> Numbers<'a> {
         self.file.figures.iter().find(|figure| figure.number == number)
     }
 
-    /// Heading that a row links to, if it is on the page.
     fn target(&self, at: At) -> Option<String> {
         match at {
             At::Table(number) => self.table(number).map(PaperTable::heading),

@@ -24,7 +24,6 @@ const END_SAMPLES: usize = 8;
 /// The run along Eq. 25: times, driving torques, and the regressor rows that predict them.
 pub(crate) struct Verification {
     times: Vec<f64>,
-    /// By joint.
     driving: [Vec<f64>; 2],
     /// By joint and sample, the six columns.
     rows: [Vec<[f64; 6]>; 2],

@@ -16,7 +16,6 @@ pub(crate) struct Assessment {
     pub(crate) information: DMatrix<f64>,
     /// Largest `ratio - 1` of all limits.
     pub(crate) violation: f64,
-    /// Largest value of each row of limits, refined between samples.
     pub(crate) extremes: Vec<f64>,
 }
 

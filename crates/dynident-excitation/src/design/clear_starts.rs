@@ -10,7 +10,6 @@ use crate::motion::Motion;
 use crate::optimisers::AugmentedLagrangianState;
 use dynident_model::sample::Random;
 
-/// Maximum number of postures, and of narrowings of the ranges around each.
 const MAX_POSTURES: usize = 24;
 const MAX_NARROWINGS: usize = 8;
 

@@ -26,9 +26,7 @@ const MAX_SHRINKABLE_VIOLATION: f64 = 3e-4;
 const MAX_SHRINK_LOSS: f64 = 1e-3;
 
 pub(super) struct Polished {
-    /// Best trajectory by the check between samples.
     kept: Assessment,
-    /// End of the last polish, if it is outside the limits.
     outside: Option<Assessment>,
 }
 

@@ -69,7 +69,6 @@ pub(super) struct Rounds<'a> {
 
 pub(super) struct Candidate {
     pub(super) state: AugmentedLagrangianState,
-    /// Best point that kept the limits on the samples, or the least violating one.
     pub(super) feasible: Vec<f64>,
     /// Largest violation on the samples at that point.
     pub(super) violation: f64,

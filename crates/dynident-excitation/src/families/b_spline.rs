@@ -178,7 +178,6 @@ mod tests {
         let settings = BSplineSettings { control_points: 25, returns: true };
         let family = BSpline::new(1, 20.0, &settings).unwrap();
         let mut parameters = vec![0.0; family.parameters()];
-        // Control point 12 acts from knot 7 to knot 13 (here in seconds).
         parameters[12 - 2] = 120.0;
         let mut motion = Motion::default();
         family.motion(&parameters, &[7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0], &mut motion);

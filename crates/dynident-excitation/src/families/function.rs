@@ -62,7 +62,6 @@ pub struct FunctionFamily {
 #[derive(Debug)]
 struct Linear {
     grids: GridCache,
-    /// Parameters of the constant motion 1, joint after joint, if there are any.
     standing: Option<Vec<f64>>,
 }
 
@@ -80,7 +79,7 @@ impl FunctionFamily {
         require_frame(NAME, joints, duration_s)?;
         let parameters = settings.parameters;
         let is_sensible = (1..=MAX_PARAMETERS).contains(&parameters);
-        require(is_sensible, NAME, "parameters", parameters as f64, "give 1 to 1000 a joint")?;
+        require(is_sensible, NAME, "parameters", parameters as f64, "give 1 to 1000 per joint")?;
         let mut family = Self { function, joints, duration_s, parameters, linear: None };
         let wrong = |problem| FamilyError::Function { name: settings.function.clone(), problem };
         let times = grid(duration_s);

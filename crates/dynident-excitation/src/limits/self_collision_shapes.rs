@@ -139,7 +139,6 @@ pub(crate) fn fitted_capsules(model: &Model, radius_m: f64) -> Vec<LinkShape> {
     (0..=model.body_count()).flat_map(|index| body_capsules(model, index.checked_sub(1), radius_m)).collect()
 }
 
-/// Fitted capsules of one body, in the frame of its first link.
 pub(crate) fn body_capsules(model: &Model, body: Option<usize>, radius_m: f64) -> Vec<LinkShape> {
     let links = &body.map_or(model.base(), |body| &model.bodies()[body]).links;
     let Some(link) = links.first() else { return Vec::new() };

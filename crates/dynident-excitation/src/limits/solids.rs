@@ -12,7 +12,6 @@ pub(crate) struct BodyShape {
     pub corners: Vec<Vec3>,
     pub radius_m: f64,
     centre: Vec3,
-    /// Radius of a sphere around the centre that contains the shape, m.
     reach_m: f64,
 }
 
@@ -41,7 +40,7 @@ pub(crate) struct SolidDistance {
     pub slope: f64,
 }
 
-/// Weight of the distance of the centres for overlapping hulls. It defines a way out and is too small to balance a
+/// Weight of the distance of the centres for overlapping hulls. It defines the direction out of the overlap, and is too small to balance a
 /// contact.
 const CENTRE_DISTANCE_WEIGHT: f64 = 0.2;
 

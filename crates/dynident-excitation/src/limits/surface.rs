@@ -6,7 +6,6 @@ use dynident_model::{Transform, Vec3};
 
 const MAX_LEAF_ELEMENTS: usize = 4;
 
-/// Convex element of a surface: a triangle, or a convex shape with its radius.
 #[derive(Clone, Debug)]
 struct Element {
     first: usize,
@@ -27,7 +26,6 @@ enum Children {
     Elements(usize, usize),
 }
 
-/// All surfaces of one link, in the frame of its body.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surface {
     corners: Vec<Vec3>,
@@ -36,7 +34,6 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// Builds the tree from the triangles of meshes, and from convex shapes.
     pub(super) fn new<'a>(solids: impl IntoIterator<Item = &'a Solid>) -> Self {
         let mut surface = Self::default();
         for solid in solids {

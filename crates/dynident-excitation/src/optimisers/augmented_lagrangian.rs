@@ -14,7 +14,6 @@ pub(crate) trait ConstrainedProblem {
     /// Lower and upper bound of each variable; infinite without bound.
     fn bounds(&self) -> Vec<[f64; 2]>;
     fn constraints(&self) -> usize;
-    /// Number of equalities, which are the first constraints.
     fn equalities(&self) -> usize {
         0
     }
@@ -109,7 +108,6 @@ impl AugmentedLagrangianSettings {
     }
 }
 
-/// State of a search, from which another can continue.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct AugmentedLagrangianState {
     pub x: Vec<f64>,

@@ -9,7 +9,6 @@ fn never(_: &Progress<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// A problem of closures: values, and the gradients of f and of every constraint.
 struct Textbook {
     bounds: Vec<[f64; 2]>,
     equalities: usize,

@@ -208,7 +208,6 @@ mod tests {
     use super::*;
     use core::ops::ControlFlow;
 
-    /// Bowl with its minimum 1 at (0.3, -2).
     fn bowl(x: &[f64]) -> f64 {
         1.0 + (x[0] - 0.3).powi(2) + (x[1] + 2.0).powi(2)
     }

@@ -206,7 +206,6 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Runs generations until the strategy or the search ends.
     fn run(&mut self, mut strategy: Strategy, watch: &mut Watch<'_>) -> CmaEsRun {
         let before = self.result.evaluations;
         let mut lowest_of_run = f64::INFINITY;

@@ -253,6 +253,8 @@ fn unknown_keys_are_refused_and_overlays_win_value_by_value() {
     assert!(toml::from_str::<Limits>("joints = [{ joint = \"a\", acceleraton = 3.0 }]").is_err());
     let over: Limits =
         toml::from_str("joints = [{ joint = \"elbow_joint\", acceleration = 10.0, speed = 1.0 }]").unwrap();
+    let collision: Limits = toml::from_str("self_collision = { radius_m = 0.05 }").unwrap();
+    assert_eq!(collision.self_collision.unwrap().min_overlap_share, 0.5);
     let model = ur10();
     let under = Limits::from_model(&model);
     let both = under.clone().overlaid(&over);

@@ -14,7 +14,6 @@ use std::path::Path;
 
 const DURATION_S: f64 = 6.0;
 
-/// Surface of a box as corners of triangles.
 fn block(low: [f64; 3], high: [f64; 3]) -> Vec<[f64; 3]> {
     let corner = |k: usize| core::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] });
     let faces = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];

@@ -45,7 +45,6 @@ fn broken_limits_stop_the_run() {
         let own = run(&LoopSettings { limits, ..LoopSettings::default() });
         let RunStatus::LimitBroken { quantity, time_s, ref joint, .. } = own.status else { panic!("{}", own.status) };
         assert_eq!((quantity, joint.as_str()), (expected, "joint1"));
-        // Completed samples are kept and equal those of the whole run.
         assert_eq!(own.samples, (time_s * 1000.0).round() as usize);
         assert_eq!(own.reference.samples, own.samples);
         for joint in 0..2 {

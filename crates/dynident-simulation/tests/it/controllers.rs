@@ -138,7 +138,6 @@ fn gravity_and_integrals_remove_the_sag() {
         own.tracking_error(0).last().unwrap()
     };
     let sag = last(&ControllerSettings::JointPd(pd()));
-    // About (2 cos 0.3 + cos 0.7) g / K_p.
     assert!((sag - 9.8 * (2.0 * 0.3_f64.cos() + 0.7_f64.cos()) / 400.0).abs() < 0.1 * sag);
     assert!(last(&ControllerSettings::PdGravity(pd())).abs() < 1e-9);
     assert!(last(&ControllerSettings::JointPid(pid)).abs() < 1e-4);

@@ -105,7 +105,6 @@ fn a_flywheel_runs_down_and_rests() {
         assert_eq!(plant.dq()[0], 0.0);
         let at = plant.q()[0];
         for step in 0..500 {
-            // Torques below the friction, in both directions.
             let tau = 0.69 * f64::from(step).sin();
             plant.advance(&[tau, 0.0], 1e-3, integrator).unwrap();
             assert_eq!((plant.q()[0], plant.dq()[0]), (at, 0.0));
@@ -150,7 +149,6 @@ fn an_arm_is_held_by_its_friction() {
             plant.advance(&[0.0, 0.0], 1e-3, integrator).unwrap();
         }
         assert_eq!((plant.q(), plant.dq()), (&[0.1, 0.2][..], &[0.0, 0.0][..]));
-        // Joint 2 cannot hold and falls, joint 1 still holds.
         let mut plant = Plant::new(&model, &[coulomb(0), coulomb(1)], &[60.0, 5.0]).unwrap();
         plant.set_state(0.0, &[0.1, 0.2], &[0.0, 0.0]);
         for _ in 0..300 {
@@ -171,7 +169,6 @@ fn methods_agree_on_stick_and_slip() {
     let mut end = |integrator, steps: i32| {
         plant.set_state(0.0, &[-1.0, 0.5], &[0.0, 0.0]);
         for step in 0..3 * steps {
-            // The same torque within each 1 ms, for any step size.
             let time = (f64::from(step) * 1000.0 / f64::from(steps)).floor() / 1000.0;
             let tau = [5.0 * (2.0 * time).sin(), 3.0 * (5.0 * time).sin()];
             plant.advance(&tau, 1.0 / f64::from(steps), integrator).unwrap();

@@ -60,7 +60,6 @@ pub(super) fn assumed_floor(
     Ok(Ok((floor, Some(words))))
 }
 
-/// Applies the floor to the shapes of all moving links, lowered for links that never come above it.
 pub(super) fn over_all_shapes(model: &Model, shapes: &ShapesOfLinks, floor: &mut FloorLimit) -> Result<(), LimitError> {
     let solids = LinkSolid::gather(model, &shapes.shapes, "the floor")?;
     let moving: Vec<(&LinkSolid, usize)> = solids.iter().filter_map(|solid| Some((solid, solid.body?))).collect();

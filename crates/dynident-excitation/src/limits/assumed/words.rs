@@ -1,6 +1,5 @@
 //! Text shared by the sentences about assumptions.
 
-/// Names, separated by commas; the first eight of a longer list.
 pub(super) fn listed(names: &[String]) -> String {
     const SHOWN: usize = 8;
     match names.len().checked_sub(SHOWN) {
