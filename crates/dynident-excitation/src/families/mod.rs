@@ -26,6 +26,7 @@ mod function;
 mod given;
 mod joined;
 mod linear;
+mod logistic_lanes;
 mod logistic_stroke;
 mod logistic_strokes;
 mod multisine;

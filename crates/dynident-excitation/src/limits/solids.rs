@@ -40,8 +40,8 @@ pub(crate) struct SolidDistance {
     pub slope: f64,
 }
 
-/// Weight of the distance of the centres for overlapping hulls. It defines the direction out of the overlap, and is too small to balance a
-/// contact.
+/// Weight of the distance of the centres for overlapping hulls. It defines the direction out of the overlap, and is too
+/// small to balance a contact.
 const CENTRE_DISTANCE_WEIGHT: f64 = 0.2;
 
 impl BodyShape {

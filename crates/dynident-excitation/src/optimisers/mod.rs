@@ -7,17 +7,19 @@
 mod augmented_lagrangian;
 mod binary_genetic;
 mod cma_es;
+mod constrained_problem;
 mod multi_start;
 mod projected_lbfgs;
 
-#[cfg(test)]
-pub(crate) use augmented_lagrangian::AugmentedLagrangianStatus;
-pub(crate) use augmented_lagrangian::{
-    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem,
-    CurvatureFacts, augmented_lagrangian,
-};
+pub(crate) use augmented_lagrangian::augmented_lagrangian;
 pub use binary_genetic::{BinaryGeneticResult, BinaryGeneticSettings, Generation, binary_genetic};
 pub use cma_es::{CmaEsResult, CmaEsRun, CmaEsSettings, CmaEsStatus, cma_es};
+#[cfg(test)]
+pub(crate) use constrained_problem::AugmentedLagrangianStatus;
+pub(crate) use constrained_problem::{
+    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem,
+    CurvatureFacts,
+};
 pub(crate) use multi_start::multi_start;
 pub(crate) use projected_lbfgs::Step;
 
