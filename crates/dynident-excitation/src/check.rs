@@ -1,9 +1,8 @@
-//! The last word on limits: every limit looked at again, sample by sample, by code that shares nothing with the
-//! optimiser's.
+//! Independent check of all limits, sample by sample, which shares no code with the optimiser.
 //!
-//! Plain loops over the description: names are looked up here, torques come from single-sample inverse dynamics and the
-//! exact known torque of friction and drives (the worst case at rest), distances of links from another algorithm than
-//! the search's. Only the choice of shapes and their pairs, which is part of what the limit *is*, comes from
+//! The check looks names up in the robot description, computes torque by single-sample inverse dynamics with the exact
+//! torque of friction and drives (the worst case at rest), and computes distances of links with another algorithm than
+//! the search. Only the choice of shapes and pairs, which is part of the limit, comes from
 //! [`SelfCollision`](crate::limits::SelfCollision).
 
 mod apart;
@@ -16,58 +15,57 @@ use dynident_model::Model;
 use probes::{Probe, probes};
 use serde::{Deserialize, Serialize};
 
-/// A ratio above 1 by more than this is a violation.
+/// Excess of a ratio above 1 that is a violation.
 pub const VIOLATION: f64 = 1e-6;
 
-/// The rate that the project checks motions of usual arms at; of others by [`OwnScale::round_hertz`], so that a motion
-/// of a watch or a crane is looked at as often.
+/// Rate at which motions of usual arms are checked, Hz. For other sizes use [`OwnScale::round_hertz`], so that a very
+/// small or very large robot is sampled as densely relative to its motion.
 ///
 /// [`OwnScale::round_hertz`]: dynident_model::OwnScale::round_hertz
 pub const CHECK_RATE_HZ: f64 = 10_000.0;
 
-/// Most samples that a check looks at: a bound on its time (some minutes), not on memory.
-const MOST_SAMPLES: f64 = 1e8;
+/// Maximum number of samples of a check. Bounds the time (some minutes), not the memory.
+const MAX_SAMPLES: f64 = 1e8;
 
-/// Samples asked from the motion at once.
-const BLOCK: usize = 1000;
+const BLOCK_SAMPLES: usize = 1000;
 
-/// How near a motion comes to one limit.
+/// Worst ratio of a motion to one limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LimitReport {
-    /// What is limited.
+    /// Kind of the limit.
     pub kind: LimitKind,
-    /// The joint; for places the point, for self-collision the pair of links.
+    /// Joint; for places the point, for self-collision the pair of links.
     pub joint: String,
-    /// 1 on the limit, above it in violation: `|x - middle| / half range`, `|x| / limit`; for a column `2 - distance /
-    /// least`, for two links 1 plus the lack of distance as a share of their radii and clearance (of 5 % of the arm's
-    /// length at least), for the floor 1 plus the arm's lengths below it. Infinite if the motion is not finite: in
-    /// JSON the largest number, 1.8e308.
+    /// Ratio to the limit: 1 on the limit, larger in violation. `|x - middle| / half range` or `|x| / limit`; for a
+    /// column `2 - distance / minimum distance`; for two links 1 plus the missing distance divided by their radii and
+    /// clearance (at least 5 % of the arm's length); for the floor 1 plus the depth below it in arm lengths. Infinite
+    /// if the motion is not finite; JSON then contains the largest number, 1.8e308.
     #[serde(serialize_with = "largest_for_infinite", deserialize_with = "infinite_for_largest")]
     #[cfg_attr(feature = "schema", schemars(with = "f64"))]
     pub worst_ratio: f64,
-    /// When the ratio is worst, s.
+    /// Time of the worst ratio, s.
     pub at_s: f64,
-    /// True if the limit is broken by more than [`VIOLATION`].
+    /// Whether the ratio exceeds 1 by more than [`VIOLATION`].
     pub violated: bool,
 }
 
-/// A ratio as JSON has it, which knows no infinity.
+/// Writes an infinite ratio as the largest finite number, because JSON has no infinity.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "the shape that serde wants")]
 fn largest_for_infinite<S: serde::Serializer>(ratio: &f64, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_f64(ratio.min(f64::MAX))
 }
 
-/// A ratio from JSON; files of earlier versions have null for infinity.
+/// Reads a ratio from JSON; files of earlier versions contain null for infinity.
 fn infinite_for_largest<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.filter(|ratio| *ratio < f64::MAX).unwrap_or(f64::INFINITY))
 }
 
-/// Checks all limits from 0 to `duration_s` at `rate_hz` ([`CHECK_RATE_HZ`]), the end included. `motion` gives the
-/// exact motion at a list of times.
+/// Checks all limits from 0 to `duration_s` at `rate_hz` (usually [`CHECK_RATE_HZ`]), both ends included. `motion`
+/// writes the exact motion at a list of times.
 ///
 /// # Errors
-/// As [`Limits::validate`]; a duration or rate that is not positive and finite, or more than 10⁸ samples.
+/// Errors of [`Limits::validate`]; a duration or rate that is not positive and finite; more than 10⁸ samples.
 pub fn check_limits(
     limits: &Limits,
     model: &Model,
@@ -78,8 +76,8 @@ pub fn check_limits(
     Ok(check_limits_until(limits, model, duration_s, rate_hz, motion, &|| false)?.unwrap_or_default())
 }
 
-/// [`check_limits()`] at duration (s) and rate (Hz), which ends without a report once `stop` is true. `stop` is called
-/// every 1000 samples.
+/// [`check_limits()`] with duration (s) and rate (Hz) that ends without a report when `stop` returns true. `stop` is
+/// called every 1000 samples.
 ///
 /// # Errors
 /// As [`check_limits()`].
@@ -93,20 +91,21 @@ pub fn check_limits_until(
 ) -> Result<Option<Vec<LimitReport>>, LimitError> {
     let steps = checked_steps(limits, model, duration_s, rate_hz)?;
     let mut check = Check::new(limits, model)?;
-    let mut times = Vec::with_capacity(BLOCK);
-    for start in (0..=steps).step_by(BLOCK) {
+    let mut times = Vec::with_capacity(BLOCK_SAMPLES);
+    for start in (0..=steps).step_by(BLOCK_SAMPLES) {
         if stop() {
             return Ok(None);
         }
         times.clear();
-        times.extend((start..(start + BLOCK).min(steps + 1)).map(|step| (step as f64 / rate_hz).min(duration_s)));
+        times.extend(
+            (start..(start + BLOCK_SAMPLES).min(steps + 1)).map(|step| (step as f64 / rate_hz).min(duration_s)),
+        );
         motion(&times, &mut check.block);
         check.take_block(&times);
     }
     Ok(Some(check.reports()))
 }
 
-/// Steps of a check of valid limits.
 fn checked_steps(limits: &Limits, model: &Model, duration_s: f64, rate_hz: f64) -> Result<usize, LimitError> {
     limits.validate(model)?;
     for (what, value) in [("duration", duration_s), ("rate", rate_hz)] {
@@ -115,19 +114,18 @@ fn checked_steps(limits: &Limits, model: &Model, duration_s: f64, rate_hz: f64) 
         }
     }
     let steps = (duration_s * rate_hz).ceil();
-    if steps >= MOST_SAMPLES {
+    if steps >= MAX_SAMPLES {
         let what = "number of samples of the check".to_owned();
-        return Err(LimitError::OutOfRange { what, value: steps, at_least: 1.0, below: MOST_SAMPLES });
+        return Err(LimitError::OutOfRange { what, value: steps, at_least: 1.0, below: MAX_SAMPLES });
     }
     Ok(steps as usize)
 }
 
-/// A check in progress: the largest ratio of each limit up to now, and work arrays.
+/// A check in progress: the largest ratios of the processed samples, and work arrays.
 struct Check<'a> {
     limits: &'a Limits,
     model: &'a Model,
     probes: Vec<(Probe, LimitReport)>,
-    /// The motion at the samples of one block.
     block: Motion,
     dynamics: Workspace,
     kinematics: Workspace,
@@ -150,7 +148,6 @@ impl<'a> Check<'a> {
         })
     }
 
-    /// Compares the samples of the block, which are at `times`, with all limits.
     fn take_block(&mut self, times: &[f64]) {
         let Self { limits, model, probes, block, dynamics, kinematics, state, torque } = self;
         for (sample, &at_s) in times.iter().enumerate() {

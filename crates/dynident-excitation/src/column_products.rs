@@ -1,12 +1,12 @@
-//! Products of tall panels with small matrices: what a criterion costs besides the regressor itself.
+//! Products of tall panels with small matrices.
 
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 
-/// Columns of a tile: sixteen sums stay in registers.
+/// Columns of a tile, chosen so that sixteen sums stay in registers.
 const TILE: usize = 4;
 
-/// Adds `weight · Pᵀ P` to the square matrix `gram` (row-major, `size` wide) at rows and columns `columns`; `panel`
-/// holds the columns of `P` one after another, `rows` values each. Both triangles are filled.
+/// Adds `weight · Pᵀ P` to both triangles of the square matrix `gram` (row-major, `size` wide) at rows and columns
+/// `columns`. `panel` contains the columns of `P` one after another, `rows` values each.
 pub(crate) fn add_gram(
     level: Level,
     panel: &[f64],
@@ -81,7 +81,7 @@ impl Kernel for Gram<'_> {
     }
 }
 
-/// Four columns from `first`; past the end the last column repeats, and its sums are not used.
+/// Four columns from `first`. Past the end the last column repeats, and its sums are not used.
 #[inline(always)]
 fn column_tile(panel: &[f64], rows: usize, first: usize, count: usize) -> [&[f64]; TILE] {
     let of = |k: usize| {
@@ -91,8 +91,8 @@ fn column_tile(panel: &[f64], rows: usize, first: usize, count: usize) -> [&[f64
     [of(0), of(1), of(2), of(3)]
 }
 
-/// `out = factor · P G[columns, columns]`, in the shape of `P`; `matrix` is `G`, row-major, `size` wide; `packed` is
-/// scratch.
+/// Computes `out = factor · P G[columns, columns]` in the shape of `P`. `matrix` is `G`, row-major, `size` wide;
+/// `packed` is scratch.
 #[allow(clippy::too_many_arguments, reason = "one product with its shapes")]
 pub(crate) fn times_matrix(
     level: Level,
@@ -122,8 +122,8 @@ struct Times<'a> {
     panel: &'a [f64],
     rows: usize,
     count: usize,
-    /// Scaled entries of the matrix for these columns: tile after tile of four target columns, source columns one after
-    /// another within.
+    /// Scaled matrix entries of these columns: one tile of four target columns after another, the source columns in
+    /// order within each tile.
     packed: &'a [f64],
     out: &'a mut [f64],
 }
@@ -155,7 +155,6 @@ impl Kernel for Times<'_> {
     }
 }
 
-/// `W` registers of samples of four target columns.
 #[inline(always)]
 fn strip<T: Lane, const W: usize>(
     panel: &[f64],
@@ -204,7 +203,6 @@ mod tests {
                 for a in 0..count {
                     for b in 0..count {
                         let expected: f64 = (0..rows).map(|s| 0.5 * panel[a * rows + s] * panel[b * rows + s]).sum();
-                        // Sums of at most 64 products below one.
                         assert!((gram[columns[a] * size + columns[b]] - expected).abs() < 1e-13);
                     }
                     for s in 0..rows {

@@ -1,5 +1,5 @@
-//! The same design by optimisers without derivatives, for comparison: the paper's genetic algorithm and CMA-ES, with
-//! penalties for what is broken.
+//! Design by optimisers without derivatives, for comparison: the genetic algorithm of the paper and CMA-ES, with
+//! penalties for violated limits.
 
 use crate::criteria::Criterion;
 use crate::design::assess::assess;
@@ -16,7 +16,7 @@ use dynident_model::sample::Random;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// Which optimiser, and its settings.
+/// Choice of the optimiser, with its settings.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DerivativeFree {
     /// [`binary_genetic()`].
@@ -25,31 +25,30 @@ pub enum DerivativeFree {
     CmaEs(CmaEsSettings),
 }
 
-/// Fitness added per unit of violation, and for a motion that does not excite every parameter.
-const PENALTY: f64 = 1000.0;
+/// Fitness penalty per unit of violation, and for a motion that does not excite every parameter.
+const VIOLATION_PENALTY: f64 = 1000.0;
 
-/// First margin on samples for what lies between them, as a share of each limit.
-const MARGIN: f64 = 0.005;
+/// Initial margin at the samples for peaks between them, as a share of each limit.
+const INITIAL_MARGIN: f64 = 0.005;
 
-/// Searches at most: again with wider margins while something is broken between samples.
-const SEARCHES: usize = 3;
+/// Maximum number of searches; each further one has wider margins.
+const MAX_SEARCHES: usize = 3;
 
-/// Name of the search's rounds.
-const ROUND: &str = "generations";
+const ROUND_NAME: &str = "generations";
 
-/// Random starts that tell how large parameters are, and by how much the box around them is wider.
-const SIZED_BY: usize = 100;
-const WIDER: f64 = 1.3;
+/// Number of random starts that determine the box of the parameters, and the factor by which the box is widened.
+const BOX_STARTS: usize = 100;
+const BOX_WIDENING: f64 = 1.3;
 
-/// Searches for [`design`](crate::design())'s task without gradients: the last criterion's
-/// [`fitness`](Criterion::fitness) plus 1000 times the sum of the largest violation of each limit.
+/// Solves the task of [`design`](crate::design()) without gradients: minimises the [`fitness`](Criterion::fitness) of
+/// the last criterion plus 1000 times the sum of the largest violation of each limit.
 ///
-/// Parameters are looked for in a box: the family's bounds, where they are finite, else what 100 random starts of the
-/// family span, 1.3 times as wide. The search grid is that of the settings; seed and time limit are theirs, too (a seed
-/// in the optimiser's own settings is not used). Up to three searches, with wider margins while something is broken
-/// between samples; the best motion by the check between samples is kept.
+/// The search box consists of the family's bounds if they are finite, otherwise of the span of 100 random starts,
+/// widened by 1.3. The search grid, seed and time limit are those of `settings` (the seed in the optimiser's settings
+/// is not used). Up to three searches run, with wider margins while a limit is violated between samples; the result is
+/// the best motion by the check between samples.
 ///
-/// Also gives one [`Generation`] of the first search after another (for CMA-ES the best so far, three times).
+/// Also returns the [`Generation`]s of the first search (for CMA-ES all three values are the best so far).
 ///
 /// # Errors
 /// If settings are out of range.
@@ -77,11 +76,10 @@ fn evolved(
     let fine = grid(task.family.duration_s(), 2 * times.len() - 1);
     let weight = logged.len() as f64 / times.len() as f64;
     let search_box = search_box(task, settings.seed);
-    let mut margins = vec![MARGIN; task.limits.constraints().len()];
+    let mut margins = vec![INITIAL_MARGIN; task.limits.constraints().len()];
     let mut kept = None;
     let (mut history, mut evaluations) = (Vec::new(), 0);
-    // Searches with tighter limits while something is broken between the samples.
-    for search in 0..SEARCHES {
+    for search in 0..MAX_SEARCHES {
         let objective = Objective { task, criterion, times: &times, weight, margins: &margins, idle: Mutex::default() };
         let watched = Watched::new(watch, &late, evaluations);
         let seed = settings.seed.wrapping_add(search as u64);
@@ -90,7 +88,6 @@ fn evolved(
         if search == 0 {
             history = found.history;
         }
-        // Its figure and violation on the fine grid.
         let found = assess(task, criterion, found.best, &fine, &logged);
         let whole = found.violation <= 0.0;
         for (margin, c) in margins.iter_mut().zip(&found.extremes) {
@@ -115,14 +112,12 @@ fn evolved(
     Ok((designed, history))
 }
 
-/// The result of one search.
 struct Found {
     best: Vec<f64>,
     evaluations: usize,
     history: Vec<Generation>,
 }
 
-/// One search with the optimiser's settings and this seed.
 fn searched(
     objective: &Objective<'_>,
     SearchBox { bounds, start }: &SearchBox,
@@ -130,12 +125,11 @@ fn searched(
     seed: u64,
     watched: &Watched<'_>,
 ) -> Result<Found, OptimiserError> {
-    // The rest of a generation is not evaluated once the search was ended.
-    let fitness = |parameters: &[f64]| if watched.ends_now() { f64::INFINITY } else { objective.fitness(parameters) };
+    let fitness = |parameters: &[f64]| if watched.is_ended() { f64::INFINITY } else { objective.fitness(parameters) };
     match optimiser {
         DerivativeFree::Genetic(own) => {
             let own = BinaryGeneticSettings { seed, ..own.clone() };
-            let result = binary_genetic(fitness, bounds, &own, &mut |progress| watched.heard(progress))?;
+            let result = binary_genetic(fitness, bounds, &own, &mut |progress| watched.report_generation(progress))?;
             Ok(Found { best: result.best, evaluations: result.evaluations, history: result.history })
         }
         DerivativeFree::CmaEs(own) => {
@@ -144,7 +138,7 @@ fn searched(
             let mut history = Vec::new();
             let mut hear = |progress: &Progress<'_>| {
                 history.push(Generation { best: progress.value, best_so_far: progress.value, mean: progress.value });
-                watched.heard(progress)
+                watched.report_generation(progress)
             };
             let result = cma_es(fitness, start, &steps, bounds, &own, &mut hear)?;
             Ok(Found { best: result.best, evaluations: result.evaluations, history })
@@ -152,11 +146,10 @@ fn searched(
     }
 }
 
-/// Reports the progress of one search to the watcher, from any thread, and remembers when the search was ended.
+/// Reports the progress of one search to the watcher, from any thread, and stores whether the search was ended.
 struct Watched<'a> {
     watch: &'a DesignWatch<'a>,
     late: &'a (dyn Fn() -> bool + Sync),
-    /// Evaluations of the searches before.
     before: usize,
     best_so_far: Mutex<f64>,
     stopped: AtomicBool,
@@ -172,44 +165,39 @@ impl<'a> Watched<'a> {
     }
 
     /// Reports a value and the number of evaluations. Returns whether the search was ended, now or before.
-    fn reported(&self, value: f64, evaluations: usize) -> bool {
-        let progress = DesignProgress { round: ROUND, value, violation: 0.0, evaluations: evaluations as u64 };
+    fn report(&self, value: f64, evaluations: usize) -> bool {
+        let progress = DesignProgress { round: ROUND_NAME, value, violation: 0.0, evaluations: evaluations as u64 };
         if !self.is_stopped() && ((self.watch)(&progress).is_break() || (self.late)()) {
             self.stopped.store(true, Ordering::Relaxed);
         }
         self.is_stopped()
     }
 
-    /// Whether the search ends before the next evaluation.
-    fn ends_now(&self) -> bool {
+    fn is_ended(&self) -> bool {
         let value = *self.best_so_far.lock().unwrap_or_else(PoisonError::into_inner);
-        self.reported(value, self.before)
+        self.report(value, self.before)
     }
 
-    /// Reports a generation.
-    fn heard(&self, progress: &Progress<'_>) -> ControlFlow<()> {
+    fn report_generation(&self, progress: &Progress<'_>) -> ControlFlow<()> {
         *self.best_so_far.lock().unwrap_or_else(PoisonError::into_inner) = progress.value;
-        let ended = self.reported(progress.value, self.before + progress.evaluations);
+        let ended = self.report(progress.value, self.before + progress.evaluations);
         if ended { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
-/// Where the searches look.
 struct SearchBox {
     bounds: Vec<[f64; 2]>,
-    /// A random start of the family.
     start: Vec<f64>,
 }
 
-/// The box, and a random start of the family in it.
 fn search_box(task: &DesignTask<'_>, seed: u64) -> SearchBox {
     let mut random = Random::new(seed);
     let (positions, speeds) = ranges(task.limits);
-    let starts: Vec<Vec<f64>> = (0..SIZED_BY).map(|_| task.family.random(&positions, &speeds, &mut random)).collect();
+    let starts: Vec<Vec<f64>> = (0..BOX_STARTS).map(|_| task.family.random(&positions, &speeds, &mut random)).collect();
     let bounds = task.family.bounds().into_iter().enumerate().map(|(parameter, [lower, upper])| {
         let seen = starts.iter().map(|start| start[parameter]);
         let (low, high) = seen.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-        let (middle, half) = (f64::midpoint(low, high), (WIDER * 0.5 * (high - low)).max(1e-6));
+        let (middle, half) = (f64::midpoint(low, high), (BOX_WIDENING * 0.5 * (high - low)).max(1e-6));
         let own = [lower, upper];
         let sized = [middle - half, middle + half];
         let bound = [own[0].max(sized[0]), own[1].min(sized[1])];
@@ -218,7 +206,7 @@ fn search_box(task: &DesignTask<'_>, seed: u64) -> SearchBox {
     SearchBox { bounds: bounds.collect(), start: starts.into_iter().next().unwrap_or_default() }
 }
 
-/// Fitness of parameters, with scratch for as many threads as ask at once.
+/// Fitness of parameters, with one scratch for each concurrent thread.
 struct Objective<'a> {
     task: &'a DesignTask<'a>,
     criterion: &'a dyn Criterion,
@@ -254,9 +242,9 @@ impl Objective<'_> {
                 row.iter().fold(0.0_f64, |worst, c| if c.is_nan() { f64::INFINITY } else { worst.max(c + margin) })
             })
             .sum();
-        let fitness = self.criterion.fitness(&information.of(motion, self.weight)).unwrap_or(PENALTY);
+        let fitness = self.criterion.fitness(&information.of(motion, self.weight)).unwrap_or(VIOLATION_PENALTY);
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
-        fitness + PENALTY * violation
+        fitness + VIOLATION_PENALTY * violation
     }
 }
 
@@ -308,8 +296,8 @@ mod tests {
             assert!(designed.violation <= 0.0, "{optimiser:?}: {}", designed.violation);
             assert!(history.len() >= generations);
             assert!(history.windows(2).all(|w| w[1].best_so_far <= w[0].best_so_far));
-            // The median random start is inside position and velocity limits; a search must beat it by more than a
-            // factor e in the determinant.
+            // The median random start keeps position and velocity limits; a search must improve its determinant by more
+            // than a factor e.
             let (positions, speeds) = ranges(&set);
             let logged = grid(6.0, 601);
             let mut figures: Vec<f64> = (0..21)

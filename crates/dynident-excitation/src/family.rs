@@ -1,4 +1,4 @@
-//! What every trajectory family offers to criteria, limits and optimisers.
+//! Interface of the trajectory families.
 
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
@@ -6,8 +6,8 @@ use nalgebra::DMatrix;
 
 /// A family of trajectories of all joints over one duration, with a vector of free parameters.
 ///
-/// Parameters are stored joint after joint unless the family says otherwise. Every family gives q, q̇, q̈ and jerk
-/// exactly (no differences), and pulls a cost's derivatives by the motion back to its parameters exactly.
+/// Parameters are stored joint after joint unless the family states otherwise. Every family provides q, q̇, q̈ and jerk
+/// analytically, and exact derivatives of a cost with respect to its parameters from those with respect to the motion.
 pub trait Family: core::fmt::Debug + Send + Sync {
     /// The family's name in study files and results.
     fn name(&self) -> &'static str;
@@ -18,35 +18,35 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     /// Duration in seconds.
     fn duration_s(&self) -> f64;
 
-    /// Number of free parameters, all joints together.
+    /// Number of free parameters of all joints.
     fn parameters(&self) -> usize;
 
-    /// Lower and upper bound of each parameter that the family itself needs (not the robot's limits); infinite where
-    /// there is none.
+    /// Lower and upper bound of each parameter required by the family (not by the robot); infinite without bound.
     fn bounds(&self) -> Vec<[f64; 2]>;
 
-    /// A random start of sensible size for joints with the given position range `[lower, upper]` and velocity limit;
+    /// Random start of suitable size for joints with the given position range `[lower, upper]` and velocity limit,
     /// inside [`bounds`](Family::bounds).
     fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64>;
 
-    /// The motion at `times_s`, within the duration.
+    /// Computes the motion at `times_s`, within the duration.
     ///
     /// # Panics
-    /// If `parameters` has not [`parameters`](Family::parameters) entries.
+    /// If `parameters` does not have [`parameters`](Family::parameters) entries.
     fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion);
 
-    /// Adds to `gradient` the derivative of a cost by the parameters, given its derivatives by the motion at `times_s`.
+    /// Adds to `gradient` the derivative of a cost with respect to the parameters, given its derivatives with respect
+    /// to the motion at `times_s`.
     ///
     /// # Panics
     /// If lengths differ.
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]);
 
     /// Adds `Σ_s Σ_o w_o(s) b_o(s) b_o(s)ᵀ` of one joint to `out` (square, the joint's parameters), where `b_o` are the
-    /// derivatives of that joint's q, q̇, q̈ and jerk by its parameters and `w_o` the numbers of `weights` in the same
-    /// arrays. Returns false, with nothing added, if the family does not offer it: optimisers then learn the curvature
-    /// of limits step by step.
+    /// derivatives of the joint's q, q̇, q̈ and jerk with respect to its parameters and `w_o` the values of `weights`
+    /// in the same arrays. Returns false and adds nothing if the family does not implement it; optimisers then learn
+    /// the curvature of limits from their steps.
     ///
-    /// Only for families whose joints have parameters of their own, equally many, joint after joint.
+    /// Only for families whose joints have separate parameters, equally many, stored joint after joint.
     ///
     /// # Panics
     /// If shapes differ.
@@ -68,7 +68,7 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     }
 }
 
-/// The panic of [`Family::apply_adjoint`].
+/// Panics of [`Family::apply_adjoint`].
 pub(crate) fn check_shapes(
     family: &impl Family,
     parameters: &[f64],

@@ -1,4 +1,4 @@
-//! The information that a motion gathers about the base parameters, and what a cost on it pulls on the motion.
+//! Information of a motion about the base parameters, and its reverse sweep to the motion.
 
 use crate::column_products::{add_gram, times_matrix};
 use crate::motion::{Motion, MotionAdjoint};
@@ -10,13 +10,13 @@ use dynident_model::Model;
 use nalgebra::DMatrix;
 
 /// `D = D₀ + Σ_j W_jᵀ W_j / σ_j²` over all samples of a motion: the information about the columns of a layout, and its
-/// reverse.
+/// adjoint.
 pub struct Information<'a> {
     model: &'a Model,
     layout: &'a PanelLayout,
     /// `1 / σ_j²` of each joint's torque.
     weights: Vec<f64>,
-    /// Information before the motion, row-major; empty for none.
+    /// Prior information, row-major; empty without prior.
     prior: Vec<f64>,
     level: Level,
     workspace: BatchWorkspace,
@@ -26,11 +26,12 @@ pub struct Information<'a> {
 }
 
 impl<'a> Information<'a> {
-    /// For the columns of `layout`, with the standard deviation of each joint's torque (Nm, N), and the information
-    /// that is there before (shape columns × columns), if any.
+    /// Creates the information for the columns of `layout`, with the standard deviation of each joint's torque (Nm, N)
+    /// and optional prior information (shape columns × columns).
     ///
     /// # Panics
-    /// If there is not one standard deviation per joint, one is not positive, or the prior has another shape.
+    /// If the number of standard deviations differs from that of the joints, one is not positive, or the prior has
+    /// another shape.
     pub fn new(model: &'a Model, layout: &'a PanelLayout, torque_std_nm: &[f64], prior: Option<&DMatrix<f64>>) -> Self {
         assert_eq!(torque_std_nm.len(), model.dof(), "one standard deviation per joint");
         assert!(torque_std_nm.iter().all(|std| *std > 0.0), "standard deviations are positive");
@@ -52,8 +53,8 @@ impl<'a> Information<'a> {
         }
     }
 
-    /// `D` of the motion; its regressor stays for [`apply_adjoint`](Information::apply_adjoint). `weight` counts every
-    /// sample so many times.
+    /// Computes `D` of the motion with `weight` on every sample, and keeps the regressor for
+    /// [`apply_adjoint`](Information::apply_adjoint).
     pub fn of(&mut self, motion: &Motion, weight: f64) -> DMatrix<f64> {
         let count = self.layout.columns().len();
         regressor_panels(self.model, &mut self.workspace, self.layout, &motion.view(), &mut self.panels);
@@ -66,9 +67,9 @@ impl<'a> Information<'a> {
         DMatrix::from_vec(count, count, gram)
     }
 
-    /// Adds the derivatives of a cost by the motion of the last [`of`](Information::of), given its symmetric derivative
-    /// `by_information = ∂f/∂D`: the regressor's entries get `2 W_j G / σ_j²`, and one reverse sweep takes them to the
-    /// motion.
+    /// Adds the derivatives of a cost with respect to the motion of the last [`of`](Information::of), given its
+    /// symmetric derivative `by_information = ∂f/∂D`: the adjoint of the regressor is `2 W_j G / σ_j²`, and one reverse
+    /// sweep propagates it to the motion.
     pub fn apply_adjoint(
         &mut self,
         motion: &Motion,

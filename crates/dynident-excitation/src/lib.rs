@@ -1,22 +1,23 @@
-//! **How should it move?** The motion that makes a robot's parameters known, inside every limit, and how well it will.
+//! **Excitation trajectories.** Computes the motion that determines the parameters of a robot best within all limits,
+//! and predicts the error bars.
 //!
 //! | task | where |
 //! | --- | --- |
-//! | describe a motion by few numbers | a [`Family`] of [`families`]: Fourier series, splines, multisines, strokes, .. |
-//! | say what the robot may do | [`limits::Limits`]: joints, boxes, floor, column, the arm's own links |
-//! | choose what makes a motion good | a [`Criterion`](criteria::Criterion) of [`criteria`]: D-, A-, E-optimal, prediction |
-//! | find the best motion | [`design()`], or [`design_without_gradients()`] to compare with |
-//! | look at all limits again | [`check::check_limits`], which shares no code with the search |
-//! | learn why no motion keeps them | [`limits::diagnose()`] |
-//! | know the error bars beforehand | [`Information`] of the motion, [`predicted_covariance()`] of every parameter |
+//! | parametrise a motion | a [`Family`] of [`families`]: Fourier series, splines, multisines, strokes, .. |
+//! | set the limits of the robot | [`limits::Limits`]: joints, boxes, floor, column, the arm's own links |
+//! | choose the optimality criterion | a [`Criterion`](criteria::Criterion) of [`criteria`]: D-, A-, E-optimal, prediction |
+//! | find the best motion | [`design()`], or [`design_without_gradients()`] for comparison |
+//! | check all limits independently | [`check::check_limits`], which shares no code with the search |
+//! | find why no motion keeps the limits | [`limits::diagnose()`] |
+//! | predict the error bars | [`Information`] of the motion, [`predicted_covariance()`] of every parameter |
 //! | move one joint after another | [`step_wise`]: strokes over windows, as in the paper |
-//! | hand the motion to a robot | [`export`]: CSV, ROS 2, URScript |
+//! | export the motion to a robot | [`export`]: CSV, ROS 2, URScript |
 //!
-//! A [`Motion`] is plain arrays: q, q̇, q̈ and jerk, joint after joint. All searches are deterministic by their seed,
-//! on any number of threads. A family, a criterion or a limit of one's own is a type with the trait: [`design()`] takes
-//! references to traits.
+//! A [`Motion`] consists of plain arrays: q, q̇, q̈ and jerk, joint after joint. All searches are deterministic for a
+//! given seed, on any number of threads. To add a family, a criterion or a limit, implement its trait: [`design()`]
+//! takes trait references.
 //!
-//! A motion for a robot from memory, its limits checked, its error bars predicted:
+//! Example: design a motion, check its limits and predict the error bars.
 //!
 //! ```
 //! use core::ops::ControlFlow;
@@ -27,7 +28,7 @@
 //! use dynident_excitation::limits::{LimitSet, Limits};
 //! use dynident_excitation::{DesignSettings, DesignTask, Family, design, predicted_covariance};
 //!
-//! // An arm with two level axes, and limits beside those of its description.
+//! // An arm with two horizontal axes, and limits in addition to those of its URDF.
 //! let arm = dynident_model::read_urdf(
 //!     r#"<robot name="arm">
 //!       <link name="base"/>
@@ -70,7 +71,7 @@
 //! })?;
 //! assert!(reports.iter().all(|report| !report.violated), "{reports:?}");
 //!
-//! // Standard deviations of m r_x, m r_z and I_yy of either link, white torque noise assumed: none worse than 0.1.
+//! // Predicted standard deviations of m r_x, m r_z and I_yy of both links, for white torque noise.
 //! let predicted = predicted_covariance(&best.information, 1);
 //! assert_eq!(predicted.std.len(), 6);
 //! assert!(predicted.std.iter().all(|std| std.is_some_and(|std| std < 0.1)), "{predicted:?}");

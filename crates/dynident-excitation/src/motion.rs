@@ -1,8 +1,8 @@
-//! Joint motion at a list of times, and what a cost pulls on it.
+//! Joint motion at a list of times, and derivatives of a cost with respect to it.
 
 use dynident_model::terms::JointMotion;
 
-/// Position, velocity, acceleration and jerk of all joints, joint-major: joint `j`, sample `s` stands at `j * samples +
+/// Position, velocity, acceleration and jerk of all joints, joint-major: joint `j`, sample `s` has index `j * samples +
 /// s`. rad (m) and seconds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
@@ -21,7 +21,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Makes room for `joints` × `samples` values and sets them to zero; memory is kept.
+    /// Resizes all arrays to `joints` × `samples` zeros, reusing the memory.
     pub fn reset(&mut self, joints: usize, samples: usize) {
         (self.joints, self.samples) = (joints, samples);
         for values in [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.dddq] {
@@ -30,16 +30,16 @@ impl Motion {
         }
     }
 
-    /// The range of one joint in any of the four arrays.
+    /// Index range of one joint in each of the four arrays.
     pub fn of(&self, joint: usize) -> core::ops::Range<usize> {
         joint * self.samples..(joint + 1) * self.samples
     }
 
-    /// The same motion as the dynamics take it.
+    /// View of the motion for the dynamics.
     pub fn view(&self) -> JointMotion<'_> {
         JointMotion { samples: self.samples, q: &self.q, dq: &self.dq, ddq: &self.ddq }
     }
 }
 
-/// Derivatives of a scalar cost by every number of a [`Motion`], in the same layout.
+/// Derivatives of a scalar cost with respect to every value of a [`Motion`], in the same layout.
 pub type MotionAdjoint = Motion;

@@ -1,39 +1,39 @@
-//! The forecast: how well each parameter will come out, before the robot moves.
+//! Predicted error bars of the parameters of a planned motion.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// What an experiment with this information will say.
+/// Predicted errors of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PredictedCovariance {
-    /// Standard deviation of every parameter's estimate, `√(D⁻¹)_kk`; none for a parameter that the motion does not
-    /// tell.
+    /// Standard deviation of every parameter's estimate, `√(D⁻¹)_kk`; `None` for a parameter that the motion does not
+    /// determine.
     pub std: Vec<Option<f64>>,
-    /// The directions that will be known worst, worst first.
+    /// Directions in the parameter space that are determined worst, worst first.
     pub worst: Vec<Direction>,
 }
 
-/// A combination of parameters, each measured in the standard deviation that it would have if it were the only unknown.
+/// A combination of parameters, each in units of the standard deviation that it would have as the only unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Direction {
-    /// By how much the others make it worse known.
+    /// Factor by which the other parameters increase the standard deviation of this direction.
     pub inflation: f64,
-    /// Share of every parameter, a unit vector.
+    /// Components of the direction, a unit vector.
     pub shares: Vec<f64>,
 }
 
-/// PredictedCovariance of weighted least squares from the information `D = Σ_j W_jᵀ W_j / σ_j²` of a motion: the
-/// estimate's covariance is `D⁻¹` when the torque errors are independent with the assumed σ_j (Swevers et al., IEEE
-/// Trans. Robotics and Automation 13(5), 1997). Residuals that are correlated in time make the real error bars larger,
-/// by 1.3 to 9 times on known arms.
+/// Predicts the covariance of weighted least squares from the information `D = Σ_j W_jᵀ W_j / σ_j²` of a motion: the
+/// covariance is `D⁻¹` if the torque errors are independent with the assumed σ_j (Swevers et al., IEEE Trans. Robotics
+/// and Automation 13(5), 1997). Residuals that are correlated in time increase the error bars, by 1.3 to 9 times on
+/// known arms.
 ///
-/// Directions are eigenvectors of `D` with its columns scaled to one, the `directions` worst of them.
+/// Directions are the `directions` worst eigenvectors of `D` with unit diagonal.
 pub fn predicted_covariance(information: &DMatrix<f64>, directions: usize) -> PredictedCovariance {
     let count = information.nrows();
     let scale: Vec<f64> =
         information.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt().recip() } else { 0.0 }).collect();
     let scaled = DMatrix::from_fn(count, count, |i, j| scale[i] * information[(i, j)] * scale[j]);
     let eigen = SymmetricEigen::new(scaled);
-    // Below this, rounding of the sum over all samples; such a direction is not excited at all.
+    // Smaller eigenvalues are rounding errors of the sum over all samples: such a direction is not excited.
     let least = f64::EPSILON * count as f64 * eigen.eigenvalues.max();
     let std = |index: usize| -> Option<f64> {
         let mut variance = 0.0;

@@ -1,38 +1,38 @@
-//! Eigenvalues and eigenvectors of a symmetric matrix, fast at the sizes of information matrices.
+//! Fast eigenvalues and eigenvectors of a symmetric matrix of the size of information matrices.
 //!
-//! Householder's reduction to three diagonals and implicit QL steps (Golub and Van Loan, *Matrix Computations*, 2013,
-//! sections 8.3.1 and 8.3.3; Bowdler, Martin, Reinsch and Wilkinson, *Numerische Mathematik* 11, 1968, 293), every
-//! operation a stream over whole rows.
+//! Householder tridiagonalisation and implicit QL steps (Golub and Van Loan, *Matrix Computations*, 2013, sections
+//! 8.3.1 and 8.3.3; Bowdler, Martin, Reinsch and Wilkinson, *Numerische Mathematik* 11, 1968, 293). Every operation
+//! streams over whole rows.
 
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::DMatrix;
 
-/// Widest lanes: rows are padded to a multiple of it.
-const WIDE: usize = 8;
+/// Width of the widest lanes; rows are padded to a multiple of it.
+const LANE_WIDTH: usize = 8;
 
-/// QL steps for one eigenvalue at most; two are usual.
-const STEPS: usize = 60;
+/// Maximum number of QL steps for one eigenvalue; two are usual.
+const MAX_QL_STEPS: usize = 60;
 
-/// `A = Σ_k λ_k v_k v_kᵀ` with orthonormal `v_k`, in no order.
+/// `A = Σ_k λ_k v_k v_kᵀ` with orthonormal `v_k`, unordered.
 pub(crate) struct SymmetricEigen {
     pub(crate) values: Vec<f64>,
-    /// The vectors, one after another, each `stride` long with zeros behind its entries.
+    /// Eigenvectors one after another, each `stride` long, padded with zeros.
     vectors: Vec<f64>,
     stride: usize,
 }
 
 impl SymmetricEigen {
-    /// Of a symmetric matrix, of which the lower triangle counts; none if an entry is not a finite number.
+    /// Decomposes the lower triangle of a symmetric matrix; `None` if an entry is not finite.
     ///
-    /// A matrix twice as large has the same vectors and values twice as large, bit for bit.
+    /// A matrix twice as large has bitwise the same vectors, and values twice as large.
     pub(crate) fn new(matrix: &DMatrix<f64>) -> Option<Self> {
         let size = matrix.nrows();
-        let stride = size.next_multiple_of(WIDE);
+        let stride = size.next_multiple_of(LANE_WIDTH);
         let largest = matrix.amax();
         if !largest.is_finite() || matrix.iter().any(|entry| !entry.is_finite()) {
             return None;
         }
-        // Squares of entries near one neither overflow nor vanish.
+        // Scaled so that squares of entries neither overflow nor underflow.
         let unit = power_of_two_near(largest);
         let mut rows = vec![0.0; size * stride];
         for i in 0..size {
@@ -48,13 +48,12 @@ impl SymmetricEigen {
         Some(Self { values, vectors: rows, stride })
     }
 
-    /// The smallest and the largest eigenvalue.
     pub(crate) fn extremes(&self) -> (f64, f64) {
         let range = (f64::INFINITY, f64::NEG_INFINITY);
         self.values.iter().fold(range, |(low, high), value| (low.min(*value), high.max(*value)))
     }
 
-    /// `Σ_k w_k v_k v_kᵀ` for the weights of the eigenvalues.
+    /// `Σ_k w_k v_k v_kᵀ` with one weight per eigenvalue.
     pub(crate) fn weighted(&self, weights: &[f64]) -> DMatrix<f64> {
         let (size, stride) = (self.values.len(), self.stride);
         let mut out = vec![0.0; size * stride];
@@ -69,7 +68,7 @@ impl SymmetricEigen {
     }
 }
 
-/// The power of two at or below a positive number; 1 for others.
+/// Largest power of two that does not exceed a positive number; 1 for other numbers.
 fn power_of_two_near(number: f64) -> f64 {
     if number.is_normal() && number > 0.0 { f64::from_bits(number.to_bits() & (0x7ff << 52)) } else { 1.0 }
 }
@@ -105,14 +104,13 @@ impl Kernel for AddSquare<'_> {
     #[inline(always)]
     fn run<T: Lane>(self) {
         for (i, row) in self.out.chunks_exact_mut(self.stride).enumerate().take(self.size) {
-            // The lower triangle, and what fills its last register.
-            let end = (i + 1).next_multiple_of(WIDE);
+            let end = (i + 1).next_multiple_of(LANE_WIDTH);
             add_times::<T>(&mut row[..end], self.weight * self.vector[i], &self.vector[..end]);
         }
     }
 }
 
-/// Takes the matrix in `rows` and leaves the eigenvectors there; gives the eigenvalues.
+/// Replaces the matrix in `rows` by the eigenvectors and returns the eigenvalues.
 struct Decompose<'a> {
     rows: &'a mut [f64],
     size: usize,
@@ -124,8 +122,8 @@ impl Kernel for Decompose<'_> {
     #[inline(always)]
     fn run<T: Lane>(self) -> Option<Vec<f64>> {
         let Self { rows, size: n, stride } = self;
-        let (mut diagonal, mut beside) = (vec![0.0; n], vec![0.0; n]);
-        // Reflections `1 - b v vᵀ`, one a column: v in the row of the same number, zero up to the diagonal.
+        let (mut diagonal, mut off_diagonal) = (vec![0.0; n], vec![0.0; n]);
+        // Reflections `1 - b v vᵀ`, one per column: v is stored in the row of the same number, zero up to the diagonal.
         let mut reflections = vec![0.0; n * stride];
         let mut factors = vec![0.0; n];
         let mut product = vec![0.0; stride];
@@ -136,19 +134,19 @@ impl Kernel for Decompose<'_> {
             }
             let (above, below) = rows.split_at_mut((k + 1) * stride);
             let v = &mut reflections[k * stride..(k + 1) * stride];
-            // The row is the column: the rest of the matrix is symmetric.
+            // The matrix is symmetric, so the row equals the column.
             v[k + 1..].copy_from_slice(&above[k * stride + k + 1..]);
-            let from = (k + 1) / WIDE * WIDE;
+            let from = (k + 1) / LANE_WIDTH * LANE_WIDTH;
             let first = core::mem::take(&mut v[k + 1]);
             let tail = dot::<T>(&v[from..], &v[from..]);
             if tail <= 0.0 {
-                beside[k] = first;
+                off_diagonal[k] = first;
                 v.fill(0.0);
                 continue;
             }
             let norm = (first * first + tail).sqrt();
             let head = if first > 0.0 { first + norm } else { first - norm };
-            beside[k] = first - head;
+            off_diagonal[k] = first - head;
             v[k + 1] = head;
             let factor = 2.0 / (head * head + tail);
             factors[k] = factor;
@@ -172,7 +170,6 @@ impl Kernel for Decompose<'_> {
             }
         }
         let q = product_of_reflections::<T>(&reflections, &factors, &mut product);
-        // The transpose, so that rotations act on rows.
         for i in 0..n {
             for j in 0..n {
                 rows[j * stride + i] = q[i * stride + j];
@@ -181,7 +178,7 @@ impl Kernel for Decompose<'_> {
                 rows[i * stride + j] = 0.0;
             }
         }
-        ql::<T>(&mut diagonal, &mut beside, rows, stride)?;
+        ql::<T>(&mut diagonal, &mut off_diagonal, rows, stride)?;
         Some(diagonal)
     }
 }
@@ -196,7 +193,7 @@ fn product_of_reflections<T: Lane>(reflections: &[f64], factors: &[f64], product
     }
     for k in (0..n.saturating_sub(2)).rev().filter(|&k| factors[k] != 0.0) {
         let v = &reflections[k * stride..(k + 1) * stride];
-        let from = (k + 1) / WIDE * WIDE;
+        let from = (k + 1) / LANE_WIDTH * LANE_WIDTH;
         product.fill(0.0);
         for (row, v_i) in q[(k + 1) * stride..].chunks_exact(stride).zip(&v[k + 1..]) {
             add_times::<T>(&mut product[from..], *v_i, &row[from..]);
@@ -208,17 +205,17 @@ fn product_of_reflections<T: Lane>(reflections: &[f64], factors: &[f64], product
     q
 }
 
-/// Implicit QL steps on the three diagonals until the outer ones vanish; rotations turn the rows of `vectors` too.
+/// Implicit QL steps on the tridiagonal matrix until the off-diagonal vanishes; the rows of `vectors` are rotated too.
 #[inline(always)]
-fn ql<T: Lane>(diagonal: &mut [f64], beside: &mut [f64], vectors: &mut [f64], stride: usize) -> Option<()> {
+fn ql<T: Lane>(diagonal: &mut [f64], off_diagonal: &mut [f64], vectors: &mut [f64], stride: usize) -> Option<()> {
     let n = diagonal.len();
     for first in 0..n {
         for step in 0.. {
-            // The block from `first` ends where the next entry beside the diagonal is nothing.
+            // The block from `first` ends where the next off-diagonal entry is negligible.
             let mut last = first;
             while last + 1 < n {
                 let around = diagonal[last].abs() + diagonal[last + 1].abs();
-                if beside[last].abs() <= f64::EPSILON * around {
+                if off_diagonal[last].abs() <= f64::EPSILON * around {
                     break;
                 }
                 last += 1;
@@ -226,24 +223,23 @@ fn ql<T: Lane>(diagonal: &mut [f64], beside: &mut [f64], vectors: &mut [f64], st
             if last == first {
                 break;
             }
-            if step == STEPS {
+            if step == MAX_QL_STEPS {
                 return None;
             }
             // Wilkinson's shift.
-            let half = (diagonal[first + 1] - diagonal[first]) / (2.0 * beside[first]);
+            let half = (diagonal[first + 1] - diagonal[first]) / (2.0 * off_diagonal[first]);
             let root = (half * half + 1.0).sqrt();
-            let shift = beside[first] / (half + if half < 0.0 { -root } else { root });
+            let shift = off_diagonal[first] / (half + if half < 0.0 { -root } else { root });
             let mut g = diagonal[last] - diagonal[first] + shift;
             let (mut sine, mut cosine, mut moved) = (1.0, 1.0, 0.0);
             let mut whole = true;
             for i in (first..last).rev() {
-                let (f, b) = (sine * beside[i], cosine * beside[i]);
+                let (f, b) = (sine * off_diagonal[i], cosine * off_diagonal[i]);
                 let radius = (f * f + g * g).sqrt();
-                beside[i + 1] = radius;
+                off_diagonal[i + 1] = radius;
                 if radius == 0.0 {
-                    // The block has come apart.
                     diagonal[i + 1] -= moved;
-                    beside[last] = 0.0;
+                    off_diagonal[last] = 0.0;
                     whole = false;
                     break;
                 }
@@ -264,8 +260,8 @@ fn ql<T: Lane>(diagonal: &mut [f64], beside: &mut [f64], vectors: &mut [f64], st
             }
             if whole {
                 diagonal[first] -= moved;
-                beside[first] = g;
-                beside[last] = 0.0;
+                off_diagonal[first] = g;
+                off_diagonal[last] = 0.0;
             }
         }
     }
@@ -282,8 +278,7 @@ mod tests {
         &root + root.transpose()
     }
 
-    /// `V diag(λ) Vᵀ = A`, `Vᵀ V = 1` and the values of a general library; 1e-13 for sums of at most 64 terms, relative
-    /// to the largest value.
+    /// Compares with a general library; tolerance 1e-13 relative to the largest value, for sums of at most 64 terms.
     #[test]
     fn agrees_with_a_library_and_with_itself() {
         let mut random = Random::new(5);
@@ -303,7 +298,7 @@ mod tests {
         }
     }
 
-    /// Equal eigenvalues, zeros, blocks, diagonals.
+    /// Equal eigenvalues, zeros, blocks, diagonal matrices.
     #[test]
     fn degenerate_matrices_have_their_values() {
         let mut random = Random::new(6);
@@ -314,7 +309,6 @@ mod tests {
         let matrix = basis.weighted(&known);
         let mut values = SymmetricEigen::new(&matrix).unwrap().values;
         values.sort_by(f64::total_cmp);
-        // Backward stability: errors relative to the largest.
         known.sort_by(f64::total_cmp);
         assert!(values.iter().zip(&known).all(|(value, known)| (value - known).abs() < 1e-13), "{values:?}");
         for matrix in [DMatrix::zeros(6, 6), DMatrix::identity(6, 6), DMatrix::from_element(6, 6, 1.0)] {

@@ -1,11 +1,11 @@
-//! Logistic strokes against Fourier series: the same arm, limits, time, controller and noise, and the error of the
-//! parameters over many noisy runs.
+//! Compares logistic strokes with Fourier series: same arm, limits, time, controller and noise; parameter errors over
+//! many noisy runs.
 //!
 //! ```text
 //! cargo run --release -p dynident-paper --example logistic_against_fourier [SEEDS [SECONDS]]
 //! ```
 //!
-//! SECONDS ends each search early: a trial, not a comparison.
+//! SECONDS ends each search early, for a quick test instead of a comparison.
 
 #![allow(clippy::print_stdout, reason = "printing a table is what this program is for")]
 
@@ -22,11 +22,11 @@ use std::error::Error;
 use std::path::Path;
 
 const RATE_HZ: f64 = 1000.0;
-/// Cut-off of the deviation's smoother and of the parallel filter: above all motions here.
+/// Cut-off of the deviation's smoother and of the parallel filter, Hz; above the power of all motions here.
 const CUTOFF_HZ: f64 = 6.0;
 const DECIMATION: usize = 50;
 
-/// Studies of the examples whose limits and duration count.
+/// Studies of the examples with the limits, and the duration (s).
 const STUDIES: [(&str, &str, Option<f64>); 2] = [
     ("the paper's arm, limits (18), 40 s", "examples/design_paper.toml", Some(40.0)),
     ("UR10, 10 s", "examples/design_ur10.toml", None),
@@ -53,8 +53,8 @@ fn main() -> Result<(), Box<dyn Error>> {
                     let reference = first.get_or_insert_with(|| errors.clone());
                     let logs: Vec<f64> = errors.iter().zip(&*reference).map(|(a, b)| (a / b).ln()).collect();
                     let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-                    // Each root mean square of n runs is known to 1/√(2n), a quotient of two to 1/√n; parameters of one
-                    // run are not independent, so this is not divided further.
+                    // A root mean square of n runs has the relative error 1/√(2n), a quotient of two 1/√n. The
+                    // parameters of one run are not independent, so the error is not divided further.
                     let bar = mean.exp() / (seeds as f64).sqrt();
                     println!("| {arm} | {name} | {log_det:.1} | {:.2} ± {bar:.2} | {tracking:.1e} |", mean.exp());
                 }
@@ -64,7 +64,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What a family did.
 struct Outcome {
     log_det: f64,
     /// Root mean square error of every base parameter over the seeds.
@@ -73,7 +72,7 @@ struct Outcome {
     tracking: f64,
 }
 
-/// Designs, runs and identifies; none if nothing was found inside the limits.
+/// Designs, runs and identifies; `None` without a motion inside the limits.
 fn compared(
     path: &Path,
     family: &str,

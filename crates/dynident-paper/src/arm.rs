@@ -1,22 +1,20 @@
-//! The paper's planar arm, and the studies that a user can run again by hand.
+//! The paper's planar arm, and studies that a user can run again.
 
 use dynident::{Error, write_whole};
 use dynident_model::{Model, load_robot};
 use std::path::{Path, PathBuf};
 
-/// The arm and its design study, as they lie in the examples: their names among the outputs, and their texts.
+/// The arm and its design study, copies of the examples: names in the output, and texts.
 pub(crate) const DESCRIPTION: (&str, &str) =
     ("study/robots/paper_2r.toml", include_str!("../study/robots/paper_2r.toml"));
 pub(crate) const DESIGN: (&str, &str) = ("study/design_paper.toml", include_str!("../study/design_paper.toml"));
 
-/// The arm's length between the joints, m, and gravity.
+/// Length between the joints, m, and gravity, m/s².
 pub(crate) const A1: f64 = 1.0;
 pub(crate) const GRAVITY: f64 = 9.8;
 
-/// Theta of the paper's section 3.
 pub(crate) const TRUTH: [f64; 6] = [2.0, 2.0, 0.0, 1.0, 1.0, 0.0];
 
-/// Where the study's files stand.
 pub(crate) struct Arm {
     pub(crate) model: Model,
     pub(crate) description: PathBuf,
@@ -24,7 +22,7 @@ pub(crate) struct Arm {
 }
 
 impl Arm {
-    /// Writes the description and the design study into `folder` and reads them back, as a user's own would be.
+    /// Writes the robot description and the design study into `folder`, and loads them like a user's own.
     pub(crate) fn written(folder: &Path) -> Result<Self, Error> {
         let (description, design) = (folder.join(DESCRIPTION.0), folder.join(DESIGN.0));
         write_whole(&description, DESCRIPTION.1.as_bytes())?;

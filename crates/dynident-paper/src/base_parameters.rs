@@ -1,18 +1,16 @@
-//! Table 2 and Eqs. 6, 7: the base parameters and the observation matrix of the planar arm, by the general algorithm.
+//! Table 2 and Eqs. 6, 7: base parameters and observation matrix of the planar arm, by the general algorithm.
 
 use crate::arm::{A1, Arm, GRAVITY, TRUTH};
 use crate::piece::{PaperCell, PaperTable};
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, Workspace, torque_regressor};
 use dynident_model::sample::Random;
 
-/// The paper's expressions.
 const PAPER: [&str; 6] = ["I1zz + m2 a1²", "m1 r1x + m2 a1", "m1 r1y", "I2zz", "m2 r2x", "m2 r2y"];
 
-/// Where θ₁ to θ₆ stand among the base columns, which keep the order of the inertial parameters: m r_x, m r_y, I_zz of
-/// each link.
+/// Indices of θ₁ to θ₆ in the base columns, which have the order of the inertial parameters: m r_x, m r_y, I_zz of each
+/// link.
 pub(crate) const COLUMNS: [usize; 6] = [2, 0, 1, 5, 3, 4];
 
-/// Random states of the comparison with Eq. 7.
 const STATES: usize = 1000;
 
 /// Table 2, and the largest difference between the general regressor and Eq. 7.
@@ -20,7 +18,7 @@ pub(crate) fn table_2(arm: &Arm) -> (PaperTable, f64) {
     let base = BaseParameters::new(&arm.model, &[], &BaseParameterSettings::default());
     let difference = difference_from_equation_7(arm, base.independent());
     let note = format!(
-        "found from the structure of the arm by the algorithm that serves every robot; the observation matrix differs from Eq. 7 by at most {difference:.1e} over {STATES} random states"
+        "computed from the structure of the arm by the algorithm for all robots; the observation matrix differs from Eq. 7 by at most {difference:.1e} over {STATES} random states"
     );
     let mut table = PaperTable::new(
         2,
@@ -40,7 +38,6 @@ pub(crate) fn table_2(arm: &Arm) -> (PaperTable, f64) {
     (table, difference)
 }
 
-/// `theta_1` and so on, as people write it.
 pub(crate) fn theta(place: usize) -> String {
     const DIGITS: [&str; 6] = ["θ₁", "θ₂", "θ₃", "θ₄", "θ₅", "θ₆"];
     DIGITS[place].to_owned()
@@ -66,7 +63,6 @@ fn difference_from_equation_7(arm: &Arm, columns: &[usize]) -> f64 {
     largest
 }
 
-/// The paper's observation matrix.
 fn equation_7(q: [f64; 2], dq: [f64; 2], ddq: [f64; 2]) -> [[f64; 6]; 2] {
     let ([q1, q2], [v1, v2], [w1, w2]) = (q, dq, ddq);
     let ((s1, c1), (s2, c2), (s12, c12)) = (q1.sin_cos(), q2.sin_cos(), (q1 + q2).sin_cos());

@@ -1,11 +1,11 @@
-//! What came out of the runs under equal conditions: Fig. 15, Table 6, the tables and figures beside the paper's, and
-//! one plain sentence on the paper's claim.
+//! Results of the runs under equal conditions: Fig. 15, Table 6, additional tables and figures, and one sentence about
+//! the paper's claim.
 
 use crate::arm::TRUTH;
 use crate::base_parameters::theta;
 use crate::equal_conditions::{
-    CUTOFF_HZ, Comparison, DURATION_S, DesignedMotion, FITTED, Method, POSITION_STD_RAD, RATE_HZ, RUNS, SEEDS,
-    TORQUE_STD_NM, Trial, Trials, WINDOW_S, Way, quotient,
+    CUTOFF_HZ, Comparison, DURATION_S, DesignedMotion, Differentiation, FITTED_HARMONICS, Method, POSITION_STD_RAD,
+    RATE_HZ, RUNS, SEEDS, TORQUE_STD_NM, Trial, Trials, WINDOW_S, quotient,
 };
 use crate::piece::{PaperCell, PaperFigure, PaperTable, rough, thinned};
 use crate::verification::{Verification, worst};
@@ -16,67 +16,66 @@ use serde::{Deserialize, Serialize};
 /// The paper's Table 6.
 const PAPER: [f64; 6] = [1.98, 2.0, 0.0, 1.007, 1.00, 0.009];
 
-/// Of so many samples one is drawn.
-const DRAWN: usize = 4;
+const PLOT_DECIMATION: usize = 4;
 
-/// Both methods under equal conditions.
+/// Comparison of both methods under equal conditions.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PaperComparison {
-    /// What was equal.
+    /// Description of the equal conditions.
     pub conditions: String,
-    /// What it means for the paper's claim.
+    /// Conclusion about the paper's claim.
     pub statement: String,
-    /// How many times larger the logistic strokes' errors of the parameters are than the Fourier series', by the
-    /// Cramér-Rao bound of the two motions: geometric mean over the six.
+    /// Ratio of the parameter errors of the logistic strokes to those of the Fourier series, by the Cramér-Rao bound of
+    /// the two motions: geometric mean over the six parameters.
     pub bound: f64,
-    /// Noisy iterations of each method and differentiator.
+    /// Number of noisy iterations of each method and differentiator.
     pub seeds: u64,
-    /// By differentiator.
+    /// Results by differentiator.
     pub cases: Vec<ComparisonCase>,
 }
 
-/// One differentiator.
+/// Results with one differentiator.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ComparisonCase {
-    /// How velocity and acceleration came from positions.
+    /// Description of the differentiator.
     pub differentiator: String,
-    /// Logistic strokes.
+    /// Results of the logistic strokes.
     pub logistic: MethodFigures,
-    /// Fourier series.
+    /// Results of the Fourier series.
     pub fourier: MethodFigures,
-    /// Errors of the parameters after the last noisy run, logistic over Fourier: geometric mean over the six of the
-    /// quotients of root mean squares over seeds.
+    /// Ratio of the parameter errors after the last noisy run, logistic strokes to Fourier series: geometric mean over
+    /// the six of the quotients of root mean squares over seeds.
     pub quotient: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the ratio.
     pub quotient_std: f64,
 }
 
-/// What one method reached.
+/// Results of one method.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MethodFigures {
-    /// By run, the largest error of a parameter, without noise.
+    /// Largest parameter error of each run, without noise.
     pub parameter_error: Vec<f64>,
-    /// By run, the largest of the parameters' errors with noise, root mean square over seeds.
+    /// Largest parameter error of each run with noise, root mean square over seeds.
     pub parameter_error_with_noise: Vec<f64>,
-    /// By run, the largest tracking error of both joints without noise, rad.
+    /// Largest tracking error of both joints in each run without noise, rad.
     pub tracking_error_rad: Vec<f64>,
-    /// By joint, root mean square of predicted less driving torque along Eq. 25 after the last run, Nm.
+    /// Root mean square of predicted minus driving torque of each joint along Eq. 25 after the last run, Nm.
     pub torque_deviation_nm: [f64; 2],
-    /// The same with noise in the runs that were identified, over all seeds.
+    /// The same with noise in the identified runs, over all seeds.
     pub torque_deviation_with_noise_nm: [f64; 2],
 }
 
-impl Way {
+impl Differentiation {
     fn name(self) -> String {
         match self {
             Self::Deviation => format!("deviation from the commanded motion, smoothed at {CUTOFF_HZ} Hz"),
             Self::Filter => format!("positions alone, zero-phase Butterworth filter at {CUTOFF_HZ} Hz"),
             Self::Own => {
                 format!(
-                    "each its own: the paper's map within {WINDOW_S} s of the mid-points, a Fourier fit with {FITTED} harmonics"
+                    "the differentiator of each method: the paper's map within {WINDOW_S} s of the mid-points, a Fourier fit with {FITTED_HARMONICS} harmonics"
                 )
             }
         }
@@ -86,7 +85,7 @@ impl Way {
 impl PaperComparison {
     pub(crate) fn new(all: &Comparison, verification: &Verification) -> Self {
         let bound = quotient(all.motions[0].bounds, all.motions[1].bounds);
-        let cases: Vec<ComparisonCase> = Way::ALL
+        let cases: Vec<ComparisonCase> = Differentiation::ALL
             .into_iter()
             .filter_map(|way| {
                 let [logistic, fourier] = [all.of(Method::Logistic, way)?, all.of(Method::Fourier, way)?];
@@ -96,21 +95,21 @@ impl PaperComparison {
                     logistic: MethodFigures::of(logistic, verification),
                     fourier: MethodFigures::of(fourier, verification),
                     quotient,
-                    // A root mean square of n runs is known to 1/√(2n), a quotient of two to 1/√n; parameters of one
-                    // run are not independent, so this is not divided further.
+                    // A root mean square of n runs has the relative error 1/√(2n), a quotient of two 1/√n. The
+                    // parameters of one run are not independent, so the error is not divided further.
                     quotient_std: quotient / (SEEDS as f64).sqrt(),
                 })
             })
             .collect();
         let conditions = format!(
-            "Same arm, same limits (18), {DURATION_S} s with both joints moving, each motion designed for the same criterion (D-optimal) within its own family, {RATE_HZ} samples a second, first run under the same joint PD, then the law (23) with the paper's gains and the parameters of the run before, {RUNS} runs, every sample used (but by the paper's map), torque and columns behind the same filter. Once without noise, and {SEEDS} times with normal noise of {:.0e}° in positions and {TORQUE_STD_NM} Nm in torques, felt by the controller as well. True parameters are those of section 3.",
+            "Same arm, same limits (18), {DURATION_S} s with both joints moving, each motion designed for the same criterion (D-optimal) within its own family, {RATE_HZ} samples per second, first run under the same joint PD, then the law (23) with the paper's gains and the parameters of the previous run, {RUNS} runs, all samples used (except with the paper's map), torque and columns with the same filter. Once without noise, and {SEEDS} times with normal noise of {:.0e}° in positions and {TORQUE_STD_NM} Nm in torques, also for the controller. True parameters are those of section 3.",
             POSITION_STD_RAD.to_degrees()
         );
         let statement = statement(&cases, bound);
         Self { conditions, statement, bound, seeds: SEEDS, cases }
     }
 
-    /// What one run tells, in a sentence: largest error of a parameter after the first and the last run without noise.
+    /// Result of a single run, in a sentence: largest parameter error after the first and the last run without noise.
     pub(crate) fn one_run(&self, own: [f64; 3]) -> String {
         let Some(case) = self.cases.first() else { return String::new() };
         let ends =
@@ -121,13 +120,12 @@ impl PaperComparison {
             ends(&case.logistic.tracking_error_rad),
         );
         format!(
-            "With a differentiator that sees what the arm really did, one run is enough for the parameters, and the loop is there for tracking. In our variant of Tables 4 and 5 the largest parameter error is {} after the first run already ({} after the third). Under equal conditions it is {p1} and {p3} without noise, {n1} and {n3} with noise, while the largest tracking error falls from {t1} to {t3} rad. Only the paper's map, which reads speed off a path that the arm does not follow, needs the loop to find the parameters.",
+            "With a differentiator of the measured motion, one run is enough for the parameters, and further runs improve only the tracking. In our variant of Tables 4 and 5 the largest parameter error is {} after the first run ({} after the third). Under equal conditions it is {p1} and {p3} without noise, {n1} and {n3} with noise, while the largest tracking error decreases from {t1} to {t3} rad. Only the paper's map, which computes speed from a path that the arm does not follow exactly, needs several runs to find the parameters.",
             rough(own[0]),
             rough(own[1]),
         )
     }
 
-    /// The table of all cases.
     pub(crate) fn table(&self) -> Table {
         let columns = [
             "differentiator",
@@ -141,7 +139,7 @@ impl PaperComparison {
             "Fourier",
         ];
         let mut table = Table::new(EQUAL_TABLE, columns).note(
-            "error of θ: the largest of the six; with noise root mean squares over seeds; logistic over Fourier: geometric mean over the six parameters. Torque: root mean square of predicted less driving torque in the run of Fig. 16. What the logistic strokes keep without noise in the first row comes from the splices, where the commanded speed jumps by some 1e-4 rad/s. Joint by joint the paper's map does better (Tables 4, 5)",
+            "error of θ: the largest of the six; with noise root mean squares over seeds; logistic over Fourier: geometric mean over the six parameters. Torque: root mean square of predicted minus driving torque in the run of Fig. 16. The error of the logistic strokes without noise in the first row is caused by the splices, where the commanded speed jumps by about 1e-4 rad/s. With one joint at a time the paper's map is more accurate (Tables 4, 5)",
         );
         for case in &self.cases {
             let methods = [&case.logistic, &case.fourier];
@@ -166,10 +164,9 @@ impl PaperComparison {
     }
 }
 
-/// Title of the table of all cases.
 pub(crate) const EQUAL_TABLE: &str = "Errors of parameters and torques, both methods";
 
-/// The paper's claim, and what these figures say of it.
+/// The paper's claim, and the conclusion from these results.
 fn statement(cases: &[ComparisonCase], bound: f64) -> String {
     let Some(case) = cases.first() else { return String::new() };
     let (quotient, bar) = (case.quotient, case.quotient_std);
@@ -179,10 +176,10 @@ fn statement(cases: &[ComparisonCase], bound: f64) -> String {
     } else if quotient + 2.0 * bar < 1.0 && bound < 1.0 {
         ("smaller", "holds")
     } else {
-        ("about as large", "is not decided")
+        ("about as large", "is undecided")
     };
     format!(
-        "Under equal conditions the paper's claim that its logistic function identifies better than a Fourier series {claim}: with noise the logistic strokes' parameter errors are {word}, {quotient:.2} ± {bar:.2} times those of the Fourier series (the Cramér-Rao bound of the two motions says {bound:.2}), and without noise both find the parameters, to {} and {} after three runs.",
+        "Under equal conditions the paper's claim that its logistic function identifies better than a Fourier series {claim}: with noise the logistic strokes' parameter errors are {word}, {quotient:.2} ± {bar:.2} times those of the Fourier series (Cramér-Rao bound of the two motions: {bound:.2}), and without noise both find the parameters, with errors of {} and {} after three runs.",
         rough(last(&case.logistic)),
         rough(last(&case.fourier)),
     )
@@ -202,7 +199,7 @@ impl MethodFigures {
     }
 }
 
-/// Fig. 15: the series; and the strokes that are compared with it.
+/// Fig. 15: the Fourier series, and the compared strokes.
 pub(crate) fn figure_15(all: &Comparison) -> (PaperFigure, LinePlot) {
     let [logistic, fourier] = &all.motions;
     let note = if fourier.feasible {
@@ -210,11 +207,12 @@ pub(crate) fn figure_15(all: &Comparison) -> (PaperFigure, LinePlot) {
     } else {
         "no series inside (18) was found"
     };
-    let note = format!("{note}; the paper does not give its coefficients");
+    let note = format!("{note}; the paper does not state its coefficients");
     let plot = drawn(fourier, "Optimized Fourier series trajectories");
-    let beside = drawn(logistic, "Beside Fig. 15: logistic strokes for the same limits, time and criterion")
-        .note("Eq. 14 for both joints at once, amplitude, ω and offset free");
-    (PaperFigure::new(15, plot, &note), beside)
+    let strokes =
+        drawn(logistic, "For comparison with Fig. 15: logistic strokes for the same limits, time and criterion")
+            .note("Eq. 14 for both joints at once, amplitude, ω and offset free");
+    (PaperFigure::new(15, plot, &note), strokes)
 }
 
 fn drawn(motion: &DesignedMotion, title: &str) -> LinePlot {
@@ -223,10 +221,10 @@ fn drawn(motion: &DesignedMotion, title: &str) -> LinePlot {
     let plot = LinePlot::new(title, "t, s", "q, rad", times)
         .line("joint 1", motion.0.q[motion.0.of(0)].to_vec())
         .line("joint 2", motion.0.q[motion.0.of(1)].to_vec());
-    thinned(plot, DRAWN)
+    thinned(plot, PLOT_DECIMATION)
 }
 
-/// Table 6: the series' parameters after three runs.
+/// Table 6: parameters of the Fourier series after three runs.
 pub(crate) fn table_6(all: &Comparison) -> PaperTable {
     let columns = [
         "parameter",
@@ -238,14 +236,16 @@ pub(crate) fn table_6(all: &Comparison) -> PaperTable {
         "deviation",
         "its error",
         "deviation, with noise: rms error",
-        "logistic strokes, alike",
+        "logistic strokes, same conditions",
     ];
-    let note = "three runs of both joints together, without noise but for the last two columns (root mean square over seeds). Fourier fit: the series' own way, a fit of the measured positions; deviation: the measured deviation from the commanded motion differentiated, as in all of our own columns. An error of 0.02 without noise, as in the paper, is one of the fit, not of the motion";
+    let note = "three runs of both joints together, without noise except in the last two columns (root mean square over seeds). Fourier fit: a fit of the measured positions; deviation: differentiation of the measured deviation from the commanded motion, as in all of our own columns. An error of 0.02 without noise, as in the paper, is caused by the fit, not by the motion";
     let mut table = PaperTable::new(6, "Inertia parameters identified by Fourier series", &columns, note);
     let of = |way| all.of(Method::Fourier, way);
     let last = |way| of(way).map_or([f64::NAN; 6], |trials| trials.clean.last());
-    let noisy = |method| all.of(method, Way::Deviation).map_or([f64::NAN; 6], |trials| trials.noisy_errors(RUNS - 1));
-    let (fit, deviation) = (last(Way::Own), last(Way::Deviation));
+    let noisy = |method| {
+        all.of(method, Differentiation::Deviation).map_or([f64::NAN; 6], |trials| trials.noisy_errors(RUNS - 1))
+    };
+    let (fit, deviation) = (last(Differentiation::Own), last(Differentiation::Deviation));
     let (fourier, logistic) = (noisy(Method::Fourier), noisy(Method::Logistic));
     for place in 0..6 {
         let truth = TRUTH[place];
@@ -257,19 +257,25 @@ pub(crate) fn table_6(all: &Comparison) -> PaperTable {
     table
 }
 
-/// Beside Figs. 9 to 14: how both methods' motions were followed, without noise.
+/// Tracking of both methods without noise, next to Figs. 9 to 14.
 pub(crate) fn tracking_figures(all: &Comparison) -> Vec<LinePlot> {
-    let [Some(logistic), Some(fourier)] =
-        [Method::Logistic, Method::Fourier].map(|method| all.of(method, Way::Deviation).map(|trials| &trials.clean))
+    let [Some(logistic), Some(fourier)] = [Method::Logistic, Method::Fourier]
+        .map(|method| all.of(method, Differentiation::Deviation).map(|trials| &trials.clean))
     else {
         return Vec::new();
     };
     let mut plots = vec![
-        followed(logistic, "Beside Figs. 9 to 11 and 13: logistic strokes of both joints, first and third run"),
-        followed(fourier, "Beside Figs. 9 to 11 and 13: Fourier series of both joints, first and third run"),
+        followed(
+            logistic,
+            "For comparison with Figs. 9 to 11 and 13: logistic strokes of both joints, first and third run",
+        ),
+        followed(
+            fourier,
+            "For comparison with Figs. 9 to 11 and 13: Fourier series of both joints, first and third run",
+        ),
     ];
     plots.extend([1, 0].map(|joint| errors(joint, logistic, fourier)));
-    plots.into_iter().map(|plot| thinned(plot, DRAWN)).collect()
+    plots.into_iter().map(|plot| thinned(plot, PLOT_DECIMATION)).collect()
 }
 
 fn times(run: &Run) -> Vec<f64> {
@@ -295,12 +301,12 @@ fn followed(trial: &Trial, title: &str) -> LinePlot {
             plot = plot.line(format!("joint {}: run {number}", joint + 1), shown(&run.q[run.of(joint)]));
         }
     }
-    plot.note("equal conditions, without noise, differentiated by the deviation from the commanded motion")
+    plot.note("equal conditions, without noise, differentiation of the deviation from the commanded motion")
 }
 
 fn errors(joint: usize, logistic: &Trial, fourier: &Trial) -> LinePlot {
     let number = if joint == 1 { 12 } else { 14 };
-    let title = format!("Beside Fig. {number}: tracking errors of joint {}, both methods", joint + 1);
+    let title = format!("For comparison with Fig. {number}: tracking errors of joint {}, both methods", joint + 1);
     let mut plot = LinePlot::new(title, "t, s", "e, rad", logistic.runs.first().map(times).unwrap_or_default());
     let length = plot.x.len();
     let mut caption = Vec::new();

@@ -5,15 +5,15 @@ use crate::piece::{PaperCell, PaperFigure, PaperTable};
 use dynident_model::Vec3;
 use dynident_report::{Diagram, LineStyle};
 
-/// Table 1: modified Denavit-Hartenberg parameters, ours read back from the model that everything here computes with.
+/// Table 1: modified Denavit-Hartenberg parameters; ours are computed from the model that the reproduction uses.
 pub(crate) fn table_1(arm: &Arm) -> PaperTable {
-    let note = "the copy of the paper that we have prints m for a of row 2; section 3 takes a₁ = 1. Ours are read back from the robot that everything on this page is computed with";
+    let note = "the available copy of the paper prints m for a of row 2; section 3 uses a₁ = 1. Our values are those of the robot model that all results on this page use";
     let columns = ["i", "α of i−1, rad", "a of i−1, paper", "a of i−1, here, m", "d of i, m", "q of i"];
     let mut table = PaperTable::new(1, "Modified D-H parameters of the robot", &columns, note);
     for (place, (joint, length)) in arm.model.joints().iter().zip(["0", "a₁"]).enumerate() {
         let Vec3([a, _, d]) = joint.placement.translation;
-        // The turn of the joint's axis about x against the one before: modified parameters have it in the rotation's
-        // last column.
+        // Rotation of the joint's axis about x relative to the previous axis; with modified parameters it is in the
+        // last column of the rotation matrix.
         let rotation = joint.placement.rotation.0;
         let alpha = (-rotation[1][2]).atan2(rotation[2][2]);
         table.row([
@@ -30,7 +30,7 @@ pub(crate) fn table_1(arm: &Arm) -> PaperTable {
 
 /// Fig. 1: the arm with its frames, by the modified D-H convention.
 pub(crate) fn figure_1() -> PaperFigure {
-    // Joint 1, joint 2 and tip of the drawing, px; angles from the horizontal.
+    // Joint 1, joint 2 and tip in the drawing, px; angles from the horizontal.
     let (first, reach) = ([170.0, 330.0], 180.0);
     let (one, two) = (30.0_f64.to_radians(), 75.0_f64.to_radians());
     let along = |[x, y]: [f64; 2], angle: f64, length: f64| [x + length * angle.cos(), y - length * angle.sin()];
@@ -40,7 +40,7 @@ pub(crate) fn figure_1() -> PaperFigure {
         (0..=12).map(|k| along(centre, from + (to - from) * f64::from(k) / 12.0, radius)).map(rounded).collect()
     };
     let up = core::f64::consts::FRAC_PI_2;
-    let words = "a planar arm of two rods in the vertical plane; frame 0 and frame 1 share their origin at the first joint, frame 2 stands at the second joint, a₁ along x₁ from the first; q₁ from x₀ to x₁, q₂ from x₁ to x₂; all z axes point at the reader, gravity along minus y₀";
+    let words = "a planar arm of two rods in the vertical plane; frame 0 and frame 1 share their origin at the first joint, frame 2 is at the second joint, a₁ along x₁ from the first; q₁ from x₀ to x₁, q₂ from x₁ to x₂; all z axes point towards the reader, gravity along minus y₀";
     let mut drawing = Diagram::new("Modified D-H model of the robot", words, [620.0, 400.0]);
     for (points, style) in [
         (vec![first, second, tip], LineStyle::Broad),
@@ -58,7 +58,6 @@ pub(crate) fn figure_1() -> PaperFigure {
         drawing = drawing.line(&points.into_iter().map(rounded).collect::<Vec<_>>(), style);
     }
     drawing = drawing.ring(first, 9.0).ring(rounded(second), 9.0);
-    // Beside the middle of the rod.
     let [middle_x, middle_y] = along(first, one, 0.5 * reach);
     for (at, text) in [
         (along(first, 0.0, 156.0), "x₀"),
@@ -75,12 +74,12 @@ pub(crate) fn figure_1() -> PaperFigure {
     ] {
         drawing = drawing.word(rounded(at), text);
     }
-    PaperFigure::new(1, drawing, "drawn after Table 1; the sizes are those of a drawing")
+    PaperFigure::new(1, drawing, "drawn from Table 1, not to scale")
 }
 
-/// Fig. 8: the procedure, as the paper's section 3 tells it, with what is done here.
+/// Fig. 8: the procedure of the paper's section 3, with the changes of the reproduction.
 pub(crate) fn figure_8() -> PaperFigure {
-    let words = "initial parameters; then in a circle: run the excitation trajectory under the controller with the parameters so far, sample positions and torques, velocity and acceleration from position, least squares, and the error of Eq. 20: if it is small the procedure ends, else the parameters go into the controller and the trajectory is run again";
+    let words = "initial parameters; then a loop: run the excitation trajectory under the controller with the present parameters, sample positions and torques, compute velocity and acceleration from position, least squares, and the error of Eq. 20: if it is small the procedure ends, otherwise the controller gets the parameters and the trajectory is run again";
     let x = 240.0;
     let (top, step) = (30.0, 66.0);
     let y = |place: f64| top + step * place;
@@ -109,7 +108,7 @@ pub(crate) fn figure_8() -> PaperFigure {
     PaperFigure::new(
         8,
         chart,
-        "after the paper's text. A real robot has no true values to compute Eq. 20 with: here an iteration ends when tracking and parameters have settled",
+        "from the paper's text. The true values of Eq. 20 are unknown for a real robot, so Dynident ends an iteration when tracking and parameters have converged",
     )
 }
 

@@ -1,7 +1,7 @@
-//! The paper's claim put to the test: logistic strokes and a Fourier series under the same conditions.
+//! Test of the paper's claim: logistic strokes and a Fourier series under equal conditions.
 //!
-//! Same arm, limits (18), 40 s, criterion of the design, sample rate, first controller and law (23), number of runs,
-//! differentiator, noise. What is left of a difference is the motion's own.
+//! Arm, limits (18), 40 s, design criterion, sample rate, first controller and law (23), number of runs, differentiator
+//! and noise are equal, so that a difference is caused by the motion.
 
 use crate::arm::{Arm, TRUTH};
 use crate::base_parameters::COLUMNS;
@@ -18,99 +18,91 @@ use rayon::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Their names among the outputs, and their texts.
+/// Names of the studies in the output, and their texts.
 pub(crate) const FOURIER: (&str, &str) = ("study/design_fourier.toml", include_str!("../study/design_fourier.toml"));
 pub(crate) const LOGISTIC: (&str, &str) = ("study/design_logistic.toml", include_str!("../study/design_logistic.toml"));
 
-/// Samples a second of robot and log, with one Runge-Kutta step each: both motions turn within seconds.
+/// Sample rate of robot and log, Hz, with one Runge-Kutta step each; both motions change within seconds.
 pub(crate) const RATE_HZ: f64 = 100.0;
-/// Length of either motion, s.
+/// Duration of either motion, s.
 pub(crate) const DURATION_S: f64 = 40.0;
-/// Runs of an iteration, as in the paper.
 pub(crate) const RUNS: usize = 3;
-/// Noisy iterations of each method and differentiator.
 pub(crate) const SEEDS: u64 = 16;
-/// Cut-off of smoothers and of the filter for torque and columns, Hz: above both motions, whose power ends at 0.5 Hz.
+/// Cut-off of smoothers and of the filter for torque and columns, Hz; the power of both motions ends at 0.5 Hz.
 pub(crate) const CUTOFF_HZ: f64 = 6.0;
-/// Of so many rows one is kept behind that filter.
+/// Decimation factor of the rows after that filter.
 const DECIMATION: usize = 5;
-/// δ of the paper's windows, s: that of the optimum inside (18).
+/// Half width δ of the paper's windows, s: that of the optimum inside (18).
 pub(crate) const WINDOW_S: f64 = 5.76;
-/// Harmonics of the series fitted to measured positions: the commanded five, and what the tracking error adds.
-pub(crate) const FITTED: usize = 15;
-/// Standard deviations of the noise: positions (1e-3 degrees) and torques, as in BIRDy's protocol.
+/// Harmonics of the series fitted to measured positions: the commanded five, and more for the tracking error.
+pub(crate) const FITTED_HARMONICS: usize = 15;
+/// Standard deviations of the noise of positions (1e-3 degrees) and torques, as in BIRDy's protocol.
 pub(crate) const POSITION_STD_RAD: f64 = 1.745_329_251_994_33e-5;
 pub(crate) const TORQUE_STD_NM: f64 = 0.05;
 
-/// What the motion is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Method {
     Logistic,
     Fourier,
 }
 
-/// How velocity and acceleration come from positions.
+/// Computation of velocity and acceleration from positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Way {
-    /// The deviation from the commanded motion smoothed, the commanded derivatives added: what a study has unless it
-    /// says otherwise.
+pub(crate) enum Differentiation {
+    /// Smoothed deviation from the commanded motion plus the commanded derivatives; the default of studies.
     Deviation,
-    /// Zero-phase Butterworth filter of the positions alone.
+    /// Zero-phase Butterworth filter of the positions.
     Filter,
-    /// Each method's own: the paper's map, a Fourier series fitted to the positions.
+    /// That of each method: the paper's map, or a Fourier series fitted to the positions.
     Own,
 }
 
-impl Way {
+impl Differentiation {
     pub(crate) const ALL: [Self; 3] = [Self::Deviation, Self::Filter, Self::Own];
 }
 
-/// A designed motion.
 pub(crate) struct DesignedMotion {
     method: Method,
     pub(crate) reference: Reference,
-    /// The closed form of logistic strokes, one a joint.
+    /// Closed form of logistic strokes, one per joint.
     paths: Vec<LogisticPath>,
     /// Standard deviation of each θ for white torque noise of 1 Nm: the Cramér-Rao bound of this motion.
     pub(crate) bounds: [f64; 6],
-    /// Whether the design is inside all limits.
+    /// Whether the design keeps all limits.
     pub(crate) feasible: bool,
 }
 
 /// One iteration of three runs.
 #[derive(Clone, Debug)]
 pub(crate) struct Trial {
-    /// By run, the six parameters from that run alone.
+    /// The six parameters after each run, from that run alone.
     pub(crate) theta: Vec<[f64; 6]>,
-    /// By run and joint, the largest tracking error, rad.
+    /// Largest tracking error of each run and joint, rad.
     pub(crate) tracking: Vec<[f64; 2]>,
-    /// The motions, of the trial without noise only.
+    /// Motions of the trial without noise; empty for others.
     pub(crate) runs: Vec<Run>,
 }
 
-/// A method with one differentiator.
 pub(crate) struct Trials {
     pub(crate) method: Method,
-    pub(crate) way: Way,
+    pub(crate) way: Differentiation,
     pub(crate) clean: Trial,
     /// By seed.
     pub(crate) noisy: Vec<Trial>,
 }
 
-/// Both methods with all differentiators.
 pub(crate) struct Comparison {
     pub(crate) motions: [DesignedMotion; 2],
     pub(crate) trials: Vec<Trials>,
 }
 
 impl Comparison {
-    pub(crate) fn of(&self, method: Method, way: Way) -> Option<&Trials> {
+    pub(crate) fn of(&self, method: Method, way: Differentiation) -> Option<&Trials> {
         self.trials.iter().find(|trials| trials.method == method && trials.way == way)
     }
 }
 
 impl Trial {
-    /// The six parameters after the last run.
     pub(crate) fn last(&self) -> [f64; 6] {
         self.theta.last().copied().unwrap_or([f64::NAN; 6])
     }
@@ -135,13 +127,13 @@ pub(crate) fn quotient(one: [f64; 6], other: [f64; 6]) -> f64 {
     (one.iter().zip(other).map(|(one, other)| (one / other).ln()).sum::<f64>() / 6.0).exp()
 }
 
-/// Designs both motions and runs everything; the noise of trial `k` has seed `seed` + k.
+/// Designs both motions and runs all trials; the noise of trial `k` has seed `seed` + k.
 pub(crate) fn compared(arm: &Arm, folder: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Comparison, Error> {
     let designed = |method| designed(arm, folder, method, seed, options);
     let motions = [designed(Method::Logistic)?, designed(Method::Fourier)?];
-    let pairs = motions.iter().flat_map(|motion| Way::ALL.map(|way| (motion, way)));
-    // One job for each trial; none of them knows of the others, so their order does not matter.
-    let jobs: Vec<(&DesignedMotion, Way, Option<u64>)> = pairs
+    let pairs = motions.iter().flat_map(|motion| Differentiation::ALL.map(|way| (motion, way)));
+    // One job per trial; the trials are independent.
+    let jobs: Vec<(&DesignedMotion, Differentiation, Option<u64>)> = pairs
         .flat_map(|(motion, way)| {
             let seeds = (0..SEEDS).map(move |k| Some(seed.wrapping_add(k)));
             core::iter::once(None).chain(seeds).map(move |seed| (motion, way, seed))
@@ -193,42 +185,46 @@ fn designed(
     Ok(DesignedMotion { method, reference, paths, bounds, feasible: outcome.file.feasible })
 }
 
-/// The stroke of a joint from its free numbers A, ω, h, with T = 40/ω.
+/// Stroke of a joint from its parameters A, ω, h, with T = 40/ω.
 fn closed_form(own: &[f64]) -> LogisticPath {
     LogisticPath { amplitude: own[0], omega: own[1], offset: own[2], period_s: 40.0 / own[1], repetitions: 1 }
 }
 
-/// Three runs with both joints moving, from no model on; without a seed without noise.
-fn trial(arm: &Arm, motion: &DesignedMotion, way: Way, seed: Option<u64>) -> Result<Trial, IterationError> {
-    // The paper's map counts around the mid-points, as the paper has it; everything else counts everywhere.
+/// Three runs with both joints moving, starting without a model; without a seed there is no noise.
+fn trial(arm: &Arm, motion: &DesignedMotion, way: Differentiation, seed: Option<u64>) -> Result<Trial, IterationError> {
+    // The paper's map uses windows around the mid-points, as in the paper; other differentiators use all samples.
     let windows = |path: &LogisticPath| {
         [0.25, 0.75].map(|share| [share * path.period_s - WINDOW_S, share * path.period_s + WINDOW_S]).to_vec()
     };
     let mut leg = match (way, motion.method) {
-        (Way::Own, Method::Logistic) => {
+        (Differentiation::Own, Method::Logistic) => {
             Leg::windowed(motion.reference.clone(), motion.paths.iter().map(windows).collect())?
         }
-        (Way::Own, Method::Fourier) | (Way::Deviation | Way::Filter, _) => Leg::whole(motion.reference.clone())?,
+        (Differentiation::Own, Method::Fourier) | (Differentiation::Deviation | Differentiation::Filter, _) => {
+            Leg::whole(motion.reference.clone())?
+        }
     };
     let mut settings = IterationSettings::default();
     settings.identification.differentiator = match (way, motion.method) {
-        (Way::Filter, _) => filter(),
-        (Way::Deviation, _) | (Way::Own, Method::Logistic) => DifferentiatorSettings::Deviation {
-            reference: ReferenceSettings::default(),
-            smoother: Box::new(filter()),
-            max_lag_s: None,
-        },
-        (Way::Own, Method::Fourier) => {
-            DifferentiatorSettings::FourierFit { base_hz: 1.0 / DURATION_S, harmonics: FITTED, trend: false }
+        (Differentiation::Filter, _) => filter(),
+        (Differentiation::Deviation, _) | (Differentiation::Own, Method::Logistic) => {
+            DifferentiatorSettings::Deviation {
+                reference: ReferenceSettings::default(),
+                smoother: Box::new(filter()),
+                max_lag_s: None,
+            }
+        }
+        (Differentiation::Own, Method::Fourier) => {
+            DifferentiatorSettings::FourierFit { base_hz: 1.0 / DURATION_S, harmonics: FITTED_HARMONICS, trend: false }
         }
     };
-    if way == Way::Own && motion.method == Method::Logistic {
+    if way == Differentiation::Own && motion.method == Method::Logistic {
         leg = leg.with_differentiator(Arc::new(LiteralMap { paths: motion.paths.clone() }));
     }
     settings.identification.parallel_filter =
         Some(DecimationSettings { factor: DECIMATION, cutoff_hz: Some(CUTOFF_HZ), ..DecimationSettings::default() });
-    // As in the paper: each run speaks for itself, its estimate goes into the controller however it followed, and all
-    // of them are made.
+    // As in the paper, each run is identified separately, the controller uses its estimate for any tracking error, and
+    // all runs are computed.
     settings.pool = false;
     let settings = with_all_runs(settings, RUNS);
     let robot = ParametricModel::new(arm.model.clone(), Vec::new())?.with_nominal(prior(false))?;
@@ -252,7 +248,7 @@ fn trial(arm: &Arm, motion: &DesignedMotion, way: Way, seed: Option<u64>) -> Res
         COLUMNS.map(|column| values.get(column).copied().unwrap_or(f64::NAN))
     });
     let theta = theta.collect();
-    // What the sensors saw is noise as well; how well a joint followed is the true distance.
+    // Tracking errors are true distances, without sensor noise.
     let tracking = runs.iter().map(|run| [run.max_error[0], run.max_error[1]]).collect();
     if seed.is_some() {
         runs.clear();
@@ -270,9 +266,9 @@ mod tests {
     use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
     use dynident_excitation::{Family, grid};
 
-    /// The map's strokes are the commanded ones: else its errors would be ours.
+    /// The strokes of the map must equal the commanded ones, otherwise the map's errors would be ours.
     #[test]
-    fn the_map_reads_the_motion_that_is_commanded() {
+    fn the_map_uses_the_commanded_motion() {
         let family = SplicedLogistic::new(2, DURATION_S, &SplicedLogisticSettings::default()).unwrap();
         let parameters = [1.9, 1.05, 0.1, 2.0, 1.2, 0.3];
         let (times, mut motion) = (grid(DURATION_S, 401), dynident_excitation::Motion::default());

@@ -1,22 +1,20 @@
-//! The index of the page: every number of the paper, ours, and a link.
+//! Index of the page: every number of the paper, the reproduced number, and a link.
 
 use crate::PaperFile;
 use crate::comparison::EQUAL_TABLE;
 use crate::piece::{PaperCell, PaperFigure, PaperTable, rough, shown};
 use dynident_report::{Cell, Table};
 
-/// Chapters of the page to which the index leads.
 pub(crate) const EQUAL: &str = "Both methods under equal conditions";
-pub(crate) const WORDS: &str = "What comes out, and what does not";
-pub(crate) const DEPARTURES: &str = "Where we depart from the paper, and why";
-pub(crate) const REFERENCES: &str = "The paper's references [7] to [20], and where their ideas live here";
+pub(crate) const STATEMENTS: &str = "Reproduced and not reproduced statements";
+pub(crate) const DEVIATION_TITLE: &str = "Deviations from the paper, with reasons";
+pub(crate) const REFERENCES: &str = "The paper's references [7] to [20] in this project";
 pub(crate) const TORQUES: &str = "Verification on another motion";
 
-/// Every number of the paper, ours, and a link.
 pub(crate) fn index(file: &PaperFile, tables: &[PaperTable]) -> Table {
     let mut index =
         Table::new("Index of tables, figures and equations", ["in the paper", "what", "the paper's number", "here"])
-            .note("a click on the first column leads there");
+            .note("the first column contains links");
     let numbers = Numbers { file, tables };
     for entry in ENTRIES {
         if let Some(to) = numbers.target(entry.at) {
@@ -28,7 +26,6 @@ pub(crate) fn index(file: &PaperFile, tables: &[PaperTable]) -> Table {
     index
 }
 
-/// The numbers of the tables and figures computed here.
 struct Numbers<'a> {
     file: &'a PaperFile,
     tables: &'a [PaperTable],
@@ -43,7 +40,6 @@ impl<'a> Numbers<'a> {
         self.file.figures.iter().find(|figure| figure.number == number)
     }
 
-    /// The heading to which a row leads, if the page has it.
     fn target(&self, at: At) -> Option<String> {
         match at {
             At::Table(number) => self.table(number).map(PaperTable::heading),
@@ -52,12 +48,10 @@ impl<'a> Numbers<'a> {
         }
     }
 
-    /// A value of a figure.
     fn value(&self, number: usize, name: &str) -> f64 {
         self.figure(number).and_then(|figure| figure.values.get(name)).copied().unwrap_or(f64::NAN)
     }
 
-    /// The value of a goal.
     fn reached(&self, goal: usize) -> f64 {
         self.file.reached.get(goal).map_or(f64::NAN, |goal| goal.value)
     }
@@ -68,14 +62,13 @@ impl<'a> Numbers<'a> {
         format!("{} rad", [1, 2, 3].map(of).join(", "))
     }
 
-    /// Values after the third run as in the paper, which are in column 4 of Tables 4 and 5.
+    /// Values after the third run in the columns as in the paper, which are in column 4 of Tables 4 and 5.
     fn third(&self, number: usize) -> String {
         let rows = self.table(number).map(|table| table.rows.as_slice()).unwrap_or_default();
         let last = rows.iter().filter(|row| row.get(1) == Some(&PaperCell::Text("3".to_owned())));
         last.filter_map(|row| row.get(4)).map(PaperCell::shown).collect::<Vec<_>>().join(", ")
     }
 
-    /// Our number for a row of the index.
     fn here(&self, entry: &Entry) -> String {
         match entry.place {
             "Table 3" | "Fig. 7" => format!(
@@ -92,7 +85,7 @@ impl<'a> Numbers<'a> {
             "the claim" => {
                 let case = self.file.comparison.cases.first();
                 case.map_or_else(String::new, |case| {
-                    format!("{:.2} ± {:.2} times the errors", case.quotient, case.quotient_std)
+                    format!("errors {:.2} ± {:.2} times as large", case.quotient, case.quotient_std)
                 })
             }
             "Eqs. 3 to 7" => format!("largest difference {}", rough(self.reached(0))),
@@ -122,7 +115,6 @@ impl<'a> Numbers<'a> {
     }
 }
 
-/// Where a row of the index leads.
 #[derive(Clone, Copy)]
 enum At {
     Table(usize),
@@ -130,7 +122,6 @@ enum At {
     Chapter(&'static str),
 }
 
-/// A row of the index.
 struct Entry {
     place: &'static str,
     at: At,
@@ -142,7 +133,7 @@ const fn entry(place: &'static str, at: At, what: &'static str, paper: &'static 
     Entry { place, at, what, paper }
 }
 
-/// The index, in the paper's order.
+/// Rows of the index, in the paper's order.
 const ENTRIES: &[Entry] = &[
     entry("Table 1", At::Table(1), "modified D-H parameters", ""),
     entry("Fig. 1", At::Figure(1), "the arm and its frames", ""),
@@ -153,12 +144,12 @@ const ENTRIES: &[Entry] = &[
     entry("Fig. 3", At::Figure(3), "spliced logistic function", "below 1e-4 at rest"),
     entry("Eq. 14, Fig. 4", At::Figure(4), "different ω", ""),
     entry("Fig. 5", At::Figure(5), "different T", ""),
-    entry("Eqs. 15, 16", At::Chapter(DEPARTURES), "the map from position to velocity and acceleration", ""),
-    entry("Fig. 6", At::Figure(6), "the samples that are used", ""),
+    entry("Eqs. 15, 16", At::Chapter(DEVIATION_TITLE), "the map from position to velocity and acceleration", ""),
+    entry("Fig. 6", At::Figure(6), "samples for the identification", ""),
     entry("Table 3", At::Table(3), "trajectory parameters; H of Eq. 19", "A, ω, δ; H not given"),
     entry("Fig. 7", At::Figure(7), "H by generation, Eqs. 17 to 19", "not given"),
     entry("Fig. 8", At::Figure(8), "the procedure", ""),
-    entry("Eqs. 21 to 23", At::Chapter(DEPARTURES), "the finite-time law", "α₂ = 0.82"),
+    entry("Eqs. 21 to 23", At::Chapter(DEVIATION_TITLE), "the finite-time law", "α₂ = 0.82"),
     entry("Fig. 9", At::Figure(9), "first run of joint 2", ""),
     entry("Fig. 10", At::Figure(10), "second run of joint 2", ""),
     entry("Fig. 11", At::Figure(11), "third run of joint 2", ""),
@@ -172,8 +163,8 @@ const ENTRIES: &[Entry] = &[
     entry("Eq. 25, verification", At::Chapter(TORQUES), "q₁ = sin t, q₂ = sin(−t)", ""),
     entry("Fig. 16", At::Figure(16), "torques of joint 1", "drawn only"),
     entry("Fig. 17", At::Figure(17), "torques of joint 2", "drawn only"),
-    entry("the claim", At::Chapter(EQUAL), "both methods, alike", "logistic better"),
+    entry("the claim", At::Chapter(EQUAL), "both methods under equal conditions", "logistic better"),
     entry("all cases", At::Chapter(EQUAL_TABLE), "both methods by differentiator and noise", ""),
-    entry("the words", At::Chapter(WORDS), "what comes out, and what does not", ""),
-    entry("[7] to [20]", At::Chapter(REFERENCES), "where their ideas live here", ""),
+    entry("the statements", At::Chapter(STATEMENTS), "reproduced and not reproduced", ""),
+    entry("[7] to [20]", At::Chapter(REFERENCES), "their ideas in this project", ""),
 ];

@@ -1,5 +1,5 @@
-//! Tables 4, 5 and Figs. 9 to 14: three runs of joint 2 while joint 1 rests, then three of joint 1, by the iteration
-//! that serves every robot.
+//! Tables 4, 5 and Figs. 9 to 14: three runs of joint 2 while joint 1 rests, then three of joint 1, with the iteration
+//! for all robots.
 
 use crate::arm::{Arm, TRUTH};
 use crate::base_parameters::{COLUMNS, theta};
@@ -19,18 +19,16 @@ use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, R
 use std::path::Path;
 use std::sync::Arc;
 
-/// What the runs give.
 pub(crate) struct JointRuns {
     pub(crate) tables: Vec<PaperTable>,
     pub(crate) figures: Vec<PaperFigure>,
-    /// The paper's own loop, joint 1 first.
+    /// The paper's loop, joint 1 first.
     pub(crate) as_paper: [Runs; 2],
-    /// Largest error of a parameter after one, three and six runs of the paper's own loop, and of ours.
+    /// Largest parameter error after one, three and six runs of the paper's loop, and of our variant.
     pub(crate) literal_errors: [f64; 3],
     pub(crate) own_errors: [f64; 3],
 }
 
-/// How a joint's runs are made.
 struct Protocol {
     rate_hz: f64,
     steps_per_sample: usize,
@@ -38,20 +36,19 @@ struct Protocol {
     literal: bool,
 }
 
-/// One joint's iteration: the parameters and the motion after each run.
+/// Iteration of one joint: parameters and motion of each run.
 pub(crate) struct Runs {
-    /// By run, the three parameters of the joint.
+    /// The three parameters of the joint after each run.
     pub(crate) values: Vec<[f64; 3]>,
-    /// The first three runs.
     pub(crate) runs: Vec<Run>,
 }
 
 /// Gains of Eq. 23: `K_p`, `K_d` of joint 1 and 2.
 const GAINS: [[f64; 2]; 2] = [[2.0, 20.0], [4.0, 4.0]];
 
-/// Gains of the first run, of a joint PD: with these the errors of Fig. 12 come about (the paper's own first run gives
-/// no torque at all).
-const FIRST: [[f64; 2]; 2] = [[100.0, 60.0], [16.0, 8.0]];
+/// Gains of the joint PD of the first run, which reproduce the errors of Fig. 12 (the paper's first run would apply no
+/// torque).
+const FIRST_RUN_GAINS: [[f64; 2]; 2] = [[100.0, 60.0], [16.0, 8.0]];
 
 /// The paper's Tables 4 and 5: identified values after each run.
 pub(crate) const PAPER: [[[f64; 3]; 3]; 2] = [
@@ -62,14 +59,14 @@ pub(crate) const PAPER: [[[f64; 3]; 3]; 2] = [
 /// The paper's largest tracking errors of joint 2, Fig. 12.
 pub(crate) const FIGURE_12: [f64; 3] = [0.6, 0.15, 0.0];
 
-/// No tracking error is looked into: what explains it is known here, and to compute that takes as long as the run.
-pub(crate) const ANY_ERROR_RAD: f64 = 1e3;
+/// Tracking tolerance that disables the analysis of tracking errors, which would take as long as the run.
+pub(crate) const UNLIMITED_ERROR_RAD: f64 = 1e3;
 
-/// Runs that the paper shows, and those that are made.
-const SHOWN: usize = 3;
-const MADE: usize = 6;
+/// Number of runs in the paper, and number of computed runs.
+const SHOWN_RUNS: usize = 3;
+const COMPUTED_RUNS: usize = 6;
 
-/// Both schemes, both joints: the paper's own with its Table 3, and ours inside the limits (18).
+/// Both schemes, both joints: the paper's with its Table 3, and our variant inside the limits (18).
 pub(crate) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, Error> {
     let paper = Protocol { rate_hz: 100.0, steps_per_sample: 10, strokes: table_3(100.0), literal: true };
     let ours = Protocol { rate_hz: 1000.0, steps_per_sample: 1, strokes: *optimum, literal: false };
@@ -85,7 +82,7 @@ pub(crate) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, 
         let of = |joint: usize| of[joint].values.get(run).map_or(f64::INFINITY, |values| error(joint, values));
         of(0).max(of(1))
     };
-    let errors = |of: &[Runs; 2]| [0, SHOWN - 1, MADE - 1].map(|run| worst(of, run));
+    let errors = |of: &[Runs; 2]| [0, SHOWN_RUNS - 1, COMPUTED_RUNS - 1].map(|run| worst(of, run));
     Ok(JointRuns {
         tables: vec![table(4, 1, &as_paper[1], &own[1]), table(5, 0, &as_paper[0], &own[0])],
         figures: figures(&as_paper),
@@ -103,7 +100,7 @@ fn error(joint: usize, values: &[f64; 3]) -> f64 {
     values.iter().zip(&TRUTH[3 * joint..]).map(|(value, truth)| (value - truth).abs()).fold(0.0, f64::max)
 }
 
-/// The runs of one joint while the other is locked at zero.
+/// Runs of one joint while the other is locked at zero.
 fn one_joint(arm: &Arm, protocol: &Protocol, joint: usize, known: &[(usize, f64)]) -> Result<Runs, IterationError> {
     let stroke = protocol.strokes[joint];
     let period_s = 40.0 / stroke.steepness_per_s;
@@ -142,26 +139,25 @@ fn one_joint(arm: &Arm, protocol: &Protocol, joint: usize, known: &[(usize, f64)
     })?;
     if let Some(run) = outcome.runs.iter().find(|run| run.estimate.is_none()) {
         let reason = run.reason.clone().unwrap_or_else(|| run.outcome.clone());
-        let problem = format!("run {} of joint {} determines nothing: {reason}", run.run, joint + 1);
+        let problem = format!("run {} of joint {} has no estimate: {reason}", run.run, joint + 1);
         return Err(IterationError::State { path: arm.description.clone(), problem });
     }
     let values = outcome.runs.iter().map(|run| {
         let values = run.estimate.as_ref().map(|estimate| estimate.values.as_slice()).unwrap_or_default();
         [0, 1, 2].map(|place| values.get(COLUMNS[3 * joint + place]).copied().unwrap_or(f64::NAN))
     });
-    runs.truncate(SHOWN);
+    runs.truncate(SHOWN_RUNS);
     Ok(Runs { values: values.collect(), runs })
 }
 
-/// Eq. 23 with its gains.
 pub(crate) fn model_based() -> ControllerSettings {
     let [kp, kd] = [0, 1].map(|gain| GAINS.map(|gains| gains[gain]).to_vec());
     ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(kp, kd))
 }
 
-/// The first run's controller, which needs no model.
+/// Controller of the first run, which needs no model.
 pub(crate) fn first_gains() -> ControllerSettings {
-    let [kp, kd] = [0, 1].map(|gain| FIRST.map(|gains| gains[gain]).to_vec());
+    let [kp, kd] = [0, 1].map(|gain| FIRST_RUN_GAINS.map(|gains| gains[gain]).to_vec());
     ControllerSettings::JointPd(JointPdSettings { kp: kp.into(), kd: kd.into() })
 }
 
@@ -170,24 +166,24 @@ fn iteration_settings(protocol: &Protocol) -> IterationSettings {
     if protocol.literal {
         settings = IterationSettings::literal(0.5);
     }
-    // Only one joint's rows count.
+    // Only the rows of one joint are used.
     settings.identification.scheme = Scheme::StepByStep;
-    with_all_runs(settings, MADE)
+    with_all_runs(settings, COMPUTED_RUNS)
 }
 
-/// The paper's controllers, and so many runs whatever they show, so that there is something to draw.
+/// The paper's controllers, with a fixed number of runs for any result.
 pub(crate) fn with_all_runs(mut settings: IterationSettings, runs: usize) -> IterationSettings {
     settings.model_free = first_gains();
     settings.controller = model_based();
     settings.max_runs = runs;
     settings.settled.parameter_sigmas = 0.0;
     settings.settled.parameter_tolerance = 0.0;
-    settings.settled.tracking_tolerance = ANY_ERROR_RAD;
+    settings.settled.tracking_tolerance = UNLIMITED_ERROR_RAD;
     settings
 }
 
-/// What is believed before the first run. The paper begins with zeros; a physically consistent set needs a mass: half a
-/// kilogram half way along each link.
+/// Initial parameters. The paper begins with zeros; a physically consistent set needs a mass: half a kilogram in the
+/// middle of each link.
 pub(crate) fn prior(literal: bool) -> Vec<f64> {
     let link = if literal { [0.0; 10] } else { [0.5, 0.25, 0.0, 0.0, 0.02, 0.0, 0.0, 0.2, 0.0, 0.2] };
     [link, link].concat()
@@ -197,7 +193,7 @@ fn table(number: usize, joint: usize, as_paper: &Runs, own: &Runs) -> PaperTable
     let title = format!("Inertial parameter identification values of the first three times of joint {}", joint + 1);
     let columns =
         ["parameter", "run", "paper", "its error", "as in the paper", "its error", "inside (18)", "its error"];
-    let note = "as in the paper: Table 3's stroke, the map of Eqs. 15 and 16 to the letter, 100 Hz, every estimate straight into the controller; inside (18): our variant, with the optimum's stroke, 1 kHz, the deviation from the commanded stroke differentiated, the physically consistent set in the controller. Both without noise; the paper shows three runs, here are six";
+    let note = "as in the paper: the stroke of Table 3, the map of Eqs. 15 and 16 exactly as printed, 100 Hz, every estimate used directly in the controller; inside (18): our variant, with the stroke of the optimum, 1 kHz, differentiation of the deviation from the commanded stroke, the physically consistent set in the controller. Both without noise; the paper shows three runs, this table six";
     let mut table = PaperTable::new(number, &title, &columns, note);
     for place in 0..3 {
         let truth = TRUTH[3 * joint + place];
@@ -227,12 +223,10 @@ fn table(number: usize, joint: usize, as_paper: &Runs, own: &Runs) -> PaperTable
     table
 }
 
-/// Which of the tables' columns Figs. 9 to 14 draw.
-const COLUMN: &str =
+const COLUMN_NOTE: &str =
     "The runs of the columns \"as in the paper\" (Table 3's stroke, the literal map, 100 Hz, without noise)";
 
-/// Why Fig. 12 agrees.
-const CHOSEN: &str = ". The first error agrees because the gains of the first run's joint PD (16 and 8), which the paper does not give, were chosen for it; the second and third follow from the first";
+const GAIN_NOTE: &str = ". The first error agrees because the gains of the first run's joint PD (16 and 8), which the paper does not state, were chosen for it; the second and third result from the first";
 
 /// Figs. 9 to 14, of the runs as in the paper.
 fn figures(runs: &[Runs; 2]) -> Vec<PaperFigure> {
@@ -241,14 +235,14 @@ fn figures(runs: &[Runs; 2]) -> Vec<PaperFigure> {
     let mut figures: Vec<PaperFigure> = Vec::new();
     for ((number, ordinal), run) in (9..).zip(ORDINALS).zip(&two.runs) {
         let plot = tracks(&format!("The {ordinal} tracking trajectory of joint 2"), run, 1, &[run]);
-        let caption = format!("{COLUMN}. Largest tracking error: {} rad", rough(run.max_error[1]));
+        let caption = format!("{COLUMN_NOTE}. Largest tracking error: {} rad", rough(run.max_error[1]));
         figures.push(PaperFigure::new(number, plot, "").value("largest_error_rad", run.max_error[1]).caption(caption));
     }
     figures.push(errors(12, 1, &two.runs, &FIGURE_12));
     if let Some(first) = one.runs.first() {
         let all: Vec<&Run> = one.runs.iter().collect();
         let plot = tracks("Track of joint 1 for the first three times", first, 0, &all);
-        figures.push(PaperFigure::new(13, plot, "").caption(format!("{COLUMN}. Largest errors: see Fig. 14")));
+        figures.push(PaperFigure::new(13, plot, "").caption(format!("{COLUMN_NOTE}. Largest errors: see Fig. 14")));
     }
     figures.push(errors(14, 0, &one.runs, &[]));
     figures
@@ -259,7 +253,7 @@ fn tracks(title: &str, first: &Run, joint: usize, runs: &[&Run]) -> LinePlot {
     let mut plot = LinePlot::new(title, "t, s", "q, rad", times(first)).dashed("desired", desired);
     for (number, run) in (1..).zip(runs) {
         let name = if runs.len() == 1 { "actual".to_owned() } else { format!("run {number}") };
-        plot = plot.line(name, as_long(run.q[run.of(joint)].to_vec(), first.samples));
+        plot = plot.line(name, padded(run.q[run.of(joint)].to_vec(), first.samples));
     }
     plot
 }
@@ -270,7 +264,7 @@ fn errors(number: usize, joint: usize, runs: &[Run], paper: &[f64]) -> PaperFigu
     let mut plot = LinePlot::new(title, "t, s", "e, rad", longest.map(times).unwrap_or_default());
     let samples = longest.map_or(0, |run| run.samples);
     for (number, run) in (1..).zip(runs) {
-        plot = plot.line(format!("run {number}"), as_long(run.tracking_error(joint).collect(), samples));
+        plot = plot.line(format!("run {number}"), padded(run.tracking_error(joint).collect(), samples));
     }
     let largest: Vec<String> = (runs.iter().enumerate())
         .map(|(k, run)| {
@@ -278,8 +272,8 @@ fn errors(number: usize, joint: usize, runs: &[Run], paper: &[f64]) -> PaperFigu
             format!("{}{paper}", rough(run.max_error[joint]))
         })
         .collect();
-    let why = if paper.is_empty() { "" } else { CHOSEN };
-    let caption = format!("{COLUMN}. Largest tracking errors in runs 1, 2, 3: {} rad{why}", largest.join(", "));
+    let why = if paper.is_empty() { "" } else { GAIN_NOTE };
+    let caption = format!("{COLUMN_NOTE}. Largest tracking errors in runs 1, 2, 3: {} rad{why}", largest.join(", "));
     let mut figure = PaperFigure::new(number, plot, "").caption(caption);
     for (place, run) in runs.iter().enumerate() {
         figure = figure.value(&format!("largest_error_of_run_{}_rad", place + 1), run.max_error[joint]);
@@ -294,8 +288,8 @@ fn times(run: &Run) -> Vec<f64> {
     (0..run.samples).map(|sample| run.time_s(sample)).collect()
 }
 
-/// A run that stopped early leaves a gap.
-fn as_long(mut values: Vec<f64>, samples: usize) -> Vec<f64> {
+/// Values after an early stop are missing.
+fn padded(mut values: Vec<f64>, samples: usize) -> Vec<f64> {
     values.resize(samples, f64::NAN);
     values
 }

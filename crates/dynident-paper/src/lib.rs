@@ -1,8 +1,8 @@
-//! **What does the paper say, and is it so?** Every table and figure of *Iterative Identification of Robot Dynamic
-//! Parameters Based on Logistic Function*, computed through the same crates and studies as a user's own robot, with
-//! what the paper alone needs.
+//! **Reproduction of the paper**: every table and figure of *Iterative Identification of Robot Dynamic Parameters Based
+//! on Logistic Function*, computed with the same crates and studies as a user's own robot, and with the parts that only
+//! the paper needs.
 //!
-//! [`reproduce`] is all of it, as the command `dynident reproduce` calls it.
+//! [`reproduce`] computes everything for the command `dynident reproduce`.
 
 #![forbid(unsafe_code)]
 
@@ -42,45 +42,45 @@ use verification::Verification;
 /// Name and version of the schema of [`PaperFile`].
 pub const PAPER_SCHEMA: &str = "dynident/paper/1";
 
-/// What `reproduce` prints as JSON and writes as `paper.json`.
+/// Output of `reproduce` as JSON, also written as `paper.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PaperFile {
     /// [`PAPER_SCHEMA`].
     pub schema: String,
-    /// The program's version.
+    /// Version of the program.
     pub version: String,
-    /// Seed of all that is random.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// What was to be reached.
+    /// Goals of the reproduction.
     pub reached: Vec<GoalFigures>,
     /// Tables 1 to 6, by number.
     pub tables: BTreeMap<String, PaperTable>,
     /// Figures 1 to 17.
     pub figures: Vec<PaperFigure>,
-    /// Both methods under equal conditions, and what that means for the paper's claim.
+    /// Comparison of both methods under equal conditions, and the conclusion about the paper's claim.
     pub comparison: PaperComparison,
-    /// What the paper says in words or reads off its figures, and whether it comes out here.
+    /// Statements and figure readings of the paper, and their results.
     pub statements: Vec<PaperStatement>,
-    /// Where we depart from the paper, and why.
+    /// Deviations from the paper, with reasons.
     pub deviations: Vec<Deviation>,
-    /// The paper's references 7 to 20, and where their ideas live here.
+    /// References 7 to 20 of the paper, and the corresponding parts of this project.
     pub references: Vec<PaperReference>,
-    /// Seconds by the clock.
+    /// Wall time, s.
     pub seconds: f64,
 }
 
-/// One goal.
+/// A goal of the reproduction.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct GoalFigures {
-    /// What is measured.
+    /// Measured quantity.
     pub what: String,
     /// Its value.
     pub value: f64,
-    /// At most this was to be reached.
+    /// Maximum value of the goal.
     pub goal: f64,
-    /// Whether it was.
+    /// Whether the goal is reached.
     pub met: bool,
 }
 
@@ -93,19 +93,19 @@ impl GoalFigures {
 /// Computes every table and figure and writes `paper.json`, `report.html`, the pictures and the studies into `out`.
 ///
 /// # Errors
-/// If a file cannot be written, or a study does not come out as it must.
+/// A file that cannot be written; a study without the required result.
 pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<PaperFile, Error> {
     let begun = Instant::now();
     check_writable(out)?;
     let stage = |name: &str| options.progress.begin(name, None);
     let done = || options.progress.end();
     stage("1 of 5: base parameters and strokes");
-    // The studies are read as a user's own would be, and appear with everything else in the end.
+    // The studies are loaded like a user's own, and appear in the output at the end.
     let folder = TemporaryFolder::new().map_err(|source| Error::Output { path: std::env::temp_dir(), source })?;
     let arm = Arm::written(folder.path())?;
     let (table_2, difference) = base_parameters::table_2(&arm);
     done();
-    stage("2 of 5: genetic algorithm, and the optimum beside it");
+    stage("2 of 5: genetic algorithm and optimum");
     let optimised = optimisation::optimised(&arm, seed, options)?;
     done();
     stage("3 of 5: runs of joint 2 and joint 1");
@@ -133,12 +133,12 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
     let statements = outcomes::statements(&runs, optimised.fitness, &comparison.statement, quotient);
     let JointRuns { literal_errors, own_errors, .. } = runs;
     figures.extend(runs.figures);
-    let (figure_15, beside_15) = comparison::figure_15(&both);
+    let (figure_15, comparison_plot) = comparison::figure_15(&both);
     figures.push(figure_15);
-    let (torques, with_noise): (Vec<_>, Vec<_>) = verification.figures(&both).into_iter().unzip();
+    let (torques, noisy_plots): (Vec<_>, Vec<_>) = verification.figures(&both).into_iter().unzip();
     figures.extend(torques);
-    let mut beside = comparison::tracking_figures(&both);
-    beside.insert(0, beside_15);
+    let mut comparison_plots = comparison::tracking_figures(&both);
+    comparison_plots.insert(0, comparison_plot);
     let tables =
         [vec![drawings::table_1(&arm), table_2, optimised.table_3], runs.tables, vec![comparison::table_6(&both)]]
             .concat();
@@ -155,12 +155,12 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
         references: references(),
         seconds: begun.elapsed().as_secs_f64(),
     };
-    let extras = page::Extras { beside, with_noise, own_errors };
+    let extras = page::Extras { comparison_plots, noisy_plots, own_errors };
     write(out, &file, &tables, &extras)?;
     Ok(file)
 }
 
-/// The goals: `difference` is that of the observation matrices, `optimum` is H of the optimum inside (18), and the
+/// Goals. `difference` is that of the observation matrices, `optimum` is H of the optimum inside (18), and the
 /// parameter errors are after one, three and six runs.
 fn goals(difference: f64, optimum: f64, literal_errors: [f64; 3], own_errors: [f64; 3]) -> Vec<GoalFigures> {
     let three_runs = "largest parameter error after three runs";
@@ -172,7 +172,6 @@ fn goals(difference: f64, optimum: f64, literal_errors: [f64; 3], own_errors: [f
     ]
 }
 
-/// Writes the file, the page, the pictures and the studies.
 fn write(out: &Path, file: &PaperFile, tables: &[PaperTable], extras: &page::Extras) -> Result<(), Error> {
     let json = dynident::text::json::to_string_pretty(file)
         .map_err(|error| Error::Result { path: out.join("paper.json"), message: error.to_string() })?;
@@ -187,6 +186,6 @@ fn write(out: &Path, file: &PaperFile, tables: &[PaperTable], extras: &page::Ext
     set.write()
 }
 
-/// Size of the pictures.
+/// Size of the pictures, px.
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 320.0;

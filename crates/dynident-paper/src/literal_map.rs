@@ -1,9 +1,9 @@
-//! The paper's map as it is written, to show what it does; `position-map` is the one for studies.
+//! The paper's position map exactly as printed, for demonstration; studies use `position-map`.
 
 use dynident_recording::{Derivatives, Differentiator, FilterError, LogisticPath, Place, SampleRanges};
 
-/// Eqs. 15 and 16 to the letter, for the stroke of each joint: the branch changes at half a period whatever the joint's
-/// lag, and positions outside the stroke are mapped as well, to velocities of the wrong sign.
+/// Eqs. 15 and 16 exactly as printed, for the stroke of each joint: the branch changes at half a period even if the
+/// joint lags, and positions outside the stroke are mapped to velocities of the wrong sign.
 #[derive(Clone, Debug)]
 pub(crate) struct LiteralMap {
     pub(crate) paths: Vec<LogisticPath>,
@@ -20,7 +20,7 @@ impl Differentiator for LiteralMap {
 
     fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError> {
         let Some(path) = self.paths.get(place.joint) else {
-            let problem = format!("there are {} strokes, and the log has more joints", self.paths.len());
+            let problem = format!("the log has more joints than the {} strokes", self.paths.len());
             return Err(FilterError::Reference { problem });
         };
         for (i, &q) in q.iter().enumerate() {
@@ -31,8 +31,7 @@ impl Differentiator for LiteralMap {
     }
 }
 
-/// Velocity and acceleration at any position, outside the stroke as well. A joint that stands still (A = 0) has
-/// neither.
+/// Velocity and acceleration at any position, also outside the stroke; zero for a joint at rest (A = 0).
 fn rates_as_written(path: &LogisticPath, q: f64, time_s: f64) -> [f64; 2] {
     let LogisticPath { amplitude, omega, offset, .. } = *path;
     if amplitude == 0.0 {

@@ -1,4 +1,4 @@
-//! Fig. 7 and Table 3: the paper's genetic algorithm on the paper's problem, and the optimum beside it.
+//! Fig. 7 and Table 3: the paper's genetic algorithm on the paper's problem, and the optimum for comparison.
 
 use crate::arm::Arm;
 use crate::piece::{PaperCell, PaperFigure, PaperTable, shown};
@@ -10,10 +10,9 @@ use dynident_excitation::optimisers::Generation;
 use dynident_excitation::step_wise::Stroke;
 use dynident_report::LinePlot;
 
-/// Rate at which the paper's δ is read as a number of samples, Hz.
+/// Rate at which the paper's δ is interpreted as a number of samples, Hz.
 const DELTA_RATE_HZ: f64 = 100.0;
 
-/// The paper's design problem, solved.
 pub(crate) struct OptimumMotion {
     pub(crate) figure_7: PaperFigure,
     pub(crate) table_3: PaperTable,
@@ -23,7 +22,7 @@ pub(crate) struct OptimumMotion {
     pub(crate) fitness: [f64; 2],
 }
 
-/// Designs by the study in `out/study`, as `dynident design` does.
+/// Solves the design study in `out/study`, like `dynident design`.
 pub(crate) fn optimised(arm: &Arm, seed: u64, options: &RunOptions<'_>) -> Result<OptimumMotion, Error> {
     let mut study = Study::load(&arm.design)?;
     study.design.get_or_insert_default().search.seed = seed;
@@ -31,7 +30,7 @@ pub(crate) fn optimised(arm: &Arm, seed: u64, options: &RunOptions<'_>) -> Resul
     let windowed =
         outcome.file.windowed.as_ref().filter(|file| file.optimum_strokes.len() == 2 && file.strokes.len() == 2);
     let Some((file, optimum_fitness)) = windowed.and_then(|file| Some((file, file.optimum?))) else {
-        let (key, fix) = ("design".to_owned(), "it found nothing inside the limits (18)");
+        let (key, fix) = ("design".to_owned(), "the search found no motion inside the limits (18)");
         let source = Box::new(StudyError::Conflict { key, fix });
         return Err(Error::Study { path: arm.design.clone(), source });
     };
@@ -45,7 +44,7 @@ pub(crate) fn optimised(arm: &Arm, seed: u64, options: &RunOptions<'_>) -> Resul
     })
 }
 
-/// The stroke of a joint by name; the tip joint comes first in a step-wise design.
+/// Stroke of a joint by name; a step-wise design begins with the tip joint.
 fn stroke(strokes: &[StrokeFile], joint: &str) -> Stroke {
     let found = strokes.iter().find(|stroke| stroke.joint == joint).unwrap_or(&strokes[0]);
     Stroke { amplitude_rad: found.amplitude_rad, steepness_per_s: found.steepness_per_s, window_s: found.window_s }
@@ -71,7 +70,7 @@ fn table_3(file: &WindowedFile, optimum: [Stroke; 2], genetic: [Stroke; 2]) -> P
     let paper = problem::table_3(DELTA_RATE_HZ);
     let constants = problem::constants();
     let note = format!(
-        "H of the optimum inside (18) is {:.2}, the genetic algorithm ends {:.0} % above it; the paper's own values break (18)",
+        "H of the optimum inside (18) is {:.2}, the genetic algorithm ends {:.0} % above it; the paper's own values violate (18)",
         file.optimum.unwrap_or(f64::NAN),
         file.above_optimum_percent.unwrap_or(f64::NAN)
     );
@@ -91,7 +90,7 @@ fn table_3(file: &WindowedFile, optimum: [Stroke; 2], genetic: [Stroke; 2]) -> P
             0.25 * stroke.amplitude_rad * stroke.steepness_per_s / constants.speed_limit
         });
         row(format!("peak acceleration over its limit, joint {}", joint + 1), &|stroke| {
-            // The largest of f(1-f)(1-2f) is 1/(6√3).
+            // The maximum of f(1-f)(1-2f) is 1/(6√3).
             stroke.amplitude_rad * stroke.steepness_per_s.powi(2)
                 / (6.0 * 3.0_f64.sqrt())
                 / constants.acceleration_limit

@@ -1,28 +1,26 @@
 //! `report.html` of the reproduction.
 
 use crate::PaperFile;
-use crate::index::{DEPARTURES, EQUAL, REFERENCES, TORQUES, WORDS, index};
+use crate::index::{DEVIATION_TITLE, EQUAL, REFERENCES, STATEMENTS, TORQUES, index};
 use crate::piece::{PaperCell, PaperFigure, PaperPicture, PaperTable, shown};
 use dynident::Error;
 use dynident_report::{Cell, Heading, KeyFigures, LinePlot, Report, Section, Table, Text, Tone};
 
-/// What the page shows beside the paper's own tables and figures.
+/// Content of the page in addition to the paper's tables and figures.
 pub(crate) struct Extras {
-    /// The compared motions, and how both were followed.
-    pub(crate) beside: Vec<LinePlot>,
-    /// Beside Figs. 16 and 17.
-    pub(crate) with_noise: Vec<LinePlot>,
+    pub(crate) comparison_plots: Vec<LinePlot>,
+    pub(crate) noisy_plots: Vec<LinePlot>,
     /// Largest parameter error of our variant after one, three and six runs.
     pub(crate) own_errors: [f64; 3],
 }
 
-const INDEX: &str = "Where to find what";
+const INDEX: &str = "Index";
 
-/// The page: what was reached, where to find what, every table and figure in the order of the paper, the comparison of
-/// both methods, what does not come out, where we depart, the references.
+/// Builds the page: goals, index, every table and figure in the order of the paper, comparison of both methods,
+/// statements, deviations, references.
 pub(crate) fn page(file: &PaperFile, tables: &[PaperTable], extras: &Extras) -> Result<String, Error> {
     let mut page = Report::new("Iterative identification of robot dynamic parameters based on logistic function")
-        .subtitle("every table and figure of the paper, computed anew by `dynident reproduce`, the paper's values beside ours");
+        .subtitle("every table and figure of the paper, computed by `dynident reproduce`, with the paper's values for comparison");
     page.add(key_figures(file));
     page.add(Text::new(file.comparison.statement.clone()));
     page.add(Text::new(file.comparison.one_run(extras.own_errors)));
@@ -39,28 +37,29 @@ pub(crate) fn page(file: &PaperFile, tables: &[PaperTable], extras: &Extras) -> 
         for figure in file.figures.iter().filter(|figure| figure_numbers.contains(&figure.number)) {
             page.add(drawn(figure));
             if *title == TORQUES {
-                let beside =
-                    extras.with_noise.iter().filter(|plot| plot.title.starts_with(&format!("Fig. {},", figure.number)));
-                beside.for_each(|plot| {
+                let comparison_plots = extras
+                    .noisy_plots
+                    .iter()
+                    .filter(|plot| plot.title.starts_with(&format!("Fig. {},", figure.number)));
+                comparison_plots.for_each(|plot| {
                     page.add(plot.clone());
                 });
             }
         }
     }
-    page.add(Heading::new(WORDS));
-    page.add(words(file));
-    page.add(Heading::new(DEPARTURES));
-    page.add(departures(file));
+    page.add(Heading::new(STATEMENTS));
+    page.add(statements(file));
+    page.add(Heading::new(DEVIATION_TITLE));
+    page.add(deviations(file));
     page.add(Heading::new(REFERENCES));
     page.add(references(file));
     page.add(Text::new(format!(
-        "Made by dynident {} with seed {} in {:.1} s. The studies lie in the folder `study`: run them again, change them.",
+        "Created by dynident {} with seed {} in {:.1} s. The studies are in the folder `study`: you can run and change them.",
         file.version, file.seed, file.seconds
     )));
     Ok(page.html()?)
 }
 
-/// The goals and the comparison of both methods.
 fn key_figures(file: &PaperFile) -> KeyFigures {
     let mut key = KeyFigures::new();
     for figure in &file.reached {
@@ -73,7 +72,7 @@ fn key_figures(file: &PaperFile) -> KeyFigures {
         key = key.judged(&figure.what, shown(figure.value), note, tone);
     }
     key.figure(
-        "logistic strokes' parameter error over the Fourier series', equal conditions, with noise",
+        "ratio of parameter errors, logistic strokes to Fourier series, equal conditions, with noise",
         file.comparison
             .cases
             .first()
@@ -82,30 +81,27 @@ fn key_figures(file: &PaperFile) -> KeyFigures {
     )
 }
 
-/// The statements of the paper, each with its result here.
-fn words(file: &PaperFile) -> Table {
-    let mut words = Table::new("What the paper says in words", ["place", "the paper says", "here", "comes out"]);
+fn statements(file: &PaperFile) -> Table {
+    let mut statements = Table::new("Statements of the paper", ["place", "the paper states", "here", "reproduced"]);
     for statement in &file.statements {
         let (answer, tone) = if statement.holds { ("yes", Tone::Good) } else { ("no", Tone::Warning) };
         let cells = [&statement.place, &statement.paper, &statement.here].map(|text| Cell::from(text.as_str()));
-        words = words.row(cells.into_iter().chain([Cell::judged(answer, tone)]));
+        statements = statements.row(cells.into_iter().chain([Cell::judged(answer, tone)]));
     }
-    words
+    statements
 }
 
-/// The deviations from the paper.
-fn departures(file: &PaperFile) -> Table {
-    let mut departures = Table::new("Departures", ["place", "in the paper", "here"]);
+fn deviations(file: &PaperFile) -> Table {
+    let mut deviations = Table::new("Deviations", ["place", "in the paper", "here"]);
     for deviation in &file.deviations {
-        departures = departures.row([&deviation.place, &deviation.trouble, &deviation.here]);
+        deviations = deviations.row([&deviation.place, &deviation.trouble, &deviation.here]);
     }
-    departures
+    deviations
 }
 
-/// The references of the paper.
 fn references(file: &PaperFile) -> Table {
-    let mut references = Table::new("References", ["number", "whose", "idea", "here"])
-        .note("names are those of the paper's text; keys are those of a study, pages those of the book");
+    let mut references = Table::new("References", ["number", "authors", "idea", "here"])
+        .note("names as in the paper's text; keys of a study, pages of the book");
     for reference in &file.references {
         references = references.row([
             format!("[{}]", reference.number),
@@ -125,7 +121,7 @@ const CHAPTERS: &[(&str, &[usize], &[usize])] = &[
     ("The iteration", &[], &[8]),
     ("Joint 2, three runs", &[4], &[9, 10, 11, 12]),
     ("Joint 1, three runs", &[5], &[13, 14]),
-    ("Fourier series beside it", &[6], &[15]),
+    ("Fourier series for comparison", &[6], &[15]),
     (TORQUES, &[], &[16, 17]),
 ];
 
@@ -134,7 +130,7 @@ fn equal_conditions(page: &mut Report, file: &PaperFile, extras: &Extras) {
     page.add(Text::new(file.comparison.conditions.clone()));
     page.add(Text::new(file.comparison.statement.clone()));
     page.add(file.comparison.table());
-    for plot in &extras.beside {
+    for plot in &extras.comparison_plots {
         page.add(plot.clone());
     }
 }
@@ -147,7 +143,7 @@ fn section(table: &PaperTable) -> Table {
     section
 }
 
-/// With a capital letter, for a sentence may follow another one.
+/// Starts with a capital letter, because the text can follow another sentence.
 fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())

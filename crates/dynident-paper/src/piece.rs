@@ -1,10 +1,10 @@
-//! Tables and figures of the paper, as data: the same for `paper.json`, the page and the pictures.
+//! Tables and figures of the paper as data for `paper.json`, the page and the pictures.
 
 use dynident_report::{Diagram, LinePlot, ReportError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What a cell of a table holds.
+/// Content of a table cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
@@ -13,12 +13,12 @@ pub enum PaperCell {
     Number(f64),
     /// A word or an expression.
     Text(String),
-    /// Nothing to compare with.
+    /// No value.
     None,
 }
 
 impl PaperCell {
-    /// As a person reads it: four digits.
+    /// Formatted with four digits.
     pub(crate) fn shown(&self) -> String {
         match self {
             Self::Number(value) if *value == 0.0 => "0".to_owned(),
@@ -43,20 +43,20 @@ impl From<&str> for PaperCell {
     }
 }
 
-/// A table of the paper, our values beside the paper's.
+/// A table of the paper, with our values next to the paper's.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PaperTable {
-    /// Its number in the paper.
+    /// Number of the table in the paper.
     #[serde(skip)]
     pub number: usize,
-    /// What it shows.
+    /// Title.
     pub title: String,
-    /// Heads of the columns.
+    /// Headings of the columns.
     pub columns: Vec<String>,
-    /// Rows, as wide as the heads.
+    /// Rows, with one cell per column.
     pub rows: Vec<Vec<PaperCell>>,
-    /// What to know when reading it.
+    /// Explanation for the reader.
     pub note: String,
 }
 
@@ -66,7 +66,6 @@ impl PaperTable {
         Self { number, title: title.to_owned(), columns, rows: Vec::new(), note: note.to_owned() }
     }
 
-    /// Its headline on the page.
     pub(crate) fn heading(&self) -> String {
         format!("Table {}: {}", self.number, self.title)
     }
@@ -80,26 +79,26 @@ impl PaperTable {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PaperFigure {
-    /// Its number in the paper.
+    /// Number of the figure in the paper.
     pub number: usize,
-    /// The picture, beside `paper.json`.
+    /// File name of the picture, in the folder of `paper.json`.
     pub file: String,
-    /// What it shows.
+    /// Title.
     pub title: String,
-    /// Figures to compare with the paper's, by name.
+    /// Values for comparison with the paper, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<String, f64>,
-    /// The same figures as a sentence, with units.
+    /// The same values as a sentence, with units.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub caption: String,
-    /// What to know when looking at it.
+    /// Explanation for the reader.
     pub note: String,
-    /// What is drawn.
+    /// Content of the picture.
     #[serde(skip)]
     pub picture: PaperPicture,
 }
 
-/// What a figure draws.
+/// Content of a figure.
 #[derive(Clone, Debug)]
 pub enum PaperPicture {
     /// Curves.
@@ -115,7 +114,7 @@ impl Default for PaperPicture {
 }
 
 impl PaperPicture {
-    /// The picture as a document, plots `width` by `height` px.
+    /// The picture as an SVG document; plots have the size `width` by `height` px.
     pub(crate) fn svg(&self, width: f64, height: f64) -> Result<String, ReportError> {
         match self {
             Self::Plot(plot) => plot.svg(width, height),
@@ -148,12 +147,10 @@ impl PaperFigure {
         Self { number, file, title, values, caption, note: note.to_owned(), picture }
     }
 
-    /// Its headline on the page.
     pub(crate) fn heading(&self) -> String {
         format!("Fig. {}: {}", self.number, self.title)
     }
 
-    /// What to compare with the paper, as a sentence.
     pub(crate) fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self
@@ -165,47 +162,46 @@ impl PaperFigure {
     }
 }
 
-/// What the paper says in words or reads off its figures, and whether it comes out here.
+/// A statement or figure reading of the paper, and its result here.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PaperStatement {
-    /// Where in the paper.
+    /// Place in the paper.
     pub place: String,
-    /// What it says.
+    /// Statement of the paper.
     pub paper: String,
-    /// What is found here.
+    /// Result here.
     pub here: String,
-    /// Whether that is so here too.
+    /// Whether the result confirms the statement.
     pub holds: bool,
 }
 
-/// A source of the paper, and where its idea lives in this project.
+/// A reference of the paper, and the corresponding part of this project.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PaperReference {
-    /// Its number in the paper.
+    /// Number in the paper.
     pub number: usize,
-    /// Whose it is, as far as the paper's text says.
+    /// Authors, as named in the paper's text.
     pub source: String,
-    /// What the paper takes from it.
+    /// Idea that the paper uses.
     pub idea: String,
-    /// Key of a study, page of the book, file.
+    /// Key of a study, page of the book, or file.
     pub here: String,
 }
 
-/// Where this reproduction departs from the paper's text, and why.
+/// A deviation of the reproduction from the paper's text, with its reason.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Deviation {
-    /// Where in the paper.
+    /// Place in the paper.
     pub place: String,
-    /// What the paper says or leaves out, and what is wrong with it.
+    /// Statement or omission of the paper, and its problem.
     pub trouble: String,
-    /// What is done here.
+    /// Solution here.
     pub here: String,
 }
 
-/// A number as a person reads it.
 pub(crate) fn shown(value: f64) -> String {
     PaperCell::from(value).shown()
 }
@@ -215,7 +211,7 @@ pub(crate) fn rough(value: f64) -> String {
     dynident_report::short(value, 2)
 }
 
-/// Every `step`-th sample of smooth curves, so that the page stays small.
+/// Reduces the samples of smooth curves by a factor to keep the page small.
 pub(crate) fn thinned(mut plot: LinePlot, step: usize) -> LinePlot {
     let every = |values: &[f64]| values.iter().step_by(step).copied().collect();
     plot.x = every(&plot.x);

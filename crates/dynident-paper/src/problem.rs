@@ -1,9 +1,9 @@
-//! The paper's design problem in numbers: section 2.2, limits (18), Table 3.
+//! The paper's design problem: section 2.2, limits (18), Table 3.
 
 use core::f64::consts::PI;
 use dynident_excitation::step_wise::{Stroke, StrokeConstants};
 
-/// The constants of either joint, with this project's reading where the paper is silent (rate, T, ranges).
+/// Constants of both joints; rate, T and ranges are assumptions, because the paper does not state them.
 pub(crate) fn constants() -> StrokeConstants {
     StrokeConstants {
         gravity: super::arm::GRAVITY,
@@ -20,7 +20,7 @@ pub(crate) fn constants() -> StrokeConstants {
     }
 }
 
-/// The paper's Table 3, joint 1 first. Its δ (367 and 246) has no unit; here it is a number of samples at
+/// The paper's Table 3, joint 1 first. δ (367 and 246) has no unit there and is interpreted as a number of samples at
 /// `delta_rate_hz`.
 pub(crate) fn table_3(delta_rate_hz: f64) -> [Stroke; 2] {
     let stroke = |amplitude_rad, steepness_per_s, samples: f64| Stroke {
@@ -40,9 +40,9 @@ mod tests {
     };
     use dynident_excitation::step_wise::{StepWiseJoint, StepWiseProblem, StrokeLimit, StrokeQuantity};
 
-    /// The optimum inside (18), known from an independent program, and the distance that the project asks for.
+    /// The optimum inside (18), from an independent program, and the tolerance that the project requires.
     const OPTIMUM: f64 = 161.3;
-    const WITHIN: f64 = OPTIMUM * 1.001;
+    const MAX_FITNESS: f64 = OPTIMUM * 1.001;
 
     fn problem() -> StepWiseProblem {
         StepWiseProblem { joints: [0, 1].map(|joint| StepWiseJoint { joint, constants: constants() }).to_vec() }
@@ -54,8 +54,8 @@ mod tests {
         assert!((table[0].window_s - 3.67).abs() < 1e-12);
         let limits = table.map(|stroke| constants().limits(&stroke));
         let find = |joint: usize, quantity| limits[joint].iter().find(|l| l.quantity == quantity).unwrap();
-        // Digits of the reading notes: 0.881 against π/6 and 0.516 against π/15; joint 2 keeps both with 0.521 and
-        // 0.200.
+        // Digits of the reading notes: 0.881 compared with π/6 and 0.516 compared with π/15; joint 2 keeps both with
+        // 0.521 and 0.200.
         let speed = find(0, StrokeQuantity::Speed);
         assert!((speed.value - 0.881).abs() < 5e-4 && (speed.excess() - 0.68).abs() < 5e-3, "{speed:?}");
         let acceleration = find(0, StrokeQuantity::Acceleration);
@@ -76,17 +76,17 @@ mod tests {
             let start: Vec<f64> = bounds.iter().map(|[low, high]| 0.5 * (low + high)).collect();
             let steps: Vec<f64> = bounds.iter().map(|[low, high]| 0.3 * (high - low)).collect();
             let mut enough = |p: &Progress<'_>| {
-                if problem.fitness(p.best) <= WITHIN { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                if problem.fitness(p.best) <= MAX_FITNESS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
             let result = cma_es(|x| problem.graded_fitness(x), &start, &steps, &bounds, &settings, &mut enough);
             let result = result.unwrap();
             assert_eq!(result.status, CmaEsStatus::Stopped, "seed {seed}: {result:?}");
-            assert!(problem.fitness(&result.best) <= WITHIN);
+            assert!(problem.fitness(&result.best) <= MAX_FITNESS);
         }
     }
 
     #[test]
-    fn the_papers_genetic_algorithm_ends_where_it_was_seen_to_end() {
+    fn the_papers_genetic_algorithm_reaches_the_known_range() {
         let problem = problem();
         let ends: Vec<f64> = (0..6)
             .map(|seed| {
@@ -100,8 +100,8 @@ mod tests {
                 result.value
             })
             .collect();
-        // An independent program saw 176 to 217 over six seeds; the band is that with room for other seeds, and no end
-        // can be below the optimum.
+        // An independent program reached 176 to 217 over six seeds; the interval is wider for other seeds, and no
+        // result can be below the optimum.
         assert!(ends.iter().filter(|end| (165.0..=230.0).contains(*end)).count() >= 4, "{ends:?}");
         assert!(ends.iter().all(|end| *end > OPTIMUM - 0.15), "{ends:?}");
     }

@@ -1,9 +1,9 @@
-//! The paper's references [7] to [20], and where their ideas live in this project.
+//! References [7] to [20] of the paper, and the corresponding parts of this project.
 
 use crate::piece::PaperReference;
 
-/// Number, whose, what the paper takes from it, where it lives. The copy of the paper that we have ends before its list
-/// of references: names are those of its text.
+/// Number, authors, idea that the paper uses, and the corresponding part of this project. The available copy of the
+/// paper ends before its list of references, so the names are those of its text.
 const REFERENCES: &[(usize, &str, &str, &str)] = &[
     (
         7,
@@ -81,7 +81,6 @@ const REFERENCES: &[(usize, &str, &str, &str)] = &[
     ),
 ];
 
-/// All of them, in the paper's order.
 pub(crate) fn references() -> Vec<PaperReference> {
     let one = |&(number, source, idea, here): &(usize, &str, &str, &str)| PaperReference {
         number,

@@ -1,11 +1,10 @@
-//! Figs. 2 to 6: the logistic function, the splice, what ω and T do to it, and the windows.
+//! Figs. 2 to 6: the logistic function, the splice, the effects of ω and T, and the windows.
 
 use crate::piece::{PaperFigure, rough, shown};
 use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
 use dynident_excitation::{Family, Motion, grid};
 use dynident_report::LinePlot;
 
-/// Points of a curve.
 const POINTS: usize = 801;
 
 fn logistic(t: f64) -> f64 {
@@ -19,7 +18,7 @@ pub(crate) fn figure_2() -> PaperFigure {
     let (f, first, second) = (of(|f| f), of(|f| f * (1.0 - f)), of(|f| f * (1.0 - f) * (1.0 - 2.0 * f)));
     let rest = first[0].max(second[0]);
     let plot = LinePlot::new("Logistic function", "t", "f", times).line("f", f).line("f'", first).line("f''", second);
-    PaperFigure::new(2, plot, "with its derivatives, which follow from its value alone")
+    PaperFigure::new(2, plot, "with its derivatives, which depend only on its value")
         .value("largest_derivative_at_minus_10", rest)
         .caption(format!("At t = −10 no derivative is above {} (the paper: below 1e-4)", rough(rest)))
 }
@@ -51,7 +50,7 @@ pub(crate) fn figure_4() -> PaperFigure {
         let (q, _) = spliced(omega, 80.0, 80.0).unwrap_or_default();
         plot = plot.line(format!("ω = {omega}"), q);
     }
-    PaperFigure::new(4, plot, "the paper does not say which values it draws")
+    PaperFigure::new(4, plot, "the paper does not state the plotted values")
 }
 
 /// Fig. 5: different T at ω = 0.6.
@@ -60,14 +59,14 @@ pub(crate) fn figure_5() -> PaperFigure {
     let mut plot = LinePlot::new("Different T at ω = 0.6", "t, s", "q, rad", times.clone());
     for period in [70.0, 80.0, 90.0, 100.0] {
         let (q, _) = spliced(0.6, period, period).unwrap_or_default();
-        // The stroke's own grid ends at T.
+        // The grid of the stroke ends at T.
         let at = |t: f64| if t <= period { sampled(&q, t / period) } else { f64::NAN };
         plot = plot.line(format!("T = {period}"), times.iter().map(|&t| at(t)).collect());
     }
-    PaperFigure::new(5, plot, "the paper does not say which values it draws")
+    PaperFigure::new(5, plot, "the paper does not state the plotted values")
 }
 
-/// Linear between samples, `share` from 0 to 1.
+/// Linear interpolation between samples, `share` from 0 to 1.
 fn sampled(values: &[f64], share: f64) -> f64 {
     let place = share * (values.len().max(2) - 1) as f64;
     let left = (place.floor() as usize).min(values.len().saturating_sub(2));

@@ -1,9 +1,9 @@
-//! Figs. 16, 17: the torques of a run along another motion (Eq. 25), and those that the identified models predict from
-//! its positions.
+//! Figs. 16, 17: torques of a run along another motion (Eq. 25), and the predictions of the identified models from its
+//! positions.
 
 use crate::arm::{Arm, TRUTH};
 use crate::base_parameters::COLUMNS;
-use crate::equal_conditions::{Comparison, Method, Trials, Way};
+use crate::equal_conditions::{Comparison, Differentiation, Method, Trials};
 use crate::joint_runs::{failed, model_based};
 use crate::piece::{PaperFigure, rough, thinned};
 use dynident::Error;
@@ -14,27 +14,25 @@ use dynident_recording::{Derivatives, DifferentiatorSettings, Place};
 use dynident_report::LinePlot;
 use dynident_simulation::{ControllerModel, Integrator, LoopSettings, Plant, Reference, closed_loop};
 
-/// Seconds of the motion, and its samples a second.
+/// Duration of the motion, s, and sampling rate, Hz.
 const DURATION_S: f64 = 10.0;
 const RATE_HZ: f64 = 1000.0;
-/// Of so many samples one is drawn.
-const DRAWN: usize = 10;
-/// Samples at either end that are left out: differences of order 8 reach over the end there.
-const ENDS: usize = 8;
+const PLOT_DECIMATION: usize = 10;
+/// Samples omitted at either end, where differences of order 8 exceed the motion.
+const END_SAMPLES: usize = 8;
 
-/// The run along Eq. 25: times, driving torques, and the rows of the regressor that predict them.
+/// The run along Eq. 25: times, driving torques, and the regressor rows that predict them.
 pub(crate) struct Verification {
     times: Vec<f64>,
-    /// By joint.
     driving: [Vec<f64>; 2],
     /// By joint and sample, the six columns.
     rows: [Vec<[f64; 6]>; 2],
 }
 
 impl Verification {
-    /// Runs the simulated arm along q1 = sin t, q2 = sin(−t) under the law (23) with the true model and samples
-    /// positions and driving torques, both without noise: what is left between driving and predicted torque is the
-    /// model's. Velocity and acceleration are central differences of the sampled positions.
+    /// Runs the simulated arm along q1 = sin t, q2 = sin(−t) under the law (23) with the true model, and samples
+    /// positions and driving torques without noise, so that the difference between driving and predicted torque is the
+    /// model error. Velocity and acceleration are central differences of the sampled positions.
     pub(crate) fn run(arm: &Arm) -> Result<Self, Error> {
         Self::made(arm).map_err(|why| failed(&arm.description, why))
     }
@@ -59,7 +57,7 @@ impl Verification {
         let settings = LoopSettings { integrator, ..LoopSettings::default() };
         let run = closed_loop(&mut Plant::new(&arm.model, &[], &[])?, controller.as_mut(), &reference, &settings)?;
         if !run.status.is_done() {
-            let problem = format!("the run along Eq. 25 did not get to its end: {}", run.status);
+            let problem = format!("the run along Eq. 25 did not reach its end: {}", run.status);
             return Err(IterationError::State { path: arm.description.clone(), problem });
         }
         let differences = DifferentiatorSettings::CentralDifferences { order: 8 }.build(0.0)?;
@@ -73,14 +71,14 @@ impl Verification {
         let mut workspace = Workspace::new(&arm.model);
         let width = 10 * arm.model.dof();
         let mut made = Self { times: Vec::new(), driving: Default::default(), rows: Default::default() };
-        for sample in ENDS..samples - ENDS {
+        for sample in END_SAMPLES..samples - END_SAMPLES {
             let of = |k: usize| [rates[0][k][sample], rates[1][k][sample]];
             let regressor = torque_regressor(&arm.model, &mut workspace, &of(0), &of(1), &of(2));
             made.times.push(run.time_s(sample));
             for joint in 0..2 {
                 let row = &regressor[joint * width..(joint + 1) * width];
                 made.rows[joint].push(COLUMNS.map(|column| row[base.independent()[column]]));
-                // Held between samples: at a sample's instant the mean of the values before and after is in force.
+                // The torque is constant between samples; at a sample the mean of the values before and after applies.
                 let torque = &run.tau[run.of(joint)];
                 made.driving[joint].push(0.5 * (torque[sample - 1] + torque[sample]));
             }
@@ -92,24 +90,24 @@ impl Verification {
         self.rows[joint].iter().map(|row| row.iter().zip(theta).map(|(row, theta)| row * theta).sum()).collect()
     }
 
-    /// Root mean square of predicted less driving torque, Nm.
+    /// Root mean square of predicted minus driving torque, Nm.
     pub(crate) fn deviation(&self, joint: usize, theta: &[f64; 6]) -> f64 {
         let predicted = self.predicted(joint, theta);
         let squares = predicted.iter().zip(&self.driving[joint]).map(|(p, d)| (p - d).powi(2));
         (squares.sum::<f64>() / predicted.len() as f64).sqrt()
     }
 
-    /// The same over all noisy trials together.
+    /// [`deviation`](Self::deviation) over all noisy trials, Nm.
     pub(crate) fn noisy_deviation(&self, joint: usize, trials: &Trials) -> f64 {
         let squares = trials.noisy.iter().map(|trial| self.deviation(joint, &trial.last()).powi(2));
         (squares.sum::<f64>() / trials.noisy.len() as f64).sqrt()
     }
 
-    /// Figs. 16 and 17: driving torque and both predictions, of the differentiator that studies have by default; and
-    /// of the same noisy trials root mean square deviations by the time of the motion.
+    /// Figs. 16 and 17: driving torque and both predictions with the default differentiator of studies, and root mean
+    /// square deviations of the same noisy trials over time.
     pub(crate) fn figures(&self, comparison: &Comparison) -> Vec<(PaperFigure, LinePlot)> {
         let [Some(logistic), Some(fourier)] =
-            [Method::Logistic, Method::Fourier].map(|method| comparison.of(method, Way::Deviation))
+            [Method::Logistic, Method::Fourier].map(|method| comparison.of(method, Differentiation::Deviation))
         else {
             return Vec::new();
         };
@@ -136,8 +134,8 @@ impl Verification {
             rough(noisy_l),
             rough(noisy_f),
         );
-        let note = "both models from equal conditions (see above), differentiated alike, after three runs without noise; driving torque and positions from a run of the simulated arm along Eq. 25, which itself breaks (18): its speed is 1 rad/s";
-        let figure = PaperFigure::new(16 + joint, thinned(plot, DRAWN), note)
+        let note = "both models from equal conditions (see above), with the same differentiator, after three runs without noise; driving torque and positions from a run of the simulated arm along Eq. 25, which itself violates (18): its speed is 1 rad/s";
+        let figure = PaperFigure::new(16 + joint, thinned(plot, PLOT_DECIMATION), note)
             .value("largest_deviation_logistic_nm", clean_l)
             .value("largest_deviation_fourier_nm", clean_f)
             .value("rms_deviation_with_noise_logistic_nm", noisy_l)
@@ -159,15 +157,14 @@ impl Verification {
             .line("logistic", over_time(logistic))
             .line("Fourier", over_time(fourier))
             .note(format!(
-                "predicted less driving torque after three noisy runs, root mean square over {} seeds; the torque itself reaches {} Nm",
+                "predicted minus driving torque after three noisy runs, root mean square over {} seeds; the largest torque is {} Nm",
                 logistic.noisy.len(),
                 rough(self.driving[joint].iter().fold(0.0_f64, |most, torque| most.max(torque.abs())))
             ));
-        (figure, thinned(deviation, DRAWN))
+        (figure, thinned(deviation, PLOT_DECIMATION))
     }
 }
 
-/// The largest of the six errors.
 pub(crate) fn worst(theta: &[f64; 6]) -> f64 {
     theta.iter().zip(TRUTH).map(|(value, truth)| (value - truth).abs()).fold(0.0, f64::max)
 }

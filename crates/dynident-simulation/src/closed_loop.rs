@@ -1,4 +1,4 @@
-//! A controller on a simulated robot along a reference.
+//! Closed loop of a controller and a simulated robot along a reference.
 
 use crate::controllers::{Controller, Measured};
 use crate::error::{SimulationError, require_length};
@@ -12,20 +12,20 @@ use crate::sensors::SensorSettings;
 use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 
-/// A velocity that no robot has: beyond it a run counts as diverged, rad/s (m/s) of a usual arm.
-const BEYOND: f64 = 1e4;
+/// Velocity above which a run has diverged, rad/s (m/s) of a usual arm; no robot reaches it.
+const DIVERGENCE_SPEED: f64 = 1e4;
 
-/// Where a run starts.
+/// Initial state of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Start {
-    /// On the reference, with its velocity.
+    /// Position and velocity of the reference.
     #[default]
     Reference,
-    /// On the reference's position, at rest.
+    /// Position of the reference, at rest.
     AtRest,
-    /// Elsewhere.
+    /// A given state.
     At {
         /// Positions, rad (m).
         q: Vec<f64>,
@@ -34,31 +34,31 @@ pub enum Start {
     },
 }
 
-/// What stops a run, and what cuts its torques. Nothing by default.
+/// Limits that stop a run, and limits of its torques. None by default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RunLimits {
-    /// Largest torque, Nm (N): the loop cuts what the controller asks for, and counts.
+    /// Maximum torque, Nm (N), to which the loop limits the controller's torque; saturated samples are counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque: Option<PerJoint>,
-    /// Lowest position, rad (m).
+    /// Minimum position, rad (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lower: Option<PerJoint>,
-    /// Highest position, rad (m).
+    /// Maximum position, rad (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub upper: Option<PerJoint>,
-    /// Highest velocity, rad/s (m/s).
+    /// Maximum velocity, rad/s (m/s).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed: Option<PerJoint>,
-    /// Largest distance from the reference, rad (m).
+    /// Maximum distance from the reference, rad (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_error: Option<PerJoint>,
 }
 
 impl RunLimits {
-    /// Position, velocity and torque limits of the description; where it has none, the largest number there is
-    /// (infinity has no place in JSON).
+    /// Position, velocity and torque limits of the robot description; missing ones are the largest finite number,
+    /// because JSON has no infinity.
     pub fn of_model(model: &Model) -> Self {
         let each = |of: fn(&dynident_model::JointLimits) -> Option<f64>, none: f64| {
             Some(PerJoint::Each(model.joints().iter().map(|joint| of(&joint.limits).unwrap_or(none)).collect()))
@@ -72,11 +72,10 @@ impl RunLimits {
         }
     }
 
-    /// Checks the numbers for so many joints.
+    /// Checks the limits for a number of joints.
     ///
     /// # Errors
-    /// Lists of another length, numbers that are not numbers, limits of torque, velocity or error that are not
-    /// positive.
+    /// Lists of the wrong length, NaN, limits of torque, velocity or error that are not positive.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.values(joints).map(|_| ())
     }
@@ -96,32 +95,32 @@ impl RunLimits {
             upper: place("limits.upper", &self.upper, f64::INFINITY)?,
             speed: positive("limits.speed", &self.speed)?,
             error: positive("limits.tracking_error", &self.tracking_error)?,
-            beyond: vec![f64::INFINITY; joints],
+            divergence_speed: vec![f64::INFINITY; joints],
         })
     }
 }
 
-/// How a run is made. The controller's rate is the reference's.
+/// Settings of a run. The controller's rate is that of the reference.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LoopSettings {
-    /// How the robot is integrated. Default one semi-implicit Euler step a sample.
+    /// Integrator of the robot. Default one semi-implicit Euler step per sample.
     pub integrator: Integrator,
-    /// Where it starts. Default on the reference.
+    /// Initial state. Default on the reference.
     pub start: Start,
-    /// What stops it. Default nothing but divergence.
+    /// Limits that stop the run. By default only divergence stops it.
     pub limits: RunLimits,
-    /// What the controller sees, and what [`SensorSettings::record`] makes of the run. Default perfect.
+    /// Sensors of the controller and of [`SensorSettings::record`]. Default perfect.
     pub sensors: SensorSettings,
-    /// Whether true accelerations are kept; default no.
+    /// Whether true accelerations are stored; default false.
     pub accelerations: bool,
 }
 
 impl LoopSettings {
-    /// Checks the numbers for so many joints.
+    /// Checks the settings for a number of joints.
     ///
     /// # Errors
-    /// [`SimulationError`] that names the setting.
+    /// [`SimulationError`] with the invalid setting.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.integrator.validate()?;
         self.limits.validate(joints)?;
@@ -129,7 +128,6 @@ impl LoopSettings {
     }
 }
 
-/// Limits of every joint, infinite where there are none.
 #[derive(Clone, Debug)]
 pub(crate) struct Limits {
     pub(crate) torque: Vec<f64>,
@@ -137,20 +135,17 @@ pub(crate) struct Limits {
     pub(crate) upper: Vec<f64>,
     pub(crate) speed: Vec<f64>,
     pub(crate) error: Vec<f64>,
-    /// Velocities that no such robot has.
-    pub(crate) beyond: Vec<f64>,
+    pub(crate) divergence_speed: Vec<f64>,
 }
 
-/// What is settled before the first sample.
 #[derive(Clone, Debug)]
-pub(crate) struct Beginning {
+pub(crate) struct LoopStart {
     pub(crate) limits: Limits,
     pub(crate) q: Vec<f64>,
     pub(crate) dq: Vec<f64>,
 }
 
-impl Beginning {
-    /// Checks a loop's parts.
+impl LoopStart {
     pub(crate) fn of(
         plant: &Plant,
         controller: &dyn Controller,
@@ -160,8 +155,9 @@ impl Beginning {
         let joints = plant.dof();
         settings.validate(joints)?;
         let own = plant.model().own_scale();
-        let beyond = plant.model().joints().iter().map(|joint| own.velocity(joint.turns(), BEYOND)).collect();
-        let limits = Limits { beyond, ..settings.limits.values(joints)? };
+        let divergence_speed =
+            plant.model().joints().iter().map(|joint| own.velocity(joint.turns(), DIVERGENCE_SPEED)).collect();
+        let limits = Limits { divergence_speed, ..settings.limits.values(joints)? };
         require_length("joints of the reference", joints, reference.joints())?;
         require_length("joints of the controller", joints, controller.joints())?;
         let motion = reference.motion();
@@ -178,9 +174,9 @@ impl Beginning {
     }
 }
 
-/// Runs the controller on the robot along the reference: at every sample it is read, the controller asks for torques,
-/// which are cut to their limits and hold until the next sample. The controller is reset first. Steps allocate nothing
-/// (but those of the adaptive integrator).
+/// Runs the controller on the robot along the reference. At every sample the controller computes torques from the
+/// measurement; they are limited and stay constant until the next sample. The controller is reset first. Steps do not
+/// allocate memory, except those of the adaptive integrator.
 ///
 /// ```
 /// use dynident_simulation::{ControllerSettings, LoopSettings, Plant, Reference, closed_loop};
@@ -196,24 +192,24 @@ impl Beginning {
 /// ```
 ///
 /// # Errors
-/// Settings without meaning, numbers of joints that differ. What happens during the run is its [`RunStatus`].
+/// Invalid settings, different numbers of joints. Events during the run are reported by its [`RunStatus`].
 pub fn closed_loop(
     plant: &mut Plant,
     controller: &mut dyn Controller,
     reference: &Reference,
     settings: &LoopSettings,
 ) -> Result<Run, SimulationError> {
-    let Beginning { limits, q, dq } = Beginning::of(plant, controller, reference, settings)?;
+    let LoopStart { limits, q, dq } = LoopStart::of(plant, controller, reference, settings)?;
     let (joints, samples) = (plant.dof(), reference.samples());
     plant.set_state(0.0, &q, &dq);
     controller.reset();
-    // Room for the whole run: the loop allocates nothing.
+    // Memory for the whole run, so that the loop does not allocate.
     let mut run = Run::begin(plant, reference, settings.accelerations);
-    let sees_the_truth = settings.sensors.see_the_truth(joints);
-    if !sees_the_truth {
+    let perfect_feedback = settings.sensors.are_perfect(joints);
+    if !perfect_feedback {
         (run.measured_q, run.measured_dq) = (vec![0.0; joints * samples], vec![0.0; joints * samples]);
     }
-    let feedback = (!sees_the_truth).then(|| Feedback::new(&settings.sensors, plant, reference.rate_hz()));
+    let feedback = (!perfect_feedback).then(|| Feedback::new(&settings.sensors, plant, reference.rate_hz()));
     let mut running = RunningLoop {
         controller,
         settings,
@@ -224,10 +220,10 @@ pub fn closed_loop(
         samples,
         tau: vec![0.0; joints],
         ddq: vec![0.0; joints],
-        tape: MotionBuffer::new(joints, !sees_the_truth),
+        buffer: MotionBuffer::new(joints, !perfect_feedback),
         plant,
         run,
-        kept: 0,
+        completed: 0,
     };
     for sample in 0..samples {
         if let Err(status) = running.sample(sample) {
@@ -235,48 +231,44 @@ pub fn closed_loop(
             break;
         }
     }
-    let RunningLoop { plant, mut tape, mut run, kept, .. } = running;
-    tape.flush(arrays(&mut run), samples);
-    if sees_the_truth {
+    let RunningLoop { plant, mut buffer, mut run, completed, .. } = running;
+    buffer.flush(arrays(&mut run), samples);
+    if perfect_feedback {
         (run.measured_q, run.measured_dq) = (run.q.clone(), run.dq.clone());
     }
     run.unsettled_steps = plant.unsettled_steps();
-    run.end(kept);
+    run.end(completed);
     Ok(run)
 }
 
-/// A loop during its run.
 struct RunningLoop<'a> {
     plant: &'a mut Plant,
     controller: &'a mut dyn Controller,
     settings: &'a LoopSettings,
     limits: Limits,
     target: ReferenceBuffer<'a>,
-    /// The sensors; `None` where the controller sees the true state.
+    /// Sensors; `None` if the controller measures the true state.
     feedback: Option<Feedback<'a>>,
-    /// Time between samples, s.
     step_s: f64,
     samples: usize,
     tau: Vec<f64>,
     ddq: Vec<f64>,
-    tape: MotionBuffer,
+    buffer: MotionBuffer,
     run: Run,
-    /// Complete samples.
-    kept: usize,
+    completed: usize,
 }
 
 impl RunningLoop<'_> {
-    /// Controls and records one sample and moves on to the next; the error is the status that ends the run.
+    /// Controls and records one sample and advances to the next; the error is the status that ends the run.
     fn sample(&mut self, sample: usize) -> Result<(), RunStatus> {
         let Self { plant, settings, limits, target, tau, run, .. } = self;
         let time_s = run.time_s(sample);
         let diverged = |reason| RunStatus::Diverged { time_s, reason };
         plant.set_time_s(time_s);
         target.go_to(sample);
-        if let Some(status) = verdict(plant.q(), plant.dq(), limits, target.target().q, time_s, &run.joints) {
+        if let Some(status) = stop_status(plant.q(), plant.dq(), limits, target.target().q, time_s, &run.joints) {
             return Err(status);
         }
-        // Sensors, control law, drives that saturate.
         let sensed = self.feedback.as_mut().map(|feedback| {
             feedback.read(plant.q(), plant.dq());
             feedback.measured()
@@ -295,9 +287,8 @@ impl RunningLoop<'_> {
             run.max_error[joint] = run.max_error[joint].max(error);
             run.rms_error[joint] += error * error;
         }
-        // Record the sample, and move on to the next.
-        if self.tape.push(Row { q: plant.q(), dq: plant.dq(), tau, measured: sensed }) {
-            self.tape.flush(arrays(run), self.samples);
+        if self.buffer.push(Row { q: plant.q(), dq: plant.dq(), tau, measured: sensed }) {
+            self.buffer.flush(arrays(run), self.samples);
         }
         if settings.accelerations {
             plant.accelerations(tau, &mut self.ddq).map_err(|fault| diverged(Divergence::Plant { fault }))?;
@@ -305,8 +296,8 @@ impl RunningLoop<'_> {
                 run.ddq[joint * self.samples + sample] = self.ddq[joint];
             }
         }
-        self.kept = sample + 1;
-        if self.kept < self.samples {
+        self.completed = sample + 1;
+        if self.completed < self.samples {
             let advanced = plant.advance(tau, self.step_s, settings.integrator);
             advanced.map_err(|fault| diverged(Divergence::Plant { fault }))?;
         }
@@ -318,9 +309,9 @@ fn arrays(run: &mut Run) -> Arrays<'_> {
     [&mut run.q, &mut run.dq, &mut run.tau, &mut run.measured_q, &mut run.measured_dq]
 }
 
-/// Why the run must stop here, if it must.
+/// Status that ends the run at this state, if any.
 #[inline]
-pub(crate) fn verdict(
+pub(crate) fn stop_status(
     q: &[f64],
     dq: &[f64],
     limits: &Limits,
@@ -330,7 +321,7 @@ pub(crate) fn verdict(
 ) -> Option<RunStatus> {
     for joint in 0..target.len() {
         let (q, dq) = (q[joint], dq[joint]);
-        if dq.abs() > limits.beyond[joint] {
+        if dq.abs() > limits.divergence_speed[joint] {
             return Some(RunStatus::Diverged { time_s, reason: Divergence::Speed { joint, value: dq } });
         }
         let error = target[joint] - q;

@@ -1,92 +1,83 @@
-//! What can be wrong before a run begins. What happens during a run is its verdict, not an error: see
-//! [`RunStatus`](crate::RunStatus).
+//! Errors before a run begins. Events during a run are reported by its [`RunStatus`](crate::RunStatus).
 
 use dynident_excitation::families::FamilyError;
 use dynident_model::ModelError;
 use thiserror::Error;
 
-/// Why an experiment could not be set up.
+/// Reason why an experiment cannot be set up.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SimulationError {
-    /// A number outside of its range.
+    /// A value out of range.
     #[error("{what} = {value}: {fix}")]
     Value {
         /// The setting, as in a file.
         what: String,
-        /// The value given.
+        /// Its value.
         value: f64,
-        /// What to do.
+        /// The fix.
         fix: &'static str,
     },
-    /// A list that has not one entry for each joint (or parameter).
-    #[error("{what}: {found} entries where {expected} are needed")]
+    /// A list that does not have one entry for each joint (or parameter).
+    #[error("{what}: expected {expected} entries, found {found}")]
     Length {
-        /// What it is a list of.
+        /// The list.
         what: String,
-        /// How many there must be.
+        /// Expected length.
         expected: usize,
-        /// How many there are.
+        /// Given length.
         found: usize,
     },
-    /// A robot's own loop of which nothing is known here.
+    /// The robot's own loop without stated gains.
     #[error("the controller position-loop runs in the robot's drives: state its kp and kd to simulate it")]
     OwnLoop,
-    /// A controller that needs a model and was given none.
-    #[error("controller {controller} needs a model of the robot: give one, or take joint-pd or joint-pid")]
+    /// A controller without the model that it needs.
+    #[error("controller {controller} needs a model of the robot: give one, or use joint-pd or joint-pid")]
     NoModel {
-        /// The controller.
+        /// Name of the controller.
         controller: &'static str,
     },
-    /// A term that acts on a joint which does not exist.
-    #[error("term {term} acts on a joint that the robot of {joints} joints does not have")]
+    /// A term that acts on a missing joint.
+    #[error("term {term} acts on a missing joint; the robot has {joints} joints")]
     TermJoint {
-        /// The term's symbol.
+        /// Symbol of the term.
         term: String,
-        /// How many joints there are.
+        /// Number of joints of the robot.
         joints: usize,
     },
-    /// Friction or inertia that would create energy.
+    /// Negative friction or inertia, which would create energy.
     #[error("{term} = {value}: a simulated robot needs zero or more")]
     Negative {
-        /// The term's symbol.
+        /// Symbol of the term.
         term: String,
         /// Its parameter.
         value: f64,
     },
-    /// One of many loops that could not be set up.
-    #[error("loop {index}: {source}")]
-    Loop {
-        /// Its place, from zero.
-        index: usize,
-        /// What is wrong with it.
-        source: Box<SimulationError>,
-    },
-    /// The mass matrix has no inverse: some joint moves nothing.
+    /// The mass matrix is singular: some joint moves no mass.
     #[error(
         "the simulated robot's mass matrix is not positive definite at the start: give every body at the tip a mass and an inertia, or its drive an inertia"
     )]
     MassMatrix,
-    /// A model's parts do not fit.
+    /// The parts of a model do not fit together.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A trajectory without meaning.
+    /// An invalid trajectory.
     #[error(transparent)]
     Family(#[from] FamilyError),
 }
 
-/// `Ok` if `holds`, else [`SimulationError::Value`].
+/// Returns [`SimulationError::Value`] unless `holds`.
 ///
 /// # Errors
-/// As said.
+/// The condition is false.
 pub fn require(holds: bool, what: impl Into<String>, value: f64, fix: &'static str) -> Result<(), SimulationError> {
     if holds { Ok(()) } else { Err(SimulationError::Value { what: what.into(), value, fix }) }
 }
 
-/// `Ok` if the numbers are equal, else [`SimulationError::Length`].
+/// Returns [`SimulationError::Length`] unless the lengths are equal.
 ///
 /// # Errors
-/// As said.
+/// The lengths differ.
 pub fn require_length(what: impl Into<String>, expected: usize, found: usize) -> Result<(), SimulationError> {
     if expected == found { Ok(()) } else { Err(SimulationError::Length { what: what.into(), expected, found }) }
 }

@@ -1,24 +1,24 @@
-//! The sensors as the controller has them, sample by sample.
+//! Measurements of the controller, sample by sample.
 
 use crate::controllers::Measured;
 use crate::plant::Plant;
 use crate::sensors::{SensorSettings, VelocitySource};
 use dynident_model::sample::Random;
 
-/// Distinguishes the stream of the feedback's noise from those of the record.
-const STREAM: u64 = 0x5eed_feed_bacc_0001;
+/// Separates the random numbers of the feedback from those of the record.
+const RANDOM_STREAM: u64 = 0x5eed_feed_bacc_0001;
 
 #[derive(Debug)]
 pub(crate) struct Feedback<'a> {
     settings: &'a SensorSettings,
     turns: Vec<bool>,
     random: Random,
-    /// Last `delay + 1` readings, joint after joint, as a ring.
+    /// Ring buffer of the last `delay + 1` readings, joint after joint.
     q: Vec<f64>,
     dq: Vec<f64>,
     place: usize,
     slots: usize,
-    /// Share of a new difference in the filtered velocity; the velocity itself and the position before.
+    /// Filter share of a new difference; filtered velocity and previous position follow below.
     share: f64,
     filtered: Vec<f64>,
     last_q: Vec<f64>,
@@ -37,7 +37,7 @@ impl<'a> Feedback<'a> {
         Self {
             settings,
             turns: plant.model().joints().iter().map(dynident_model::Joint::turns).collect(),
-            random: Random::new(settings.seed ^ STREAM),
+            random: Random::new(settings.seed ^ RANDOM_STREAM),
             q: vec![0.0; joints * slots],
             dq: vec![0.0; joints * slots],
             place: 0,
@@ -50,7 +50,7 @@ impl<'a> Feedback<'a> {
         }
     }
 
-    /// Takes a reading; [`measured`](Self::measured) is then the one the controller sees.
+    /// Processes a reading; [`measured`](Self::measured) then returns the delayed one for the controller.
     #[inline]
     pub(crate) fn read(&mut self, q: &[f64], dq: &[f64]) {
         let joints = q.len();
@@ -73,7 +73,7 @@ impl<'a> Feedback<'a> {
         }
         if !self.started {
             self.started = true;
-            // Before the run the robot stood where it starts.
+            // Before the run the robot rests at its start.
             for slot in 0..self.slots {
                 for joint in 0..joints {
                     self.q[slot * joints + joint] = self.last_q[joint];

@@ -1,15 +1,15 @@
-//! **What would it do?** Controllers at a fixed rate, a simulated robot with friction that sticks, sensors as robots
-//! have them, and the closed loop of the three.
+//! **Simulation**: controllers at a fixed rate, a robot with stiction, realistic sensors, and the closed loop of the
+//! three.
 //!
-//! | task | take |
+//! | task | use |
 //! | --- | --- |
-//! | the robot that is simulated | [`Plant`]: a model, torque terms and their values, disturbances, locked joints |
-//! | one that differs from its description | [`with_length_errors`], [`with_placements`] |
-//! | what it is to follow | [`Reference`]: samples, or a family of trajectories |
-//! | how it is controlled | [`ControllerSettings`], or a type of one's own with [`Controller`] |
-//! | what stops a run | [`RunLimits`] in [`LoopSettings`] |
-//! | the run | [`closed_loop()`] gives a [`Run`]: what truly was, what the controller saw, how well the joints followed, a [`RunStatus`] |
-//! | what a log of it would hold | [`SensorSettings::record`]: quantised, noisy, late |
+//! | simulate a robot | [`Plant`]: a model, torque terms and their values, disturbances, locked joints |
+//! | simulate a robot that differs from its description | [`with_length_errors`], [`with_placements`] |
+//! | define the motion | [`Reference`]: samples, or a family of trajectories |
+//! | select the controller | [`ControllerSettings`], or implement [`Controller`] |
+//! | stop a run at limits | [`RunLimits`] in [`LoopSettings`] |
+//! | run the loop | [`closed_loop()`] returns a [`Run`]: true motion, measurements of the controller, tracking errors, a [`RunStatus`] |
+//! | record a log | [`SensorSettings::record`]: quantised, noisy, delayed |
 //!
 //! ```
 //! use dynident_simulation::controllers::{JointPd, JointPdSettings};
@@ -22,11 +22,11 @@
 //! let mut plant = Plant::new(&model, &[], &[])?;
 //! let mut controller = JointPd::new(1, &JointPdSettings { kp: 200.0.into(), kd: 40.0.into() })?;
 //!
-//! // One second at 1 kHz, held out level against gravity.
+//! // One second at 1 kHz, held horizontally against gravity.
 //! let reference = Reference::standing(&[1.57], 1000.0, 1.0)?;
 //! let run = closed_loop(&mut plant, &mut controller, &reference, &LoopSettings::default())?;
 //! assert!(run.status.is_done());
-//! // A spring of 200 N m/rad gives by 2 kg · 9.81 m/s² · 0.5 m.
+//! // A spring of 200 N m/rad deflects by 2 kg · 9.81 m/s² · 0.5 m.
 //! assert!((run.max_error[0] - 9.81 / 200.0).abs() < 0.005);
 //!
 //! let log = SensorSettings::birdy_standard(1).record(&model, &run)?;

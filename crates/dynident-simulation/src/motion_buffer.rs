@@ -1,44 +1,42 @@
-//! Blocks of samples between the loop, which goes from sample to sample, and arrays that are joint-major. Written
-//! straight, every sample would touch a page for each joint of each array, more than a processor keeps addresses of; in
-//! blocks it is one page in 32 samples.
+//! Blocks of samples between the loop, which processes single samples, and joint-major arrays. Without blocks every
+//! sample would access one memory page for each joint of each array, more than the processor caches; a block accesses
+//! them once in 32 samples.
 
 use crate::controllers::{Measured, Target};
 use crate::reference::Reference;
 
-/// Samples in a block: with 35 numbers each, nine kilobytes.
-const BLOCK: usize = 32;
+/// Samples in a block: with 35 numbers per sample nine kilobytes.
+const BLOCK_SAMPLES: usize = 32;
 
-/// What the loop writes of one sample.
 #[derive(Clone, Copy)]
 pub(crate) struct Row<'a> {
     pub(crate) q: &'a [f64],
     pub(crate) dq: &'a [f64],
     pub(crate) tau: &'a [f64],
-    /// Where it is not the true motion.
+    /// Measurement, if it differs from the true motion.
     pub(crate) measured: Option<Measured<'a>>,
 }
 
-/// The arrays in the order of [`Row`]; the last two are filled where something is measured.
+/// Arrays in the order of [`Row`]; the last two contain the measurement.
 pub(crate) type Arrays<'a> = [&'a mut Vec<f64>; 5];
 
 #[derive(Debug)]
 pub(crate) struct MotionBuffer {
     joints: usize,
-    /// Numbers of each joint in a row.
     kinds: usize,
     rows: Vec<f64>,
     filled: usize,
-    /// The sample of the first row.
+    /// Index of the first row's sample.
     first: usize,
 }
 
 impl MotionBuffer {
     pub(crate) fn new(joints: usize, with_measured: bool) -> Self {
         let kinds = if with_measured { 5 } else { 3 };
-        Self { joints, kinds, rows: vec![0.0; kinds * joints * BLOCK], filled: 0, first: 0 }
+        Self { joints, kinds, rows: vec![0.0; kinds * joints * BLOCK_SAMPLES], filled: 0, first: 0 }
     }
 
-    /// True once the block must be given to [`flush`](Self::flush).
+    /// Returns true if the block is full and must be [flushed](Self::flush).
     #[inline]
     pub(crate) fn push(&mut self, row: Row<'_>) -> bool {
         let n = self.joints;
@@ -51,10 +49,10 @@ impl MotionBuffer {
             to[4 * n..].copy_from_slice(measured.dq);
         }
         self.filled += 1;
-        self.filled == BLOCK
+        self.filled == BLOCK_SAMPLES
     }
 
-    /// Writes the rows into arrays of `samples` samples a joint.
+    /// Writes the rows into arrays of `samples` samples per joint.
     pub(crate) fn flush(&mut self, arrays: Arrays<'_>, samples: usize) {
         let width = self.kinds * self.joints;
         for (place, array) in arrays.into_iter().take(self.kinds).enumerate() {
@@ -71,7 +69,6 @@ impl MotionBuffer {
     }
 }
 
-/// A reference, read block by block.
 #[derive(Debug)]
 pub(crate) struct ReferenceBuffer<'a> {
     reference: &'a Reference,
@@ -81,13 +78,12 @@ pub(crate) struct ReferenceBuffer<'a> {
 
 impl<'a> ReferenceBuffer<'a> {
     pub(crate) fn new(reference: &'a Reference) -> Self {
-        Self { reference, rows: vec![0.0; 3 * reference.joints() * BLOCK], at: 0 }
+        Self { reference, rows: vec![0.0; 3 * reference.joints() * BLOCK_SAMPLES], at: 0 }
     }
 
-    /// Goes to a sample.
     #[inline]
     pub(crate) fn go_to(&mut self, sample: usize) {
-        self.at = sample % BLOCK;
+        self.at = sample % BLOCK_SAMPLES;
         if self.at == 0 {
             self.fill(sample);
         }
@@ -96,7 +92,7 @@ impl<'a> ReferenceBuffer<'a> {
     fn fill(&mut self, first: usize) {
         let motion = self.reference.motion();
         let (joints, samples) = (motion.joints, motion.samples);
-        let count = BLOCK.min(samples - first);
+        let count = BLOCK_SAMPLES.min(samples - first);
         for (place, array) in [&motion.q, &motion.dq, &motion.ddq].into_iter().enumerate() {
             for joint in 0..joints {
                 let to = self.rows[place * joints + joint..].iter_mut().step_by(3 * joints);

@@ -1,9 +1,9 @@
-//! A number for all joints, or one for each.
+//! A value for all joints, or one for each.
 
 use crate::error::{SimulationError, require, require_length};
 use serde::{Deserialize, Serialize};
 
-/// A setting of every joint: one number for all of them, or a list with one for each, in the model's order.
+/// A setting of every joint: one value for all of them, or a list with one for each, in the model's order.
 ///
 /// ```
 /// use dynident_simulation::PerJoint;
@@ -17,17 +17,17 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum PerJoint {
-    /// The same for all joints.
+    /// The same value for all joints.
     All(f64),
-    /// One for each joint.
+    /// One value for each joint.
     Each(Vec<f64>),
 }
 
 impl PerJoint {
-    /// The value at `joint`.
+    /// Value at `joint`.
     ///
     /// # Panics
-    /// If a list has no such entry: [`values`](Self::values) checks that.
+    /// If a list has no such entry; [`values`](Self::values) checks the length.
     pub fn of(&self, joint: usize) -> f64 {
         match self {
             Self::All(value) => *value,
@@ -35,10 +35,10 @@ impl PerJoint {
         }
     }
 
-    /// The values of so many joints.
+    /// Values of a number of joints.
     ///
     /// # Errors
-    /// A list of another length, or a value for which `holds` is false.
+    /// A list of the wrong length, or a value for which `holds` is false.
     pub fn values(
         &self,
         what: &str,
@@ -56,7 +56,7 @@ impl PerJoint {
         Ok(values)
     }
 
-    /// The values of so many joints, which must be finite and zero or more.
+    /// Values of a number of joints, which must be finite and not negative.
     pub(crate) fn gains(&self, what: &str, joints: usize) -> Result<Vec<f64>, SimulationError> {
         self.values(what, joints, "give zero or a finite positive number", |x| x >= 0.0 && x.is_finite())
     }

@@ -1,4 +1,4 @@
-//! A run as a log holds it.
+//! Record of a run as in a log.
 
 use crate::error::{SimulationError, require};
 use crate::run::Run;
@@ -6,17 +6,17 @@ use crate::sensors::SensorSettings;
 use dynident_model::Model;
 use dynident_model::sample::Random;
 
-/// Distinguishes the streams of positions, torques and instants.
-const STREAMS: [u64; 3] = [0x5eed_0002, 0x5eed_0003, 0x5eed_0004];
+/// Separate the random numbers of positions, torques and instants.
+const RANDOM_STREAMS: [u64; 3] = [0x5eed_0002, 0x5eed_0003, 0x5eed_0004];
 
-/// What was recorded of a run, joint-major: joint `j`, sample `s` at `j * samples + s`.
+/// Recorded samples of a run, joint-major: joint `j`, sample `s` at `j * samples + s`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
     /// Names of the joints.
     pub joints: Vec<String>,
-    /// Samples a second by the record's clock.
+    /// Sampling rate by the record's clock, Hz.
     pub rate_hz: f64,
-    /// Samples of each joint.
+    /// Number of samples of each joint.
     pub samples: usize,
     /// Times by the record's clock, s.
     pub times_s: Vec<f64>,
@@ -27,18 +27,17 @@ pub struct Record {
 }
 
 impl Record {
-    /// The range of one joint in either array.
+    /// Index range of one joint in either array.
     pub fn of(&self, joint: usize) -> core::ops::Range<usize> {
         joint * self.samples..(joint + 1) * self.samples
     }
 
-    /// The record as a table `t_s, q1.., tau1..`, every number with all its digits: what a log reader takes.
+    /// The record as a CSV table `t_s, q1.., tau1..` with full precision, for log readers.
     pub fn csv(&self) -> String {
         use core::fmt::Write;
         let mut text = String::from("t_s");
         for prefix in ["q", "tau"] {
             for joint in 1..=self.joints.len() {
-                // Writing to a string cannot fail, here and below.
                 let _ = write!(text, ",{prefix}{joint}");
             }
         }
@@ -57,15 +56,15 @@ impl Record {
 }
 
 impl SensorSettings {
-    /// What these sensors record of a run of a robot.
+    /// Records a run of a robot with these sensors.
     ///
-    /// Positions between the controller's samples are those of the cubic polynomial that takes over position and
-    /// velocity of both (error below `h⁴/384` of the fourth derivative); torques are constant between samples. Where
-    /// the record takes its positions at the controller's own instants (same rate, no jitter, drift or delay), they are
-    /// the readings that the controller saw, with the same noise.
+    /// Positions between the controller's samples are cubic Hermite polynomials of position and velocity (error below
+    /// `h⁴/384` of the fourth derivative); torques are constant between samples. If the record has the controller's
+    /// instants (same rate, no jitter, drift or delay), its positions are the controller's readings, with the same
+    /// noise.
     ///
     /// # Errors
-    /// As [`validate`](Self::validate); noise or steps so large that a record would not be finite.
+    /// Errors of [`validate`](Self::validate); noise or steps so large that the record would not be finite.
     pub fn record(&self, model: &Model, run: &Run) -> Result<Record, SimulationError> {
         let joints = run.joints.len();
         self.validate(joints)?;
@@ -73,7 +72,7 @@ impl SensorSettings {
         let stretch = 1.0 + 1e-6 * self.clock_drift_ppm;
         let end_s = run.samples.saturating_sub(1) as f64 / run.rate_hz;
         let samples = if run.samples == 0 { 0 } else { (end_s * rate_hz / stretch + 1e-9).floor() as usize + 1 };
-        let [mut position, mut torque, mut instant] = STREAMS.map(|stream| Random::new(self.seed ^ stream));
+        let [mut position, mut torque, mut instant] = RANDOM_STREAMS.map(|stream| Random::new(self.seed ^ stream));
         let times_s: Vec<f64> = (0..samples).map(|sample| sample as f64 / rate_hz).collect();
         let true_times: Vec<f64> = times_s
             .iter()
@@ -92,7 +91,7 @@ impl SensorSettings {
                 q.extend_from_slice(&run.measured_q[own.clone()]);
             } else {
                 q.extend(true_times.iter().map(|time| {
-                    let at = between(&run.q[own.clone()], &run.dq[own.clone()], run.rate_hz, time - delay_q);
+                    let at = interpolate(&run.q[own.clone()], &run.dq[own.clone()], run.rate_hz, time - delay_q);
                     self.position(joint, at, turns, &mut position)
                 }));
             }
@@ -101,7 +100,7 @@ impl SensorSettings {
             let mut error = if std > 0.0 { std * torque.normal() } else { 0.0 };
             let torques = &run.tau[own];
             for time in &true_times {
-                // The sample in force: rounding must not fetch the one before.
+                // The tolerance prevents that rounding selects the previous sample.
                 let at = ((time - delay_tau).max(0.0) * run.rate_hz + 1e-6).floor() as usize;
                 let value = torques[at.min(run.samples - 1)] + error;
                 tau.push(match &self.torque_step {
@@ -113,7 +112,7 @@ impl SensorSettings {
                 }
             }
         }
-        // Noise and steps of any size are allowed, and a run's own numbers are finite.
+        // Noise and steps are not limited, while the values of a run are finite.
         if let Some(&value) = q.iter().chain(&tau).find(|value| !value.is_finite()) {
             let fix = "give position_std, torque_std, encoder_steps and torque_step sizes that a sensor can have";
             require(false, "a recorded position or torque", value, fix)?;
@@ -122,8 +121,7 @@ impl SensorSettings {
     }
 }
 
-/// Cubic Hermite interpolation of samples with their derivatives; before the first sample its value.
-fn between(q: &[f64], dq: &[f64], rate_hz: f64, time_s: f64) -> f64 {
+fn interpolate(q: &[f64], dq: &[f64], rate_hz: f64, time_s: f64) -> f64 {
     let place = (time_s * rate_hz).max(0.0);
     let from = (place.floor() as usize).min(q.len().saturating_sub(2));
     let Some(&next) = q.get(from + 1) else { return q[0] };

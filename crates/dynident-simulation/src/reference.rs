@@ -1,26 +1,25 @@
-//! What a run should follow, at the controller's samples.
+//! Reference trajectory of a run at the controller's samples.
 
 use crate::controllers::Target;
 use crate::error::{SimulationError, require, require_length};
 use dynident_excitation::{Family, Motion};
 use std::sync::Arc;
 
-/// Most samples of a run: beyond this a setting is a slip (28 hours at 1 kHz).
-const MOST_SAMPLES: f64 = 1e8;
+/// Maximum number of samples of a run (28 hours at 1 kHz); a larger number is a typing error.
+const MAX_SAMPLES: f64 = 1e8;
 
-/// A reference trajectory sampled at the controller's rate: sample `k` stands at `k / rate_hz`.
+/// A reference trajectory sampled at the controller's rate: sample `k` is at the time `k / rate_hz`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     rate_hz: f64,
-    /// Shared with the runs that follow it.
     motion: Arc<Motion>,
 }
 
 impl Reference {
-    /// The reference with the samples of `motion` (jerk is not looked at).
+    /// Creates the reference from the samples of `motion`, whose jerk is not used.
     ///
     /// # Errors
-    /// A rate that is not positive, no samples, arrays of other lengths, a number that is not finite.
+    /// A rate that is not positive, no samples, arrays of the wrong length, a value that is not finite.
     pub fn new(rate_hz: f64, motion: Motion) -> Result<Self, SimulationError> {
         require_rate(rate_hz)?;
         require(motion.samples >= 1 && motion.joints >= 1, "samples of the reference", 0.0, "give one or more")?;
@@ -37,11 +36,11 @@ impl Reference {
         Ok(Self { rate_hz, motion: Arc::new(motion) })
     }
 
-    /// A trajectory of a family over its whole duration, or over `duration_s` of it.
+    /// Samples a trajectory of a family over its whole duration, or over `duration_s` of it.
     ///
     /// # Errors
-    /// Parameters of another length, a rate or duration that is not positive or gives too many samples, a motion that
-    /// is not finite.
+    /// A wrong number of parameters, a rate or duration that is not positive or results in too many samples, a motion
+    /// that is not finite.
     pub fn of_family(
         family: &dyn Family,
         parameters: &[f64],
@@ -52,9 +51,14 @@ impl Reference {
         require_length(format!("parameters of {}", family.name()), family.parameters(), parameters.len())?;
         let duration_s = duration_s.unwrap_or(family.duration_s());
         let within = duration_s > 0.0 && duration_s <= family.duration_s() * (1.0 + 1e-12);
-        require(within, "duration_s", duration_s, "give more than 0, at most the trajectory's own duration")?;
-        require(duration_s * rate_hz < MOST_SAMPLES, "duration_s", duration_s, "that is more than 1e8 samples")?;
-        // The last sample may lie on the end, rounding or not.
+        require(within, "duration_s", duration_s, "give more than 0, at most the duration of the trajectory")?;
+        require(
+            duration_s * rate_hz < MAX_SAMPLES,
+            "duration_s",
+            duration_s,
+            "give a duration of at most 1e8 samples",
+        )?;
+        // The tolerance includes a last sample exactly at the end.
         let last = (duration_s * rate_hz + 1e-9).floor() as usize;
         let times: Vec<f64> = (0..=last).map(|sample| (sample as f64 / rate_hz).min(family.duration_s())).collect();
         let mut motion = Motion::default();
@@ -62,13 +66,13 @@ impl Reference {
         Self::new(rate_hz, motion)
     }
 
-    /// Standing still at `q` for `duration_s`.
+    /// Rest at `q` for `duration_s`.
     ///
     /// # Errors
-    /// A rate or duration that is not positive or gives too many samples, positions that are not finite.
+    /// A rate or duration that is not positive or results in too many samples, positions that are not finite.
     pub fn standing(q: &[f64], rate_hz: f64, duration_s: f64) -> Result<Self, SimulationError> {
         require_rate(rate_hz)?;
-        let some = duration_s > 0.0 && duration_s * rate_hz < MOST_SAMPLES;
+        let some = duration_s > 0.0 && duration_s * rate_hz < MAX_SAMPLES;
         require(some, "duration_s", duration_s, "give more than 0, and at most 1e8 samples")?;
         let samples = (duration_s * rate_hz + 1e-9).floor() as usize + 1;
         let mut motion = Motion::default();
@@ -80,12 +84,12 @@ impl Reference {
         Self::new(rate_hz, motion)
     }
 
-    /// The same reference with a joint held at a position: the controller keeps it there.
+    /// Holds a joint at a constant position.
     ///
     /// # Errors
-    /// A joint that does not exist, a position that is not finite.
+    /// A missing joint, a position that is not finite.
     pub fn with_joint_held(mut self, joint: usize, position: f64) -> Result<Self, SimulationError> {
-        require(joint < self.joints(), "joint held", joint as f64, "there is no such joint")?;
+        require(joint < self.joints(), "joint held", joint as f64, "give the index of an existing joint")?;
         require(position.is_finite(), "position held", position, "give a finite position")?;
         let motion = Arc::make_mut(&mut self.motion);
         let own = motion.of(joint);
@@ -98,17 +102,16 @@ impl Reference {
         Ok(self)
     }
 
-    /// Samples a second: the controller's rate.
+    /// Rate of the controller, Hz.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// The samples, joint-major.
+    /// Samples, joint-major.
     pub fn motion(&self) -> &Motion {
         &self.motion
     }
 
-    /// The same samples, shared.
     pub(crate) fn shared(&self) -> Arc<Motion> {
         Arc::clone(&self.motion)
     }
@@ -129,7 +132,7 @@ impl Reference {
     }
 }
 
-/// One sample of a reference, as controllers take it.
+/// One sample of a reference.
 #[derive(Clone, Debug)]
 pub struct ReferenceSample {
     q: Vec<f64>,
@@ -138,12 +141,12 @@ pub struct ReferenceSample {
 }
 
 impl ReferenceSample {
-    /// Zeros for so many joints.
+    /// Zeros for a number of joints.
     pub fn new(joints: usize) -> Self {
         Self { q: vec![0.0; joints], dq: vec![0.0; joints], ddq: vec![0.0; joints] }
     }
 
-    /// Takes sample number `sample` of a reference with as many joints.
+    /// Copies sample number `sample` of a reference with the same number of joints.
     ///
     /// # Panics
     /// If the reference has fewer joints or samples.
@@ -156,7 +159,7 @@ impl ReferenceSample {
         }
     }
 
-    /// As controllers take it.
+    /// View for controllers.
     pub fn target(&self) -> Target<'_> {
         Target { q: &self.q, dq: &self.dq, ddq: &self.ddq }
     }

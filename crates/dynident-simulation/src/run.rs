@@ -1,4 +1,4 @@
-//! What came of a run.
+//! Result of a run.
 
 use crate::plant::{Plant, PlantFault};
 use crate::reference::Reference;
@@ -6,36 +6,36 @@ use dynident_excitation::Motion;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// How a run ended.
+/// End of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "status", rename_all = "kebab-case")]
 pub enum RunStatus {
-    /// At the reference's end.
+    /// The run reached the end of the reference.
     Done,
-    /// A limit was broken, and the run stopped.
+    /// A limit was violated, and the run stopped.
     LimitBroken {
-        /// When, s.
+        /// Time, s.
         time_s: f64,
-        /// The joint's name.
+        /// Name of the joint.
         joint: String,
-        /// What was limited.
+        /// Limited quantity.
         quantity: LimitedQuantity,
         /// Its value, rad, rad/s (m, m/s).
         value: f64,
         /// The limit.
         limit: f64,
     },
-    /// The motion blew up, and the run stopped.
+    /// The motion diverged, and the run stopped.
     Diverged {
-        /// When, s.
+        /// Time, s.
         time_s: f64,
-        /// Why.
+        /// Reason.
         reason: Divergence,
     },
 }
 
-/// What a run may not exceed.
+/// Limited quantity of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -58,26 +58,26 @@ impl LimitedQuantity {
     }
 }
 
-/// Why a run counts as diverged.
+/// Reason for a divergence.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Divergence {
-    /// The simulated robot cannot go on.
+    /// The simulation of the robot cannot continue.
     Plant {
-        /// Why.
+        /// Reason.
         fault: PlantFault,
     },
-    /// The controller asked for a torque that is not a number.
+    /// The controller's torque is not finite.
     Torque {
-        /// The joint's place.
+        /// Index of the joint.
         joint: usize,
     },
-    /// A velocity beyond all robots.
+    /// A velocity that no robot reaches.
     Speed {
-        /// The joint's place.
+        /// Index of the joint.
         joint: usize,
-        /// rad/s (m/s).
+        /// Velocity, rad/s (m/s).
         value: f64,
     },
 }
@@ -95,7 +95,7 @@ impl core::fmt::Display for Divergence {
 }
 
 impl RunStatus {
-    /// Whether the run reached the reference's end.
+    /// Whether the run reached the end of the reference.
     pub fn is_done(&self) -> bool {
         *self == Self::Done
     }
@@ -117,44 +117,45 @@ impl core::fmt::Display for RunStatus {
     }
 }
 
-/// A run: what truly was at every sample of the controller up to its end, what the controller saw, and how it went.
-/// Arrays are joint-major: joint `j`, sample `s` at `j * samples + s`. All numbers are finite, whatever happened.
+/// A run: true motion at every sample of the controller up to its end, measurements of the controller, and tracking
+/// errors. Arrays are joint-major: joint `j`, sample `s` at `j * samples + s`. All values are finite in every case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
     /// Names of the joints.
     pub joints: Vec<String>,
-    /// Samples a second.
+    /// Sampling rate, Hz.
     pub rate_hz: f64,
-    /// Samples of each joint; sample `k` stands at `k / rate_hz`.
+    /// Number of samples of each joint; sample `k` is at the time `k / rate_hz`.
     pub samples: usize,
-    /// How it ended.
+    /// End of the run.
     pub status: RunStatus,
-    /// What was to be followed, up to the run's end.
+    /// Reference up to the end of the run.
     pub reference: Arc<Motion>,
     /// True positions, rad (m).
     pub q: Vec<f64>,
-    /// True velocities.
+    /// True velocities, rad/s (m/s).
     pub dq: Vec<f64>,
-    /// True accelerations just after each sample, if they were asked for; else empty.
+    /// True accelerations immediately after each sample, if requested; otherwise empty.
     pub ddq: Vec<f64>,
     /// Torques of the drives from each sample to the next, Nm (N), after the limits.
     pub tau: Vec<f64>,
-    /// Positions as the controller saw them.
+    /// Positions measured by the controller.
     pub measured_q: Vec<f64>,
-    /// Velocities as the controller saw them.
+    /// Velocities measured by the controller.
     pub measured_dq: Vec<f64>,
-    /// Per joint: the largest true distance from the reference, rad (m).
+    /// Largest true distance from the reference of each joint, rad (m).
     pub max_error: Vec<f64>,
-    /// Per joint: the root mean square of that distance.
+    /// Root mean square of that distance of each joint.
     pub rms_error: Vec<f64>,
-    /// Per joint: samples at which the torque was cut to its limit.
+    /// Number of samples with saturated torque of each joint.
     pub saturated: Vec<usize>,
-    /// Steps whose friction torques had not settled: see [`Plant::unsettled_steps`](crate::Plant::unsettled_steps).
+    /// Steps without convergence of the friction torques: see
+    /// [`Plant::unsettled_steps`](crate::Plant::unsettled_steps).
     pub unsettled_steps: usize,
 }
 
 impl Run {
-    /// A run that has not begun: zeros, room for what is true at every sample, none yet for what is measured.
+    /// An empty run with memory for the true motion, but not for measurements.
     pub(crate) fn begin(plant: &Plant, reference: &Reference, accelerations: bool) -> Self {
         let (joints, samples) = (plant.dof(), reference.samples());
         let zeros = || vec![0.0; joints * samples];
@@ -177,7 +178,7 @@ impl Run {
         }
     }
 
-    /// The end of a run of which `kept` samples were run, with sums of squares in place of root mean squares.
+    /// Ends a run after `kept` samples, and converts sums of squares to root mean squares.
     pub(crate) fn end(&mut self, kept: usize) {
         for error in &mut self.rms_error {
             *error = (*error / kept.max(1) as f64).sqrt();
@@ -185,7 +186,7 @@ impl Run {
         self.cut(kept);
     }
 
-    /// The range of one joint in any of the arrays.
+    /// Index range of one joint in any of the arrays.
     pub fn of(&self, joint: usize) -> core::ops::Range<usize> {
         joint * self.samples..(joint + 1) * self.samples
     }
@@ -200,8 +201,8 @@ impl Run {
         self.reference.q[self.of(joint)].iter().zip(&self.q[self.of(joint)]).map(|(reference, q)| reference - q)
     }
 
-    /// The part with these samples, as far as the run got: times count from the first of them. Cut torques and
-    /// unsettled steps are those of the whole.
+    /// The part with these samples, as far as the run reached; times start at the first of them. Numbers of saturated
+    /// samples and unsettled steps are those of the whole run.
     #[must_use]
     pub fn of_samples(&self, range: core::ops::Range<usize>) -> Self {
         let (joints, before) = (self.joints.len(), self.samples);
@@ -241,7 +242,6 @@ impl Run {
         part
     }
 
-    /// Drops all samples but the first `samples`.
     pub(crate) fn cut(&mut self, samples: usize) {
         let (before, joints) = (self.samples, self.joints.len());
         if samples == before {

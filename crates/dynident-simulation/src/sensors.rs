@@ -1,21 +1,21 @@
-//! What sensors make of a motion.
+//! Simulated sensors.
 
 use crate::error::{SimulationError, require};
 use crate::per_joint::PerJoint;
 use dynident_model::sample::Random;
 use serde::{Deserialize, Serialize};
 
-/// Where the controller's velocities come from.
+/// Source of the controller's velocities.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum VelocitySource {
-    /// A perfect tachometer.
+    /// The true velocities.
     #[default]
     True,
-    /// Differences of the measured positions from sample to sample, through a low-pass of order 1.
+    /// Differences of the measured positions between samples, with a first-order low-pass filter.
     Differences {
-        /// Its cut-off.
+        /// Cut-off frequency of the filter, Hz.
         cutoff_hz: f64,
     },
 }
@@ -34,33 +34,32 @@ pub enum VelocitySource {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorSettings {
-    /// Steps of the encoders in a turn of the joint (in a metre). Default none: not quantised.
+    /// Encoder steps per turn of the joint (per metre). Default none: not quantised.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_steps: Option<PerJoint>,
-    /// Standard deviation of a position's white noise, rad (m), before quantisation. Default 0.
+    /// Standard deviation of the white noise of positions, rad (m), before quantisation. Default 0.
     pub position_std: PerJoint,
-    /// Standard deviation of a torque's noise, Nm (N). Default 0.
+    /// Standard deviation of the noise of torques, Nm (N). Default 0.
     pub torque_std: PerJoint,
-    /// Correlation of a torque's noise from one recorded sample to the next: AR(1), 0 (the default) for white noise.
+    /// Correlation of the torque noise between recorded samples: AR(1), 0 (the default) for white noise.
     pub torque_correlation: f64,
-    /// Step of recorded torques, Nm (N). Default none.
+    /// Quantisation step of recorded torques, Nm (N). Default none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_step: Option<PerJoint>,
-    /// Where the controller's velocities come from. Default true velocities.
+    /// Source of the controller's velocities. Default true velocities.
     pub speed: VelocitySource,
-    /// How many samples late the controller sees positions and velocities. Default 0.
+    /// Delay of the controller's positions and velocities, samples. Default 0.
     pub feedback_delay_samples: usize,
-    /// Samples a second of the record. Default the controller's rate.
+    /// Rate of the record, Hz. Default the controller's rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub record_rate_hz: Option<f64>,
-    /// Standard deviation of the record's instants against its clock, s. Default 0.
+    /// Standard deviation of the record's instants relative to its clock, s. Default 0.
     pub jitter_std_s: f64,
-    /// How late recorded positions are, s. Default 0.
+    /// Delay of recorded positions, s. Default 0.
     pub position_delay_s: PerJoint,
-    /// How late recorded torques are, s. Default 0.
+    /// Delay of recorded torques, s. Default 0.
     pub torque_delay_s: PerJoint,
-    /// By how many millionths the record's clock runs slow: its sample `k` is taken at `k/rate · (1 + 1e-6 · drift)`.
-    /// Default 0.
+    /// Clock drift of the record, parts per million: sample `k` is taken at `k/rate · (1 + 1e-6 · drift)`. Default 0.
     pub clock_drift_ppm: f64,
     /// Seed of all noise. Default 1.
     pub seed: u64,
@@ -87,8 +86,8 @@ impl Default for SensorSettings {
 }
 
 impl SensorSettings {
-    /// The standard noise of BIRDy's protocol: positions 1e-3 degrees, torques 0.05 Nm, recorded at 1 kHz (Leboutet et
-    /// al., Applied Sciences 11 (2021) 4303).
+    /// Standard noise of BIRDy's protocol: positions 1e-3 degrees, torques 0.05 Nm, recorded at 1 kHz (Leboutet et al.,
+    /// Applied Sciences 11 (2021) 4303).
     pub fn birdy_standard(seed: u64) -> Self {
         Self {
             position_std: 1e-3_f64.to_radians().into(),
@@ -99,10 +98,10 @@ impl SensorSettings {
         }
     }
 
-    /// Checks the numbers for so many joints.
+    /// Checks the settings for a number of joints.
     ///
     /// # Errors
-    /// Numbers that are negative or not finite, lists of another length, steps that are not positive, a correlation
+    /// Values that are negative or not finite, lists of the wrong length, steps that are not positive, a correlation
     /// outside [0, 1), delays above 10 s or 1000 samples, a drift of more than 10 %.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         let none_or_more = "give zero or a finite positive number";
@@ -132,15 +131,14 @@ impl SensorSettings {
         require(drift.abs() <= 1e5, "clock_drift_ppm", drift, "give -100000 to 100000")
     }
 
-    /// Whether the controller sees the true state.
-    pub(crate) fn see_the_truth(&self, joints: usize) -> bool {
+    /// Whether the controller measures the true state.
+    pub(crate) fn are_perfect(&self, joints: usize) -> bool {
         self.encoder_steps.is_none()
             && (0..joints).all(|joint| self.position_std.of(joint) == 0.0)
             && self.speed == VelocitySource::True
             && self.feedback_delay_samples == 0
     }
 
-    /// What the encoder of a joint says of a position.
     #[inline]
     pub(crate) fn position(&self, joint: usize, q: f64, turns: bool, random: &mut Random) -> f64 {
         let std = self.position_std.of(joint);

@@ -1,4 +1,4 @@
-//! The same path, slower.
+//! Slower execution of a reference.
 
 use crate::error::{SimulationError, require};
 use crate::reference::Reference;
@@ -6,11 +6,10 @@ use dynident_excitation::Motion;
 
 impl Reference {
     /// The motion at a share s of its speed, at the same rate: `q(s t)`, `s q̇(s t)`, `s² q̈(s t)`. Between samples
-    /// positions and velocities are those of the cubic polynomial that takes over both at either end, accelerations go
-    /// straight.
+    /// positions and velocities are cubic Hermite polynomials, and accelerations are linear.
     ///
     /// # Errors
-    /// A share that is not within (0, 1].
+    /// A share outside (0, 1].
     pub fn slowed(&self, speed: f64) -> Result<Reference, SimulationError> {
         require(speed > 0.0 && speed <= 1.0, "speed_steps", speed, "give more than 0, at most 1")?;
         let own = self.motion();
@@ -55,11 +54,10 @@ mod tests {
             (motion.q[k], motion.dq[k], motion.ddq[k]) = (sine, 3.0 * cosine, -9.0 * sine);
         }
         let slow = Reference::new(rate_hz, motion).unwrap().slowed(0.3).unwrap();
-        // 2 s take 6.67 s.
         assert!((slow.duration_s() - 2.0 / 0.3).abs() < 1.5 / rate_hz);
         for k in 0..slow.samples() - 2 {
             let (sine, cosine) = (0.9 * k as f64 / rate_hz).sin_cos();
-            // Cubic pieces of 5 ms: 3^4 h^4 / 384 of the position, half of 3^4 h^2 / 8 of a straight acceleration.
+            // Cubic pieces of 5 ms: error 3^4 h^4 / 384 of the position, half of 3^4 h^2 / 8 of a linear acceleration.
             assert!((slow.motion().q[k] - sine).abs() < 2e-10);
             assert!((slow.motion().dq[k] - 0.9 * cosine).abs() < 1e-7);
             assert!((slow.motion().ddq[k] + 0.81 * sine).abs() < 1e-4);

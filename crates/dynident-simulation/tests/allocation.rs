@@ -1,4 +1,4 @@
-//! Steps of the closed loop allocate nothing: a run twice as long asks for memory as often.
+//! Steps of the closed loop do not allocate: a run twice as long has the same number of allocations.
 
 #![allow(unsafe_code, reason = "a global allocator cannot be written without")]
 #![allow(clippy::unwrap_used, reason = "tests")]
@@ -16,13 +16,13 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 thread_local! {
-    /// Requests of this thread alone: the test harness has threads of its own.
+    /// Allocations of this thread only, because the test harness has other threads.
     static REQUESTS: Cell<usize> = const { Cell::new(0) };
 }
 
 struct Counting;
 
-// Sound: every request goes to the system's allocator as it came.
+// Sound: every request is passed unchanged to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         REQUESTS.set(REQUESTS.get() + 1);

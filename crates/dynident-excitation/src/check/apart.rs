@@ -1,66 +1,63 @@
-//! The distance of two links by an algorithm that the search does not know.
+//! Distance of two links, computed with another algorithm than the search.
 //!
-//! The nearest points of two hulls are weighted means of their corners. Weight goes from the corner that is worst to
-//! the one that is best (Mitchell, Demyanov and Malozemov, SIAM J. Control 12(1), 1974) until what is left to gain is
-//! nothing; the plane between the two certifies from below how far apart they are, and only what is certified counts.
+//! The nearest points of two convex hulls are weighted means of their corners. Each iteration moves weight from the
+//! worst corner to the best one (Mitchell, Demyanov and Malozemov, SIAM J. Control 12(1), 1974) until no further gain
+//! is possible. The separating plane gives a lower bound of the distance, and the check uses this bound.
 
 use dynident_model::{Transform, Vec3};
 
-/// Corners and the radius about their hull, in a body's frame.
+/// Corners of a convex hull in the frame of its body, with a radius around it.
 pub(super) struct Hull {
     pub(super) corners: Vec<Vec3>,
     pub(super) radius_m: f64,
 }
 
-/// A link: its body and its hulls.
 pub(super) struct Link {
     pub(super) body: Option<usize>,
     pub(super) hulls: Vec<Hull>,
-    /// Of each hull a point and a radius about it that holds the hull, m.
+    /// Bounding ball of each hull: centre and radius, m.
     balls: Vec<(Vec3, f64)>,
-    /// No point is farther from the body's origin, m.
-    far_m: f64,
+    /// Distance of the farthest point from the body's origin, m.
+    reach_m: f64,
 }
 
-/// Two links and what is known of their distance.
 pub(super) struct Pair {
     pub(super) links: [Link; 2],
     pub(super) clearance_m: f64,
     pub(super) size_m: f64,
-    /// Where both stood when their distance was last found, and that distance.
+    /// Placements of both links at the last computed distance, and that distance.
     known: Option<([Transform; 2], f64)>,
 }
 
-/// Exchanges of weight at most.
-const EXCHANGES: usize = 4000;
+const MAX_EXCHANGES: usize = 4000;
 
-/// A distance is found when its bounds are so near, as a share of the pair's size.
-const NEAR: f64 = 1e-7;
+/// Maximum gap between the bounds of a distance, as a share of the pair's size.
+const RELATIVE_DISTANCE_TOLERANCE: f64 = 1e-7;
 
 impl Pair {
     pub(super) fn new(links: [Link; 2], clearance_m: f64, size_m: f64) -> Self {
         Self { links, clearance_m, size_m, known: None }
     }
 
-    /// 1 at the clearance, more where it is missing; where the ratio cannot reach the `worst` so far, that one.
+    /// Ratio to the clearance: 1 at the clearance, larger below it. Returns `worst` if the ratio cannot exceed it.
     pub(super) fn ratio(&mut self, placements: &[Transform], worst: f64) -> f64 {
         let at = [0, 1].map(|k| self.links[k].body.map_or(Transform::IDENTITY, |body| placements[body]));
         let ratio = |apart: f64| 1.0 + (self.clearance_m - apart) / self.size_m;
-        // No point of a link has gone farther than its frame, and its distance from it turned.
+        // A point moves at most as far as the frame's translation plus the rotation times its distance from the origin.
         if let Some((then, apart)) = &self.known {
-            let gone: f64 = (0..2).map(|k| self.links[k].farthest_gone(&then[k], &at[k])).sum();
+            let gone: f64 = (0..2).map(|k| self.links[k].max_displacement_m(&then[k], &at[k])).sum();
             if ratio(apart - gone) <= worst {
                 return worst;
             }
         }
-        // Below this distance the pair matters.
-        let matters = self.clearance_m - (worst - 1.0) * self.size_m;
+        // Only a smaller distance can exceed the worst ratio.
+        let relevant_m = self.clearance_m - (worst - 1.0) * self.size_m;
         let mut apart = f64::INFINITY;
         let balls = |k: usize| self.links[k].hulls.iter().zip(&self.links[k].balls);
         for (first, ball) in balls(0) {
             for (second, other_ball) in balls(1) {
                 let between = (at[0].point(ball.0) - at[1].point(other_ball.0)).norm() - ball.1 - other_ball.1;
-                if between > matters.min(apart) {
+                if between > relevant_m.min(apart) {
                     apart = apart.min(between);
                     continue;
                 }
@@ -69,7 +66,8 @@ impl Pair {
                     hull.corners.iter().map(place).collect::<Vec<_>>()
                 });
                 let radii = first.radius_m + second.radius_m;
-                apart = apart.min(certified_m(&a, &b, matters + radii, NEAR * self.size_m) - radii);
+                apart = apart
+                    .min(certified_m(&a, &b, relevant_m + radii, RELATIVE_DISTANCE_TOLERANCE * self.size_m) - radii);
             }
         }
         self.known = Some((at, apart));
@@ -85,7 +83,7 @@ impl Link {
                 .map(|corner| corner.norm())
                 .fold(hull.radius_m, |far, corner| far.max(corner + hull.radius_m))
         };
-        let far_m = hulls.iter().map(far).fold(0.0, f64::max);
+        let reach_m = hulls.iter().map(far).fold(0.0, f64::max);
         let ball = |hull: &Hull| {
             let sum = hull.corners.iter().fold(Vec3::ZERO, |sum, corner| sum + *corner);
             let centre = sum.scale(1.0 / hull.corners.len().max(1) as f64);
@@ -93,13 +91,13 @@ impl Link {
             (centre, hull.corners.iter().fold(0.0, far) + hull.radius_m)
         };
         let balls = hulls.iter().map(ball).collect();
-        Self { body, hulls, balls, far_m }
+        Self { body, hulls, balls, reach_m }
     }
 
-    /// How much lower than `height_m` the lowest point is, m; `worst_m` where that cannot be more.
-    pub(super) fn below_m(&self, placements: &[Transform], height_m: f64, worst_m: f64) -> f64 {
+    /// Depth of the lowest point below `height_m`, m; `worst_m` if the depth cannot exceed it.
+    pub(super) fn depth_below_m(&self, placements: &[Transform], height_m: f64, worst_m: f64) -> f64 {
         let at = self.body.map_or(Transform::IDENTITY, |body| placements[body]);
-        if height_m - (at.translation[2] - self.far_m) <= worst_m {
+        if height_m - (at.translation[2] - self.reach_m) <= worst_m {
             return worst_m;
         }
         let up = Vec3(at.rotation.0[2]);
@@ -112,29 +110,30 @@ impl Link {
         height_m - lowest
     }
 
-    /// A bound of how far any point of the link has gone from one place to another.
-    fn farthest_gone(&self, then: &Transform, now: &Transform) -> f64 {
+    /// Upper bound of the displacement of all points of the link between two placements, m.
+    fn max_displacement_m(&self, then: &Transform, now: &Transform) -> f64 {
         let turned: f64 = (0..3)
             .flat_map(|row| (0..3).map(move |column| (row, column)))
             .map(|(row, column)| (now.rotation.0[row][column] - then.rotation.0[row][column]).powi(2))
             .sum();
-        (now.translation - then.translation).norm() + self.far_m * turned.sqrt()
+        (now.translation - then.translation).norm() + self.reach_m * turned.sqrt()
     }
 }
 
-/// A lower bound of the distance of two hulls, as near to it as `near`, or above `enough`; zero where they overlap.
+/// Lower bound of the distance of two hulls, at most `near` below the distance or larger than `enough`; zero if they
+/// overlap.
 fn certified_m(first: &[Vec3], second: &[Vec3], enough: f64, near: f64) -> f64 {
     let mut shares = [vec![0.0; first.len()], vec![0.0; second.len()]];
     shares[0][0] = 1.0;
     shares[1][0] = 1.0;
     let mut apart = first[0] - second[0];
     let mut certified = 0.0_f64;
-    for _ in 0..EXCHANGES {
+    for _ in 0..MAX_EXCHANGES {
         let length = apart.norm();
         if length <= near {
             return 0.0;
         }
-        // The first hull's corners are best where lowest along `apart`, the second's where highest.
+        // Along `apart` the best corner of the first hull is the lowest, that of the second the highest.
         let mut exchange: Option<(f64, usize, usize, usize, Vec3)> = None;
         let mut reach = 0.0;
         for (side, corners) in [first, second].into_iter().enumerate() {

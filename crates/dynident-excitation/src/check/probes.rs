@@ -1,11 +1,10 @@
-//! What is checked at each sample: the limits of a study, with names looked up in the robot description.
+//! Checks of each sample: the limits of a study with names resolved in the robot description.
 
 use super::LimitReport;
 use super::apart::{Hull, Link, Pair};
 use crate::limits::{FloorLimit, JointLimit, LimitError, LimitKind, Limits, LinkPoint, LinkShape, SelfCollision};
 use dynident_model::{Body, Model, Transform, Vec3};
 
-/// What is checked at each sample.
 pub(super) enum Probe {
     Band { array: usize, joint: usize, lower: f64, upper: f64 },
     Follower { array: usize, sources: Vec<(usize, f64)>, offset: f64, range: [f64; 2] },
@@ -24,7 +23,6 @@ pub(super) struct Point {
     radius_m: f64,
 }
 
-/// The probes of all limits, in the order of the report.
 pub(super) fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, LimitReport)>, LimitError> {
     let mut probes = Probes(Vec::new());
     for limit in &limits.joints {
@@ -60,7 +58,6 @@ pub(super) fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, Limit
     Ok(probes.0)
 }
 
-/// Probes with their reports, before the first sample.
 struct Probes(Vec<(Probe, LimitReport)>);
 
 impl Probes {
@@ -69,7 +66,6 @@ impl Probes {
         self.0.push((probe, report));
     }
 
-    /// Position, rates, torque and power of a driven joint.
     fn add_joint(&mut self, joint: usize, limit: &JointLimit) {
         let JointLimit { position, speed, acceleration, jerk, torque, torque_margin, power_w, .. } = limit;
         let name = || limit.joint.clone();
@@ -90,7 +86,6 @@ impl Probes {
         }
     }
 
-    /// Position and speed of joints that follow others.
     fn add_followers(&mut self, model: &Model) {
         for (index, joint) in model.followers() {
             let Some(coupling) = model.coupling() else { continue };
@@ -102,8 +97,8 @@ impl Probes {
             if let Some((lower, upper)) = ends.filter(|(lower, upper)| lower < upper) {
                 add(LimitKind::Position, 0, coupling.offset(index), [lower, upper]);
             }
-            if let Some(most) = joint.limits.velocity.filter(|most| *most > 0.0) {
-                add(LimitKind::Speed, 1, 0.0, [-most, most]);
+            if let Some(max_magnitude) = joint.limits.velocity.filter(|max_magnitude| *max_magnitude > 0.0) {
+                add(LimitKind::Speed, 1, 0.0, [-max_magnitude, max_magnitude]);
             }
         }
     }
@@ -121,7 +116,6 @@ impl Probes {
         }
     }
 
-    /// Pairs of links that keep apart.
     fn add_pairs(&mut self, model: &Model, limit: &SelfCollision) -> Result<(), LimitError> {
         let resolved = limit.resolve(model)?;
         for pair in resolved.pairs {
@@ -139,7 +133,7 @@ impl Probes {
     }
 }
 
-/// Points and their names; of an empty list the origins of the moving bodies.
+/// Points and their names; for an empty list the origins of the moving bodies.
 fn points(model: &Model, points: &[LinkPoint]) -> Vec<(String, Point)> {
     let mut found = Vec::new();
     let bodies = |body: usize| -> (Option<usize>, &Body) {
@@ -167,7 +161,7 @@ fn points(model: &Model, points: &[LinkPoint]) -> Vec<(String, Point)> {
     found
 }
 
-/// The longest chain of joints and frames from the base, m.
+/// Length of the longest chain of joints and frames from the base, m.
 fn arm_length_m(model: &Model) -> f64 {
     let stroke = |body: usize| {
         let limits = model.tree_joints()[body].limits;
@@ -185,7 +179,7 @@ fn arm_length_m(model: &Model) -> f64 {
     (0..model.body_count()).map(|body| to(body) + frames(body).fold(0.0, f64::max)).fold(1e-9, f64::max)
 }
 
-/// Links with shapes, in the order of the description's.
+/// Links with shapes, in the order of the robot description.
 fn links(model: &Model, shapes: &[LinkShape]) -> Vec<(String, Link)> {
     let mut found: Vec<(String, Option<usize>, Vec<Hull>)> = Vec::new();
     for shape in shapes {
@@ -202,24 +196,22 @@ fn links(model: &Model, shapes: &[LinkShape]) -> Vec<(String, Link)> {
     found.into_iter().map(|(name, body, hulls)| (name, Link::new(body, hulls))).collect()
 }
 
-/// Position of a point of a body in the base frame, m.
 fn place(placements: &[Transform], body: Option<usize>, at: Vec3) -> Vec3 {
     body.map_or(at, |body| placements[body].rotation.mul_vec(at) + placements[body].translation)
 }
 
-/// How far `x` goes from the middle of its range, in halves of the range.
-fn band(x: f64, lower: f64, upper: f64) -> f64 {
+/// Distance of `x` from the middle of its range, in half ranges.
+fn range_ratio(x: f64, lower: f64, upper: f64) -> f64 {
     let half = upper / 2.0 - lower / 2.0;
     ((x - lower) / half - 1.0).max((upper - x) / half - 1.0)
 }
 
-/// The larger magnitude of the lowest and the highest torque of a joint.
-fn most([low, high]: &[Vec<f64>; 2], joint: usize) -> f64 {
+fn max_magnitude([low, high]: &[Vec<f64>; 2], joint: usize) -> f64 {
     low[joint].abs().max(high[joint].abs())
 }
 
 impl Probe {
-    /// The ratio at one sample. A pair that cannot reach the `worst` ratio found up to now returns `worst`.
+    /// Ratio at one sample. Returns `worst` for a pair that cannot exceed this ratio.
     pub(super) fn ratio(
         &mut self,
         state: &[Vec<f64>],
@@ -229,27 +221,26 @@ impl Probe {
     ) -> f64 {
         let at = |point: &Point| place(placements, point.body, point.at);
         match self {
-            Self::Band { array, joint, lower, upper } => band(state[*array][*joint], *lower, *upper),
+            Self::Band { array, joint, lower, upper } => range_ratio(state[*array][*joint], *lower, *upper),
             Self::Follower { array, sources, offset, range: [lower, upper] } => {
                 let followed = sources.iter().map(|&(joint, share)| share * state[*array][joint]);
-                band(*offset + followed.sum::<f64>(), *lower, *upper)
+                range_ratio(*offset + followed.sum::<f64>(), *lower, *upper)
             }
-            Self::Torque { joint, limit } => most(torque, *joint) / *limit,
-            Self::Power { joint, limit } => most(torque, *joint) * state[1][*joint].abs() / *limit,
+            Self::Torque { joint, limit } => max_magnitude(torque, *joint) / *limit,
+            Self::Power { joint, limit } => max_magnitude(torque, *joint) * state[1][*joint].abs() / *limit,
             Self::Axis { point, axis, lower, upper } => {
-                band(at(point)[*axis], *lower + point.radius_m, *upper - point.radius_m)
+                range_ratio(at(point)[*axis], *lower + point.radius_m, *upper - point.radius_m)
             }
             Self::Floor { point, height_m, length_m } => {
                 1.0 + (*height_m - (at(point)[2] - point.radius_m)) / *length_m
             }
             Self::FloorLink { link, height_m, length_m } => {
-                1.0 + link.below_m(placements, *height_m, (worst - 1.0) * *length_m) / *length_m
+                1.0 + link.depth_below_m(placements, *height_m, (worst - 1.0) * *length_m) / *length_m
             }
             Self::Column { point, x, y, radius_m, top_m } => {
                 let at = at(point);
                 let distance = ((at[0] - *x) * (at[0] - *x) + (at[1] - *y) * (at[1] - *y)).sqrt();
                 let least = *radius_m + point.radius_m;
-                // The larger of the distances from the side and from the top of the column.
                 (2.0 - distance / least).min(1.0 + (*top_m + point.radius_m - at[2]) / least)
             }
             Self::Pair(pair) => pair.ratio(placements, worst),

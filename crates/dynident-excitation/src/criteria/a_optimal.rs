@@ -4,7 +4,7 @@ use super::{Criterion, ValueAndGradient};
 use crate::definite_inverse::log_det_and_inverse;
 use nalgebra::DMatrix;
 
-/// `log tr D⁻¹`, with derivative `-D⁻² / tr D⁻¹`: the logarithm keeps steps of one size from start to end.
+/// `log tr D⁻¹`, with derivative `-D⁻² / tr D⁻¹`. The logarithm keeps the step size similar throughout the search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AOptimal;
 

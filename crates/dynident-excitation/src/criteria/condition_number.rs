@@ -1,16 +1,16 @@
-//! The condition number of the stacked regressor, `√(λ_max / λ_min)` of its information.
+//! Condition number of the stacked regressor, `√(λ_max / λ_min)` of its information matrix.
 
 use super::{Criterion, ValueAndGradient};
 use crate::symmetric_eigen::SymmetricEigen;
 use nalgebra::DMatrix;
 
-/// `cond(W)` by p-norms of the eigenvalues: `½ (log ‖λ‖_p + log ‖1/λ‖_p)`, smooth where eigenvalues meet (and at an
-/// optimum the lowest three or four do meet). The larger `p`, the nearer to the condition number itself.
+/// `cond(W)` by p-norms of the eigenvalues: `½ (log ‖λ‖_p + log ‖1/λ‖_p)`. It is smooth where eigenvalues coincide, as
+/// the lowest three or four do at an optimum. A larger `p` approximates the condition number more closely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConditionNumber {
-    /// Order of the norm, positive. 40 to 80 serve well from the start.
+    /// Order of the norm, positive; 40 to 80 is suitable from the start of a search.
     pub order: f64,
-    /// Divide each column by its norm first: the condition that does not depend on units.
+    /// Divides each column by its norm first, so that the condition number does not depend on units.
     pub scaled: bool,
 }
 
@@ -21,7 +21,7 @@ impl Default for ConditionNumber {
 }
 
 impl ConditionNumber {
-    /// `S D S` with `S = diag(D)^-1/2`, or `D` itself; and the scale.
+    /// `S D S` with `S = diag(D)^-1/2`, or `D` if not scaled, and the scale.
     fn scaling(&self, information: &DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<f64>)> {
         if !self.scaled {
             return Some((information.clone(), vec![1.0; information.nrows()]));
@@ -54,7 +54,7 @@ impl Criterion for ConditionNumber {
             return None;
         }
         let p = self.order;
-        // Shares of the two norms, relative to their largest terms so that no power overflows.
+        // Relative to the largest term, so that no power overflows.
         let high: Vec<f64> = eigen.values.iter().map(|l| (l / largest).powf(p)).collect();
         let low: Vec<f64> = eigen.values.iter().map(|l| (smallest / l).powf(p)).collect();
         let (high_sum, low_sum) = (high.iter().sum::<f64>(), low.iter().sum::<f64>());
@@ -63,7 +63,7 @@ impl Criterion for ConditionNumber {
             eigen.values.iter().enumerate().map(|(k, l)| 0.5 * (high[k] / high_sum - low[k] / low_sum) / l).collect();
         let mut derivative = eigen.weighted(&slopes);
         if self.scaled {
-            // f(S D S): through the outer factors, and through S = diag(D)^-1/2.
+            // Derivative of f(S D S) through the outer factors and through S = diag(D)^-1/2.
             let (d, inner) = (information, derivative);
             derivative = DMatrix::from_fn(d.nrows(), d.ncols(), |i, j| scale[i] * inner[(i, j)] * scale[j]);
             for i in 0..d.nrows() {

@@ -1,4 +1,4 @@
-//! V-optimality: how well the fitted model will predict the torque of a task.
+//! V-optimality: the torque prediction error of the fitted model on a task.
 
 use super::{Criterion, ValueAndGradient};
 use crate::definite_inverse::log_det_and_inverse;
@@ -16,9 +16,9 @@ pub struct Prediction {
 }
 
 impl Prediction {
-    /// For a task with `M` = `task`: symmetric, positive semi-definite, in the columns of the information that is to be
-    /// judged. [`Information::of`](crate::Information::of) gives it for the task's motion with the weight `1 /
-    /// samples`.
+    /// Creates the criterion for a task with `M` = `task`: symmetric, positive semi-definite, in the columns of the
+    /// information matrix. [`Information::of`](crate::Information::of) computes it from the motion of the task with the
+    /// weight `1 / samples`.
     pub fn new(task: DMatrix<f64>) -> Self {
         Self { task }
     }
@@ -33,7 +33,6 @@ impl Criterion for Prediction {
         let (_, inverse) = log_det_and_inverse(information)?;
         let spread = &inverse * &self.task;
         let trace = spread.trace();
-        // A task without any torque has nothing to predict.
         (trace > 0.0 && trace.is_finite()).then(|| (trace.ln(), -(spread * inverse) / trace))
     }
 
@@ -47,14 +46,10 @@ impl Criterion for Prediction {
 mod tests {
     use super::*;
     use crate::criteria::AOptimal;
+    use crate::criteria::testing::{check_derivative, random_definite};
     use dynident_model::sample::Random;
 
-    fn random_definite(random: &mut Random, size: usize) -> DMatrix<f64> {
-        let root = DMatrix::from_fn(3 * size, size, |_, _| random.normal());
-        root.transpose() * root
-    }
-
-    /// With M = 1 the criterion is A-optimality; with M = D every parameter counts once.
+    /// With M = 1 the criterion is A-optimality; with M = D the result is the number of parameters.
     #[test]
     fn known_cases() {
         let mut random = Random::new(3);
@@ -62,7 +57,6 @@ mod tests {
         let unit = Prediction::new(DMatrix::identity(9, 9));
         let (value, derivative) = unit.value_and_derivative(&information).unwrap();
         let (a_value, a_derivative) = AOptimal.value_and_derivative(&information).unwrap();
-        // Condition of some tens, sums of nine products.
         assert!((value - a_value).abs() < 1e-12 && (derivative - a_derivative).amax() < 1e-12);
         let own = Prediction::new(information.clone());
         assert!((own.figure(&information).unwrap() - 9.0).abs() < 1e-11);
@@ -70,22 +64,14 @@ mod tests {
         assert!(Prediction::new(DMatrix::zeros(9, 9)).value_and_derivative(&information).is_none());
     }
 
-    /// The derivative against central differences of fourth order: step 1e-3 leaves 1e-12 of truncation, rounding
-    /// 1e-13.
     #[test]
     fn derivative_is_the_slope() {
         let mut random = Random::new(8);
         let (information, task) = (random_definite(&mut random, 7), random_definite(&mut random, 7));
         let criterion = Prediction::new(task);
-        let root = DMatrix::from_fn(7, 7, |_, _| random.normal());
-        let direction = &root + root.transpose();
-        let (_, derivative) = criterion.value_and_derivative(&information).unwrap();
-        let at = |step: f64| criterion.value_and_derivative(&(&information + &direction * step)).unwrap().0;
-        let step = 1e-3;
-        let slope = (8.0 * (at(step) - at(-step)) - (at(2.0 * step) - at(-2.0 * step))) / (12.0 * step);
-        let expected = derivative.component_mul(&direction).sum();
-        assert!((slope - expected).abs() < 1e-8 * expected.abs().max(1.0), "{slope} {expected}");
-        let (value, figure) = (at(0.0), criterion.figure(&information).unwrap());
+        check_derivative(&criterion, &information, &mut random);
+        let (value, _) = criterion.value_and_derivative(&information).unwrap();
+        let figure = criterion.figure(&information).unwrap();
         assert!((value.exp() - figure).abs() < 1e-12 * figure.max(1.0));
     }
 }

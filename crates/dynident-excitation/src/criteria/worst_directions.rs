@@ -1,18 +1,18 @@
-//! The directions that are known worst, in units of one's own: Kiefer's φ_p between A- and E-optimality.
+//! Kiefer's φ_p criterion between A- and E-optimality, in given units of the parameters.
 
 use super::{Criterion, ValueAndGradient};
 use crate::symmetric_eigen::SymmetricEigen;
 use nalgebra::DMatrix;
 
 /// `log ‖1/λ‖_p` of the eigenvalues λ of `Tᵀ D T`, with derivative `-T U diag(λ^(-p-1)) Uᵀ Tᵀ / Σ λ^-p`: the p-norm of
-/// the variances along the axes of the confidence ellipsoid of `x`, where `θ = T x`. Order 1 is A-optimality of x (the
-/// mean variance), infinity E-optimality (the largest); in between the worst directions have the say, and not one
-/// alone. Kiefer, Annals of Statistics 2 (1974) 849; Pukelsheim, Optimal Design of Experiments (1993), chapter 6.
+/// the variances along the axes of the confidence ellipsoid of `x`, where `θ = T x`. Order 1 is A-optimality of x (mean
+/// variance), infinity is E-optimality (largest variance); an order in between weights the directions with the largest
+/// variances. Kiefer, Annals of Statistics 2 (1974) 849; Pukelsheim, Optimal Design of Experiments (1993), chapter 6.
 ///
-/// With `T Tᵀ = M⁻¹`, M the mean information of a sample of some motions, the variances are those of the torque
-/// predicted along them, and order 1 is [`Prediction`](super::Prediction). Unlike D-optimality it asks where
-/// information is missing: `-log det` gains as much by twice the information of a direction that is known well as by
-/// twice that of one that is hardly known.
+/// With `T Tᵀ = M⁻¹`, where M is the mean information of a sample of some motions, the variances are those of the
+/// torque predicted along these motions, and order 1 is [`Prediction`](super::Prediction). Unlike this criterion,
+/// D-optimality (`-log det`) gains as much from doubling the information of a well determined direction as from
+/// doubling that of a poorly determined one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorstDirections {
     units: DMatrix<f64>,
@@ -20,8 +20,8 @@ pub struct WorstDirections {
 }
 
 impl WorstDirections {
-    /// With T = `units`, whose columns are steps of θ that count alike (square, regular, a row for each of the
-    /// information's columns), and the order of the norm (positive).
+    /// Creates the criterion with T = `units` and the order of the norm (positive). The columns of T are steps of θ of
+    /// equal importance; T is square and regular, with one row for each column of the information matrix.
     pub fn new(units: DMatrix<f64>, order: f64) -> Self {
         Self { units, order }
     }
@@ -57,22 +57,17 @@ impl Criterion for WorstDirections {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::criteria::testing::{check_derivative, random_definite};
     use crate::criteria::{EOptimal, Prediction};
     use dynident_model::sample::Random;
 
-    fn random_definite(random: &mut Random, size: usize) -> DMatrix<f64> {
-        let root = DMatrix::from_fn(3 * size, size, |_, _| random.normal());
-        root.transpose() * root
-    }
-
-    /// Order 1 in units of a task is the prediction of its torque, order 40 the smooth E-optimality.
+    /// Order 1 in units of a task equals the torque prediction, order 40 the smooth E-optimality.
     #[test]
     fn known_cases() {
         let mut random = Random::new(3);
         let (information, task) = (random_definite(&mut random, 9), random_definite(&mut random, 9));
         let units = task.clone().cholesky().unwrap().l().try_inverse().unwrap().transpose();
         let value = |order| WorstDirections::new(units.clone(), order).value_and_derivative(&information).unwrap().0;
-        // Condition of some hundreds, sums of nine terms.
         let expected = Prediction::new(task).value_and_derivative(&information).unwrap().0;
         assert!((value(1.0) - expected).abs() < 1e-10, "{} {expected}", value(1.0));
         let expected = EOptimal::default().value_and_derivative(&(units.tr_mul(&information) * &units)).unwrap().0;
@@ -81,21 +76,11 @@ mod tests {
         assert!(WorstDirections::new(DMatrix::identity(8, 8), 2.0).figure(&information).is_none());
     }
 
-    /// The derivative against central differences of fourth order: step 1e-3 leaves 1e-12 of truncation, rounding
-    /// 1e-13.
     #[test]
     fn derivative_is_the_slope() {
         let mut random = Random::new(8);
         let information = random_definite(&mut random, 7);
         let units = DMatrix::from_fn(7, 7, |_, _| random.normal());
-        let criterion = WorstDirections::new(units, 2.0);
-        let root = DMatrix::from_fn(7, 7, |_, _| random.normal());
-        let direction = &root + root.transpose();
-        let (_, derivative) = criterion.value_and_derivative(&information).unwrap();
-        let at = |step: f64| criterion.value_and_derivative(&(&information + &direction * step)).unwrap().0;
-        let step = 1e-3;
-        let slope = (8.0 * (at(step) - at(-step)) - (at(2.0 * step) - at(-2.0 * step))) / (12.0 * step);
-        let expected = derivative.component_mul(&direction).sum();
-        assert!((slope - expected).abs() < 1e-8 * expected.abs().max(1.0), "{slope} {expected}");
+        check_derivative(&WorstDirections::new(units, 2.0), &information, &mut random);
     }
 }

@@ -1,4 +1,4 @@
-//! A trajectory judged as it will be used.
+//! Assessment of a trajectory with every logged sample, and every limit between samples.
 
 use super::{DesignTask, grid};
 use crate::criteria::Criterion;
@@ -7,10 +7,8 @@ use crate::limits::{PeakSettings, peaks};
 use crate::motion::Motion;
 use nalgebra::DMatrix;
 
-/// Samples on which extremes are looked for at least.
-const LEAST_SAMPLES: usize = 1001;
+const MIN_PEAK_SAMPLES: usize = 1001;
 
-/// A trajectory judged as it will be used: every logged sample, every limit between samples.
 #[derive(Clone)]
 pub(crate) struct Assessment {
     pub(crate) parameters: Vec<f64>,
@@ -18,7 +16,6 @@ pub(crate) struct Assessment {
     pub(crate) information: DMatrix<f64>,
     /// Largest `ratio - 1` of all limits.
     pub(crate) violation: f64,
-    /// The largest value of every limit's row, refined between samples.
     pub(crate) extremes: Vec<f64>,
 }
 
@@ -33,7 +30,6 @@ impl Assessment {
     }
 }
 
-/// Judges a trajectory.
 pub(crate) fn assess(
     task: &DesignTask<'_>,
     criterion: &dyn Criterion,
@@ -45,14 +41,13 @@ pub(crate) fn assess(
     task.family.motion(&parameters, logged, &mut motion);
     let information =
         Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior).of(&motion, 1.0);
-    // Finer than any grid of a search: a peak that falls between samples is refined only if it is seen.
-    let dense = grid(task.family.duration_s(), (4 * fine.len()).max(LEAST_SAMPLES));
+    // Finer than the grids of the search, so that no peak between samples is missed.
+    let dense = grid(task.family.duration_s(), (4 * fine.len()).max(MIN_PEAK_SAMPLES));
     let extremes = extremes(task, &parameters, &dense);
     let violation = extremes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     Assessment { figure: criterion.figure(&information), parameters, information, violation, extremes }
 }
 
-/// The largest value of every limit's row, refined between samples.
 pub(super) fn extremes(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> Vec<f64> {
     let mut workspace = task.limits.workspace();
     let found = peaks(task.limits, &mut workspace, times, PeakSettings::default(), |times, out| {

@@ -1,8 +1,8 @@
 //! Random starts that stay clear of floor, column and other links.
 //!
-//! A descent shrinks what a motion uses too much of, but it does not lead an arm around an obstacle that it passes
-//! through: in the middle of a column there is no way out that begins downhill. So starts are drawn on the right side:
-//! a posture that keeps the places, and a motion in ranges narrowed about it until the whole motion does.
+//! A descent reduces violations but does not lead an arm around an obstacle that it passes through: in the middle of a
+//! column no direction is downhill. The starts are therefore drawn outside obstacles: a posture that keeps the place
+//! limits, and a motion within ranges that are narrowed around it until the whole motion keeps them.
 
 use super::{DesignTask, ranges};
 use crate::limits::LimitWorkspace;
@@ -10,14 +10,12 @@ use crate::motion::Motion;
 use crate::optimisers::AugmentedLagrangianState;
 use dynident_model::sample::Random;
 
-/// Postures tried, and narrowings of the ranges about each.
-const POSTURES: usize = 24;
-const NARROWINGS: usize = 8;
+const MAX_POSTURES: usize = 24;
+const MAX_NARROWINGS: usize = 8;
 
-/// A motion counts as clear although it breaks places by so much: a descent leads it back.
-const NEARLY: f64 = 0.02;
+/// Largest violation of places of an acceptable start; a descent corrects it.
+const MAX_START_VIOLATION: f64 = 0.02;
 
-/// Draws starts of one task.
 pub(super) struct Starts<'a> {
     task: &'a DesignTask<'a>,
     times: &'a [f64],
@@ -29,7 +27,6 @@ pub(super) struct Starts<'a> {
 }
 
 impl<'a> Starts<'a> {
-    /// Starts seen at `times`.
     pub(super) fn new(task: &'a DesignTask<'a>, times: &'a [f64]) -> Self {
         let (positions, speeds) = ranges(task.limits);
         let mut workspace = task.limits.workspace();
@@ -37,7 +34,6 @@ impl<'a> Starts<'a> {
         Self { task, times, positions, speeds, workspace, motion: Motion::default(), values: Vec::new() }
     }
 
-    /// Draws `count` starts; after `stop` is true it draws no more, and returns at least one.
     pub(super) fn several(
         &mut self,
         count: usize,
@@ -51,16 +47,16 @@ impl<'a> Starts<'a> {
         starts
     }
 
-    /// The next start: the family's own where no places are limited, else the clearest of those tried, the first that
-    /// is clear enough.
+    /// Returns the next start: the family's random start if no places are limited, else the first start that is clear
+    /// enough, or the clearest of those tried.
     fn next(&mut self, random: &mut Random, stop: &dyn Fn() -> bool) -> Vec<f64> {
         let mut best = self.task.family.random(&self.positions, &self.speeds, random);
         if !self.task.limits.has_places() {
             return best;
         }
         let mut least = self.broken_places(&best);
-        for _ in 0..POSTURES {
-            if least <= NEARLY || stop() {
+        for _ in 0..MAX_POSTURES {
+            if least <= MAX_START_VIOLATION || stop() {
                 break;
             }
             let posture: Vec<f64> = self.positions.iter().map(|[low, high]| random.uniform(*low, *high)).collect();
@@ -68,7 +64,7 @@ impl<'a> Starts<'a> {
                 continue;
             }
             let mut shares = vec![1.0; posture.len()];
-            for _ in 0..NARROWINGS {
+            for _ in 0..MAX_NARROWINGS {
                 let narrowed: Vec<[f64; 2]> = self
                     .positions
                     .iter()
@@ -81,10 +77,10 @@ impl<'a> Starts<'a> {
                 if broken < least {
                     (best, least) = (start, broken);
                 }
-                if least <= NEARLY || stop() {
+                if least <= MAX_START_VIOLATION || stop() {
                     break;
                 }
-                // Not all joints alike: which of them lead into the obstacle is not known.
+                // Each joint is narrowed by a random factor, because the joint that causes the collision is unknown.
                 for share in &mut shares {
                     *share *= random.uniform(0.4, 1.0);
                 }
@@ -93,7 +89,6 @@ impl<'a> Starts<'a> {
         best
     }
 
-    /// Largest value of a row that limits places.
     fn broken_places(&mut self, parameters: &[f64]) -> f64 {
         self.task.family.motion(parameters, self.times, &mut self.motion);
         self.worst()
@@ -114,7 +109,7 @@ impl<'a> Starts<'a> {
     }
 }
 
-/// The part of a range about a position that is `share` of it.
+/// The part of a range around a position with `share` of its width.
 fn about(range: [f64; 2], position: f64, share: f64) -> [f64; 2] {
     let [low, high] = range;
     let half = 0.5 * share * (high - low);

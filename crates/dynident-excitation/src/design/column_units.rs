@@ -7,15 +7,14 @@ use crate::motion::Motion;
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 
-/// The motion that units are taken from: any will do, as long as all searches of a task take the same.
+/// Seed of the motion that determines the units. All searches of a task must use the same one.
 const SEED: u64 = 1;
 
 /// For each column a power of two near `1 / √D_kk`. Products with powers of two are exact: a robot twice as heavy or
-/// long has the same information in these units, bit for bit, and its search takes the same steps.
+/// long has bitwise the same information in these units, so that its search takes the same steps.
 pub(super) struct ColumnUnits(Vec<f64>);
 
 impl ColumnUnits {
-    /// By a random motion, seen at `times`.
     pub(super) fn new(task: &DesignTask<'_>, times: &[f64], weight: f64) -> Self {
         let (positions, speeds) = ranges(task.limits);
         let parameters = task.family.random(&positions, &speeds, &mut Random::new(SEED));
@@ -25,7 +24,7 @@ impl ColumnUnits {
         Self(information.of(&motion, weight).diagonal().iter().map(|d| near_root(*d).recip()).collect())
     }
 
-    /// The criterion of an information, in these units if it asks for them, and its derivative.
+    /// Value and derivative of the criterion, in these units if the criterion is free of units.
     pub(super) fn value_and_derivative(
         &self,
         criterion: &dyn Criterion,
@@ -43,8 +42,8 @@ impl ColumnUnits {
     }
 }
 
-/// A power of two near the root of a positive number, exactly twice as large for a number four times as large; 1 for
-/// others.
+/// A power of two near the root of a positive number, which doubles exactly when the number is four times as large; 1
+/// for other numbers.
 fn near_root(number: f64) -> f64 {
     if !(number.is_normal() && number > 0.0) {
         return 1.0;

@@ -1,22 +1,20 @@
-//! Cholesky's factor of a matrix with many zeros: rows from their first entry that is not zero, which is where the
-//! factor's rows begin too.
+//! Cholesky factorisation of a sparse matrix. Each row is stored from its first nonzero entry, where the row of the
+//! factor begins too.
 //!
-//! George and Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), section 4.1. The last variable
-//! comes first: of a spline that returns, the first number, its ends, is tied to the numbers of both ends, and would
-//! else fill the factor.
+//! George and Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), section 4.1. The variables are
+//! reversed, because the first parameter of a periodic spline is coupled to the parameters of both ends and would
+//! otherwise fill the factor.
 
 use nalgebra::DMatrix;
 
-/// `L` with `L Lᵀ = P A Pᵀ`, P the reversal.
+/// `L` with `L Lᵀ = P A Pᵀ`, where P reverses the order.
 pub(super) struct EnvelopeFactor {
-    /// Rows of `L`, each `size` long.
     rows: Vec<f64>,
-    /// Where each row begins.
     first: Vec<usize>,
 }
 
 impl EnvelopeFactor {
-    /// None if the matrix, of which the lower triangle counts, is not positive definite.
+    /// Factors the lower triangle of a matrix; `None` if it is not positive definite.
     pub(super) fn new(matrix: &DMatrix<f64>) -> Option<Self> {
         let size = matrix.nrows();
         let mut rows = vec![0.0; size * size];
@@ -70,7 +68,8 @@ mod tests {
     use dynident_model::sample::Random;
     use nalgebra::DVector;
 
-    /// Against a general library, for dense matrices and for bands whose first number is tied to the last ones.
+    /// Compares with a general library, for dense matrices and for bands whose first variable is coupled to the last
+    /// ones.
     #[test]
     fn solves_as_a_library_does() {
         let mut random = Random::new(3);
@@ -84,10 +83,8 @@ mod tests {
             let factor = EnvelopeFactor::new(&matrix).unwrap();
             let mut found = vector.as_slice().to_vec();
             factor.solve(&mut found);
-            // Condition of some tens.
             assert!(found.iter().zip(&expected).all(|(found, expected)| (found - expected).abs() < 1e-14), "{size}");
             if size == 30 {
-                // The rows of the band stay short; only the last is long.
                 assert!((0..29).all(|row| row - factor.first[row] <= band));
             }
         }

@@ -1,8 +1,8 @@
-//! How strongly the augmented Lagrangian is curved, joint by joint.
+//! Curvature of the augmented Lagrangian, joint by joint.
 //!
-//! Limits of a single joint depend on that joint's parameters alone: the curvature of those that push is known (exactly
-//! for linear families, to first order for others) and need not be learnt step by step. What is left, the criterion, is
-//! curved about as the motion's size is, measured in its limits.
+//! Limits of a single joint depend only on the parameters of that joint. The curvature of the active ones is known
+//! (exactly for linear families, to first order for others) and need not be learnt from steps. The curvature of the
+//! criterion is approximated by the size of the motion in units of its limits.
 
 use super::DesignTask;
 use super::envelope::EnvelopeFactor;
@@ -10,23 +10,21 @@ use crate::motion::Motion;
 use crate::optimisers::{CurvatureFacts, Step};
 use nalgebra::{DMatrix, DVectorView};
 
-/// `σ G + C`, one block a joint: `G` the mean square of the motion in units of its limits, `C` the curvature of the
-/// limits that push, and `σ` the criterion's share, from the last step.
+/// `σ G + C`, one block per joint: `G` is the mean square of the motion in units of its limits, `C` the curvature of
+/// the active limits, and `σ` the curvature of the criterion, estimated from the last step.
 pub(super) struct Metric {
     size: Vec<DMatrix<f64>>,
     limits: Vec<DMatrix<f64>>,
     factors: Vec<EnvelopeFactor>,
     size_weights: Motion,
     weights: Motion,
-    /// Whether `size` holds numbers yet.
     sized: bool,
     share: f64,
-    /// Parameters of a joint.
     each: usize,
 }
 
 impl Metric {
-    /// None where joints do not have equally many parameters.
+    /// `None` if the joints have different numbers of parameters.
     pub(super) fn new(task: &DesignTask<'_>, times: &[f64]) -> Option<Self> {
         let (family, joints) = (task.family, task.family.joints());
         let each = family.parameters().checked_div(joints)?;
@@ -53,14 +51,14 @@ impl Metric {
         })
     }
 
-    /// `G` at the given parameters; false if the family does not know it.
-    fn take_size(&mut self, task: &DesignTask<'_>, times: &[f64], at: &[f64]) -> bool {
+    /// Computes `G` at the given parameters; false if the family does not provide it.
+    fn update_size(&mut self, task: &DesignTask<'_>, times: &[f64], at: &[f64]) -> bool {
         for (joint, size) in self.size.iter_mut().enumerate() {
             size.fill(0.0);
             if !task.family.curvature(at, times, joint, &self.size_weights, size) {
                 return false;
             }
-            // Directions that no limit sees, kept from being infinitely long.
+            // Bounds steps in directions that no limit depends on.
             let floor = 1e-9 * size.trace().max(1e-9) / self.each as f64;
             for k in 0..self.each {
                 size[(k, k)] += floor;
@@ -70,9 +68,9 @@ impl Metric {
         true
     }
 
-    /// Takes up the limits that push at the parameters `at`, and the criterion's share from the last step and its
-    /// change of the gradient, or, at the start, such that the first step is a fifth of the motion. False if no
-    /// positive matrix comes of it.
+    /// Computes the curvature of the limits that are active at the parameters `at`, and `σ` from the last step and its
+    /// change of the gradient, or at the start such that the first step is a fifth of the motion. Returns false if the
+    /// matrix is not positive definite.
     pub(super) fn prepare(
         &mut self,
         task: &DesignTask<'_>,
@@ -81,9 +79,9 @@ impl Metric {
         known: &CurvatureFacts<'_>,
     ) -> bool {
         let CurvatureFacts { pushing, gradient, free, last } = *known;
-        // A linear family's size is the same everywhere; another's is taken anew wherever the memory of steps begins
-        // anew.
-        if (!self.sized || (last.is_none() && !task.family.is_linear())) && !self.take_size(task, times, at) {
+        // The size of a linear family is constant; that of another family is computed again whenever the optimiser's
+        // memory of steps is reset.
+        if (!self.sized || (last.is_none() && !task.family.is_linear())) && !self.update_size(task, times, at) {
             return false;
         }
         let samples = times.len();
@@ -124,7 +122,7 @@ impl Metric {
         self.factors.clear();
         for (size, limits) in self.size.iter().zip(&self.limits) {
             let mut block = size * self.share + limits;
-            // What a bound holds stands apart.
+            // A parameter at its bound is decoupled from the others.
             let held = free[self.factors.len() * self.each..].iter().take(self.each).enumerate();
             for (k, _) in held.filter(|(_, free)| !**free) {
                 block.row_mut(k).fill(0.0);

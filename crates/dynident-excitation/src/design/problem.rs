@@ -1,4 +1,4 @@
-//! Criterion and limits of a trajectory, as an optimiser takes them.
+//! Criterion and limits of a trajectory as a constrained problem for an optimiser.
 
 use super::DesignTask;
 use super::column_units::ColumnUnits;
@@ -10,20 +10,19 @@ use crate::motion::Motion;
 use crate::optimisers::{ConstrainedProblem, CurvatureFacts};
 use nalgebra::DMatrix;
 
-/// A place that is broken weighs so much more than a velocity: a search may wander outside a joint's limits and come
-/// back, but not to the other side of an obstacle.
-const PLACE_SCALE: f64 = 5.0;
+/// Weight of a violated place relative to other limits: a search may exceed a joint's limits and return, but must not
+/// cross an obstacle.
+const PLACE_WEIGHT: f64 = 5.0;
 
-/// No step leads deeper into an obstacle than this share of its limit (arm's lengths for a floor): penalties alone do
-/// not keep a long step from ending on its other side. Chosen on the UR10 of the examples, whose wrist crosses its
-/// column by breaking it by 18 %: an obstacle that can be crossed by breaking it less is not held by it. A wall at 0.1
-/// stopped descents early.
-const WALL: f64 = 0.16;
+/// Maximum violation of a place, as a share of its limit (arm lengths for a floor). Penalties alone do not prevent a
+/// long step to the other side of an obstacle. Chosen on the UR10 of the examples, whose wrist crosses its column with
+/// a violation of 0.18; an obstacle that can be crossed with a smaller violation is not enforced by this limit. A limit
+/// of 0.1 stopped descents early.
+const MAX_PLACE_VIOLATION: f64 = 0.16;
 
-/// Criterion and limits of one trajectory as functions of the family's parameters.
 pub(super) struct Problem<'a> {
     task: &'a DesignTask<'a>,
-    /// Added to every value of each row, so that what is kept on samples is kept between them.
+    /// Margins that are added to every value of each row, so that limits are also kept between samples.
     margins: &'a [f64],
     criterion: &'a dyn Criterion,
     units: &'a ColumnUnits,
@@ -31,13 +30,11 @@ pub(super) struct Problem<'a> {
     weight: f64,
     information: Information<'a>,
     workspace: LimitWorkspace,
-    /// What each row's values are multiplied by.
     scales: Vec<f64>,
     scaled_weights: Vec<f64>,
-    /// How far places may be broken: [`WALL`], or as far as the first motion does.
-    wall: Option<f64>,
+    /// Maximum violation of places: [`MAX_PLACE_VIOLATION`], or that of the first motion if larger.
+    max_place_violation: Option<f64>,
     parameters: Vec<f64>,
-    /// Where the gradient was last asked for; a rejected trial may have followed.
     at_gradient: Vec<f64>,
     motion: Motion,
     adjoint: Motion,
@@ -67,10 +64,10 @@ impl<'a> Problem<'a> {
                 .limits
                 .constraints()
                 .iter()
-                .map(|constraint| if constraint.kind.is_place() { PLACE_SCALE } else { 1.0 })
+                .map(|constraint| if constraint.kind.is_place() { PLACE_WEIGHT } else { 1.0 })
                 .collect(),
             scaled_weights: Vec::new(),
-            wall: None,
+            max_place_violation: None,
             task,
             margins,
             criterion,
@@ -89,15 +86,15 @@ impl<'a> Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Whether the motion breaks places so deeply that it may have come to the other side of an obstacle.
-    fn beyond_the_wall(&mut self) -> bool {
+    /// Whether the motion violates places so much that it may have crossed an obstacle.
+    fn crosses_obstacle(&mut self) -> bool {
         if !self.task.limits.has_places() {
             return false;
         }
         let rows = self.values.chunks_exact(self.times.len()).zip(self.task.limits.constraints());
         let places = rows.filter(|(_, constraint)| constraint.kind.is_place()).flat_map(|(values, _)| values);
         let deepest = places.fold(0.0, |deepest: f64, value| deepest.max(*value));
-        deepest > *self.wall.get_or_insert(deepest.max(WALL))
+        deepest > *self.max_place_violation.get_or_insert(deepest.max(MAX_PLACE_VIOLATION))
     }
 }
 
@@ -128,7 +125,7 @@ impl ConstrainedProblem for Problem<'_> {
                 *to = scale * (from + margin);
             }
         }
-        if self.beyond_the_wall() {
+        if self.crosses_obstacle() {
             self.by_information = None;
             return f64::INFINITY;
         }

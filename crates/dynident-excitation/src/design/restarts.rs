@@ -1,70 +1,72 @@
-//! Where the restarts of a search begin: around the best motion of a neighbourhood, farther from it the longer nothing
-//! better is found, and in the end in another neighbourhood.
+//! Starting points of the restarts of a search: around the best motion of a neighbourhood, farther away the longer no
+//! improvement is found, and finally in another neighbourhood.
 //!
-//! Most of a family's good basins lie near each other, but not all: of twelve searches for the condition number of an
-//! iiwa14 that stayed around their best, four ended 2 to 6 % above the others, and in one of them 30 rounds of 36
-//! found nothing.
+//! Most good optima of a family are close to each other, but not all: of twelve searches for the condition number of an
+//! iiwa14 that stayed around their best, four ended 2 to 6 % above the others, and in one of them 30 of 36 rounds found
+//! no improvement.
 
 use super::joint_scales;
 use super::rounds::Candidate;
 use crate::optimisers::AugmentedLagrangianState;
 use dynident_model::sample::Random;
 
-/// Noise of the restarts, as shares of each joint's root mean square, round after round. With 0.3, 0.15 and 0.08 three
-/// of four restarts came back to the motion that they began around.
-const NOISE: [f64; 2] = [0.5, 0.3];
-/// What each round that found nothing adds to it, as a share.
+/// Noise of the restarts in alternating rounds, as shares of each joint's root mean square. With 0.3, 0.15 and 0.08
+/// three of four restarts returned to the motion that they started from.
+const RESTART_NOISE: [f64; 2] = [0.5, 0.3];
+/// Relative increase of the noise for each round without improvement.
 const NOISE_GROWTH: f64 = 0.05;
-/// Noise of the restarts in which one joint moves otherwise.
+/// Noise of the joints that a restart perturbs strongly.
 const ONE_JOINT_NOISE: f64 = 1.0;
-/// Noise of the other joints in them.
+/// Noise of the other joints in such a restart.
 const OTHER_JOINTS_NOISE: f64 = 0.02;
-/// Rounds that found nothing after which one more joint moves otherwise.
-const MORE_JOINTS: usize = 3;
-/// The same after which another neighbourhood is tried, if so many rounds are left for it.
-const STALE: usize = 5;
-const LEAST_LEFT: usize = 4;
-/// Rounds of a search that goes farther at all: with the eight that rich families have, the search stays near.
-const FAR_ROUNDS: usize = 16;
+/// Rounds without improvement after which one more joint is perturbed strongly.
+const STALE_ROUNDS_FOR_MORE_JOINTS: usize = 3;
+/// Rounds without improvement after which another neighbourhood is searched, and the remaining rounds that this
+/// requires.
+const MAX_STALE_ROUNDS: usize = 5;
+const MIN_ROUNDS_LEFT: usize = 4;
+/// Minimum number of rounds of a search that can change the neighbourhood; the eight rounds of families with many
+/// parameters are too few.
+const MIN_ROUNDS_TO_RELOCATE: usize = 16;
 
-/// The neighbourhood that is searched.
 pub(super) struct Neighbourhood {
-    /// Whether the search has the rounds to go farther.
-    goes_far: bool,
-    /// Its best motion and that one's score; none before its first round.
+    can_relocate: bool,
+    /// Best motion of the neighbourhood and its score; `None` before the first round.
     best: Option<(AugmentedLagrangianState, f64)>,
-    /// Rounds in it since the last gain, where the search goes far.
+    /// Rounds since the last improvement, counted if the neighbourhood can change.
     stale: usize,
 }
 
 impl Neighbourhood {
-    /// None yet, of a search of so many rounds.
     pub(super) fn of_search(rounds: usize) -> Self {
-        Self { goes_far: rounds >= FAR_ROUNDS, best: None, stale: 0 }
+        Self { can_relocate: rounds >= MIN_ROUNDS_TO_RELOCATE, best: None, stale: 0 }
     }
 
-    /// What its best motion scores; none before its first round.
     pub(super) fn score(&self) -> Option<f64> {
         self.best.as_ref().map(|(_, score)| *score)
     }
 
-    /// Learns of the best of a round. It becomes the neighbourhood's if it is better, which is a gain if it is by more
-    /// than `same`, or if scores so far are no measure.
+    /// Updates the neighbourhood with the best of a round if it is better. An improvement must exceed `same`, unless
+    /// the previous scores are not comparable.
     pub(super) fn take(&mut self, found: &Candidate, same: f64, is_new_measure: bool) {
         let before = self.score().filter(|_| !is_new_measure).unwrap_or(f64::INFINITY);
         let gains = found.score < before - same || before == f64::INFINITY;
-        self.stale = if gains { 0 } else { self.stale + usize::from(self.goes_far) };
+        self.stale = if gains { 0 } else { self.stale + usize::from(self.can_relocate) };
         if gains || found.score < before {
             self.best = Some((found.state.clone(), found.score));
         }
     }
 
-    /// Another one, where this one has nothing better and `rounds_left` are enough for it.
-    pub(super) fn left_when_stale(self, rounds_left: usize) -> Self {
-        if self.stale >= STALE && rounds_left >= LEAST_LEFT { Self { best: None, stale: 0, ..self } } else { self }
+    /// An empty neighbourhood if this one is stale and `rounds_left` suffice for another.
+    pub(super) fn replaced_if_stale(self, rounds_left: usize) -> Self {
+        if self.stale >= MAX_STALE_ROUNDS && rounds_left >= MIN_ROUNDS_LEFT {
+            Self { best: None, stale: 0, ..self }
+        } else {
+            self
+        }
     }
 
-    /// Its best motion and `count` others around it, to follow round number `round`; none before its first.
+    /// The best motion and `count` perturbed ones for the next round; `None` before the first round.
     pub(super) fn starts(
         &self,
         round: usize,
@@ -73,18 +75,18 @@ impl Neighbourhood {
         random: &mut Random,
     ) -> Option<Vec<AugmentedLagrangianState>> {
         let (best, _) = self.best.as_ref()?;
-        let size = NOISE[round % NOISE.len()] * (1.0 + NOISE_GROWTH * self.stale as f64);
+        let size = RESTART_NOISE[round % RESTART_NOISE.len()] * (1.0 + NOISE_GROWTH * self.stale as f64);
         let scales = joint_scales(&best.x, joints);
         let joints = joints.max(1);
         let each = (best.x.len() / joints).max(1);
         let moved = |restart: usize| {
-            // One restart near all of the best, the next with one of its joints moving otherwise; in every other round
-            // both have one more joint that does.
+            // Even restarts stay near the best; odd ones perturb one joint strongly. In every other round both kinds
+            // perturb one more joint.
             let mut draw = |is: bool| is.then(|| (random.uniform(0.0, joints as f64) as usize).min(joints - 1));
             let near = restart.is_multiple_of(2);
-            let otherwise = [draw(!near), draw(round % 2 == 1), draw(self.stale >= MORE_JOINTS)];
+            let perturbed = [draw(!near), draw(round % 2 == 1), draw(self.stale >= STALE_ROUNDS_FOR_MORE_JOINTS)];
             let noise = best.x.iter().zip(&scales).enumerate().map(|(k, (p, scale))| {
-                let size = match otherwise.contains(&Some(k / each)) {
+                let size = match perturbed.contains(&Some(k / each)) {
                     true => ONE_JOINT_NOISE,
                     false if near => size,
                     false => OTHER_JOINTS_NOISE,

@@ -1,7 +1,7 @@
-//! When a search ends outside the limits: a search for the limits alone.
+//! Search for feasibility alone, when a search ends outside the limits.
 
 use super::assess::{Assessment, assess};
-use super::effort::most_of_restoration;
+use super::effort::restoration_budget;
 use super::rounds::{Rounds, Stop};
 use super::shrunk::shrunk;
 use super::way_inside::way_inside;
@@ -12,26 +12,25 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 
-/// Random starts beside the best so far, and evaluations of each descent at least: a small search must still find its
-/// way inside.
-const STARTS: usize = 4;
-const EVALUATIONS: usize = 400;
+/// Number of random starts in addition to the best so far, and the minimum evaluations of each descent, so that a small
+/// search can still find a feasible motion.
+const RANDOM_STARTS: usize = 4;
+const MIN_EVALUATIONS: usize = 400;
 
-/// Descents from one start, with wider margins while something is broken between samples, and the most that one of them
-/// widens.
-const ROUNDS: usize = 4;
-const WIDEST: f64 = 0.02;
+/// Maximum number of descents from one start, with wider margins while a limit is violated between samples, and the
+/// largest increase of a margin.
+const MAX_DESCENTS: usize = 4;
+const MAX_MARGIN_STEP: f64 = 0.02;
 
-/// First margin on samples, as a share of each limit.
-const MARGIN: f64 = 0.003;
+const INITIAL_MARGIN: f64 = 0.003;
 
-/// Nothing to be gained but the limits.
+/// Zero objective: only feasibility is optimised.
 #[derive(Debug)]
-pub(super) struct Anything;
+pub(super) struct FeasibilityOnly;
 
-impl Criterion for Anything {
+impl Criterion for FeasibilityOnly {
     fn name(&self) -> &'static str {
-        "anything"
+        "feasibility"
     }
 
     fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient {
@@ -42,24 +41,25 @@ impl Criterion for Anything {
         Some(0.0)
     }
 
-    /// Nothing is to be found outside the limits here: with the evaluations of a restoration the first penalty is about
-    /// ten.
+    /// Scale that makes the first penalty about ten with the evaluations of a restoration, because leaving the limits
+    /// gains nothing here.
     fn scale(&self, _: usize) -> f64 {
         50.0
     }
 
-    /// There is no value: gradients are those of violations, which are shares of limits.
+    /// Gradients are those of violations, which are shares of limits.
     fn gradient_scale(&self, _: usize) -> f64 {
         1.0
     }
 }
 
-/// The best motion, if need be after a search for the limits alone: from the best so far and from random starts, until
-/// one keeps every limit between samples; from there one more descent by the criterion. Starts follow one another, so
-/// that the first that succeeds is the same on any number of threads. Also the number of evaluations.
+/// Returns the best motion, if necessary after a search for feasibility alone, and the number of evaluations. The
+/// search starts at the best motion so far and at random ones, until one motion keeps every limit between samples; one
+/// more descent by the criterion follows. Starts run one after another, so that the first success is the same on any
+/// number of threads.
 ///
-/// A criterion can hold a search outside: its slope grows without end as an ill-conditioned motion is pressed into
-/// narrow limits, while the penalty only grows in steps.
+/// A criterion can keep a search outside: its slope grows without bound as an ill-conditioned motion is forced into
+/// narrow limits, while the penalty grows only in steps.
 pub(crate) fn restored(
     task: &DesignTask<'_>,
     settings: &DesignSettings,
@@ -72,30 +72,29 @@ pub(crate) fn restored(
     let mut random = Random::new(settings.seed ^ 0x5e57);
     let (positions, speeds) = ranges(task.limits);
     let (mut best, mut evaluations) = (kept, 0);
-    // Asked where nothing else is to be reported.
     let (least, ended) = (best.violation, AtomicBool::new(false));
     let report = |value: f64, violation: f64| {
         ended.fetch_or(stop(value, violation), Ordering::Relaxed);
         ended.load(Ordering::Relaxed)
     };
     let over = || report(0.0, least);
-    // Without a criterion nothing says how long a step may be where no limit pushes.
+    // Without a criterion the metric does not bound the steps where no limit is active.
     let [plain, rounds] = [false, true].map(|shaped| Rounds::new(task, fine, logged.len(), shaped));
-    let most = most_of_restoration(task, settings, fine.len());
-    for start in 0..=STARTS {
+    let most = restoration_budget(task, settings, fine.len());
+    for start in 0..=RANDOM_STARTS {
         let mut parameters =
             if start == 0 { best.parameters.clone() } else { task.family.random(&positions, &speeds, &mut random) };
-        let mut margins = vec![MARGIN; task.limits.constraints().len()];
-        for _ in 0..ROUNDS {
-            // A part of what is left, so that other starts have their turn.
+        let mut margins = vec![INITIAL_MARGIN; task.limits.constraints().len()];
+        for _ in 0..MAX_DESCENTS {
+            // A third of the rest, so that evaluations remain for other starts.
             let left = most.saturating_sub(evaluations);
-            let budget = settings.polish_evaluations.max(EVALUATIONS).min(left.div_ceil(3).max(1));
-            let found = plain.polish(&Anything, &margins, parameters.into(), budget, &|value, violation| {
+            let budget = settings.polish_evaluations.max(MIN_EVALUATIONS).min(left.div_ceil(3).max(1));
+            let found = plain.polish(&FeasibilityOnly, &margins, parameters.into(), budget, &|value, violation| {
                 violation <= 0.0 || report(value, violation)
             })?;
             evaluations += found.evaluations;
             let assessed = assess(task, criterion, found.best.feasible, fine, logged);
-            let on_samples = found.best.violation <= MARGIN;
+            let on_samples = found.best.violation <= INITIAL_MARGIN;
             let from = improve(&mut best, &assessed, task, [fine, logged], &over);
             parameters = from.parameters;
             if from.whole && !over() {
@@ -112,7 +111,7 @@ pub(crate) fn restored(
                 break;
             }
             for (margin, c) in margins.iter_mut().zip(&assessed.extremes) {
-                *margin += if *c > 0.0 { c.min(WIDEST) + 1e-6 } else { 0.0 };
+                *margin += if *c > 0.0 { c.min(MAX_MARGIN_STEP) + 1e-6 } else { 0.0 };
             }
         }
         if evaluations >= most || over() {
@@ -122,14 +121,12 @@ pub(crate) fn restored(
     Ok((best, evaluations))
 }
 
-/// Where the next descent begins.
 struct NextStart {
     parameters: Vec<f64>,
-    /// Whether this motion keeps all limits between samples.
     whole: bool,
 }
 
-/// Improves `best` by a motion of a descent for the limits alone, or by one between both, or by a smaller one.
+/// Improves `best` by a motion of a descent for feasibility alone, by an interpolation of both, or by a shrunk motion.
 fn improve(
     best: &mut Assessment,
     found: &Assessment,
@@ -139,7 +136,7 @@ fn improve(
 ) -> NextStart {
     let criterion = task.criteria[task.criteria.len() - 1];
     let whole = found.violation <= 0.0;
-    // Slightly away from the best motion most of what the criterion had found is still there.
+    // A motion close to the best one preserves most of the criterion's value.
     if let Some(between) = way_inside(task, criterion, best, found, grids, stop) {
         *best = between;
         NextStart { parameters: best.parameters.clone(), whole }

@@ -6,17 +6,13 @@ use super::{DesignSettings, DesignTask, DesignWatch, grid};
 use crate::criteria::Criterion;
 use crate::optimisers::OptimiserError;
 
-/// One design: its task, its grids and what may end it.
 pub(super) struct DesignRun<'a> {
     pub(super) task: &'a DesignTask<'a>,
     pub(super) settings: &'a DesignSettings,
-    /// The last criterion, which judges the result.
+    /// Last criterion, which ranks the results.
     pub(super) criterion: &'a dyn Criterion,
-    /// Samples of the search, s.
     pub(super) coarse: Vec<f64>,
-    /// Samples of the polish, s.
     pub(super) fine: Vec<f64>,
-    /// Logged samples, s.
     pub(super) logged: Vec<f64>,
     pub(super) interruption: Interruption<'a>,
 }
@@ -42,12 +38,10 @@ impl<'a> DesignRun<'a> {
         })
     }
 
-    /// A margin of zero for each limit.
     pub(super) fn no_margins(&self) -> Vec<f64> {
         vec![0.0; self.task.limits.constraints().len()]
     }
 
-    /// Judges a trajectory by the last criterion.
     pub(super) fn assess(&self, parameters: Vec<f64>) -> Assessment {
         assess(self.task, self.criterion, parameters, &self.fine, &self.logged)
     }

@@ -1,8 +1,8 @@
-//! A motion outside the limits made smaller until it keeps them.
+//! Shrinks a motion outside the limits until it keeps them.
 //!
-//! Whatever a search was given to do, the last thing it has is a motion a little outside: by 10⁻⁴ after a polish that
-//! was cut short, by some hundredths after none. About a posture inside the limits the same motion, smaller by as much,
-//! keeps them, and a criterion loses about as much as the motion does.
+//! A search always ends with a motion that is slightly outside: by 10⁻⁴ after an interrupted polish, by some hundredths
+//! without polish. The same motion, shrunk by that share around a posture inside the limits, keeps them, and the
+//! criterion changes by about that share.
 
 use super::assess::{Assessment, assess, extremes};
 use super::{DesignTask, ranges};
@@ -10,30 +10,28 @@ use crate::criteria::Criterion;
 use crate::motion::Motion;
 use dynident_model::sample::Random;
 
-/// Most that a motion is shrunk by: a search that ends among its first steps is far outside.
-const MOST: f64 = 0.9;
+const MAX_SHRINK: f64 = 0.9;
 
-/// Added to each share, so that rounding does not leave a limit broken by 10⁻¹⁶.
-const HAIR: f64 = 1e-9;
+/// Added to each share against violations of 10⁻¹⁶ by rounding.
+const ROUNDING_MARGIN: f64 = 1e-9;
 
-/// How often a share that was not enough is doubled.
-const DOUBLINGS: usize = 8;
+const MAX_DOUBLINGS: usize = 8;
 
-/// The first share of a joint whose own limits are kept, where something else is broken: torques, places.
+/// First share if all joints keep their own limits but torques or places are violated.
 const FIRST_SHARE: f64 = 1.0 / 512.0;
 
-/// Speed and width of the range of a motion that stands nearly still, as shares of the limits. Not zero, so that it
-/// stays a motion of families that divide by their size.
-const STILL: f64 = 1e-6;
+/// Speed and range of a motion at near standstill, as shares of the limits. Not zero, because some families divide by
+/// the size of the motion.
+const STANDSTILL_SHARE: f64 = 1e-6;
 
-/// `outside`, between it and standing still in the middle of each joint's own way,
-/// with the smallest of the shares tried that keeps all limits between samples. None if it keeps them already, or if
-/// a tenth of the motion is not small enough, or once `stop` says so.
+/// Interpolates `outside` towards standstill in the middle of each joint's path, with the smallest of the tried shares
+/// that keeps all limits between samples. `None` if `outside` keeps the limits, if a tenth of the motion is still too
+/// large, or after `stop` returns true.
 ///
-/// A family whose motions are linear in its parameters needs no trial where single joints break their own limits: on
-/// the way to a motion inside a value `v > 0` that ends at `-d` is zero at the share `v / (v + d)` at the latest,
-/// because limits on a joint's motion are convex; and the other joints need not change. Whatever is still broken then,
-/// by torques, places or a family that is not linear, is tried with more, of all joints.
+/// For a linear family the shares of joints that violate their own limits are known: limits on a joint's motion are
+/// convex, so on the way to a motion inside a value `v > 0` that ends at `-d` is zero at the share `v / (v + d)` at the
+/// latest, and the other joints need not change. If torques, places or a nonlinear family still violate a limit, larger
+/// shares of all joints are tried.
 pub(super) fn shrunk(
     task: &DesignTask<'_>,
     criterion: &dyn Criterion,
@@ -52,17 +50,17 @@ pub(super) fn shrunk(
     for band in task.limits.bands() {
         let (value, end) = (outside.extremes[band.row], at_rest[band.row]);
         if value > 0.0 {
-            let share = if end < 0.0 { value / (value - end) + HAIR } else { MOST };
+            let share = if end < 0.0 { value / (value - end) + ROUNDING_MARGIN } else { MAX_SHRINK };
             shares[band.joint] = share.max(shares[band.joint]);
         }
     }
     let each = (outside.parameters.len() / joints).max(1);
     if shares.iter().all(|share| *share == 0.0) {
-        shares.fill(FIRST_SHARE.max(outside.violation).min(MOST));
+        shares.fill(FIRST_SHARE.max(outside.violation).min(MAX_SHRINK));
     }
     let of_all = shares.iter().copied().fold(FIRST_SHARE, f64::max);
-    for doubling in 0..=DOUBLINGS {
-        if shares.iter().any(|share| *share > MOST) || stop() {
+    for doubling in 0..=MAX_DOUBLINGS {
+        if shares.iter().any(|share| *share > MAX_SHRINK) || stop() {
             return None;
         }
         let ways = outside.parameters.iter().zip(&still).enumerate();
@@ -79,7 +77,7 @@ pub(super) fn shrunk(
     None
 }
 
-/// Parameters of a motion that stands nearly still in the middle of what each joint does.
+/// Parameters of a motion at near standstill in the middle of each joint's range of motion.
 fn standing_still(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> Vec<f64> {
     let mut motion = Motion::default();
     task.family.motion(parameters, times, &mut motion);
@@ -88,12 +86,11 @@ fn standing_still(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> V
         let own = &motion.q[motion.of(joint)];
         let low = own.iter().copied().fold(f64::INFINITY, f64::min);
         let high = own.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let half = STILL * (range[1] - range[0]);
+        let half = STANDSTILL_SHARE * (range[1] - range[0]);
         let middle = (0.5 * (low + high)).max(range[0] + half).min(range[1] - half);
         *range = [middle - half, middle + half];
-        speeds[joint] *= STILL;
+        speeds[joint] *= STANDSTILL_SHARE;
     }
-    // Which of these motions it is makes no difference to be seen.
     task.family.random(&positions, &speeds, &mut Random::new(1))
 }
 
@@ -121,7 +118,6 @@ mod tests {
         (model, limits)
     }
 
-    /// Runs `of` with the condition number of motions of `family` as the task.
     fn with_task<T>(
         (model, limits): &(Model, Limits),
         family: &dyn Family,
@@ -146,22 +142,22 @@ mod tests {
     }
 
     #[test]
-    fn a_search_that_ends_anywhere_keeps_the_limits() {
+    fn interrupted_searches_keep_the_limits() {
         let mut failures = Vec::new();
         for (name, seed) in [("ur10", 1), ("panda_arm7", 2), ("iiwa14", 3)] {
             let robot = robot(name);
             let family = fourier(&robot.0);
             for asked in [60, 120, 250, 500, 700, 900] {
                 let design = with_task(&robot, &family, |task| {
-                    // The time is up when the clock has been asked so often, at least once an evaluation: how long the
-                    // computer takes makes no difference.
+                    // The fake clock jumps past the time limit after a number of calls, at least one per evaluation, so
+                    // that the test does not depend on the computer.
                     let clock = AtomicU64::new(0);
                     let elapsed = || if clock.fetch_add(1, Ordering::Relaxed) < asked { 0.0 } else { 1.0 };
                     let settings = DesignSettings { time_limit_s: Some(1.0), seed, ..DesignSettings::default() };
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
                     pool.install(|| timed(task, &settings, &|_| ControlFlow::Continue(()), &elapsed)).unwrap()
                 });
-                // Often enough that a peak of five harmonics between samples is below the check's tolerance.
+                // Dense enough that a peak of five harmonics between samples is below the tolerance of the check.
                 let reports = check_limits(&robot.1, &robot.0, 10.0, 5_000.0, |times, out: &mut Motion| {
                     family.motion(&design.parameters, times, out);
                 });
@@ -175,8 +171,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_broken_by_a_share_costs_about_that_share() {
-        // Joint 4's range does not hold zero: a motion is shrunk about a posture, not its numbers to zero.
+    fn shrinking_costs_about_the_violation() {
+        // The range of joint 4 does not contain zero: a motion must shrink around a posture, not its parameters to
+        // zero.
         let robot = robot("panda_arm7");
         let family = fourier(&robot.0);
         with_task(&robot, &family, |task| {
@@ -188,7 +185,7 @@ mod tests {
             let first = judged(start.clone());
             let inside = shrunk(task, &condition, &first, [&fine, &logged], &|| false).unwrap_or(first);
             assert!(inside.violation <= 0.0);
-            // As much larger about its posture as breaks a limit by some hundredths.
+            // Enlarged around its posture such that it violates a limit by some hundredths.
             let still = standing_still(task, &inside.parameters, &fine);
             let larger = |by: f64| {
                 judged(inside.parameters.iter().zip(&still).map(|(p, still)| still + by * (p - still)).collect())
@@ -202,8 +199,9 @@ mod tests {
             assert!(outside.violation > 0.009, "{}", outside.violation);
             let smaller = shrunk(task, &condition, &outside, [&fine, &logged], &|| false).expect("a hundredth does");
             assert!(smaller.violation <= 0.0);
-            // The regressor goes with the motion, and its smallest singular value with the acceleration's square at
-            // most: two hundredths of the figure, and as much for what position takes of a range that is not centred.
+            // The regressor scales with the motion, and its smallest singular value at most with the square of the
+            // acceleration: two hundredths of the figure, and as much for the position part of a range that is not
+            // centred.
             let lost = smaller.figure.unwrap() / outside.figure.unwrap() - 1.0;
             assert!(lost < 0.04, "{lost}");
             assert!(shrunk(task, &condition, &smaller, [&fine, &logged], &|| false).is_none());

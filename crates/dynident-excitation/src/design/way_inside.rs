@@ -1,23 +1,23 @@
-//! From a motion a little outside the limits straight towards one inside them.
+//! Interpolation from a motion slightly outside the limits towards one inside.
 
 use super::DesignTask;
 use super::assess::{Assessment, assess};
 use crate::criteria::Criterion;
 
-/// Violation above which a straight line is no small change.
-const SMALL: f64 = 0.02;
+/// Maximum violation for which an interpolation is a small change.
+const MAX_VIOLATION: f64 = 0.02;
 
-/// First share of the way, and how often it is doubled: at the last, half of the motion is the other's.
+/// First interpolation share, and the number of shares tried; the last one is a half.
 const FIRST_SHARE: f64 = 1.0 / 512.0;
-const DOUBLINGS: i32 = 9;
+const SHARES: i32 = 9;
 
 /// `(1 - s) outside + s inside`, for the smallest of the shares s = 1/512, 1/256, .., 1/2 that keeps all limits between
-/// samples; none if `outside` is inside already or far outside, `inside` breaks a limit, the family is not linear
-/// in its parameters, the result is worse than `inside`, or `stop` says so.
+/// samples. `None` if `outside` is inside already or far outside, `inside` violates a limit, the family is not linear
+/// in its parameters, the result is worse than `inside`, or `stop` returns true.
 ///
-/// For a family that is linear in its parameters positions, velocities and accelerations, and with them all limits that
-/// are convex in them, change by no more than a straight line: what is broken by a share ε is kept after about ε of the
-/// way, and little of what the criterion had found is lost.
+/// In a linear family positions, velocities and accelerations change linearly with the share, and all limits that are
+/// convex in them change by no more than a straight line. A violation ε is therefore removed at a share of about ε, at
+/// a small loss of the criterion.
 pub(super) fn way_inside(
     task: &DesignTask<'_>,
     criterion: &dyn Criterion,
@@ -27,14 +27,14 @@ pub(super) fn way_inside(
     stop: &dyn Fn() -> bool,
 ) -> Option<Assessment> {
     let [fine, logged] = grids;
-    let near = outside.violation > 0.0 && outside.violation <= SMALL;
+    let near = outside.violation > 0.0 && outside.violation <= MAX_VIOLATION;
     if !near || inside.violation > 0.0 || !task.family.is_linear() {
         return None;
     }
     let between = |share: f64| -> Vec<f64> {
         outside.parameters.iter().zip(&inside.parameters).map(|(from, to)| from + share * (to - from)).collect()
     };
-    (0..DOUBLINGS)
+    (0..SHARES)
         .take_while(|_| !stop())
         .map(|doubling| assess(task, criterion, between(FIRST_SHARE * f64::from(1 << doubling)), fine, logged))
         .find(|assessed| assessed.violation <= 0.0)
@@ -54,7 +54,7 @@ mod tests {
     use dynident_model::sample::Random;
 
     #[test]
-    fn a_hair_of_the_way_costs_a_hair_of_the_criterion() {
+    fn small_shares_cost_little() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
         let model = load_robot(path).unwrap().model;
         let limits = LimitSet::new(&Limits::from_model(&model), &model).unwrap();
@@ -75,21 +75,20 @@ mod tests {
         let (positions, speeds) = ranges(&limits);
         let start = family.random(&positions, &speeds, &mut Random::new(3));
         let scaled = |by: f64| judged(start.iter().map(|p| by * p).collect());
-        // The size at which the first limit is reached, from both sides.
         let (mut below, mut above) = (0.0, 64.0);
         for _ in 0..60 {
             let middle = 0.5 * (below + above);
             *(if scaled(middle).violation <= 0.0 { &mut below } else { &mut above }) = middle;
         }
         let (outside, inside, far) = (scaled(1.001 * above), scaled(0.5 * below), scaled(2.0 * above));
-        assert!(outside.violation > 0.0 && inside.violation <= 0.0 && far.violation > SMALL);
-        let between = way(&outside, &inside).expect("a hair of the way is enough");
+        assert!(outside.violation > 0.0 && inside.violation <= 0.0 && far.violation > MAX_VIOLATION);
+        let between = way(&outside, &inside).expect("a small share is sufficient");
         assert!(between.violation <= 0.0);
-        // A 256th of the way of half a motion, of 36 columns' squares: 36 · 2 · 0.5 / 256 nats, and as much again for
-        // the step before it.
+        // Share 1/256 of a change by half of the motion, squared in 36 columns: 36 · 2 · 0.5 / 256 nats, and as much
+        // again for the previous step.
         let lost = between.figure.unwrap() - outside.figure.unwrap();
         assert!(lost < 0.3, "{lost}");
-        assert!(way(&far, &inside).is_none(), "far outside a straight line is no small change");
+        assert!(way(&far, &inside).is_none(), "far outside an interpolation is not a small change");
         assert!(way(&inside, &inside).is_none() && way(&outside, &far).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! **How does the robot get it?** A sampled motion as the tables and programs that robots take, one format a file.
+//! **Export**: a sampled motion as tables and programs for robots, one format per file.
 
 mod fitness_csv;
 mod ros2;
@@ -26,50 +26,49 @@ pub struct Sampled<'a> {
     pub motion: &'a Motion,
 }
 
-/// Why a motion cannot be written in a format.
+/// Reason why a motion cannot be written in a format.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// Names, times and motion do not belong together.
+    /// Names, times and motion have different lengths.
     #[error("{what}: expected {expected}, found {found}")]
     Shape {
-        /// What there are too many or too few of.
+        /// The list.
         what: &'static str,
-        /// How many the motion has.
+        /// Expected length.
         expected: usize,
-        /// How many were given.
+        /// Given length.
         found: usize,
     },
-    /// A number that no robot can take.
+    /// A value that is not finite.
     #[error("the motion of joint `{joint}` is not finite at {at_s} s: export a finite motion")]
     NotFinite {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// When, s.
+        /// Time, s.
         at_s: f64,
     },
-    /// A robot with another number of joints than the format is for.
+    /// The format is for another number of joints.
     #[error(
-        "URScript is for the six joints of a UR arm; the robot has {joints}: lock the others, or choose another format"
+        "URScript needs the six joints of a UR arm, but the robot has {joints}: lock the others, or choose another format"
     )]
     SixJoints {
-        /// The robot's number of joints.
+        /// Number of joints of the robot.
         joints: usize,
     },
-    /// A setting without meaning.
+    /// A setting out of range.
     #[error("{setting} = {value}: give {needed}")]
     Setting {
-        /// Its name.
+        /// Name of the setting.
         setting: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Valid range.
         needed: &'static str,
     },
 }
 
 impl Sampled<'_> {
-    /// Checks that names, times and motion belong together and that every number is finite.
     fn check(&self) -> Result<(), ExportError> {
         let Motion { samples, joints, .. } = *self.motion;
         for (what, expected, found) in
@@ -111,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_belong_together_is_named() {
+    fn different_lengths_are_named() {
         let (mut joints, times, mut motion) = sampled(6, 5);
         let error = trajectory_csv(&Sampled { joints: &joints, times_s: &times[1..], motion: &motion }).unwrap_err();
         assert_eq!(error, ExportError::Shape { what: "times", expected: 5, found: 4 });

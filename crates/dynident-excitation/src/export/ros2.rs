@@ -4,26 +4,25 @@ use super::{ExportError, Sampled};
 use core::fmt::Write;
 use dynident_text::quoted;
 
-/// A `JointTrajectory` message with positions, velocities and accelerations, as `ros2 topic pub` and parameter files
-/// read it. Move the arm to the first point before.
+/// A `JointTrajectory` message with positions, velocities and accelerations, for `ros2 topic pub` and parameter files.
+/// Move the arm to the first point before.
 ///
 /// # Source
 /// ROS 2 interfaces `trajectory_msgs/msg/JointTrajectory`, `trajectory_msgs/msg/JointTrajectoryPoint`,
 /// `builtin_interfaces/msg/Duration`.
 ///
 /// # Errors
-/// Names, times and motion that do not belong together, and numbers that are not finite.
+/// Different lengths of names, times and motion; values that are not finite.
 pub fn ros2_joint_trajectory(sampled: &Sampled<'_>) -> Result<String, ExportError> {
     sampled.check()?;
     let mut text = String::from("header:\n  stamp: {sec: 0, nanosec: 0}\n  frame_id: \"\"\njoint_names:\n");
     for name in sampled.joints {
-        // Writing to a string cannot fail, here and below.
         let _ = writeln!(text, "  - {}", quoted(name));
     }
     text.push_str("points:\n");
     for (sample, time) in sampled.times_s.iter().enumerate() {
         for (order, key) in ["  - positions", "    velocities", "    accelerations"].into_iter().enumerate() {
-            // YAML takes `1` for an integer, ROS wants a float: `{:?}` keeps the point.
+            // YAML reads `1` as an integer, but ROS needs a float: `{:?}` writes the decimal point.
             let row: Vec<String> =
                 (0..sampled.joints.len()).map(|joint| format!("{:?}", sampled.at(joint, sample)[order])).collect();
             let _ = writeln!(text, "{key}: [{}]", row.join(", "));

@@ -3,17 +3,16 @@
 use super::{ExportError, Sampled};
 use core::fmt::Write;
 
-/// `t_s, q1.., dq1.., ddq1..`, one row per time, SI units, every number with all its digits.
+/// `t_s, q1.., dq1.., ddq1..`, one row per time, SI units, full precision.
 ///
 /// # Errors
-/// Names, times and motion that do not belong together, and numbers that are not finite.
+/// Different lengths of names, times and motion; values that are not finite.
 pub fn trajectory_csv(sampled: &Sampled<'_>) -> Result<String, ExportError> {
     sampled.check()?;
     let joints = sampled.joints.len();
     let mut text = String::from("t_s");
     for prefix in ["q", "dq", "ddq"] {
         for joint in 1..=joints {
-            // Writing to a string cannot fail, here and below.
             let _ = write!(text, ",{prefix}{joint}");
         }
     }

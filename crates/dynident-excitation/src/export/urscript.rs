@@ -3,12 +3,13 @@
 use super::{ExportError, Sampled};
 use core::fmt::Write;
 
-/// How the arm follows.
+/// Settings of the URScript program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UrScriptSettings {
-    /// Rate of the calls, Hz: 125 for CB-series, 500 for e-series. Default 125. The motion must be sampled at it.
+    /// Rate of the calls, Hz: 125 for CB-series, 500 for e-series. Default 125. The motion must be sampled at this
+    /// rate.
     pub rate_hz: f64,
-    /// `lookahead_time` of servoj, s, 0.03 to 0.2. Default 0.03: the least smoothing.
+    /// `lookahead_time` of servoj, s, 0.03 to 0.2. Default 0.03, the weakest smoothing.
     pub lookahead_time_s: f64,
     /// `gain` of servoj, 100 to 2000. Default 300.
     pub gain: f64,
@@ -26,7 +27,7 @@ impl UrScriptSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// The first one outside its range.
+    /// The first setting out of range.
     pub fn validate(&self) -> Result<(), ExportError> {
         for (setting, value, [least, most], needed) in [
             ("rate_hz", self.rate_hz, [1.0, 500.0], "1 to 500 (125 for CB-series, 500 for e-series)"),
@@ -42,14 +43,14 @@ impl UrScriptSettings {
     }
 }
 
-/// A URScript program: a slow `movej` to the first point, one `servoj` per sample, then a stop. Only positions are
-/// told; the controller makes the rates.
+/// Writes a URScript program: a slow `movej` to the first point, one `servoj` per sample, then a stop. The program
+/// contains only positions; the controller computes the rates.
 ///
 /// # Source
 /// Universal Robots, The URScript Programming Language, `movej` and `servoj`.
 ///
 /// # Errors
-/// Settings out of range, another number of joints than six, and as the other formats.
+/// Settings out of range; a number of joints other than six; errors of the other formats.
 pub fn urscript(sampled: &Sampled<'_>, settings: &UrScriptSettings) -> Result<String, ExportError> {
     sampled.check()?;
     settings.validate()?;
@@ -57,14 +58,13 @@ pub fn urscript(sampled: &Sampled<'_>, settings: &UrScriptSettings) -> Result<St
         return Err(ExportError::SixJoints { joints: sampled.joints.len() });
     }
     let point = |sample: usize| -> String {
-        // A hundredth of a microradian is far below what an encoder sees.
+        // 1e-8 rad, far below the resolution of an encoder.
         let row: Vec<String> = (0..6).map(|joint| format!("{:.8}", sampled.at(joint, sample)[0])).collect();
         row.join(", ")
     };
     let UrScriptSettings { rate_hz, lookahead_time_s, gain, approach_speed } = settings;
     let mut text = String::from("def excitation():\n");
     if !sampled.times_s.is_empty() {
-        // Writing to a string cannot fail, here and below.
         let _ = writeln!(text, "  movej([{}], a=0.5, v={approach_speed})\n  sleep(1.0)", point(0));
     }
     for sample in 0..sampled.times_s.len() {

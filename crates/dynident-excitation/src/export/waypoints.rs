@@ -1,4 +1,4 @@
-//! Plain waypoints: time and positions under the joints' own names.
+//! Waypoints: times and positions with the names of the joints.
 
 use super::{ExportError, Sampled};
 use core::fmt::Write;
@@ -7,7 +7,7 @@ use dynident_text::csv_field;
 /// `t_s, <joint names>`, one row per time, rad (m); names are fields of RFC 4180 ([`csv_field`]).
 ///
 /// # Errors
-/// Names, times and motion that do not belong together, and numbers that are not finite.
+/// Different lengths of names, times and motion; values that are not finite.
 pub fn waypoints_csv(sampled: &Sampled<'_>) -> Result<String, ExportError> {
     sampled.check()?;
     let mut text = String::from("t_s");
@@ -32,7 +32,7 @@ mod tests {
     use crate::export::tests::sampled;
 
     #[test]
-    fn names_are_quoted_and_rows_hold_positions() {
+    fn names_are_quoted_and_rows_contain_positions() {
         let (mut joints, times, motion) = sampled(2, 3);
         joints[1] = "elbow".to_owned();
         let text = waypoints_csv(&Sampled { joints: &joints, times_s: &times, motion: &motion }).unwrap();

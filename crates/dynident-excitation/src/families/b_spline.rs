@@ -1,20 +1,20 @@
 //! Quintic B-splines, exactly at rest at both ends.
 
-use super::error::{FamilyError, MOST, require, require_frame};
+use super::error::{FamilyError, MAX_COUNT, require, require_frame};
 use super::linear::{Basis, LinearFamily};
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "b_spline";
 const DEGREE: usize = 5;
 
-/// What a [`BSpline`] family is made of.
+/// Settings of a [`BSpline`] family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct BSplineSettings {
-    /// Number of control points n, those at the ends included. Default 14.
+    /// Number of control points n, including those at the ends. Default 14.
     pub control_points: usize,
-    /// The motion ends where it began. Default true.
+    /// Whether the motion ends at its start position. Default true.
     pub returns: bool,
 }
 
@@ -28,27 +28,27 @@ impl BSplineSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// Fewer than 7 control points (with 6 nothing moves if the motion returns), or more than 1000.
+    /// Fewer than 7 control points (with 6 a returning motion cannot move), or more than 1000.
     pub fn validate(&self) -> Result<(), FamilyError> {
         let fix = "give 7 to 1000";
-        require((7..=MOST).contains(&self.control_points), NAME, "control_points", self.control_points as f64, fix)
+        require((7..=MAX_COUNT).contains(&self.control_points), NAME, "control_points", self.control_points as f64, fix)
     }
 }
 
 /// q(t) = Σ_i P_i N_i(t) with B-splines of degree 5 on equally spaced knots, the end knots six-fold.
 ///
-/// The first three control points are equal, and so are the last three, which makes q̇ = q̈ = 0 at both ends exact.
-/// With q(T) = q(0) all six are one number and n - 5 numbers a joint are free: the end posture, then P_3 .. P_(n-4),
-/// all in rad (m). Otherwise n - 4: start, end, then the inner ones. Every control point acts on six spans only, so
-/// richer splines cost no more per sample. Position, being an average of control points, stays between the smallest and
-/// the largest.
+/// The first three control points are equal, and so are the last three, so that q̇ = q̈ = 0 exactly at both ends. With
+/// q(T) = q(0) all six are equal and n - 5 parameters per joint are free: the end posture, then P_3 .. P_(n-4), all in
+/// rad (m). Otherwise n - 4: start, end, then the inner ones. Every control point acts on only six spans, so the cost
+/// per sample does not depend on n. Positions are averages of control points and stay between the smallest and the
+/// largest.
 ///
 /// # Source
 /// de Boor, A Practical Guide to Splines (2001), chapters IX and X; The NURBS Book (Piegl and Tiller 1997), Eqs. 2.5
 /// and 2.7.
 pub type BSpline = LinearFamily<BSplineBasis>;
 
-/// The functions of a [`BSpline`] family.
+/// Basis functions of a [`BSpline`] family.
 #[derive(Clone, Debug)]
 pub struct BSplineBasis {
     settings: BSplineSettings,
@@ -56,10 +56,10 @@ pub struct BSplineBasis {
 }
 
 impl BSpline {
-    /// The family for so many joints and seconds.
+    /// Creates the family for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// Settings without meaning; see [`BSplineSettings::validate`].
+    /// Invalid settings; see [`BSplineSettings::validate`].
     pub fn new(joints: usize, duration_s: f64, settings: &BSplineSettings) -> Result<Self, FamilyError> {
         require_frame(NAME, joints, duration_s)?;
         settings.validate()?;
@@ -72,7 +72,7 @@ impl BSplineBasis {
         if self.settings.returns { 1 } else { 2 }
     }
 
-    /// Knot `index` in units of a span, of the clamped vector.
+    /// Knot `index` of the clamped vector, in units of a span.
     fn knot(&self, index: usize) -> f64 {
         index.saturating_sub(DEGREE).min(self.settings.control_points - DEGREE) as f64
     }
@@ -86,7 +86,7 @@ impl BSplineBasis {
         triangle[0][0] = 1.0;
         for degree in 1..=DEGREE {
             for position in 0..degree {
-                // The function of one degree less that begins at knot `first`.
+                // The function of the next lower degree that begins at knot `first`.
                 let first = span + 1 + position - degree;
                 let (from, to) = (self.knot(first), self.knot(first + degree));
                 let part = triangle[degree - 1][position] / (to - from);
@@ -96,7 +96,7 @@ impl BSplineBasis {
         }
         let mut out = [[0.0; 4]; DEGREE + 1];
         for order in 0..4 {
-            // Differentiating once raises the degree by one and takes differences (Eq. 2.7).
+            // Each derivative raises the degree by one and takes differences (Eq. 2.7).
             let mut values = triangle[DEGREE - order];
             for degree in DEGREE - order + 1..=DEGREE {
                 let mut raised = [0.0; DEGREE + 1];
@@ -128,8 +128,8 @@ impl Basis for BSplineBasis {
         let per_span = (points - DEGREE) as f64 / self.duration_s;
         let (first, functions) = self.functions(time_s * per_span);
         let scales = [1.0, per_span, per_span.powi(2), per_span.powi(3)];
-        // All functions add up to 1: with one number for both ends its function is what the others leave, exactly at
-        // rest where they are; nothing where the ends' own functions are nothing.
+        // All functions sum to 1. With one parameter for both ends its function is 1 minus the others, and exactly zero
+        // where no function of the ends is nonzero.
         let of_ends = ends == 1 && (first < 3 || first + DEGREE + 3 >= points);
         if of_ends {
             out[0][0] = 1.0;
@@ -171,14 +171,13 @@ mod tests {
         }
     }
 
-    /// In the middle of a long spline the functions are cardinal B-splines: N(k) = 1, 26, 66, 26, 1 over 120 at the
-    /// knots, (Schoenberg), slopes 5, 50, 0, -50, -5 over 120.
+    /// In the middle of a long spline the functions are cardinal B-splines (Schoenberg): N(k) = 1, 26, 66, 26, 1 over
+    /// 120 at the knots, slopes 5, 50, 0, -50, -5 over 120.
     #[test]
     fn cardinal_values() {
         let settings = BSplineSettings { control_points: 25, returns: true };
         let family = BSpline::new(1, 20.0, &settings).unwrap();
         let mut parameters = vec![0.0; family.parameters()];
-        // Control point 12 acts from knot 7 to knot 13 (in seconds here).
         parameters[12 - 2] = 120.0;
         let mut motion = Motion::default();
         family.motion(&parameters, &[7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0], &mut motion);
@@ -187,13 +186,11 @@ mod tests {
                 .iter()
                 .enumerate()
         {
-            // Rounding of numbers up to 120.
             assert!((motion.q[sample] - value).abs() < 1e-12 && (motion.dq[sample] - slope).abs() < 1e-12);
         }
     }
 
-    /// Away from the ends no more than six functions are not zero, so that a sample costs no more however many there
-    /// are; the sum of all is one everywhere.
+    /// At most six functions are nonzero away from the ends, and the sum of all is one everywhere.
     #[test]
     fn supports_are_six_spans() {
         let basis = BSplineBasis { settings: BSplineSettings { control_points: 80, returns: true }, duration_s: 10.0 };
@@ -205,7 +202,6 @@ mod tests {
             assert!((sum - 1.0).abs() < 1e-14, "{time_s} {sum}");
             let acting = row.iter().filter(|function| function.iter().any(|value| *value != 0.0)).count();
             assert!(acting <= 6, "{time_s}: {acting}");
-            // The ends' functions act on three spans of 10/75 s.
             assert!(row[0] == [0.0; 4] || !(0.41..9.59).contains(&time_s), "{time_s}");
         }
     }

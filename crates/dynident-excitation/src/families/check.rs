@@ -1,4 +1,4 @@
-//! What every family's tests ask: exact derivatives, an exact gradient, rest at the ends.
+//! Shared tests of all families: exact derivatives, exact gradient, rest at the ends.
 
 use super::random_start::grid;
 use crate::family::Family;
@@ -6,7 +6,6 @@ use crate::motion::Motion;
 use dynident_model::sample::Random;
 use nalgebra::{DMatrix, DVector};
 
-/// A random start for joints with unequal ranges and velocities.
 pub(crate) fn start(family: &dyn Family, seed: u64) -> Vec<f64> {
     let joints = family.joints();
     let ranges: Vec<_> = (0..joints).map(|joint| [-1.5 - joint as f64 * 0.2, 2.0]).collect();
@@ -27,18 +26,16 @@ pub(crate) fn start(family: &dyn Family, seed: u64) -> Vec<f64> {
     parameters
 }
 
-/// Random times inside the duration.
 fn times(family: &dyn Family, random: &mut Random) -> Vec<f64> {
     let duration = family.duration_s();
     (0..29).map(|_| random.uniform(0.02 * duration, 0.98 * duration)).collect()
 }
 
-/// Each of q̇, q̈ and jerk integrated over short spans by Gauss-Legendre quadrature with five points against the change
-/// of q, q̇ and q̈.
+/// Compares the integrals of q̇, q̈ and jerk over short spans with the changes of q, q̇ and q̈.
 ///
-/// The spans are 1e-4 of the duration, so short that five points integrate every smooth piece to rounding; allowed are
-/// 1e-6 of the integral's largest possible value and the rounding of the difference. Where a span holds a break of the
-/// next derivative (a knot) the quadrature is worth less: two spans of 29 may.
+/// Gauss-Legendre quadrature with five points over 1e-4 of the duration integrates every smooth piece up to rounding.
+/// The tolerance is 1e-6 of the integral's largest possible value, plus the rounding of the difference. A span with a
+/// discontinuity of the next derivative (a knot) is less accurate; two of 29 spans may fail.
 pub(crate) fn derivatives(family: &dyn Family, seed: u64) {
     const NODES: [[f64; 2]; 5] = [
         [-0.906_179_845_938_664, 0.236_926_885_056_189_08],
@@ -64,7 +61,7 @@ pub(crate) fn derivatives(family: &dyn Family, seed: u64) {
         for joint in 0..family.joints() {
             let (low, high) = (&orders[order][motion.of(joint)], &orders[order + 1][motion.of(joint)]);
             let size = |values: &[f64]| values.iter().fold(0.0_f64, |peak, value| peak.max(value.abs()));
-            // Peaks of the whole motion: rounding of a sum does not shrink where the sum happens to vanish.
+            // Peaks of the whole motion, because rounding of a sum does not decrease where the sum vanishes.
             let (peak_low, peak_high) = (size(low), size(high));
             let mut broken = 0;
             for middle in 0..middles.len() {
@@ -81,18 +78,16 @@ pub(crate) fn derivatives(family: &dyn Family, seed: u64) {
     }
 }
 
-/// The gradient of a random linear function of the motion against central differences, and that it is added, not
-/// stored.
+/// Compares the gradient of a random linear function of the motion with central differences, and checks that it is
+/// added to the output.
 pub(crate) fn gradient(family: &dyn Family, seed: u64) {
     gradient_at(family, &start(family, seed), seed);
 }
 
-/// As [`gradient`], at given parameters.
 pub(crate) fn gradient_at(family: &dyn Family, parameters: &[f64], seed: u64) {
     gradient_on(family, parameters, &times(family, &mut Random::new(seed ^ 0xaa)), seed);
 }
 
-/// As [`gradient`], at given parameters and times.
 pub(crate) fn gradient_on(family: &dyn Family, parameters: &[f64], times: &[f64], seed: u64) {
     let mut random = Random::new(seed ^ 0x77);
     let mut adjoint = Motion::default();
@@ -133,8 +128,7 @@ pub(crate) fn gradient_on(family: &dyn Family, parameters: &[f64], times: &[f64]
     }
 }
 
-/// The curvature of random weights against the gradients of every weighted number of the motion, one by one: Σ w
-/// (Jᵀe)(Jᵀe)ᵀ.
+/// Compares the curvature for random weights with the gradients of every weighted value of the motion: Σ w (Jᵀe)(Jᵀe)ᵀ.
 pub(crate) fn curvature(family: &dyn Family, seed: u64) {
     let parameters = start(family, seed);
     let mut random = Random::new(seed ^ 0x55);
@@ -168,13 +162,12 @@ pub(crate) fn curvature(family: &dyn Family, seed: u64) {
                 expected.ger(weights[sample], &row, &row, 1.0);
             }
         }
-        // Sums of at most 20 squares, in another order.
         let error = (&found - &expected).amax();
         assert!(error <= 1e-12 * expected.amax(), "{}: curvature off by {error:e}", family.name());
     }
 }
 
-/// q̇ = q̈ = 0 at both ends, up to rounding of the peaks.
+/// Checks q̇ = q̈ = 0 at both ends, up to rounding of the peaks.
 pub(crate) fn rest(family: &dyn Family, seed: u64) {
     let parameters = start(family, seed);
     let mut motion = Motion::default();

@@ -1,49 +1,47 @@
-//! What can be wrong with the settings of a family.
+//! Errors in the settings of a family.
 
 use thiserror::Error;
 
-/// Why a family could not be made.
+/// Reason why a family cannot be created.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum FamilyError {
-    /// A setting has no meaning or asks for no motion.
+    /// A setting out of range.
     #[error("family {family}, setting {setting} = {value}: {fix}")]
     Setting {
-        /// The family.
+        /// Name of the family.
         family: &'static str,
-        /// The setting's name.
+        /// Name of the setting.
         setting: &'static str,
         /// Its value.
         value: f64,
-        /// What would do.
+        /// Valid values.
         fix: &'static str,
     },
-    /// A caller's own family that is not what it says it is.
+    /// A user's motion function that violates its contract.
     #[error("family function `{name}`: {problem}")]
     Function {
-        /// Its name.
+        /// Name of the function.
         name: String,
-        /// What is wrong, and what to do.
+        /// The problem and its fix.
         problem: &'static str,
     },
-    /// A list has the wrong number of entries.
+    /// A list with the wrong number of entries.
     #[error("family {family}, {what}: expected {expected} entries, found {found}")]
     Length {
-        /// The family.
+        /// Name of the family.
         family: &'static str,
-        /// Which list.
+        /// The list.
         what: &'static str,
-        /// Entries needed.
+        /// Expected length.
         expected: usize,
-        /// Entries given.
+        /// Given length.
         found: usize,
     },
 }
 
-/// The largest number of joints, strokes, harmonics, points and postures accepted: more is a slip of the keyboard, not
-/// a robot.
-pub(crate) const MOST: usize = 1000;
+/// Maximum number of joints, strokes, harmonics, points and postures; a larger number is a typing error.
+pub(crate) const MAX_COUNT: usize = 1000;
 
-/// Passes if `ok`, else says what is wrong with the setting.
 pub(crate) fn require(
     ok: bool,
     family: &'static str,
@@ -54,9 +52,8 @@ pub(crate) fn require(
     if ok { Ok(()) } else { Err(FamilyError::Setting { family, setting, value, fix }) }
 }
 
-/// The checks that all families share: some joints, and a duration with which rates can be computed.
 pub(crate) fn require_frame(family: &'static str, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
-    require((1..=MOST).contains(&joints), family, "joints", joints as f64, "give between 1 and 1000 joints")?;
+    require((1..=MAX_COUNT).contains(&joints), family, "joints", joints as f64, "give between 1 and 1000 joints")?;
     let fix = "give between a millisecond and 1e7 seconds";
     require((1e-3..=1e7).contains(&duration_s), family, "duration_s", duration_s, fix)
 }

@@ -1,22 +1,22 @@
 //! Finite Fourier series, periodic or exactly at rest at both ends.
 
-use super::error::{FamilyError, MOST, require, require_frame};
+use super::error::{FamilyError, MAX_COUNT, require, require_frame};
 use super::linear::{Basis, LinearFamily};
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "fourier";
 
-/// What a [`Fourier`] family is made of.
+/// Settings of a [`Fourier`] family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct FourierSettings {
     /// Number of harmonics H. Default 5.
     pub harmonics: usize,
-    /// q̇ = q̈ = 0 at both ends, exactly. Default true; false gives the plain periodic series.
+    /// Exact rest (q̇ = q̈ = 0) at both ends. Default true; false selects the plain periodic series.
     pub rest: bool,
-    /// Periods within the duration. Default 1; bandwidth counts for information, so a long experiment does better with
-    /// repeated periods.
+    /// Periods within the duration. Default 1. Higher frequencies increase the information, so a long experiment is
+    /// better with several periods.
     pub periods: usize,
 }
 
@@ -30,12 +30,12 @@ impl FourierSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// No harmonics (at rest: fewer than 2, which cannot move), no periods, or more than 1000 of either.
+    /// No harmonics (with rest fewer than 2, which cannot move), no periods, or more than 1000 of either.
     pub fn validate(&self) -> Result<(), FamilyError> {
         let least = if self.rest { 2 } else { 1 };
         let fix = "give 1 to 1000, and at least 2 if the ends are at rest";
-        require((least..=MOST).contains(&self.harmonics), NAME, "harmonics", self.harmonics as f64, fix)?;
-        require((1..=MOST).contains(&self.periods), NAME, "periods", self.periods as f64, "give 1 to 1000")
+        require((least..=MAX_COUNT).contains(&self.harmonics), NAME, "harmonics", self.harmonics as f64, fix)?;
+        require((1..=MAX_COUNT).contains(&self.periods), NAME, "periods", self.periods as f64, "give 1 to 1000")
     }
 }
 
@@ -43,12 +43,12 @@ impl FourierSettings {
 ///
 /// q(t) = q0 + Σ_k a_k/(kω) sin kωt + b_k/(kω) cos kωt, k = 1..H, ω = 2π · periods / duration,
 ///
-/// so that a_k, b_k are amplitudes of velocity in rad/s (m/s). Eq. 24 of the paper is the same series with its
-/// coefficients in rad: a_k/(kω), b_k/(kω) here.
+/// a_k, b_k are amplitudes of velocity in rad/s (m/s). Eq. 24 of the paper is the same series with coefficients in rad,
+/// here a_k/(kω) and b_k/(kω).
 ///
-/// At rest at both ends means q̇(0) = Σ a_k = 0 and q̈(0) = -ω Σ k b_k = 0; both are solved beforehand by an
-/// orthonormal basis of their null spaces, so no constraint is left and 2 H - 1 numbers a joint are free: q0, then H -
-/// 1 for a, then H - 1 for b. Periodic: q0, a_1..a_H, b_1..b_H.
+/// Rest at both ends means q̇(0) = Σ a_k = 0 and q̈(0) = -ω Σ k b_k = 0. An orthonormal basis of the null spaces solves
+/// both, so that 2 H - 1 unconstrained parameters per joint are left: q0, then H - 1 for a, then H - 1 for b. Periodic:
+/// q0, a_1..a_H, b_1..b_H.
 ///
 /// ```
 /// use dynident_excitation::{Family, families::{Fourier, FourierSettings}};
@@ -58,20 +58,20 @@ impl FourierSettings {
 /// ```
 pub type Fourier = LinearFamily<FourierBasis>;
 
-/// The functions of a [`Fourier`] family.
+/// Basis functions of a [`Fourier`] family.
 #[derive(Clone, Debug)]
 pub struct FourierBasis {
     harmonics: usize,
     omega: f64,
-    /// Rows: free numbers for a (then b); columns: harmonics. `None` if periodic.
+    /// Rows: free parameters for a (then b); columns: harmonics. `None` if periodic.
     rest: Option<[Vec<Vec<f64>>; 2]>,
 }
 
 impl Fourier {
-    /// The family for so many joints and seconds.
+    /// Creates the family for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// Settings without meaning; see [`FourierSettings::validate`].
+    /// Invalid settings; see [`FourierSettings::validate`].
     pub fn new(joints: usize, duration_s: f64, settings: &FourierSettings) -> Result<Self, FamilyError> {
         require_frame(NAME, joints, duration_s)?;
         settings.validate()?;
@@ -83,10 +83,10 @@ impl Fourier {
         Ok(Self::of(FourierBasis { harmonics, omega, rest }, joints, duration_s))
     }
 
-    /// The coefficients of one joint, `[a_k, b_k]` in rad/s (m/s) for k = 1..H, of the given parameters of all joints.
+    /// Coefficients of one joint, `[a_k, b_k]` in rad/s (m/s) for k = 1..H, for the parameters of all joints.
     ///
     /// # Panics
-    /// If the joint or the parameters do not exist.
+    /// If the joint does not exist or there are too few parameters.
     pub fn coefficients(&self, parameters: &[f64], joint: usize) -> Vec<[f64; 2]> {
         let basis = self.basis();
         let own = &parameters[joint * basis.columns()..(joint + 1) * basis.columns()];
@@ -115,7 +115,7 @@ impl Basis for FourierBasis {
         let half = (out.len() - 1) / 2;
         for k in 1..=self.harmonics {
             let speed = k as f64 * self.omega;
-            // Reduced first: both ends give the same angle, so that rest there is exact.
+            // Reduced to one turn, so that both ends have the same angle and rest is exact.
             let turns = (time_s * speed / core::f64::consts::TAU).fract();
             let (sin, cos) = (turns * core::f64::consts::TAU).sin_cos();
             let sine = [sin / speed, cos, -speed * sin, -speed * speed * cos];
@@ -141,8 +141,8 @@ impl Basis for FourierBasis {
     }
 }
 
-/// An orthonormal basis of the vectors at right angles to `normal`: all but the first column of the Householder
-/// reflection that turns `normal` onto the first axis.
+/// Orthonormal basis of the vectors normal to `normal`: all but the first column of the Householder reflection that
+/// maps `normal` to the first axis.
 fn null_space(normal: &[f64]) -> Vec<Vec<f64>> {
     let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
     let mut mirror: Vec<f64> = normal.iter().map(|x| x / length).collect();
@@ -170,14 +170,13 @@ mod tests {
     }
 
     #[test]
-    fn free_numbers() {
+    fn parameter_counts() {
         for (harmonics, rest, numbers) in [(5, true, 9), (10, true, 19), (5, false, 11)] {
             assert_eq!(Fourier::new(1, 10.0, &settings(harmonics, rest)).unwrap().parameters(), numbers);
         }
     }
 
-    /// Eq. 24 written out, with coefficients taken from the family, against its motion; rounding of sums of ten terms
-    /// below 10.
+    /// Compares the motion with Eq. 24 with the coefficients of the family; rounding of sums of ten terms below 10.
     #[test]
     fn is_the_series() {
         let (duration, harmonics) = (8.0, 5);
@@ -210,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_cannot_move() {
+    fn rejects_settings_without_motion() {
         for (joints, duration, harmonics) in [(0, 1.0, 5), (1, 0.0, 5), (1, f64::NAN, 5), (1, 1.0, 1), (1, 1.0, 9999)] {
             assert!(Fourier::new(joints, duration, &settings(harmonics, true)).is_err());
         }

@@ -1,6 +1,6 @@
-//! Sweeps at constant velocity, from slow to fast, for friction curves.
+//! Sweeps at constant velocity, from slow to fast, for the identification of friction curves.
 
-use super::error::{FamilyError, MOST, require, require_frame};
+use super::error::{FamilyError, MAX_COUNT, require, require_frame};
 use super::linear::{Basis, LinearFamily};
 use super::polynomials::smooth_ramp;
 use dynident_model::sample::Random;
@@ -8,31 +8,32 @@ use serde::{Deserialize, Serialize};
 
 const NAME: &str = "friction_ladder";
 
-/// How the time is shared among the rungs of a [`FrictionLadder`].
+/// Distribution of the time among the rungs of a [`FrictionLadder`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LadderPace {
-    /// Every sweep lasts as long: slow sweeps are short ways.
+    /// Sweeps of equal duration: slow sweeps cover a short distance.
     EqualTime,
-    /// Every sweep goes as far: slow sweeps last long.
+    /// Sweeps of equal distance: slow sweeps take longer.
     EqualTravel,
 }
 
-/// What a [`FrictionLadder`] family is made of.
+/// Settings of a [`FrictionLadder`] family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct FrictionLadderSettings {
     /// Number of velocities. Default 6.
     pub rungs: usize,
-    /// The slowest velocity as a part of the fastest; the others lie between in geometric steps. Default 0.05.
+    /// Slowest velocity as a share of the fastest; the others are geometric steps between them. Default 0.05.
     pub slowest_part: f64,
-    /// Seconds in which a velocity is reached or left. Default 0.2.
+    /// Duration of a velocity ramp, s. Default 0.2.
     pub ramp_s: f64,
-    /// How time is shared. Default equal time.
+    /// Distribution of the time. Default equal time.
     pub pace: LadderPace,
-    /// One joint after another, the others at rest, each for its share of the duration. Default false: all at once.
+    /// Whether joints move one after another, each for an equal part of the duration, while the others rest. Default
+    /// false: all at once.
     pub one_by_one: bool,
 }
 
@@ -43,12 +44,12 @@ impl Default for FrictionLadderSettings {
 }
 
 impl FrictionLadderSettings {
-    /// Checks the settings for so many joints and seconds.
+    /// Checks the settings for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// No rung, a part outside 0..1, or ramps that leave no time at constant velocity.
+    /// No rung, a share outside 0..1, or ramps that leave no time at constant velocity.
     pub fn validate(&self, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
-        require((1..=MOST).contains(&self.rungs), NAME, "rungs", self.rungs as f64, "give 1 to 1000")?;
+        require((1..=MAX_COUNT).contains(&self.rungs), NAME, "rungs", self.rungs as f64, "give 1 to 1000")?;
         let fix = "give a part above 0 and at most 1";
         require(self.slowest_part > 0.0 && self.slowest_part <= 1.0, NAME, "slowest_part", self.slowest_part, fix)?;
         require(self.ramp_s >= 1e-3, NAME, "ramp_s", self.ramp_s, "give a millisecond or more")?;
@@ -57,24 +58,24 @@ impl FrictionLadderSettings {
             NAME,
             "ramp_s",
             self.ramp_s,
-            "the ramps (four a rung) take the whole duration: shorten them, take fewer rungs or a longer duration",
+            "the ramps (four per rung) take the whole duration: shorten them, use fewer rungs or a longer duration",
         )
     }
 
-    /// Seconds at constant velocity, of one joint.
+    /// Time at constant velocity of one joint, s.
     fn cruising_s(&self, joints: usize, duration_s: f64) -> f64 {
         let turns = if self.one_by_one { joints } else { 1 };
         duration_s / turns as f64 - 4.0 * self.rungs as f64 * self.ramp_s
     }
 }
 
-/// Sweeps there and back at constant velocity, one pair for each rung of a ladder of velocities, joined by smooth
+/// Sweeps back and forth at constant velocity, one pair for each rung of a ladder of velocities, joined by smooth
 /// ramps.
 ///
-/// q(t) = q_mid + V g(t): the shape g is fixed by the settings, so a joint has two free numbers: the middle of its
-/// longest sweep in rad (m) and the fastest velocity V in rad/s (m/s; negative begins the other way). During each sweep
-/// q̈ = 0 exactly, so torque is gravity and friction; the velocity ramps up by a polynomial with continuous q̈ and
-/// jerk. Both ends are at rest and equal.
+/// q(t) = q_mid + V g(t): the settings fix the shape g, so that a joint has two free parameters: the middle of its
+/// longest sweep in rad (m) and the fastest velocity V in rad/s (m/s; negative begins in the other direction). During
+/// each sweep q̈ = 0 exactly, so that the torque is gravity and friction. The velocity ramps are polynomials with
+/// continuous q̈ and jerk. Both ends are at rest and equal.
 ///
 /// # Source
 /// Constant-velocity friction identification as in Armstrong-Hélouvry, Control of Machines with Friction (1991).
@@ -87,7 +88,7 @@ struct Rung {
     part: f64,
 }
 
-/// The functions of a [`FrictionLadder`] family.
+/// Basis functions of a [`FrictionLadder`] family.
 #[derive(Clone, Debug)]
 pub struct FrictionLadderBasis {
     rungs: Vec<Rung>,
@@ -98,10 +99,10 @@ pub struct FrictionLadderBasis {
 }
 
 impl FrictionLadder {
-    /// The family for so many joints and seconds.
+    /// Creates the family for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// Settings without meaning; see [`FrictionLadderSettings::validate`].
+    /// Invalid settings; see [`FrictionLadderSettings::validate`].
     pub fn new(joints: usize, duration_s: f64, settings: &FrictionLadderSettings) -> Result<Self, FamilyError> {
         require_frame(NAME, joints, duration_s)?;
         settings.validate(joints, duration_s)?;
@@ -122,7 +123,6 @@ impl FrictionLadder {
         let mut start_s = 0.0;
         for rung in &mut rungs {
             rung.start_s = start_s;
-            // There and back.
             rung.cruise_s = 0.5 * cruising_s * share(rung) / all;
             start_s += 2.0 * (rung.cruise_s + 2.0 * ramp_s);
         }
@@ -137,7 +137,8 @@ impl FrictionLadder {
 }
 
 impl FrictionLadderBasis {
-    /// The times in which `joint` moves at constant velocity, and its velocity as a part of V: `[from_s, to_s, part]`.
+    /// Intervals in which `joint` moves at constant velocity, and its velocity as a share of V: `[from_s, to_s,
+    /// share]`.
     pub fn sweeps(&self, joint: usize) -> Vec<[f64; 3]> {
         let turn = self.turn_s * joint as f64;
         let mut sweeps = Vec::with_capacity(2 * self.rungs.len());
@@ -150,7 +151,7 @@ impl FrictionLadderBasis {
         sweeps
     }
 
-    /// Way gone in a sweep at unit velocity, with derivatives: a ramp up, constant velocity, and the same ramp
+    /// Distance covered in a sweep at unit velocity, with derivatives: a ramp up, constant velocity, and the same ramp
     /// subtracted.
     fn sweep(&self, time_s: f64, cruise_s: f64) -> [f64; 4] {
         let scales = [self.ramp_s, 1.0, 1.0 / self.ramp_s, self.ramp_s.powi(-2)];
@@ -201,8 +202,8 @@ mod tests {
     use crate::family::Family;
     use proptest::prelude::*;
 
-    /// In every sweep the velocity is the rung's and the acceleration is nothing; geometric ladder; the middle is the
-    /// middle.
+    /// In every sweep the velocity is that of the rung and the acceleration is zero; the ladder is geometric; the
+    /// middle is correct.
     #[test]
     fn sweeps_are_at_constant_speed() {
         for (pace, one_by_one) in
@@ -221,7 +222,7 @@ mod tests {
                     let mut motion = Motion::default();
                     family.motion(&parameters, &times, &mut motion);
                     for sample in motion.of(joint) {
-                        // Sweep ends are sums of times: up to rounding they lie a hair inside the ramp.
+                        // Sweep ends are sums of times, so rounding can place them slightly inside the ramp.
                         assert!((motion.dq[sample] - parameters[2 * joint + 1] * part).abs() < 1e-12);
                         assert!(motion.ddq[sample].abs() < 1e-9);
                     }
@@ -232,13 +233,12 @@ mod tests {
             family.motion(&parameters, &times, &mut motion);
             let own = &motion.q[motion.of(0)];
             let [low, high] = own.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], q| [l.min(*q), h.max(*q)]);
-            // The turning point lies between two samples: q̈ dt²/8.
             assert!((0.5 * (low + high) - 0.3).abs() < 1e-5 && (own[0] - own[20_000]).abs() < 1e-12);
         }
     }
 
     #[test]
-    fn refuses_ramps_that_leave_no_time() {
+    fn rejects_ramps_that_are_too_long() {
         let settings = FrictionLadderSettings::default();
         assert!(FrictionLadder::new(1, 4.8, &settings).is_err());
         assert!(FrictionLadder::new(1, 4.9, &settings).is_ok());

@@ -1,4 +1,4 @@
-//! A family that is a caller's own code: joints with parameters of their own, equally many.
+//! Family from a user's motion function; joints have separate parameters, equally many.
 
 use super::error::{FamilyError, require, require_frame};
 use super::random_start::{grid, scale_and_shift};
@@ -12,68 +12,64 @@ use std::sync::Arc;
 
 const NAME: &str = "function";
 
-/// Step of a parameter, as a share of `1 + |p|`, by which a motion that is not linear is differentiated: the cube root
-/// of the rounding.
-const STEP: f64 = 6e-6;
-/// The largest deviation from linearity, as a share of the motion, that is rounding.
-const LINEAR: f64 = 1e-9;
-/// The largest deviation of a motion that should stand still at 1.
-const STANDING: f64 = 1e-6;
-/// Seed of the parameters at which linearity is tried.
+/// Relative step of a parameter, as a share of `1 + |p|`, for the differences of a nonlinear motion: the cube root of
+/// the rounding.
+const RELATIVE_STEP: f64 = 6e-6;
+/// Largest deviation from linearity, as a share of the motion, that is attributed to rounding.
+const LINEARITY_TOLERANCE: f64 = 1e-9;
+/// Largest deviation from 1 of a constant motion.
+const CONSTANT_TOLERANCE: f64 = 1e-6;
 const SEED: u64 = 33;
-/// Most parameters a joint.
-const MOST_PARAMETERS: usize = 1000;
+const MAX_PARAMETERS: usize = 1000;
 
-/// The motion of all joints by their parameters, for many times at once.
+/// Motion of all joints as a function of their parameters, for many times at once.
 ///
-/// Each joint follows its own parameters alone, and position, velocity, acceleration and jerk are derivatives of one
-/// another.
+/// Each joint depends only on its own parameters, and position, velocity, acceleration and jerk are consistent
+/// derivatives.
 pub trait MotionFunction: Debug + Send + Sync {
-    /// Writes the motion at `times_s` into `out`, which has its size; `parameters` stand joint after joint.
+    /// Writes the motion at `times_s` into `out`, which already has its size; `parameters` are stored joint after
+    /// joint.
     fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion);
 }
 
-/// What a [`FunctionFamily`] is.
+/// Settings of a [`FunctionFamily`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct FunctionFamilySettings {
-    /// What the function is called in results.
+    /// Name of the function in results.
     pub function: String,
-    /// Free parameters of each joint, 1 to 1000.
+    /// Number of free parameters of each joint, 1 to 1000.
     pub parameters: usize,
-    /// Whether the motion is linear in the parameters, zero at zero: gradients are then exact, and the function is
-    /// called once for each parameter and grid of times; otherwise it is differentiated, with two calls for each
-    /// parameter and step of the search. Default false.
+    /// Whether the motion is linear in the parameters and zero at zero. Gradients are then exact, and the function is
+    /// called once for each parameter and grid of times; otherwise the motion is differentiated numerically, with two
+    /// calls for each parameter and step of the search. Default false.
     pub linear: bool,
 }
 
-/// A family that is a caller's [`MotionFunction`].
+/// Family of the motions of a user's [`MotionFunction`].
 ///
-/// A random start draws every parameter from the standard normal distribution. Where the family is linear, it is then
-/// scaled to a part of each joint's range and velocity and shifted inside it, if a motion that stands still is among
-/// the family's; where it is not, the function itself has to make sensible motions of such parameters.
+/// A random start draws every parameter from the standard normal distribution. If the family is linear and contains a
+/// constant motion, the start is then scaled to a part of each joint's range and velocity and shifted inside it.
+/// Otherwise the function must create reasonable motions from such parameters.
 #[derive(Debug)]
 pub struct FunctionFamily {
     function: Arc<dyn MotionFunction>,
     joints: usize,
     duration_s: f64,
-    /// Of a joint.
     parameters: usize,
     linear: Option<Linear>,
 }
 
-/// What a linear family keeps.
 #[derive(Debug)]
 struct Linear {
     grids: GridCache,
-    /// Parameters of a joint that stands still at 1, joint after joint, where there are such.
     standing: Option<Vec<f64>>,
 }
 
 impl FunctionFamily {
-    /// The family for so many joints and seconds.
+    /// Creates the family for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// Settings without meaning; a function that says it is linear and is not, or one without a finite motion.
+    /// Invalid settings; a function that is declared linear but is not; a motion that is not finite.
     pub fn new(
         joints: usize,
         duration_s: f64,
@@ -82,8 +78,8 @@ impl FunctionFamily {
     ) -> Result<Self, FamilyError> {
         require_frame(NAME, joints, duration_s)?;
         let parameters = settings.parameters;
-        let is_sensible = (1..=MOST_PARAMETERS).contains(&parameters);
-        require(is_sensible, NAME, "parameters", parameters as f64, "give 1 to 1000 a joint")?;
+        let is_sensible = (1..=MAX_PARAMETERS).contains(&parameters);
+        require(is_sensible, NAME, "parameters", parameters as f64, "give 1 to 1000 per joint")?;
         let mut family = Self { function, joints, duration_s, parameters, linear: None };
         let wrong = |problem| FamilyError::Function { name: settings.function.clone(), problem };
         let times = grid(duration_s);
@@ -94,30 +90,30 @@ impl FunctionFamily {
         let values = |motion: &Motion| [&motion.q, &motion.dq, &motion.ddq, &motion.dddq].map(Clone::clone).concat();
         let tried = values(&motion);
         if tried.iter().any(|value| !value.is_finite()) {
-            return Err(wrong("a motion that is not finite at parameters of the standard normal distribution"));
+            return Err(wrong("the motion is not finite for parameters of the standard normal distribution"));
         }
         if settings.linear {
             family.linear = Some(Linear { grids: GridCache::default(), standing: family.standing(&times) });
             family.motion(&draws, &times, &mut motion);
             let largest = tried.iter().fold(1e-300_f64, |most, value| most.max(value.abs()));
-            let is_linear =
-                values(&motion).iter().zip(&tried).all(|(by_basis, own)| (by_basis - own).abs() <= LINEAR * largest);
+            let is_linear = values(&motion)
+                .iter()
+                .zip(&tried)
+                .all(|(by_basis, own)| (by_basis - own).abs() <= LINEARITY_TOLERANCE * largest);
             if !is_linear {
                 return Err(wrong(
-                    "linear = true, and its motion is not linear in its parameters (zero at zero): leave it out",
+                    "the motion is not linear in its parameters (or not zero at zero): omit linear = true",
                 ));
             }
         }
         Ok(family)
     }
 
-    /// The motion by the code.
     fn called(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
         out.reset(self.joints, times_s.len());
         self.function.motion(parameters, times_s, out);
     }
 
-    /// The motion of each parameter alone.
     fn columns(&self, times_s: &[f64]) -> Vec<Motion> {
         let of = |column: usize| {
             let mut one = vec![0.0; self.joints * self.parameters];
@@ -129,7 +125,7 @@ impl FunctionFamily {
         (0..self.parameters).map(of).collect()
     }
 
-    /// The parameters whose motion is 1 at all times, by least squares; none where the best is not.
+    /// Parameters of the constant motion 1, by least squares; `None` without such parameters.
     fn standing(&self, times_s: &[f64]) -> Option<Vec<f64>> {
         let columns = self.columns(times_s);
         let mut standing = Vec::new();
@@ -141,7 +137,7 @@ impl FunctionFamily {
             let one = DVector::from_element(times_s.len(), 1.0);
             let found = basis.clone().svd(true, true).solve(&one, 1e-12).ok()?;
             let worst = (&basis * &found - one).amax();
-            if worst.is_nan() || worst >= STANDING {
+            if worst.is_nan() || worst >= CONSTANT_TOLERANCE {
                 return None;
             }
             standing.extend(found.iter());
@@ -149,12 +145,12 @@ impl FunctionFamily {
         Some(standing)
     }
 
-    /// Calls `with` for the basis on the grid, or for each of its pieces and where it begins.
+    /// Calls `with` for the basis on the grid, or for each of its pieces and the index where it begins.
     fn on_grid(&self, linear: &Linear, times_s: &[f64], with: impl FnMut(&SampledBasis, usize)) {
         let sample = |times: &[f64]| {
             let columns = self.columns(times);
             let at = core::cell::Cell::new(0);
-            // Samples come in their order, joint by joint.
+            // Samples are requested in order, joint by joint.
             SampledBasis::new(self.parameters, self.joints, times, |joint, _, out| {
                 let sample = at.get() % times.len();
                 at.set(at.get() + 1);
@@ -220,13 +216,13 @@ impl Family for FunctionFamily {
         if let Some(linear) = &self.linear {
             return self.on_grid(linear, times_s, |basis, from| basis.apply_adjoint(from, adjoint, gradient));
         }
-        // One parameter of every joint at a time: joints do not follow each other's.
+        // One parameter of every joint at a time, because joints are independent.
         let mut moved = parameters.to_vec();
         let mut sides = [Motion::default(), Motion::default()];
         for column in 0..self.parameters {
             let own = || (column..parameters.len()).step_by(self.parameters);
             for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
-                own().for_each(|at| moved[at] = parameters[at] + sign * STEP * (1.0 + parameters[at].abs()));
+                own().for_each(|at| moved[at] = parameters[at] + sign * RELATIVE_STEP * (1.0 + parameters[at].abs()));
                 self.called(&moved, times_s, side);
             }
             own().for_each(|at| moved[at] = parameters[at]);
@@ -247,7 +243,7 @@ impl Family for FunctionFamily {
                         pulls.map(|(pull, (below, above))| pull * (above - below)).sum()
                     })
                     .sum();
-                gradient[at] += pulled / (2.0 * STEP * (1.0 + parameters[at].abs()));
+                gradient[at] += pulled / (2.0 * RELATIVE_STEP * (1.0 + parameters[at].abs()));
             }
         }
     }
@@ -277,7 +273,6 @@ mod tests {
     use super::*;
     use crate::families::{Fourier, FourierSettings, check};
 
-    /// The built-in series as code of a caller.
     #[derive(Debug)]
     struct Series(Fourier);
 
@@ -295,15 +290,14 @@ mod tests {
         (fourier(), linear, FunctionFamily::new(3, 7.0, &settings, Arc::new(Series(fourier()))).unwrap())
     }
 
-    /// The same motion, starts and gradients as the built-in family: to rounding where linear; where differentiated, to
-    /// the 1e-10 or so that central differences of this step leave of a linear function, relative to the largest.
+    /// Same motion, starts and gradients as the built-in family: up to rounding if linear; numerically differentiated
+    /// gradients have an error of about 1e-10, relative to the largest.
     #[test]
     fn the_series_as_code_is_the_series() {
         let (fourier, linear, differentiated) = families();
         let ranges = [[-2.0, 1.0]; 3];
         let start = |family: &dyn Family| family.random(&ranges, &[3.0; 3], &mut Random::new(8));
         let parameters = start(&fourier);
-        // The constant is found by least squares: some 1e-15.
         assert!(parameters.iter().zip(start(&linear)).all(|(a, b)| (a - b).abs() < 1e-12));
         let times: Vec<f64> = (0..50).map(|k| 0.14 * f64::from(k)).collect();
         let mut adjoint = Motion::default();
@@ -331,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_linear_is_not_taken_for_linear() {
+    fn nonlinear_functions_are_detected() {
         #[derive(Debug)]
         struct Shifted;
         impl MotionFunction for Shifted {

@@ -1,4 +1,4 @@
-//! A motion that is known already: samples of a file or of a log.
+//! A known motion: samples of a file or a log.
 
 use super::error::{FamilyError, require};
 use super::polynomials::quintic_hermite;
@@ -8,9 +8,9 @@ use dynident_model::sample::Random;
 
 const NAME: &str = "given";
 
-/// A motion given at samples, as a family without free numbers. Between two samples it is the quintic polynomial that
-/// takes over q, q̇ and q̈ of both, so that these are exact at the samples and continuous everywhere; jerk is the
-/// polynomial's own.
+/// A motion defined by samples, as a family without free parameters. Between two samples it is the quintic polynomial
+/// with q, q̇ and q̈ of both, so that these are exact at the samples and continuous everywhere; the jerk is that of the
+/// polynomial.
 ///
 /// ```
 /// use dynident_excitation::{Family, Motion, families::Given};
@@ -31,10 +31,11 @@ pub struct Given {
 }
 
 impl Given {
-    /// The motion with q, q̇ and q̈ of `samples` at `times_s`, which are counted from the first; jerk is not looked at.
+    /// Creates the motion with q, q̇ and q̈ of `samples` at `times_s`, which are shifted to start at 0; the jerk is not
+    /// used.
     ///
     /// # Errors
-    /// Fewer than two samples, times that do not increase, arrays of other lengths than joints × samples, a number that
+    /// Fewer than two samples, times that do not increase, arrays of other lengths than joints × samples, a value that
     /// is not finite.
     pub fn new(mut times_s: Vec<f64>, samples: Motion) -> Result<Self, FamilyError> {
         let length = |what, expected, found| {
@@ -51,7 +52,7 @@ impl Given {
             }
         }
         for pair in times_s.windows(2) {
-            // False for NaN as well.
+            // The comparison is false for NaN as well.
             require(pair[1] > pair[0], NAME, "time", pair[1], "give times that increase")?;
         }
         let first = times_s[0];
@@ -127,14 +128,13 @@ mod tests {
     use super::*;
     use crate::families::{Fourier, FourierSettings, check};
 
-    /// Samples of a series, read back: exact at samples, and between them as near as the remainder h⁶ max|q⁽⁶⁾| / (720
-    /// · 64) of quintic Hermite interpolation says.
+    /// Interpolates samples of a series: exact at samples, with an error between them below the remainder h⁶ max|q⁽⁶⁾|
+    /// / (720 · 64) of quintic Hermite interpolation.
     #[test]
     fn a_sampled_series_comes_back() {
         let duration = 8.0;
         let series = Fourier::new(2, duration, &FourierSettings::default()).unwrap();
         let parameters = check::start(&series, 4);
-        // Unequal steps, from a time other than zero.
         let own: Vec<f64> = (0..=160).map(|k| f64::from(k) * 0.05 - 0.02 * f64::from(k % 2)).collect();
         let mut samples = Motion::default();
         series.motion(&parameters, &own, &mut samples);
@@ -148,14 +148,14 @@ mod tests {
         let (mut found, mut expected) = (Motion::default(), Motion::default());
         given.motion(&[], &between, &mut found);
         series.motion(&parameters, &between, &mut expected);
-        // Fastest harmonic 5 · 2π/8 = 3.93 rad/s, velocities below 4 rad/s in all: q⁽⁶⁾ below 4 · 3.93⁵ = 3.8e3; h at
-        // most 0.07.
+        // Fastest harmonic 5 · 2π/8 = 3.93 rad/s, velocities below 4 rad/s: q⁽⁶⁾ below 4 · 3.93⁵ = 3.8e3; h at most
+        // 0.07.
         let worst = found.q.iter().zip(&expected.q).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
         assert!(worst < 0.07_f64.powi(6) * 3.8e3 / (720.0 * 64.0), "{worst}");
     }
 
     #[test]
-    fn refuses_what_is_no_motion() {
+    fn rejects_invalid_samples() {
         let motion = |values: usize| Motion {
             samples: 2,
             joints: 1,

@@ -1,4 +1,4 @@
-//! Families one after another in one experiment.
+//! Sequence of families in one experiment.
 
 use super::error::{FamilyError, require};
 use super::polynomials::quintic_hermite;
@@ -10,15 +10,15 @@ use serde::{Deserialize, Serialize};
 
 const NAME: &str = "joined";
 
-/// How a [`JoinedFamily`] family connects its members.
+/// Connections between the members of a [`JoinedFamily`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct JoinedSettings {
-    /// Seconds of each connecting move. Default 2.
+    /// Duration of each connecting move, s. Default 2.
     pub move_s: f64,
-    /// Posture from which the experiment starts at rest, rad (m). Default none: it starts with the first member.
+    /// Posture at rest from which the experiment starts, rad (m). Default: the start of the first member.
     pub start: Option<Vec<f64>>,
-    /// Posture at which the experiment ends at rest. Default none: it ends with the last member.
+    /// Posture at rest at which the experiment ends. Default: the end of the last member.
     pub end: Option<Vec<f64>>,
 }
 
@@ -28,13 +28,13 @@ impl Default for JoinedSettings {
     }
 }
 
-/// Members one after another, with a move between each two, and from and to given postures.
+/// A sequence of members, with a move between each two, and from and to given postures.
 ///
-/// A move is the quintic polynomial that takes over position, velocity and acceleration of both ends (so a plain
-/// periodic series can be joined too); between members at rest it is the minimum-jerk move. Velocity and acceleration
-/// are continuous everywhere if they are within the members.
+/// A move is the quintic polynomial that matches position, velocity and acceleration at both ends, so that a plain
+/// periodic series can be a member too; between members at rest it is the minimum-jerk move. Velocity and acceleration
+/// are continuous everywhere if they are continuous within the members.
 ///
-/// Free numbers: those of the first member (all its joints), of the second, and so on.
+/// Parameters: those of the first member (all its joints), of the second, and so on.
 #[derive(Debug)]
 pub struct JoinedFamily {
     members: Vec<Box<dyn Family>>,
@@ -42,15 +42,14 @@ pub struct JoinedFamily {
     joints: usize,
 }
 
-/// What happens at a time: a member, or the move before member `n` (`n` = number of members: the last move).
+/// A member, or the move before member `n` (`n` = number of members: the last move).
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Piece {
     Member(usize),
     MoveTo(usize),
 }
 
-/// Position, velocity and acceleration of all joints at both ends of one member: `[joint][order][end]` as a [`Motion`]
-/// of two samples.
+/// Position, velocity and acceleration of all joints at both ends of one member, as a [`Motion`] of two samples.
 fn ends_of(member: &dyn Family, parameters: &[f64]) -> Motion {
     let mut ends = Motion::default();
     member.motion(parameters, &[0.0, member.duration_s()], &mut ends);
@@ -58,11 +57,10 @@ fn ends_of(member: &dyn Family, parameters: &[f64]) -> Motion {
 }
 
 impl JoinedFamily {
-    /// The members in this order.
+    /// Creates the sequence.
     ///
     /// # Errors
-    /// No members, members or postures of unequal numbers of joints, a posture that is not finite, or a move without
-    /// time.
+    /// No members, different numbers of joints, a posture that is not finite, or a move without duration.
     pub fn new(members: Vec<Box<dyn Family>>, settings: &JoinedSettings) -> Result<Self, FamilyError> {
         let move_s = settings.move_s;
         require((1e-3..=1e7).contains(&move_s), NAME, "move_s", move_s, "give between a millisecond and 1e7 seconds")?;
@@ -88,12 +86,12 @@ impl JoinedFamily {
         Ok(Self { members, settings: settings.clone(), joints })
     }
 
-    /// From when to when each member runs, in seconds.
+    /// Start and end of each member, s.
     pub fn spans(&self) -> Vec<[f64; 2]> {
         self.pieces().into_iter().filter(|(piece, _)| matches!(piece, Piece::Member(_))).map(|(_, span)| span).collect()
     }
 
-    /// The members.
+    /// The members, in order.
     pub fn members(&self) -> &[Box<dyn Family>] {
         &self.members
     }
@@ -117,7 +115,6 @@ impl JoinedFamily {
         pieces
     }
 
-    /// The samples in each piece, with times from its start.
     fn split(&self, times_s: &[f64]) -> Vec<(Piece, Vec<usize>, Vec<f64>)> {
         let pieces = self.pieces();
         let mut split: Vec<_> = pieces.iter().map(|(piece, _)| (*piece, Vec::new(), Vec::new())).collect();
@@ -130,7 +127,6 @@ impl JoinedFamily {
         split
     }
 
-    /// Each member's free numbers within all of them.
     fn ranges(&self) -> Vec<Range<usize>> {
         let mut from = 0;
         self.members
@@ -143,7 +139,7 @@ impl JoinedFamily {
             .collect()
     }
 
-    /// Boundary values of the move to member `index`, as the six weights of [`quintic_hermite`], for one joint.
+    /// Boundary values of one joint in the move to member `index`, as the six weights of [`quintic_hermite`].
     fn boundary(&self, ends: &[Motion], index: usize, joint: usize) -> [f64; 6] {
         let side = |member: Option<usize>, posture: &Option<Vec<f64>>, last: usize| match member {
             Some(member) => {
@@ -227,7 +223,7 @@ impl Family for JoinedFamily {
         check_shapes(self, parameters, times_s, adjoint, gradient);
         let own = self.ranges();
         let arrays = [&adjoint.q, &adjoint.dq, &adjoint.ddq, &adjoint.dddq];
-        // What the moves pull on both ends of each member.
+        // Adjoint of both ends of each member through the moves.
         let mut ends = vec![Motion::default(); self.members.len()];
         for end in &mut ends {
             end.reset(self.joints, 2);
@@ -257,7 +253,6 @@ impl Family for JoinedFamily {
                             let pull = |weight: usize| -> f64 {
                                 functions[weight].iter().zip(arrays).map(|(f, array)| f * array[from]).sum()
                             };
-                            // The move leaves the end of one member and arrives at the start of the next.
                             for (member, weight, at) in
                                 [(index.checked_sub(1), 0, 2 * joint + 1), (Some(index), 3, 2 * joint)]
                             {
@@ -300,8 +295,8 @@ mod tests {
         family.random(&[[-1.0, 1.0], [-2.0, 0.5]], &[1.0, 2.0], &mut Random::new(seed))
     }
 
-    /// Start and end postures at rest, members where they should be, and no step of q, q̇ or q̈ at any join: a step
-    /// over 2e-9 s is at most rate × 2e-9 (rates here are below 1e3).
+    /// Start and end postures are at rest, members start at the right times, and q, q̇ and q̈ are continuous at every
+    /// join: the change over 2e-9 s is at most rate × 2e-9 (rates here are below 1e3).
     #[test]
     fn joins_are_smooth() {
         let settings = JoinedSettings { move_s: 1.5, start: Some(vec![0.1, 0.2]), end: Some(vec![-0.3, 0.4]) };
@@ -334,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_does_not_fit() {
+    fn rejects_inconsistent_members() {
         let make = |members, settings: &JoinedSettings| JoinedFamily::new(members, settings);
         assert!(make(vec![], &JoinedSettings::default()).is_err());
         assert!(make(members(), &JoinedSettings { move_s: 0.0, ..Default::default() }).is_err());
@@ -348,7 +343,6 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(12))]
         #[test]
         fn exact(seed in any::<u64>(), open in any::<bool>()) {
-            // Moves long enough that the checks' velocities hold.
             let end = (!open).then(|| vec![0.2, -0.1]);
             let mut list = members();
             if let Some(member) = list.get_mut(1) {
@@ -360,7 +354,7 @@ mod tests {
             check::rest(&family, seed);
         }
 
-        /// Members in motion at their ends pull through the moves too.
+        /// Members in motion at their ends have a gradient through the moves too.
         #[test]
         fn gradient_through_moves_in_motion(seed in any::<u64>()) {
             let family = JoinedFamily::new(members(), &JoinedSettings { move_s: 9.0, ..Default::default() }).unwrap();

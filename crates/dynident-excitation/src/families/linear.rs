@@ -7,35 +7,36 @@ use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 
-/// The functions of time B_c(t) of one joint, q(t) = Σ_c p_c B_c(t), of a [`LinearFamily`].
+/// Basis functions of time B_c(t) of one joint, q(t) = Σ_c p_c B_c(t), of a [`LinearFamily`].
 pub trait Basis: core::fmt::Debug + Send + Sync {
-    /// The family's name.
+    /// Name of the family.
     const NAME: &'static str;
 
-    /// Number of functions: free numbers a joint.
+    /// Number of functions, equal to the number of parameters per joint.
     fn columns(&self) -> usize;
 
-    /// Whether joints have different functions (else all share those of joint 0).
+    /// Whether joints have different functions; otherwise all use those of joint 0.
     fn differs_by_joint(&self) -> bool {
         false
     }
 
-    /// Value, first, second and third derivative of every function at `time_s` for a joint; `out` comes zeroed.
+    /// Computes the value and the first three derivatives of every function at `time_s` for a joint; `out` is
+    /// initialised to zero.
     fn row(&self, joint: usize, time_s: f64, out: &mut [[f64; 4]]);
 
-    /// The parameters of the motion that stands still at 1.
+    /// Parameters of the constant motion 1.
     fn standing(&self) -> Vec<f64>;
 
-    /// A random shape, of any size.
+    /// Random shape of arbitrary size.
     fn shape(&self, random: &mut Random) -> Vec<f64> {
         (0..self.columns()).map(|_| random.normal()).collect()
     }
 }
 
-/// A family linear in its parameters: joint after joint, the weights of its [`Basis`].
+/// A family that is linear in its parameters: joint after joint, the weights of its [`Basis`].
 ///
-/// The functions are sampled once per grid of times and kept, so that motion and gradient are two small matrix
-/// products. A grid is recognised by its times, so optimisers should ask again for the same ones.
+/// The functions are sampled once per grid of times and stored, so that motion and gradient are two small matrix
+/// products. A grid is recognised by its times, so optimisers should use the same grids repeatedly.
 #[derive(Clone, Debug)]
 pub struct LinearFamily<B> {
     basis: B,
@@ -49,17 +50,16 @@ impl<B: Basis> LinearFamily<B> {
         Self { basis, joints, duration_s, grids: GridCache::default() }
     }
 
-    /// The functions of time.
+    /// The basis functions.
     pub fn basis(&self) -> &B {
         &self.basis
     }
 
-    /// Sets of functions that differ.
     fn sets(&self) -> usize {
         if self.basis.differs_by_joint() { self.joints } else { 1 }
     }
 
-    /// Calls `with` for the basis on the grid, or for each of its pieces and where it begins.
+    /// Calls `with` for the basis on the grid, or for each of its pieces and the index where it begins.
     fn on_grid(&self, times_s: &[f64], with: impl FnMut(&SampledBasis, usize)) {
         let (columns, sets) = (self.basis.columns(), self.sets());
         let sample = |times: &[f64]| {

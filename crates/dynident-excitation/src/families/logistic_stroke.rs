@@ -1,4 +1,4 @@
-//! One logistic stroke that is exactly at rest outside its window.
+//! A logistic stroke with exact rest outside its window.
 
 use dynident_lanes::Scalar;
 
@@ -6,30 +6,30 @@ use dynident_lanes::Scalar;
 ///
 /// s(t) = 1/(1 + e^-φ), φ = κ u/(1 - u²), u = (t - c)/w,
 ///
-/// times an amplitude, from 0 at t = c - w to 1 at t = c + w. φ runs to ±∞ at the window's ends, so that s reaches 0
-/// and 1 there with **all** derivatives zero: the exact soft start and stop that Eq. 11 of the paper asks for. Around
-/// the middle φ = ω (t - c) with ω = κ/w: the paper's stroke of that steepness (peak velocity Aω/4), which it becomes
-/// everywhere as κ grows. κ = 2√3 has the flattest velocity at the middle; κ near 4 resembles a minimum-jerk move.
-///
-/// φ(u) can be inverted in closed form, so position still determines velocity and acceleration.
+/// multiplied by an amplitude, from 0 at t = c - w to 1 at t = c + w. φ tends to ±∞ at the ends of the window, so that
+/// s reaches 0 and 1 there with **all** derivatives zero: the exact soft start and stop that Eq. 11 of the paper
+/// requires. Around the middle φ = ω (t - c) with ω = κ/w: the paper's stroke of that steepness (peak velocity Aω/4),
+/// which is the limit everywhere for large κ. κ = 2√3 has the flattest velocity at the middle; κ near 4 is similar to a
+/// minimum-jerk move.
+/// The inverse of φ(u) has a closed form, so position still determines velocity and acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogisticStroke {
-    /// Way from start to end, rad (m).
+    /// Distance from start to end, rad (m).
     pub amplitude: f64,
     /// Middle of the window, s.
     pub centre_s: f64,
-    /// Half the window's length w, s.
+    /// Half duration w of the window, s.
     pub half_duration_s: f64,
-    /// κ.
+    /// Sharpness κ.
     pub sharpness: f64,
 }
 
-/// Beyond this |u| every κ >= 2√3 has φ > 3500, where e^-φ is zero in double precision: s and all its derivatives are
-/// exact there.
-pub(super) const LAST: f64 = 1.0 - 1.0 / 2048.0;
+/// For larger |u| every κ >= 2√3 has φ > 3500, where e^-φ is zero in double precision: s and all its derivatives are
+/// exact.
+pub(super) const MAX_WARP: f64 = 1.0 - 1.0 / 2048.0;
 
 impl LogisticStroke {
-    /// The least κ: the velocity has its one peak at the middle.
+    /// Minimum κ, above which the velocity has a single peak in the middle.
     pub const LEAST_SHARPNESS: f64 = 3.464_101_615_137_755;
 
     /// The steepness ω = κ/w in 1/s, the paper's ω.
@@ -37,9 +37,9 @@ impl LogisticStroke {
         self.sharpness / self.half_duration_s
     }
 
-    /// u, held inside the part where anything happens.
+    /// Normalised time u, limited to the range in which the stroke moves.
     pub(super) fn warped(&self, time_s: f64) -> f64 {
-        ((time_s - self.centre_s) / self.half_duration_s).clamp(-LAST, LAST)
+        ((time_s - self.centre_s) / self.half_duration_s).clamp(-MAX_WARP, MAX_WARP)
     }
 
     /// Derivatives of q, q̇, q̈ and jerk at a time by (amplitude, centre, half duration, sharpness).
@@ -51,7 +51,7 @@ impl LogisticStroke {
         let inverse = 1.0 / self.half_duration_s;
         let mut scale = 1.0;
         core::array::from_fn(|order| {
-            // Moving the middle by dc is -du·w; stretching by dw scales u: order n gains -(u S_{n+1} + n S_n)/w.
+            // A shift of the middle by dc is -du·w; a change of w scales u: order n gets -(u S_{n+1} + n S_n)/w.
             let stretched = u * unit.value[order + 1] + order as f64 * unit.value[order];
             let sized = self.amplitude * scale;
             let row = [
@@ -90,8 +90,8 @@ pub(super) fn warp<T: Scalar>(u: T) -> [T; 5] {
     psi
 }
 
-/// The unit stroke by Taylor arithmetic from its [`warp`], given the logistic function's value at κψ and its derivative
-/// there.
+/// The unit stroke by Taylor arithmetic from its [`warp`], given the value and the derivative of the logistic function
+/// at κψ.
 #[inline(always)]
 pub(super) fn unit_stroke<T: Scalar>(psi: &[T; 5], sharpness: T, value: T, bell: T) -> StrokeDerivatives<T> {
     let two = T::splat(2.0);
@@ -121,7 +121,7 @@ pub(super) fn unit_stroke<T: Scalar>(psi: &[T; 5], sharpness: T, value: T, bell:
             k[n] = p[i].mul_add(psi[n - i], k[n]);
         }
     }
-    // No closures here: they would not be compiled for the wide registers.
+    // No closures here, because they would not be compiled for wide registers.
     let factorials = [1.0, 1.0, 2.0, 6.0, 24.0];
     for n in 2..5 {
         s[n] = s[n] * T::splat(factorials[n]);
@@ -132,7 +132,7 @@ pub(super) fn unit_stroke<T: Scalar>(psi: &[T; 5], sharpness: T, value: T, bell:
     StrokeDerivatives { value: s, by_sharpness: k }
 }
 
-/// 1/(1 + e^-φ) and its derivative, neither losing digits far from the middle.
+/// 1/(1 + e^-φ) and its derivative, accurate far from the middle.
 #[inline(always)]
 pub(super) fn logistic_and_bell(phi: f64) -> (f64, f64) {
     let e = (-phi.abs()).exp();
@@ -167,9 +167,9 @@ mod tests {
     }
 
     #[test]
-    fn nothing_moves_outside_the_window() {
+    fn the_stroke_rests_outside_the_window() {
         for sharpness in [LogisticStroke::LEAST_SHARPNESS, 4.0, 40.0] {
-            for (u, end) in [(-LAST, 0.0), (LAST, 1.0)] {
+            for (u, end) in [(-MAX_WARP, 0.0), (MAX_WARP, 1.0)] {
                 let stroke = plain_stroke(u, sharpness);
                 assert_eq!(stroke.value, [end, 0.0, 0.0, 0.0, 0.0]);
                 assert_eq!(stroke.by_sharpness, [0.0; 4]);
@@ -177,14 +177,13 @@ mod tests {
         }
     }
 
-    /// A sharp stroke is the paper's: around the middle φ = ωt (1 + u² + ..), and ωt = 8 lies at u = 8/κ, so the
-    /// relative change of φ is (8/κ)².
+    /// A sharp stroke approximates the paper's: around the middle φ = ωt (1 + u² + ..), and ωt = 8 is at u = 8/κ, so
+    /// that the relative change of φ is (8/κ)².
     #[test]
     fn large_sharpness_is_the_papers_stroke() {
         let stroke = LogisticStroke { amplitude: 2.0, centre_s: 0.0, half_duration_s: 1e5, sharpness: 1e5 };
         for time in [-8.0_f64, -2.0, 0.0, 1.0, 5.0] {
             let gone = 2.0 / (1.0 + (-time).exp());
-            // By the amplitude: order by order the stroke itself, over 2 rad.
             let [q, dq, ddq, _] = stroke.derivatives_by_shape(time).map(|row| 2.0 * row[0]);
             assert!((q - gone).abs() < 1e-7);
             assert!((dq - 0.5 * gone * (2.0 - gone)).abs() < 1e-7);
@@ -193,8 +192,8 @@ mod tests {
     }
 
     proptest! {
-        /// Dual numbers through the same arithmetic: each order's derivative is the next order, and the one by κ is
-        /// ∂/∂κ. 1e-11 of the sizes that Taylor coefficients reach near the window's ends.
+        /// Dual numbers through the same arithmetic: the derivative of each order is the next order, and that by κ is
+        /// ∂/∂κ. Tolerance 1e-11 of the sizes that Taylor coefficients reach near the ends of the window.
         #[test]
         fn orders_derive_each_other(u in -0.97_f64..0.97, sharpness in 3.4642_f64..30.0) {
             let plain = plain_stroke(u, sharpness);

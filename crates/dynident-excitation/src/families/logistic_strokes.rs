@@ -1,47 +1,47 @@
-//! Any number of logistic strokes a joint, all joints at once, exactly at rest at both ends.
+//! Several logistic strokes per joint, all joints at once, with exact rest at both ends.
 
-use super::error::{FamilyError, MOST, require, require_frame};
-use super::logistic_stroke::{LAST, LogisticStroke, StrokeDerivatives, logistic_and_bell, unit_stroke, warp};
+use super::error::{FamilyError, MAX_COUNT, require, require_frame};
+use super::logistic_lanes::{Backward, Forward};
+use super::logistic_stroke::LogisticStroke;
 use super::random_start::{grid, scale_and_shift};
-use super::sampled_basis::{load_some, store_some};
 use crate::family::{Family, check_shapes};
 use crate::motion::{Motion, MotionAdjoint};
-use dynident_lanes::{Kernel, Lane, Level, dispatch};
+use dynident_lanes::{Level, dispatch};
 use dynident_model::sample::Random;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "logistic_strokes";
-/// The sharpest spliced stroke.
-const MOST_SHARPNESS: f64 = 40.0;
-/// Bound of the logarithm of a slot's length against the last slot's.
-const MOST_LOG_SLOT: f64 = 3.0;
+const MAX_SHARPNESS: f64 = 40.0;
+/// Bound of the logarithm of the length of a slot relative to the last slot.
+const MAX_LOG_SLOT: f64 = 3.0;
 
-/// How the strokes of one joint lie in time.
+/// Order of the strokes of one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum StrokeOrder {
-    /// A sum of strokes anywhere within the duration: more information, no map from position to velocity.
+    /// A sum of strokes anywhere within the duration: more information, but position does not determine velocity.
     Overlapping,
-    /// One after another in slots of free length that fill the duration: the map holds on every stroke.
+    /// One after another in slots of free length that fill the duration: position determines velocity on every stroke.
     Spliced,
 }
 
-/// What a [`LogisticStrokes`] family is made of.
+/// Settings of a [`LogisticStrokes`] family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct LogisticStrokesSettings {
-    /// Strokes a joint, K. Default 6.
+    /// Number of strokes per joint, K. Default 6.
     pub strokes: usize,
-    /// How they lie in time. Default overlapping.
+    /// Order of the strokes. Default overlapping.
     pub order: StrokeOrder,
-    /// The motion ends where it began. Default true.
+    /// Whether the motion ends at its start position. Default true.
     pub returns: bool,
-    /// κ of overlapping strokes, from 2√3 to 40; see [`LogisticStroke`]. Default 4. Spliced strokes have it free.
+    /// κ of overlapping strokes, from 2√3 to 40; see [`LogisticStroke`]. Default 4. A free parameter for spliced
+    /// strokes.
     pub sharpness: f64,
-    /// Largest steepness ω of overlapping strokes in 1/s. Default 15.
+    /// Maximum steepness ω of overlapping strokes, 1/s. Default 15.
     pub omega_max: f64,
 }
 
@@ -52,17 +52,17 @@ impl Default for LogisticStrokesSettings {
 }
 
 impl LogisticStrokesSettings {
-    /// Checks the settings for a duration.
+    /// Checks the settings for a duration (s).
     ///
     /// # Errors
-    /// Too few strokes (1, or 2 if the motion returns) or more than 1000, κ outside its range, or a largest ω too small
-    /// for one stroke to fit into the duration.
+    /// Too few strokes (1, or 2 if the motion returns) or more than 1000, κ out of range, or a maximum ω too small for
+    /// one stroke to fit into the duration.
     pub fn validate(&self, duration_s: f64) -> Result<(), FamilyError> {
         let least = if self.returns { 2 } else { 1 };
         let fix = "give 1 to 1000, and at least 2 if the motion returns to its start";
-        require((least..=MOST).contains(&self.strokes), NAME, "strokes", self.strokes as f64, fix)?;
+        require((least..=MAX_COUNT).contains(&self.strokes), NAME, "strokes", self.strokes as f64, fix)?;
         require(
-            (LogisticStroke::LEAST_SHARPNESS..=MOST_SHARPNESS).contains(&self.sharpness),
+            (LogisticStroke::LEAST_SHARPNESS..=MAX_SHARPNESS).contains(&self.sharpness),
             NAME,
             "sharpness",
             self.sharpness,
@@ -78,17 +78,18 @@ impl LogisticStrokesSettings {
     }
 }
 
-/// q(t) = h + Σ_k A_k s_k(t) with [`LogisticStroke`]s: the generalisation of the paper's Eq. 14 to strokes of unequal
-/// amplitude, steepness and time, all joints moving at once.
+/// q(t) = h + Σ_k A_k s_k(t) with [`LogisticStroke`]s: a generalisation of the paper's Eq. 14 to strokes of unequal
+/// amplitude, steepness and time, with all joints moving at once.
 ///
-/// Free numbers a joint, in this order:
-/// * overlapping: h, A_1..A_K (without A_K, which closes the sum, if the motion returns), ω_1..ω_K in 1/s, places
-///   τ_1..τ_K from 0 (stroke begins with the motion) to 1 (ends with it). 3 K numbers if it returns.
-/// * spliced: h, A_1..A_K (ditto), κ_1..κ_K, logarithms of the lengths of slots 1..K-1 against the last slot's. 3 K - 1
-///   numbers if it returns.
+/// Parameters per joint, in this order:
+/// * overlapping: h, A_1..A_K (without A_K, which closes the sum, if the motion returns), ω_1..ω_K in 1/s, positions
+///   τ_1..τ_K in time from 0 (the stroke begins with the motion) to 1 (it ends with the motion). 3 K parameters if the
+///   motion returns.
+/// * spliced: h, A_1..A_K (as above), κ_1..κ_K, logarithms of the lengths of slots 1..K-1 relative to the last slot. 3
+///   K - 1 parameters if the motion returns.
 ///
-/// Every value within [`bounds`](Family::bounds) keeps all strokes within the duration, so both ends are exactly at
-/// rest, with all derivatives zero.
+/// Every value within [`bounds`](Family::bounds) keeps all strokes within the duration, so that both ends are exactly
+/// at rest, with all derivatives zero.
 #[derive(Clone, Debug)]
 pub struct LogisticStrokes {
     settings: LogisticStrokesSettings,
@@ -97,22 +98,22 @@ pub struct LogisticStrokes {
 }
 
 impl LogisticStrokes {
-    /// The family for so many joints and seconds.
+    /// Creates the family for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// Settings without meaning; see [`LogisticStrokesSettings::validate`].
+    /// Invalid settings; see [`LogisticStrokesSettings::validate`].
     pub fn new(joints: usize, duration_s: f64, settings: &LogisticStrokesSettings) -> Result<Self, FamilyError> {
         require_frame(NAME, joints, duration_s)?;
         settings.validate(duration_s)?;
         Ok(Self { settings: settings.clone(), joints, duration_s })
     }
 
-    /// The strokes of one joint, in the order of the parameters; the motion starts at the returned position.
+    /// Start position and strokes of one joint, in the order of the parameters.
     ///
     /// # Panics
-    /// If the joint or the parameters do not exist.
+    /// If the joint does not exist or there are too few parameters.
     pub fn strokes(&self, parameters: &[f64], joint: usize) -> (f64, Vec<LogisticStroke>) {
-        let own = &parameters[joint * self.each()..(joint + 1) * self.each()];
+        let own = &parameters[joint * self.parameters_per_joint()..(joint + 1) * self.parameters_per_joint()];
         let (count, free) = (self.settings.strokes, self.free_amplitudes());
         let amplitudes = &own[1..=free];
         let (third, fourth) = own[1 + free..].split_at(count);
@@ -143,13 +144,12 @@ impl LogisticStrokes {
         self.settings.strokes - usize::from(self.settings.returns)
     }
 
-    /// Free numbers a joint.
-    fn each(&self) -> usize {
+    fn parameters_per_joint(&self) -> usize {
         let slots = self.settings.strokes - usize::from(self.settings.order == StrokeOrder::Spliced);
         1 + self.free_amplitudes() + self.settings.strokes + slots
     }
 
-    /// Lengths of the slots from their logarithms, the last one's being zero.
+    /// Lengths of the slots, s, from their logarithms; that of the last slot is zero.
     fn slots(&self, logarithms: &[f64]) -> Vec<f64> {
         let mut lengths: Vec<f64> = logarithms.iter().map(|x| x.exp()).collect();
         lengths.resize(self.settings.strokes, 1.0);
@@ -160,7 +160,7 @@ impl LogisticStrokes {
         lengths
     }
 
-    /// From derivatives by (A, c, w, κ) of each stroke to derivatives by the joint's free numbers after h.
+    /// Converts derivatives by (A, c, w, κ) of each stroke to derivatives by the joint's parameters after h.
     fn chain(&self, own: &[f64], raw: &[[f64; 4]], gradient: &mut [f64]) {
         let (count, free) = (self.settings.strokes, self.free_amplitudes());
         let closing = if free < count { raw[free][0] } else { 0.0 };
@@ -180,7 +180,7 @@ impl LogisticStrokes {
             }
             StrokeOrder::Spliced => {
                 let lengths = self.slots(fourth);
-                // A slot's length moves its own middle by half, and every later one.
+                // The length of a slot shifts its own middle by half, and all later middles.
                 let mut later = 0.0;
                 let mut by_length = vec![0.0; count];
                 for k in (0..count).rev() {
@@ -194,137 +194,6 @@ impl LogisticStrokes {
                 }
             }
         }
-    }
-}
-
-/// Whether a chunk of samples lies before a stroke, after it, or sees it move.
-enum Chunk<T> {
-    Before,
-    After,
-    Within(T),
-}
-
-#[inline(always)]
-fn chunk_of<T: Lane>(stroke: &LogisticStroke, times: &[f64]) -> Chunk<T> {
-    let mut warped = [LAST; 8];
-    let (mut least, mut most) = (LAST, -LAST);
-    for (u, &time) in warped.iter_mut().zip(times) {
-        *u = stroke.warped(time);
-        (least, most) = (least.min(*u), most.max(*u));
-    }
-    if least >= LAST {
-        Chunk::After
-    } else if most <= -LAST {
-        Chunk::Before
-    } else {
-        Chunk::Within(T::load(&warped))
-    }
-}
-
-#[inline(always)]
-fn lanes_stroke<T: Lane>(u: T, sharpness: f64) -> StrokeDerivatives<T> {
-    let (psi, kappa) = (warp(u), T::splat(sharpness));
-    let (mut values, mut bells) = ([0.0; 8], [0.0; 8]);
-    (kappa * psi[0]).store(&mut values);
-    for lane in 0..T::LANES {
-        (values[lane], bells[lane]) = logistic_and_bell(values[lane]);
-    }
-    unit_stroke(&psi, kappa, T::load(&values), T::load(&bells))
-}
-
-struct Forward<'a> {
-    strokes: &'a [LogisticStroke],
-    start_at: f64,
-    times_s: &'a [f64],
-    joint: usize,
-    out: &'a mut Motion,
-}
-
-impl Kernel for Forward<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<T: Lane>(self) {
-        let Self { strokes, start_at, times_s, joint, out } = self;
-        let start = out.of(joint).start;
-        for (index, times) in times_s.chunks(T::LANES).enumerate() {
-            let at = start + index * T::LANES;
-            let mut sums = [T::splat(start_at), T::ZERO, T::ZERO, T::ZERO];
-            for stroke in strokes {
-                match chunk_of::<T>(stroke, times) {
-                    Chunk::Before => {}
-                    Chunk::After => sums[0] += T::splat(stroke.amplitude),
-                    Chunk::Within(u) => {
-                        let unit = lanes_stroke(u, stroke.sharpness);
-                        let (mut scale, inverse) = (stroke.amplitude, 1.0 / stroke.half_duration_s);
-                        for order in 0..4 {
-                            sums[order] = unit.value[order].mul_add(T::splat(scale), sums[order]);
-                            scale *= inverse;
-                        }
-                    }
-                }
-            }
-            store_some(sums[0], &mut out.q, at, times.len());
-            store_some(sums[1], &mut out.dq, at, times.len());
-            store_some(sums[2], &mut out.ddq, at, times.len());
-            store_some(sums[3], &mut out.dddq, at, times.len());
-        }
-    }
-}
-
-struct Backward<'a> {
-    strokes: &'a [LogisticStroke],
-    times_s: &'a [f64],
-    joint: usize,
-    adjoint: &'a MotionAdjoint,
-}
-
-impl Kernel for Backward<'_> {
-    /// Derivatives by (A, c, w, κ) of each stroke.
-    type Output = Vec<[f64; 4]>;
-    #[inline(always)]
-    fn run<T: Lane>(self) -> Vec<[f64; 4]> {
-        let Self { strokes, times_s, joint, adjoint } = self;
-        let start = adjoint.of(joint).start;
-        let mut sums = vec![[T::ZERO; 4]; strokes.len()];
-        for (index, times) in times_s.chunks(T::LANES).enumerate() {
-            let at = start + index * T::LANES;
-            let pulls: [T; 4] = [
-                load_some(&adjoint.q, at, times.len()),
-                load_some(&adjoint.dq, at, times.len()),
-                load_some(&adjoint.ddq, at, times.len()),
-                load_some(&adjoint.dddq, at, times.len()),
-            ];
-            for (stroke, sum) in strokes.iter().zip(&mut sums) {
-                match chunk_of::<T>(stroke, times) {
-                    Chunk::Before => {}
-                    Chunk::After => sum[0] += pulls[0],
-                    Chunk::Within(u) => {
-                        let unit = lanes_stroke(u, stroke.sharpness);
-                        let inverse = T::splat(1.0 / stroke.half_duration_s);
-                        let mut scale = T::ONE;
-                        // Moving the middle by dc is -du·w; stretching by dw scales u: order n gains -(u S_{n+1} + n
-                        // S_n)/w.
-                        let mut local = [T::ZERO; 4];
-                        for order in 0..4 {
-                            let pull = pulls[order] * scale;
-                            let stretched =
-                                u.mul_add(unit.value[order + 1], T::splat(order as f64) * unit.value[order]);
-                            local[0] = pull.mul_add(unit.value[order], local[0]);
-                            local[1] = pull.neg_mul_add(unit.value[order + 1], local[1]);
-                            local[2] = pull.neg_mul_add(stretched, local[2]);
-                            local[3] = pull.mul_add(unit.by_sharpness[order], local[3]);
-                            scale = scale * inverse;
-                        }
-                        let amplitude = T::splat(stroke.amplitude);
-                        sum[0] += local[0];
-                        sum[1] += local[1] * amplitude * inverse;
-                        sum[2] += local[2] * amplitude * inverse;
-                        sum[3] += local[3] * amplitude;
-                    }
-                }
-            }
-        }
-        sums.iter().map(|sum| sum.map(Lane::sum)).collect()
     }
 }
 
@@ -342,24 +211,22 @@ impl Family for LogisticStrokes {
     }
 
     fn parameters(&self) -> usize {
-        self.joints * self.each()
+        self.joints * self.parameters_per_joint()
     }
 
-    /// Overlapping: ω from the one stroke that fills the duration to the largest, places from 0 to 1. Spliced: κ from
-    /// 2√3 to 40, slots up to e³ times as long as the last or as short.
+    /// Overlapping: ω from that of a stroke over the whole duration to the maximum, positions in time from 0 to 1.
+    /// Spliced: κ from 2√3 to 40, slots up to e³ times longer or shorter than the last.
     fn bounds(&self) -> Vec<[f64; 2]> {
         let count = self.settings.strokes;
         let (third, fourth) = match self.settings.order {
             StrokeOrder::Overlapping => {
                 ([2.0 * self.settings.sharpness / self.duration_s, self.settings.omega_max], [0.0, 1.0])
             }
-            StrokeOrder::Spliced => {
-                ([LogisticStroke::LEAST_SHARPNESS, MOST_SHARPNESS], [-MOST_LOG_SLOT, MOST_LOG_SLOT])
-            }
+            StrokeOrder::Spliced => ([LogisticStroke::LEAST_SHARPNESS, MAX_SHARPNESS], [-MAX_LOG_SLOT, MAX_LOG_SLOT]),
         };
         let mut own = vec![[f64::NEG_INFINITY, f64::INFINITY]; 1 + self.free_amplitudes()];
         own.resize(own.len() + count, third);
-        own.resize(self.each(), fourth);
+        own.resize(self.parameters_per_joint(), fourth);
         own.repeat(self.joints)
     }
 
@@ -367,20 +234,19 @@ impl Family for LogisticStrokes {
         let (count, free) = (self.settings.strokes, self.free_amplitudes());
         let bounds = self.bounds();
         let mut parameters = Vec::with_capacity(self.parameters());
-        for own in bounds.chunks(self.each()) {
+        for own in bounds.chunks(self.parameters_per_joint()) {
             parameters.push(0.0);
             parameters.extend((0..free).map(|_| random.normal()));
             let [least, most] = own[1 + free];
-            // Slow strokes first of all: their size is what the limits allow.
+            // Starts with slow strokes, whose size the limits allow.
             let most = most.min(6.0 * least);
             parameters.extend((0..count).map(|_| least * (most / least).powf(random.uniform(0.0, 1.0))));
             let [low, high] = match self.settings.order {
                 StrokeOrder::Overlapping => [0.0, 1.0],
                 StrokeOrder::Spliced => [-0.5, 0.5],
             };
-            parameters.extend((1 + free + count..self.each()).map(|_| random.uniform(low, high)));
+            parameters.extend((1 + free + count..self.parameters_per_joint()).map(|_| random.uniform(low, high)));
         }
-        // Finely enough that no stroke hides between the times.
         let coarse = grid(self.duration_s);
         let times: Vec<f64> = coarse
             .windows(2)
@@ -388,7 +254,7 @@ impl Family for LogisticStrokes {
             .collect();
         let mut motion = Motion::default();
         self.motion(&parameters, &times, &mut motion);
-        for (joint, own) in parameters.chunks_mut(self.each()).enumerate() {
+        for (joint, own) in parameters.chunks_mut(self.parameters_per_joint()).enumerate() {
             let span = motion.of(joint);
             let [scale, shift] =
                 scale_and_shift(&motion.q[span.clone()], &motion.dq[span], ranges[joint], speeds[joint], random);
@@ -409,12 +275,12 @@ impl Family for LogisticStrokes {
 
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         check_shapes(self, parameters, times_s, adjoint, gradient);
-        let each = self.each();
-        for (joint, own) in gradient.chunks_mut(each).enumerate() {
+        let parameters_per_joint = self.parameters_per_joint();
+        for (joint, own) in gradient.chunks_mut(parameters_per_joint).enumerate() {
             let (_, strokes) = self.strokes(parameters, joint);
             let raw = dispatch(Level::detect(), Backward { strokes: &strokes, times_s, joint, adjoint });
             own[0] += adjoint.q[adjoint.of(joint)].iter().sum::<f64>();
-            self.chain(&parameters[joint * each..(joint + 1) * each], &raw, own);
+            self.chain(&parameters[joint * parameters_per_joint..(joint + 1) * parameters_per_joint], &raw, own);
         }
     }
 
@@ -427,12 +293,12 @@ impl Family for LogisticStrokes {
         out: &mut DMatrix<f64>,
     ) -> bool {
         assert_eq!((weights.joints, weights.samples), (self.joints, times_s.len()), "weights of {NAME}");
-        let each = self.each();
-        let own = &parameters[joint * each..(joint + 1) * each];
+        let parameters_per_joint = self.parameters_per_joint();
+        let own = &parameters[joint * parameters_per_joint..(joint + 1) * parameters_per_joint];
         let (_, strokes) = self.strokes(parameters, joint);
         let range = weights.of(joint);
         let arrays = [&weights.q, &weights.dq, &weights.ddq, &weights.dddq].map(|array| &array[range.clone()]);
-        let (mut raw, mut row) = (vec![[[0.0; 4]; 4]; strokes.len()], DVector::zeros(each));
+        let (mut raw, mut row) = (vec![[[0.0; 4]; 4]; strokes.len()], DVector::zeros(parameters_per_joint));
         for (sample, &time) in times_s.iter().enumerate() {
             if arrays.iter().all(|array| array[sample] == 0.0) {
                 continue;
@@ -494,7 +360,7 @@ mod tests {
             check::curvature(&family, seed);
         }
 
-        /// Not nearly at rest but exactly, jerk included; and back at the start up to rounding of the sum.
+        /// Rest is exact, including jerk, and the motion returns to its start up to rounding of the sum.
         #[test]
         fn rests_exactly(seed in any::<u64>(), strokes in 2_usize..7, order in orders()) {
             let family = family(strokes, order, true);

@@ -1,20 +1,20 @@
-//! The trajectory families, one file each.
+//! Trajectory families, one file each.
 //!
-//! | family | free numbers a joint | at rest at the ends |
+//! | family | parameters per joint | at rest at the ends |
 //! | --- | --- | --- |
 //! | [`SplicedLogistic`]: the paper's Eqs. 12 to 14 | 2 or 3 | nearly (e^-10) |
-//! | [`LogisticStrokes`]: strokes with overlap, or one after another | 3 K or 3 K - 1 | exactly |
-//! | [`Fourier`]: H harmonics | 2 H + 1, at rest 2 H - 1 | by choice |
-//! | [`Quintic`]: piecewise through M waypoints | M - 1, free rates 3 M - 5 | exactly |
+//! | [`LogisticStrokes`]: overlapping or consecutive strokes | 3 K or 3 K - 1 | exactly |
+//! | [`Fourier`]: H harmonics | 2 H + 1, at rest 2 H - 1 | optional |
+//! | [`Quintic`]: piecewise through M waypoints | M - 1, with free rates 3 M - 5 | exactly |
 //! | [`BSpline`]: degree 5, n control points | n - 5 | exactly |
 //! | [`Multisine`]: Schroeder phases | 2 | with ramps |
 //! | [`FrictionLadder`]: constant-velocity sweeps | 2 | exactly |
-//! | [`StaticPostures`]: K postures held | K | exactly |
+//! | [`StaticPostures`]: K held postures | K | exactly |
 //! | [`StepWiseLogistic`]: spliced logistic functions, one joint after another | 2 | nearly (e^-10) |
-//! | [`JoinedFamily`]: families one after another | sum | as its members |
-//! | [`StartingAt`]: a family moved to a start posture | as the family | as the family |
-//! | [`Given`]: a motion that is known already | none | as it is |
-//! | [`FunctionFamily`]: a caller's own code | as it says | as it is |
+//! | [`JoinedFamily`]: a sequence of families | sum | as its members |
+//! | [`StartingAt`]: a family shifted to a start posture | as the family | as the family |
+//! | [`Given`]: a known motion | 0 | as the motion |
+//! | [`FunctionFamily`]: a user's function | as the function | as the function |
 
 mod b_spline;
 #[cfg(test)]
@@ -26,6 +26,7 @@ mod function;
 mod given;
 mod joined;
 mod linear;
+mod logistic_lanes;
 mod logistic_stroke;
 mod logistic_strokes;
 mod multisine;

@@ -1,6 +1,6 @@
 //! Multisines with Schroeder's phases.
 
-use super::error::{FamilyError, MOST, require, require_frame};
+use super::error::{FamilyError, MAX_COUNT, require, require_frame};
 use super::linear::{Basis, LinearFamily};
 use super::polynomials::smooth_step;
 use core::f64::consts::{PI, TAU};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 const NAME: &str = "multisine";
 
-/// What a [`Multisine`] family is made of.
+/// Settings of a [`Multisine`] family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -18,7 +18,7 @@ pub struct MultisineSettings {
     pub harmonics: usize,
     /// Periods between the ramps. Default 1.
     pub periods: usize,
-    /// Seconds at each end in which the motion fades in and out; 0 gives the plain periodic multisine. Default 1.
+    /// Fade-in and fade-out time at each end, s; 0 selects the plain periodic multisine. Default 1.
     pub ramp_s: f64,
 }
 
@@ -29,13 +29,13 @@ impl Default for MultisineSettings {
 }
 
 impl MultisineSettings {
-    /// Checks the settings for a duration.
+    /// Checks the settings for a duration (s).
     ///
     /// # Errors
     /// No harmonics or periods, more than 1000 of either, or ramps that leave no time between them.
     pub fn validate(&self, duration_s: f64) -> Result<(), FamilyError> {
         for (setting, value) in [("harmonics", self.harmonics), ("periods", self.periods)] {
-            require((1..=MOST).contains(&value), NAME, setting, value as f64, "give 1 to 1000")?;
+            require((1..=MAX_COUNT).contains(&value), NAME, setting, value as f64, "give 1 to 1000")?;
         }
         require(
             (self.ramp_s == 0.0 || self.ramp_s >= 1e-3) && 2.0 * self.ramp_s < duration_s,
@@ -49,19 +49,19 @@ impl MultisineSettings {
 
 /// q_j(t) = q0_j + A_j w(t) m(t + jP/n), m' = √(2/N) Σ_k cos(kωt + φ_k), with Schroeder's phases φ_k = -π k (k - 1)/N,
 ///
-/// ω = 2π/P, P the period between the ramps, n joints. The velocity has a flat spectrum and a low crest factor; A_j is
-/// its rms in rad/s (m/s). Joints are shifted in time against each other, since equal motions of two joints would not
-/// distinguish their parameters apart.
+/// ω = 2π/P, P is the period between the ramps, n the number of joints. The velocity has a flat spectrum and a low
+/// crest factor; A_j is its rms in rad/s (m/s). The joints are shifted in time relative to each other, because equal
+/// motions of two joints would not distinguish their parameters.
 ///
 /// w fades in and out over the ramps with three vanishing derivatives, so that both ends are exactly at rest; between
-/// the ramps whole periods pass unchanged, for averaging. Free numbers a joint: q0, A.
+/// the ramps whole periods are unchanged, for averaging. Parameters per joint: q0, A.
 ///
 /// # Source
 /// Schroeder, Synthesis of low-peak-factor signals, IEEE Trans. Information Theory 16(1), 1970; Pintelon and Schoukens,
 /// System Identification (2012), section 5.
 pub type Multisine = LinearFamily<MultisineBasis>;
 
-/// The functions of a [`Multisine`] family.
+/// Basis functions of a [`Multisine`] family.
 #[derive(Clone, Debug)]
 pub struct MultisineBasis {
     settings: MultisineSettings,
@@ -71,10 +71,10 @@ pub struct MultisineBasis {
 }
 
 impl Multisine {
-    /// The family for so many joints and seconds.
+    /// Creates the family for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// Settings without meaning; see [`MultisineSettings::validate`].
+    /// Invalid settings; see [`MultisineSettings::validate`].
     pub fn new(joints: usize, duration_s: f64, settings: &MultisineSettings) -> Result<Self, FamilyError> {
         require_frame(NAME, joints, duration_s)?;
         settings.validate(duration_s)?;
@@ -84,7 +84,6 @@ impl Multisine {
 }
 
 impl MultisineBasis {
-    /// The unit multisine and its first three derivatives.
     fn wave(&self, time_s: f64) -> [f64; 4] {
         let count = self.settings.harmonics as f64;
         let turn = (time_s / self.period_s).rem_euclid(1.0);
@@ -101,7 +100,6 @@ impl MultisineBasis {
         sum
     }
 
-    /// The fade and its first three derivatives.
     fn fade(&self, time_s: f64) -> [f64; 4] {
         let ramp = self.settings.ramp_s;
         let (edge, sign) =
@@ -154,8 +152,8 @@ mod tests {
     use crate::family::Family;
     use proptest::prelude::*;
 
-    /// The rms of the velocity over a period is A, and its crest factor is Schroeder's: below 2 where N equal phases
-    /// would give √(2N) = 6.3.
+    /// The rms of the velocity over a period is A. The crest factor of Schroeder's phases is below 2; equal phases
+    /// would result in √(2N) = 6.3.
     #[test]
     fn rms_and_crest() {
         let settings = MultisineSettings { harmonics: 20, periods: 1, ramp_s: 0.0 };
@@ -168,7 +166,7 @@ mod tests {
             let speed = &motion.dq[motion.of(joint)];
             let rms = (speed.iter().map(|v| v * v).sum::<f64>() / 4000.0).sqrt();
             let peak = speed.iter().fold(0.0_f64, |peak, v| peak.max(v.abs()));
-            // A trigonometric polynomial is summed exactly by equal steps: rounding only.
+            // Equal steps sum a trigonometric polynomial exactly, up to rounding.
             assert!((rms - 0.7).abs() < 1e-12);
             assert!(peak / rms < 2.0, "crest {}", peak / rms);
         }

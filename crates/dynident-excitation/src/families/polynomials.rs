@@ -1,4 +1,4 @@
-//! The polynomial pieces that several families share.
+//! Polynomial pieces shared by several families.
 
 /// The step 35x⁴ - 84x⁵ + 70x⁶ - 20x⁷ from 0 to 1 with three vanishing derivatives at both ends, with its first three
 /// derivatives by x; constant outside 0..1.
@@ -35,10 +35,9 @@ pub(crate) fn smooth_ramp(x: f64) -> [f64; 4] {
 /// q, q̇, q̈ at the start, then of q, q̇, q̈ at the end.
 ///
 /// # Source
-/// The quintic that takes position, velocity and acceleration at both ends; Craig, Introduction to Robotics, section
-/// 7.3.
+/// Quintic polynomial with given position, velocity and acceleration at both ends; Craig, Introduction to Robotics,
+/// section 7.3.
 pub(crate) fn quintic_hermite(time_s: f64, span_s: f64) -> [[f64; 4]; 6] {
-    // Coefficients of 1, x, .. x⁵ for a unit span.
     const START: [[f64; 6]; 3] =
         [[1.0, 0.0, 0.0, -10.0, 15.0, -6.0], [0.0, 1.0, 0.0, -6.0, 8.0, -3.0], [0.0, 0.0, 0.5, -1.5, 1.5, -0.5]];
     // Each end is computed from its own side, so that both are exact.
@@ -66,7 +65,7 @@ mod tests {
     use super::*;
     use dynident_lanes::{Dual, Scalar};
 
-    /// Horner's rule on dual numbers of the same polynomial, written out in powers: an independent way to each
+    /// Horner's rule on dual numbers with the polynomial written in powers, an independent computation of each
     /// derivative (1e-12: sums of terms below 1e3).
     #[test]
     fn step_and_ramp_derive_each_other() {
@@ -94,7 +93,7 @@ mod tests {
         assert_eq!(smooth_ramp(1.0)[0], 0.5);
     }
 
-    /// Each function has exactly its own end value among the six, and reproduces t⁵ (1e-12).
+    /// Each function has only its own end value, and the six reproduce t⁵ (1e-12).
     #[test]
     fn hermite_interpolates() {
         let span = 1.7;

@@ -1,6 +1,6 @@
 //! Piecewise quintic polynomials through waypoints.
 
-use super::error::{FamilyError, MOST, require, require_frame};
+use super::error::{FamilyError, MAX_COUNT, require, require_frame};
 use super::linear::{Basis, LinearFamily};
 use super::polynomials::quintic_hermite;
 use dynident_model::sample::Random;
@@ -8,17 +8,17 @@ use serde::{Deserialize, Serialize};
 
 const NAME: &str = "quintic";
 
-/// What a [`Quintic`] family is made of.
+/// Settings of a [`Quintic`] family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct QuinticSettings {
-    /// Number of waypoints, ends included, equally spaced in time. Default 6.
+    /// Number of waypoints, equally spaced in time, including both ends. Default 6.
     pub way_points: usize,
-    /// Velocity and acceleration at the inner waypoints are free numbers too. Default false: the motion comes to rest
-    /// at every waypoint.
+    /// Whether velocity and acceleration at the inner waypoints are free parameters. Default false: the motion rests at
+    /// every waypoint.
     pub free_rates: bool,
-    /// The last waypoint is the first one. Default true.
+    /// Whether the last waypoint equals the first. Default true.
     pub returns: bool,
 }
 
@@ -32,19 +32,19 @@ impl QuinticSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// Fewer waypoints than a motion needs (2, or 3 if it returns), or more than 1000.
+    /// Too few waypoints (2, or 3 if the motion returns), or more than 1000.
     pub fn validate(&self) -> Result<(), FamilyError> {
         let least = if self.returns { 3 } else { 2 };
         let fix = "give 2 to 1000, and at least 3 if the motion returns to its start";
-        require((least..=MOST).contains(&self.way_points), NAME, "way_points", self.way_points as f64, fix)
+        require((least..=MAX_COUNT).contains(&self.way_points), NAME, "way_points", self.way_points as f64, fix)
     }
 }
 
 /// Quintic polynomials between waypoints at equal times, with continuous velocity and acceleration, at rest at both
 /// ends.
 ///
-/// Free numbers a joint: positions of the waypoints (the last one left out if the motion returns), then, with free
-/// rates, q̇ of the inner waypoints in rad/s and q̈ in rad/s². The jerk may jump at waypoints.
+/// Parameters per joint: positions of the waypoints (without the last one if the motion returns), then, with free
+/// rates, q̇ of the inner waypoints in rad/s and q̈ in rad/s². The jerk can be discontinuous at waypoints.
 ///
 /// # Source
 /// Atkeson, An and Hollerbach, Estimation of inertial parameters of manipulator loads and links, IJRR 5(3), 1986 (the
@@ -52,7 +52,7 @@ impl QuinticSettings {
 /// accelerations.
 pub type Quintic = LinearFamily<QuinticBasis>;
 
-/// The functions of a [`Quintic`] family.
+/// Basis functions of a [`Quintic`] family.
 #[derive(Clone, Debug)]
 pub struct QuinticBasis {
     settings: QuinticSettings,
@@ -60,10 +60,10 @@ pub struct QuinticBasis {
 }
 
 impl Quintic {
-    /// The family for so many joints and seconds.
+    /// Creates the family for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// Settings without meaning; see [`QuinticSettings::validate`].
+    /// Invalid settings; see [`QuinticSettings::validate`].
     pub fn new(joints: usize, duration_s: f64, settings: &QuinticSettings) -> Result<Self, FamilyError> {
         require_frame(NAME, joints, duration_s)?;
         settings.validate()?;
@@ -109,7 +109,7 @@ impl Basis for QuinticBasis {
         (0..self.columns()).map(|column| f64::from(u8::from(column < self.positions()))).collect()
     }
 
-    /// Rates of the size that unit steps in one span have.
+    /// The rates have the size of unit steps within one span.
     fn shape(&self, random: &mut Random) -> Vec<f64> {
         let (positions, inner) = (self.positions(), self.settings.way_points - 2);
         (0..self.columns())
@@ -130,7 +130,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn free_numbers_and_way_points() {
+    fn parameter_counts_and_waypoints() {
         for (free_rates, returns, numbers) in [(false, true, 5), (false, false, 6), (true, true, 13), (true, false, 14)]
         {
             let settings = QuinticSettings { way_points: 6, free_rates, returns };

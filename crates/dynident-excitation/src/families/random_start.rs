@@ -1,12 +1,12 @@
-//! Random starts that use a sensible part of each joint's range and velocity.
+//! Random starts that use a reasonable part of each joint's range and velocity.
 
 use dynident_model::sample::Random;
 
-/// How to scale and shift the shape `q`, `dq` of one joint so that it uses a random part (0.3 to 0.9) of the range or
-/// of the velocity limit, whichever binds first, at a random place inside the range.
+/// Scale and shift of the shape `q`, `dq` of one joint, so that it uses a random part (0.3 to 0.9) of the range or of
+/// the velocity limit (whichever is reached first) at a random place inside the range.
 ///
-/// An infinite range counts as ±π, an unknown velocity limit (infinite or not positive) as none, an empty range as one
-/// point.
+/// An infinite range is replaced by ±π, a velocity limit that is infinite or not positive is ignored, and an empty
+/// range is a single point.
 pub(crate) fn scale_and_shift(q: &[f64], dq: &[f64], range: [f64; 2], speed: f64, random: &mut Random) -> [f64; 2] {
     use core::f64::consts::PI;
     let lower = if range[0].is_finite() { range[0] } else { -PI };
@@ -29,7 +29,6 @@ pub(crate) fn scale_and_shift(q: &[f64], dq: &[f64], range: [f64; 2], speed: f64
     [scale, from + place * (to - from)]
 }
 
-/// Evenly spaced times over the duration, on which starts are scaled.
 pub(crate) fn grid(duration_s: f64) -> Vec<f64> {
     const SAMPLES: usize = 128;
     (0..=SAMPLES).map(|sample| duration_s * (sample as f64 / SAMPLES as f64)).collect()

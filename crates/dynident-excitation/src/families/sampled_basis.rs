@@ -1,22 +1,22 @@
-//! A basis of functions of time, sampled once on a grid, and the two products with it that a linear family needs.
+//! Basis functions sampled once on a grid, and their two products for linear families.
 
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, Level, dispatch};
 use nalgebra::DMatrix;
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// Samples in a block: the widest lanes.
+/// Samples in a block, equal to the widest lanes.
 const BLOCK: usize = 8;
 /// Values of one column in one block: four derivatives (orders 0 to 3).
 const CELL: usize = 4 * BLOCK;
-/// Samples above which a grid is worked through in pieces that are not kept.
-const LARGEST_KEPT: usize = 4096;
-/// Functions times samples, at most, of a grid or piece: 32 MiB.
-const LARGEST_TABLE: usize = 1 << 20;
-/// Grids kept per family: search, polish and check grids, and a spare.
-const GRIDS_KEPT: usize = 4;
+/// Number of samples above which a grid is processed in pieces that are not stored.
+const MAX_STORED_SAMPLES: usize = 4096;
+/// Maximum number of functions times samples of a grid or piece: 32 MiB.
+const MAX_TABLE_VALUES: usize = 1 << 20;
+/// Number of stored grids per family: search, polish and check grids, and one more.
+const MAX_STORED_GRIDS: usize = 4;
 
-/// One set of columns on one grid; in a block, columns outside `[first, end)` vanish (local support of splines).
+/// One set of columns on one grid. In a block, columns outside `[first, end)` are zero (local support of splines).
 #[derive(Debug)]
 struct Columns {
     supports: Vec<[usize; 2]>,
@@ -24,25 +24,22 @@ struct Columns {
 }
 
 impl Columns {
-    /// The values of one block.
     #[inline(always)]
     fn cells(&self, columns: usize, block: usize) -> &[f64] {
         &self.values.as_slice()[block * columns * CELL..(block + 1) * columns * CELL]
     }
 }
 
-/// The basis functions of a family and their first three derivatives at given times.
 #[derive(Debug)]
 pub(crate) struct SampledBasis {
     times_s: Vec<f64>,
     columns: usize,
-    /// One entry if all joints share the basis, else one a joint.
     sets: Vec<Columns>,
 }
 
 impl SampledBasis {
-    /// Samples `columns` functions; `row(set, time, out)` gives value, first, second and third derivative of each into
-    /// zeroed `out`.
+    /// Samples `columns` functions; `row(set, time, out)` writes the value and the first three derivatives of each into
+    /// `out`, which is initialised to zero.
     pub(crate) fn new(columns: usize, sets: usize, times_s: &[f64], row: impl Fn(usize, f64, &mut [[f64; 4]])) -> Self {
         let blocks = times_s.len().div_ceil(BLOCK);
         let mut buffer = vec![[0.0; 4]; columns];
@@ -74,13 +71,12 @@ impl SampledBasis {
         Self { times_s: times_s.to_vec(), columns, sets }
     }
 
-    /// Writes Σ parameter · column and its derivatives for samples `[from, from + len)` of `out`, which is already
-    /// sized.
+    /// Writes Σ parameter · column and its derivatives for samples `[from, from + len)` of `out`, which already has its
+    /// size.
     pub(crate) fn motion(&self, parameters: &[f64], from: usize, out: &mut Motion) {
         dispatch(Level::detect(), Forward { basis: self, parameters, from, out });
     }
 
-    /// Adds the derivative of a cost by the parameters.
     pub(crate) fn apply_adjoint(&self, from: usize, adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         dispatch(Level::detect(), Backward { basis: self, from, adjoint, gradient });
     }
@@ -127,7 +123,7 @@ impl Kernel for Forward<'_> {
     fn run<T: Lane>(self) {
         let Self { basis, parameters, from, out } = self;
         let joints = out.joints;
-        // Pairs share every load of a common basis: eight independent chains hide the multiply-add's latency.
+        // Two joints share every load of a common basis: eight independent chains hide the latency of multiply-add.
         let paired = if basis.sets.len() == 1 { joints / 2 * 2 } else { 0 };
         let blocks = basis.times_s.len().div_ceil(BLOCK);
         for joint in (0..paired).step_by(2) {
@@ -198,7 +194,6 @@ fn place<T: Lane, const J: usize>(
     }
 }
 
-/// Stores the first `count` lanes to `array` from `at`.
 #[inline(always)]
 pub(crate) fn store_some<T: Lane>(value: T, array: &mut [f64], at: usize, count: usize) {
     if count == T::LANES {
@@ -258,7 +253,7 @@ impl Kernel for Backward<'_> {
     }
 }
 
-/// Up to a register's lanes of `array` from `at`; the rest is zero.
+/// Loads up to a register's lanes of `array` from `at`; the rest is zero.
 #[inline(always)]
 pub(crate) fn load_some<T: Lane>(array: &[f64], at: usize, count: usize) -> T {
     if count == T::LANES {
@@ -272,7 +267,7 @@ pub(crate) fn load_some<T: Lane>(array: &[f64], at: usize, count: usize) -> T {
     }
 }
 
-/// The last few grids on which a family was asked for its motion. Only speed depends on it, no result does.
+/// The last few grids of a family. The cache affects only the speed.
 #[derive(Debug, Default)]
 pub(crate) struct GridCache(RwLock<Vec<Arc<SampledBasis>>>);
 
@@ -284,8 +279,8 @@ impl Clone for GridCache {
 }
 
 impl GridCache {
-    /// Calls `with(basis, from)` for the whole grid if its table of so many functions is small (sampled once, then
-    /// kept), else piece by piece.
+    /// Calls `with(basis, from)` for the whole grid if its table is small (sampled once, then stored), else piece by
+    /// piece.
     pub(crate) fn each(
         &self,
         functions: usize,
@@ -293,7 +288,7 @@ impl GridCache {
         sample: impl Fn(&[f64]) -> SampledBasis,
         mut with: impl FnMut(&SampledBasis, usize),
     ) {
-        let most = (LARGEST_TABLE / functions.max(1)).clamp(BLOCK, LARGEST_KEPT);
+        let most = (MAX_TABLE_VALUES / functions.max(1)).clamp(BLOCK, MAX_STORED_SAMPLES);
         if times_s.len() > most {
             for (piece, times) in times_s.chunks(most).enumerate() {
                 with(&sample(times), piece * most);
@@ -307,7 +302,7 @@ impl GridCache {
             let made = Arc::new(sample(times_s));
             let mut kept = self.0.write().unwrap_or_else(PoisonError::into_inner);
             kept.insert(0, Arc::clone(&made));
-            kept.truncate(GRIDS_KEPT);
+            kept.truncate(MAX_STORED_GRIDS);
             made
         });
         with(&basis, 0);
@@ -319,7 +314,7 @@ mod tests {
     use super::*;
     use dynident_model::sample::Random;
 
-    /// Four unlike functions a set, the third only in the first half: (t + set)^n with derivatives.
+    /// Four different functions per set, the third only in the first half: (t + set)^n with derivatives.
     fn row(set: usize, time: f64, out: &mut [[f64; 4]]) {
         let x = time + set as f64;
         *out.first_mut().unwrap() = [1.0, 0.0, 0.0, 0.0];
@@ -330,8 +325,8 @@ mod tests {
         out[3] = [x.sin(), x.cos(), -x.sin(), -x.cos()];
     }
 
-    /// Against the plain sums, for joints in pairs and alone, shared and own functions, and every remainder of a block;
-    /// 1e-13 for sums of four terms below 5.
+    /// Compares with plain sums, for joints in pairs and alone, shared and separate functions, and every remainder of a
+    /// block; 1e-13 for sums of four terms below 5.
     #[test]
     fn both_products_are_the_plain_sums() {
         let mut random = Random::new(4);
@@ -373,10 +368,10 @@ mod tests {
         }
     }
 
-    /// A grid too long to keep is worked through in pieces with the same result, and a kept one is found again.
+    /// A grid that is too long is processed in pieces with the same result, and a stored one is reused.
     #[test]
     fn pieces_join_and_grids_are_kept() {
-        let times: Vec<f64> = (0..LARGEST_KEPT + 5).map(|s| s as f64 / 5000.0).collect();
+        let times: Vec<f64> = (0..MAX_STORED_SAMPLES + 5).map(|s| s as f64 / 5000.0).collect();
         let parameters = [0.3, -1.0, 2.0, 0.7];
         let sampled = std::cell::Cell::new(0);
         let sample = |times: &[f64]| {
@@ -390,10 +385,10 @@ mod tests {
             cache.each(4, times, sample, |basis, from| basis.motion(&parameters, from, &mut out));
             out
         };
-        let (long, short) = (motion(&times), motion(&times[LARGEST_KEPT..]));
+        let (long, short) = (motion(&times), motion(&times[MAX_STORED_SAMPLES..]));
         assert_eq!(sampled.get(), 3);
-        assert_eq!(long.q[LARGEST_KEPT..], short.q[..]);
-        assert_eq!(motion(&times[LARGEST_KEPT..]), short);
+        assert_eq!(long.q[MAX_STORED_SAMPLES..], short.q[..]);
+        assert_eq!(motion(&times[MAX_STORED_SAMPLES..]), short);
         assert_eq!(sampled.get(), 3);
         assert_eq!(motion(&times[..7]).q[..], long.q[..7]);
         assert_eq!(sampled.get(), 4);

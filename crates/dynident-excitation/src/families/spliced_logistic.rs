@@ -1,6 +1,6 @@
-//! The paper's excitation trajectory: logistic functions spliced there and back.
+//! The paper's excitation trajectory: logistic functions back and forth.
 
-use super::error::{FamilyError, MOST, require, require_frame};
+use super::error::{FamilyError, MAX_COUNT, require, require_frame};
 use super::random_start::{grid, scale_and_shift};
 use crate::family::{Family, check_shapes};
 use crate::motion::{Motion, MotionAdjoint};
@@ -9,19 +9,19 @@ use serde::{Deserialize, Serialize};
 
 const NAME: &str = "spliced_logistic";
 
-/// What a [`SplicedLogistic`] family is made of.
+/// Settings of a [`SplicedLogistic`] family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SplicedLogisticSettings {
-    /// ω T. Default 40 (the paper gives no T; |q̇(0)| < 1e-4 rad/s asks for about this). Where T is given, its least
-    /// allowed value.
+    /// ω T. Default 40 (the paper does not state T; |q̇(0)| < 1e-4 rad/s requires about this value). With a given T,
+    /// its minimum.
     pub period_times_omega: f64,
-    /// The period T of each joint in seconds. Default none: T = `period_times_omega` / ω, changing with ω.
+    /// Period T of each joint, s. Default none: T = `period_times_omega` / ω, which depends on ω.
     pub periods_s: Option<Vec<f64>>,
-    /// The offset h of each joint in rad (m). Default none: free.
+    /// Offset h of each joint, rad (m). Default none: a free parameter.
     pub offsets: Option<Vec<f64>>,
-    /// Number of periods; afterwards the joint stands still at its start. Default 1.
+    /// Number of periods, after which the joint rests at its start. Default 1.
     pub repetitions: usize,
 }
 
@@ -32,16 +32,16 @@ impl Default for SplicedLogisticSettings {
 }
 
 impl SplicedLogisticSettings {
-    /// Checks the settings for so many joints and seconds.
+    /// Checks the settings for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// ω T not positive or above 1e4, no repetitions, lists that do not name each joint once, numbers that are not
-    /// finite, or periods that do not fit into the duration.
+    /// ω T not positive or above 1e4, no repetitions, lists of the wrong length, values that are not finite, or periods
+    /// that do not fit into the duration.
     pub fn validate(&self, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
         let product = self.period_times_omega;
         require(product > 0.0 && product <= 1e4, NAME, "period_times_omega", product, "give more than 0, at most 1e4")?;
         let repetitions = self.repetitions as f64;
-        require((1..=MOST).contains(&self.repetitions), NAME, "repetitions", repetitions, "give 1 to 1000")?;
+        require((1..=MAX_COUNT).contains(&self.repetitions), NAME, "repetitions", repetitions, "give 1 to 1000")?;
         for (what, list) in [("periods_s", &self.periods_s), ("offsets", &self.offsets)] {
             let found = list.as_ref().map_or(joints, Vec::len);
             if found != joints {
@@ -54,7 +54,7 @@ impl SplicedLogisticSettings {
                 NAME,
                 "periods_s",
                 period,
-                "give periods of a millisecond or more, of which the repetitions fit into the duration",
+                "give periods of at least a millisecond whose repetitions fit into the duration",
             )?;
         }
         for &offset in self.offsets.iter().flatten() {
@@ -69,12 +69,12 @@ impl SplicedLogisticSettings {
 /// q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4)) in the first half of each period, h + A/(1 + e^(ω rem(t, T) - 3ωT/4)) in
 /// the second.
 ///
-/// Free numbers a joint: A in rad (m), ω in 1/s, and h in rad (m) unless given. Peak velocity Aω/4, peak acceleration
+/// Parameters per joint: A in rad (m), ω in 1/s, and h in rad (m) unless given. Peak velocity Aω/4, peak acceleration
 /// Aω²/(6√3).
 ///
-/// At the splices the joint is at rest only nearly: it is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for
-/// ωT = 40) with a velocity of about that times ω, which changes sign there.
-/// [`LogisticStrokes`](super::LogisticStrokes) are exactly at rest.
+/// At the splices the joint is only nearly at rest: it is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for ωT =
+/// 40), with a velocity of about that times ω, whose sign changes there. [`LogisticStrokes`](super::LogisticStrokes)
+/// are exactly at rest.
 ///
 /// Position determines velocity and acceleration.
 #[derive(Clone, Debug)]
@@ -84,7 +84,6 @@ pub struct SplicedLogistic {
     duration_s: f64,
 }
 
-/// Where a joint is on its logistic function.
 struct Phase {
     argument: f64,
     by_omega: f64,
@@ -93,26 +92,25 @@ struct Phase {
 }
 
 impl SplicedLogistic {
-    /// The family for so many joints and seconds.
+    /// Creates the family for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// Settings without meaning; see [`SplicedLogisticSettings::validate`].
+    /// Invalid settings; see [`SplicedLogisticSettings::validate`].
     pub fn new(joints: usize, duration_s: f64, settings: &SplicedLogisticSettings) -> Result<Self, FamilyError> {
         require_frame(NAME, joints, duration_s)?;
         settings.validate(joints, duration_s)?;
         Ok(Self { settings: settings.clone(), joints, duration_s })
     }
 
-    /// The period T of a joint in seconds.
+    /// Period T of a joint, s.
     ///
     /// # Panics
-    /// If the joint or the parameters do not exist.
+    /// If the joint does not exist or there are too few parameters.
     pub fn period_s(&self, parameters: &[f64], joint: usize) -> f64 {
-        self.period(joint, parameters[joint * self.each() + 1])
+        self.period(joint, parameters[joint * self.parameters_per_joint() + 1])
     }
 
-    /// Free numbers a joint.
-    fn each(&self) -> usize {
+    fn parameters_per_joint(&self) -> usize {
         if self.settings.offsets.is_some() { 2 } else { 3 }
     }
 
@@ -136,7 +134,7 @@ impl SplicedLogistic {
         let rest = time_s - whole * period;
         let (sign, centre) = if rest < 0.5 * period { (1.0, 0.25) } else { (-1.0, 0.75) };
         let from_centre = rest - centre * period;
-        // With T = c/ω the argument is ωt less a constant.
+        // With T = c/ω the argument is ωt minus a constant.
         let by_omega = sign * if given { from_centre } else { time_s };
         Phase { argument: sign * omega * from_centre, by_omega, sign, frozen: false }
     }
@@ -147,7 +145,7 @@ fn logistic(x: f64) -> [f64; 5] {
     let e = (-x.abs()).exp();
     let d = 1.0 / (1.0 + e);
     let (value, first) = (if x >= 0.0 { d } else { e * d }, e * d * d);
-    // 1 - 2f, also for f near 1/2.
+    // 1 - 2f, accurate also for f near 1/2.
     let slope = if x >= 0.0 { (e - 1.0) * d } else { (1.0 - e) * d };
     [value, first, first * slope, first * (1.0 - 6.0 * first), first * slope * (1.0 - 12.0 * first)]
 }
@@ -166,10 +164,10 @@ impl Family for SplicedLogistic {
     }
 
     fn parameters(&self) -> usize {
-        self.joints * self.each()
+        self.joints * self.parameters_per_joint()
     }
 
-    /// ω is so large that all periods fit into the duration, or that a given period keeps ωT.
+    /// Lower bounds of ω, for which all periods fit into the duration, or a given period keeps the minimum of ωT.
     fn bounds(&self) -> Vec<[f64; 2]> {
         let free = [f64::NEG_INFINITY, f64::INFINITY];
         (0..self.joints)
@@ -180,7 +178,7 @@ impl Family for SplicedLogistic {
                     .as_ref()
                     .map_or(self.duration_s / self.settings.repetitions as f64, |periods| periods[joint]);
                 let omega = [self.settings.period_times_omega / period, f64::INFINITY];
-                [free, omega, free].into_iter().take(self.each())
+                [free, omega, free].into_iter().take(self.parameters_per_joint())
             })
             .collect()
     }
@@ -189,19 +187,19 @@ impl Family for SplicedLogistic {
         let times = grid(self.duration_s);
         let mut parameters: Vec<f64> = self
             .bounds()
-            .chunks(self.each())
+            .chunks(self.parameters_per_joint())
             .flat_map(|own| {
                 let amplitude = if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
                 let omega = own[1][0] * random.uniform(0.0, 1.2).exp();
-                [amplitude, omega, 0.0].into_iter().take(self.each())
+                [amplitude, omega, 0.0].into_iter().take(self.parameters_per_joint())
             })
             .collect();
         let mut motion = Motion::default();
         self.motion(&parameters, &times, &mut motion);
-        for (joint, own) in parameters.chunks_mut(self.each()).enumerate() {
+        for (joint, own) in parameters.chunks_mut(self.parameters_per_joint()).enumerate() {
             let range = ranges[joint];
             if let Some(offsets) = &self.settings.offsets {
-                // The offset stands: go to the side with more room.
+                // The offset is fixed, so the stroke uses the side with more room.
                 let room = [range[0] - offsets[joint], range[1] - offsets[joint]];
                 let most = if room[1] >= -room[0] { room[1] } else { room[0] };
                 let most = if most.is_finite() { most } else { core::f64::consts::PI };
@@ -209,7 +207,7 @@ impl Family for SplicedLogistic {
                 own[0] = random.uniform(0.3, 0.9) * most.signum() * most.abs().min(fast);
             } else {
                 let span = motion.of(joint);
-                // The grid may miss the middle of a stroke: its velocity is known to be ω/4.
+                // The grid can miss the middle of a stroke, whose velocity is ω/4.
                 let peak = [0.25 * own[1]];
                 let [scale, shift] = scale_and_shift(&motion.q[span], &peak, range, speeds[joint], random);
                 own[0] *= scale;
@@ -222,7 +220,7 @@ impl Family for SplicedLogistic {
     fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
         assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
         out.reset(self.joints, times_s.len());
-        for (joint, own) in parameters.chunks(self.each()).enumerate() {
+        for (joint, own) in parameters.chunks(self.parameters_per_joint()).enumerate() {
             let (amplitude, omega, offset) = (own[0], own[1], self.offset(joint, own));
             for (at, &time) in out.of(joint).zip(times_s) {
                 let phase = self.phase(joint, omega, time);
@@ -240,7 +238,7 @@ impl Family for SplicedLogistic {
 
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         check_shapes(self, parameters, times_s, adjoint, gradient);
-        for (joint, own) in parameters.chunks(self.each()).enumerate() {
+        for (joint, own) in parameters.chunks(self.parameters_per_joint()).enumerate() {
             let (amplitude, omega) = (own[0], own[1]);
             let mut sum = [0.0; 3];
             for (at, &time) in adjoint.of(joint).zip(times_s) {
@@ -250,7 +248,6 @@ impl Family for SplicedLogistic {
                 let orders = if phase.frozen { 1 } else { 4 };
                 let mut power = 1.0;
                 for (order, pull) in pulls.into_iter().enumerate().take(orders) {
-                    // d/dω of ω^n f_n(argument).
                     let by_omega = order as f64 / omega * f[order] + f[order + 1] * phase.by_omega;
                     sum[0] += pull * power * f[order];
                     sum[1] += pull * power * amplitude * by_omega;
@@ -258,7 +255,10 @@ impl Family for SplicedLogistic {
                 }
                 sum[2] += pulls[0];
             }
-            for (out, value) in gradient[joint * self.each()..].iter_mut().zip(sum.iter().take(self.each())) {
+            for (out, value) in gradient[joint * self.parameters_per_joint()..]
+                .iter_mut()
+                .zip(sum.iter().take(self.parameters_per_joint()))
+            {
                 *out += value;
             }
         }
@@ -276,7 +276,7 @@ mod tests {
     }
 
     /// Figs. 4 and 5: for T = 80 all ω pass A/2 at T/4 and 3T/4 with slope ±Aω/4 and reach A at T/2; for ω = 0.6 the
-    /// same stroke moves with T. Peak acceleration Aω²/(6√3) where e^x = 2 + √3. Rounding only.
+    /// same stroke shifts with T. Peak acceleration Aω²/(6√3) at e^x = 2 + √3. Tolerance: rounding.
     #[test]
     fn features_of_figures_4_and_5() {
         for (omega, period) in [(0.5, 80.0), (1.0, 80.0), (2.0, 80.0), (0.6, 70.0), (0.6, 80.0), (0.6, 100.0)] {
@@ -302,7 +302,7 @@ mod tests {
             assert!((motion.q[2] - 2.25 + far).abs() < 1e-13 && (motion.q[3] - 0.25 - far).abs() < 1e-13);
             assert!((motion.ddq[5] - 2.0 * omega * omega / (6.0 * 3.0_f64.sqrt())).abs() < 1e-12);
             assert!(motion.dddq[5].abs() < 1e-12);
-            // Below 1e-4 at the splices as the paper asks, once ωT >= 40.
+            // Below 1e-4 at the splices, as the paper requires, for ωT >= 40.
             if omega * period >= 44.0 {
                 assert!([2, 3].iter().all(|&s| motion.dq[s].abs() < 1e-4 && motion.ddq[s].abs() < 1e-4));
             }
@@ -332,7 +332,7 @@ mod tests {
             check::derivatives(&family(2, 60.0, &settings), seed);
         }
 
-        /// On the strokes: at a splice, which moves with ω where T does, the velocity jumps by e^-10 and has no
+        /// Tested on the strokes: at a splice, which depends on ω if T does, the velocity jumps by e^-10 and has no
         /// derivative.
         #[test]
         fn gradient_is_exact(seed in any::<u64>(), repetitions in 1_usize..4, fixed in any::<bool>(), given in any::<bool>()) {

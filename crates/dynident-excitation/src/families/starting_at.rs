@@ -1,19 +1,18 @@
-//! A family whose motions start in a given posture.
+//! A family with a given start posture.
 
 use super::error::{FamilyError, require};
 use crate::family::Family;
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 
-/// Part of a joint's range that a random start uses at least, wherever the start posture stands in it.
-const LEAST_PART: f64 = 0.3;
+/// Minimum share of a joint's range that a random start uses, for any start posture.
+const MIN_RANGE_SHARE: f64 = 0.3;
 
-/// Every motion of another family, moved joint by joint so that it starts at given positions: `q_j(t) + s_j - q_j(0)`.
+/// Every motion of another family, shifted joint by joint to start at given positions: `q_j(t) + s_j - q_j(0)`.
 ///
-/// The start is exact by construction, and so is the end of a family that returns. Rates stay as they are. Parameters
-/// are those of the family; a parameter that only moves a joint as a whole has no effect where that joint's start is
-/// given. Of a family that is not moved by its own parameters (a joined one with a start posture of its own) it moves
-/// every posture alike.
+/// The start is exact by construction, and so is the end of a returning family. Rates are unchanged. Parameters are
+/// those of the family; a parameter that only shifts a joint has no effect if the start of that joint is given. A
+/// family with a fixed posture, such as a joined one with its own start posture, is shifted as a whole.
 #[derive(Debug)]
 pub struct StartingAt {
     inner: Box<dyn Family>,
@@ -21,10 +20,11 @@ pub struct StartingAt {
 }
 
 impl StartingAt {
-    /// `start`: position of each joint at the beginning, rad (m); `None` leaves it to the family.
+    /// Creates the family. `start` is the position of each joint at the beginning, rad (m); for `None` the family
+    /// determines it.
     ///
     /// # Errors
-    /// Not one entry per joint, or a position that is not finite.
+    /// A wrong number of entries, or a position that is not finite.
     pub fn new(inner: Box<dyn Family>, start: Vec<Option<f64>>) -> Result<Self, FamilyError> {
         let (family, expected, found) = (inner.name(), inner.joints(), start.len());
         if expected != found {
@@ -36,7 +36,6 @@ impl StartingAt {
         Ok(Self { inner, start })
     }
 
-    /// The joints whose start is given, with their positions.
     fn given(&self) -> impl Iterator<Item = (usize, f64)> {
         self.start.iter().enumerate().filter_map(|(joint, start)| start.map(|start| (joint, start)))
     }
@@ -63,15 +62,15 @@ impl Family for StartingAt {
         self.inner.bounds()
     }
 
-    /// As the family's, in ranges about the start posture: what leaves the joint's own range there is for the search to
-    /// fix.
+    /// Random start of the family in ranges around the start posture; the search corrects violations of the joint's
+    /// range.
     fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64> {
         let mut ranges = ranges.to_vec();
         for (joint, start) in self.given() {
             let [lower, upper] = ranges[joint];
             if (upper - lower).is_finite() && upper > lower {
                 let room = (start - lower).min(upper - start).max(0.0);
-                let half = 0.5 * room.max(LEAST_PART * (upper - lower));
+                let half = 0.5 * room.max(MIN_RANGE_SHARE * (upper - lower));
                 ranges[joint] = [start - half, start + half];
             }
         }
@@ -80,7 +79,6 @@ impl Family for StartingAt {
 
     fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
         self.inner.motion(parameters, times_s, out);
-        // Searches ask for grids that begin at the start.
         let first = (times_s.first() != Some(&0.0)).then(|| {
             let mut first = Motion::default();
             self.inner.motion(parameters, &[0.0], &mut first);
@@ -92,7 +90,7 @@ impl Family for StartingAt {
             for q in &mut out.q[own.clone()] {
                 *q += start - q0;
             }
-            // Exact where rounding of the sum would not be.
+            // Exact, without rounding of the sum.
             if first.is_none() {
                 out.q[own.start] = start;
             }
@@ -104,7 +102,7 @@ impl Family for StartingAt {
         if times_s.is_empty() {
             return;
         }
-        // ∂(s - q(0)): what all positions of a joint pull, at the start and the other way.
+        // ∂(s - q(0)): the sum of the adjoints of all positions of a joint, at the start with opposite sign.
         let mut at_start = Motion::default();
         at_start.reset(adjoint.joints, 1);
         for (joint, _) in self.given() {
@@ -138,7 +136,6 @@ mod tests {
             moved.motion(&parameters, &times, &mut whole);
             moved.motion(&parameters, &times[1..], &mut later);
             assert_eq!((whole.q[0], whole.q[8]), (0.7, -1.1));
-            // Both families return.
             assert!((whole.q[3] - 0.7).abs() < 1e-12 && (whole.q[11] + 1.1).abs() < 1e-12);
             assert_eq!(whole.q[4..8], plain.q[4..8]);
             assert_eq!((&whole.dq, &whole.ddq, &whole.dddq), (&plain.dq, &plain.ddq, &plain.dddq));
@@ -159,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_is_no_posture() {
+    fn rejects_invalid_postures() {
         for start in [vec![None; 2], vec![Some(f64::NAN), None, None]] {
             let [inner, _] = families();
             assert!(StartingAt::new(inner, start).is_err());

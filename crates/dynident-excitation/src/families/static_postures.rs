@@ -1,20 +1,20 @@
 //! Postures held one after another, for gravity and friction offsets.
 
-use super::error::{FamilyError, MOST, require, require_frame};
+use super::error::{FamilyError, MAX_COUNT, require, require_frame};
 use super::linear::{Basis, LinearFamily};
 use super::polynomials::smooth_step;
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "static_postures";
 
-/// What a [`StaticPostures`] family is made of.
+/// Settings of a [`StaticPostures`] family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct StaticPosturesSettings {
     /// Number of postures. Default 10.
     pub postures: usize,
-    /// The part of the duration that is spent at rest; the moves share the other part equally. Default 0.5.
+    /// Share of the duration at rest; the moves divide the rest equally. Default 0.5.
     pub rest_part: f64,
 }
 
@@ -28,9 +28,9 @@ impl StaticPosturesSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// Fewer than 2 postures or more than 1000, or a resting part outside 0..1 (ends excluded).
+    /// Fewer than 2 postures or more than 1000, or a share at rest outside 0..1 (ends excluded).
     pub fn validate(&self) -> Result<(), FamilyError> {
-        require((2..=MOST).contains(&self.postures), NAME, "postures", self.postures as f64, "give 2 to 1000")?;
+        require((2..=MAX_COUNT).contains(&self.postures), NAME, "postures", self.postures as f64, "give 2 to 1000")?;
         let fix = "give a part between 0 and 1";
         require(self.rest_part > 0.0 && self.rest_part < 1.0, NAME, "rest_part", self.rest_part, fix)
     }
@@ -39,10 +39,10 @@ impl StaticPosturesSettings {
 /// K postures, each held for the same time, with moves between them that begin and end with q̇ = q̈ = jerk = 0
 /// (polynomials of degree 7).
 ///
-/// Free numbers a joint: its positions in the K postures, rad (m). The motion begins and ends in a held posture.
+/// Parameters per joint: its positions in the K postures, rad (m). The motion begins and ends in a held posture.
 pub type StaticPostures = LinearFamily<StaticPosturesBasis>;
 
-/// The functions of a [`StaticPostures`] family.
+/// Basis functions of a [`StaticPostures`] family.
 #[derive(Clone, Debug)]
 pub struct StaticPosturesBasis {
     postures: usize,
@@ -51,10 +51,10 @@ pub struct StaticPosturesBasis {
 }
 
 impl StaticPostures {
-    /// The family for so many joints and seconds.
+    /// Creates the family for a number of joints and a duration (s).
     ///
     /// # Errors
-    /// Settings without meaning; see [`StaticPosturesSettings::validate`].
+    /// Invalid settings; see [`StaticPosturesSettings::validate`].
     pub fn new(joints: usize, duration_s: f64, settings: &StaticPosturesSettings) -> Result<Self, FamilyError> {
         require_frame(NAME, joints, duration_s)?;
         settings.validate()?;
@@ -66,7 +66,7 @@ impl StaticPostures {
 }
 
 impl StaticPosturesBasis {
-    /// From when to when each posture is held, in seconds.
+    /// Start and end of each hold, s.
     pub fn holds(&self) -> Vec<[f64; 2]> {
         let period = self.hold_s + self.move_s;
         (0..self.postures).map(|posture| posture as f64 * period).map(|from| [from, from + self.hold_s]).collect()
@@ -112,7 +112,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn holds_its_postures() {
+    fn postures_are_held() {
         let family = StaticPostures::new(2, 12.0, &StaticPosturesSettings { postures: 4, rest_part: 0.4 }).unwrap();
         let parameters = check::start(&family, 9);
         for (posture, [from, to]) in family.basis().holds().into_iter().enumerate() {

@@ -6,13 +6,13 @@ use crate::family::Family;
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 
-/// Free numbers a step: A, ω.
-const EACH: usize = 2;
+/// Parameters per step: A, ω.
+const PARAMETERS_PER_STEP: usize = 2;
 
-/// One joint's turn.
+/// Motion of one joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
-    /// The joint that moves.
+    /// Index of the joint.
     pub joint: usize,
     /// Its period T, s.
     pub period_s: f64,
@@ -21,9 +21,9 @@ pub struct Step {
 /// [`SplicedLogistic`] of single joints, one after another. Parameters: A in rad (m) and ω in 1/s of each step, in the
 /// order of the steps.
 ///
-/// Before and after its turn a joint stands where its function starts, A/(1 + e^(ωT/4)) from its offset; a joint
-/// without a turn stands at its offset. Velocity and acceleration jump by what the splice leaves (Eq. 17 of the paper
-/// asks for less than 1e-4).
+/// Before and after its step a joint rests at the start of its function, A/(1 + e^(ωT/4)) from its offset; a joint
+/// without a step rests at its offset. Velocity and acceleration jump at the splices (Eq. 17 of the paper requires less
+/// than 1e-4).
 #[derive(Clone, Debug)]
 pub struct StepWiseLogistic {
     offsets: Vec<f64>,
@@ -39,13 +39,13 @@ struct Turn {
 }
 
 impl StepWiseLogistic {
-    /// The family for joints with these offsets h (rad, m). Of `settings` it takes ωT and the repetitions.
+    /// Creates the family for joints with the offsets h (rad, m), with ωT and the repetitions of `settings`.
     ///
     /// # Errors
-    /// As [`SplicedLogistic::new`] for each step.
+    /// Errors of [`SplicedLogistic::new`] for each step.
     ///
     /// # Panics
-    /// If a step names a joint that has no offset.
+    /// If a step contains a joint without offset.
     pub fn new(offsets: &[f64], steps: &[Step], settings: &SplicedLogisticSettings) -> Result<Self, FamilyError> {
         let mut start_s = 0.0;
         let mut turns = Vec::with_capacity(steps.len());
@@ -87,7 +87,7 @@ impl Family for StepWiseLogistic {
     }
 
     fn parameters(&self) -> usize {
-        EACH * self.steps.len()
+        PARAMETERS_PER_STEP * self.steps.len()
     }
 
     fn bounds(&self) -> Vec<[f64; 2]> {
@@ -107,7 +107,7 @@ impl Family for StepWiseLogistic {
             out.q[of].fill(*offset);
         }
         let mut alone = Motion::default();
-        for (turn, own) in self.steps.iter().zip(parameters.chunks_exact(EACH)) {
+        for (turn, own) in self.steps.iter().zip(parameters.chunks_exact(PARAMETERS_PER_STEP)) {
             turn.family.motion(own, &turn.own_times(times_s), &mut alone);
             for (sample, (at, time)) in out.of(turn.joint).zip(times_s).enumerate() {
                 out.q[at] = alone.q[sample];
@@ -121,7 +121,7 @@ impl Family for StepWiseLogistic {
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         assert_eq!(gradient.len(), self.parameters(), "gradient of {}", self.name());
         let mut alone = Motion::default();
-        let parts = parameters.chunks_exact(EACH).zip(gradient.chunks_exact_mut(EACH));
+        let parts = parameters.chunks_exact(PARAMETERS_PER_STEP).zip(gradient.chunks_exact_mut(PARAMETERS_PER_STEP));
         for (turn, (own, gradient)) in self.steps.iter().zip(parts) {
             alone.reset(1, times_s.len());
             for (sample, (at, time)) in adjoint.of(turn.joint).zip(times_s).enumerate() {
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn one_joint_moves_at_a_time_and_peaks_as_equation_16_says() {
+    fn one_joint_moves_at_a_time_with_the_peaks_of_equation_16() {
         let family = family();
         let times = grid(60.0, 6001);
         let mut motion = Motion::default();
@@ -157,7 +157,6 @@ mod tests {
             assert!((0..3).filter(|joint| motion.dq[joint * 6001 + sample] != 0.0).count() <= 1);
             assert_eq!(motion.q[2 * 6001 + sample], 0.3);
         }
-        // Aω/4 at T/4, which is on the grid. Rounding.
         assert!((motion.dq[6001 + 1000] - 0.5).abs() < 1e-12 && (motion.dq[4500] - 0.75).abs() < 1e-12);
     }
 

@@ -1,24 +1,23 @@
-//! Where no single change would do: the smallest changes that do together.
+//! Smallest combination of changes, for motions that no single change makes feasible.
 
-use super::relaxation::{BrokenLimit, LARGEST_STRETCH, Relaxation, broken_limits, change, stretched};
+use super::relaxation::{BrokenLimit, MAX_STRETCH, Relaxation, broken_limits, change, stretched};
 use super::set::LimitSet;
 use crate::motion::Motion;
 
-/// Places of the first look, and golden-section steps after it (each 0.618 of the last: 1e-5 of a first step).
-const PLACES: usize = 24;
-const STEPS: usize = 24;
+/// Points of the initial grid, and golden-section steps after it, which reduce the interval by 1e-5.
+const GRID_POINTS: usize = 24;
+const GOLDEN_STEPS: usize = 24;
 
-/// A slower run is part of a change from this share on.
-const LEAST_SLOWING: f64 = 1e-3;
+const MIN_SLOWDOWN: f64 = 1e-3;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// A run slower by a factor s with every limit that is then still broken made just wide enough, the factor chosen for
-/// the smallest sum of relative changes, `s - 1 + Σ c_i(s)`.
+/// Slows the run down by a factor s and widens each limit that is still violated by the necessary amount. The factor
+/// minimises the sum of relative changes, `s - 1 + Σ c_i(s)`.
 ///
-/// `c` is the constraint's value: the share of the limit that is missing, for the floor metres. A slower run fixes
-/// velocity, acceleration, jerk and the part of torque that gravity does not ask for, so the sum falls before it rises;
-/// it is looked at on a grid up to where s - 1 alone costs more than limits alone, then by golden section. `None` if a
-/// motion is not finite, or `stop` says so.
+/// `c` is the constraint's value: the violation as a share of the limit, for the floor of the arm's length. A slower
+/// run reduces velocity, acceleration, jerk and the part of the torque that is not gravity, so the sum falls before it
+/// rises. It is evaluated on a grid up to the s whose `s - 1` alone exceeds the sum at s = 1, then refined by golden
+/// section. `None` if a motion is not finite or `stop` returns true.
 pub(super) fn smallest_combination(
     set: &LimitSet,
     times_s: &[f64],
@@ -38,11 +37,11 @@ pub(super) fn smallest_combination(
         return None;
     }
     if best.2.iter().any(|broken| broken.constraint.kind.depends_on_time()) {
-        let most = (1.0 + best.0).min(LARGEST_STRETCH);
-        // Squares: small factors are the common case.
-        let place = |k: usize| 1.0 + (most - 1.0) * (k as f64 / PLACES as f64).powi(2);
+        let most = (1.0 + best.0).min(MAX_STRETCH);
+        // A quadratic grid, because small factors are the common case.
+        let place = |k: usize| 1.0 + (most - 1.0) * (k as f64 / GRID_POINTS as f64).powi(2);
         let mut lowest = 0;
-        for k in 1..=PLACES {
+        for k in 1..=GRID_POINTS {
             if stop() {
                 return None;
             }
@@ -51,8 +50,8 @@ pub(super) fn smallest_combination(
                 (best, lowest) = (found, k);
             }
         }
-        let (mut from, mut to) = (place(lowest.saturating_sub(1)), place((lowest + 1).min(PLACES)));
-        for _ in 0..STEPS {
+        let (mut from, mut to) = (place(lowest.saturating_sub(1)), place((lowest + 1).min(GRID_POINTS)));
+        for _ in 0..GOLDEN_STEPS {
             if stop() {
                 return None;
             }
@@ -70,8 +69,7 @@ pub(super) fn smallest_combination(
             }
         }
     }
-    // A run that is hardly slower is no change worth making: its share goes to the limits.
-    if best.1 - 1.0 < LEAST_SLOWING {
+    if best.1 - 1.0 < MIN_SLOWDOWN {
         best = at(1.0);
     }
     let (_, factor, broken) = best;

@@ -1,36 +1,32 @@
-//! The distance between the convex hulls of two sets of corners, with the points where it is attained.
+//! Distance between the convex hulls of two sets of corners, with the nearest points.
 //!
-//! The algorithm of Gilbert, Johnson and Keerthi (IEEE J. Robotics and Automation 4(2), 1988): the point nearest to the
-//! origin of the Minkowski difference, approached by simplices of its corners.
+//! Algorithm of Gilbert, Johnson and Keerthi (IEEE J. Robotics and Automation 4(2), 1988): simplices of corners of the
+//! Minkowski difference approach its point nearest to the origin.
 
 use super::segments::segment_distance;
 use dynident_model::{Transform, Vec3};
 
-/// Corners in a body's frame, and where the body stands.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placed<'a> {
     pub(crate) corners: &'a [Vec3],
     pub(crate) at: &'a Transform,
 }
 
-/// Where two hulls come nearest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HullDistance {
-    /// The distance, m; 0 where they overlap. Beyond the distance asked for a lower bound.
+    /// Distance, m; 0 if they overlap. Beyond the requested distance a lower bound.
     pub distance_m: f64,
-    /// The nearest points of the two.
+    /// Nearest points of the two hulls.
     pub points: [Vec3; 2],
-    /// Unit vector from the second's point to the first's; where hulls overlap, between their centres.
+    /// Unit vector from the second point to the first; for overlapping hulls between their centres.
     pub direction: Vec3,
 }
 
-/// Steps at most: a dozen are usual.
-const STEPS: usize = 48;
+/// Maximum number of iterations; a dozen are usual.
+const MAX_ITERATIONS: usize = 48;
 
-/// Relative accuracy of the squared distance.
-const ACCURACY: f64 = 1e-12;
+const RELATIVE_TOLERANCE: f64 = 1e-12;
 
-/// A corner of the difference, and the two corners that it is of.
 #[derive(Clone, Copy)]
 struct Corner {
     difference: Vec3,
@@ -39,7 +35,6 @@ struct Corner {
 }
 
 impl Placed<'_> {
-    /// The corner farthest along a direction of the base frame.
     fn farthest(&self, direction: Vec3) -> Vec3 {
         let local = self.at.rotation.transpose_mul_vec(direction);
         let mut best = (f64::NEG_INFINITY, Vec3::ZERO);
@@ -58,8 +53,8 @@ impl Placed<'_> {
     }
 }
 
-/// The distance of two hulls. One that is found to be above `beyond` need not be exact: a lower bound above `beyond`
-/// is given then. `guess` is where the last answer of a like question is kept: the direction to begin with.
+/// Distance of two hulls. For a distance above `beyond` the result is a lower bound above `beyond`. `guess` stores the
+/// last direction and is the initial one of the next similar query.
 pub(crate) fn hull_distance(first: Placed<'_>, second: Placed<'_>, beyond: f64, guess: &mut Vec3) -> HullDistance {
     if let ([a, .., b] | [a @ b], [c, .., d] | [c @ d]) = (first.corners, second.corners)
         && first.corners.len() <= 2
@@ -77,7 +72,7 @@ pub(crate) fn hull_distance(first: Placed<'_>, second: Placed<'_>, beyond: f64, 
     }
     let mut simplex: Vec<Corner> = Vec::with_capacity(4);
     let mut nearest: Option<Nearest> = None;
-    for _ in 0..STEPS {
+    for _ in 0..MAX_ITERATIONS {
         let (a, b) = (first.farthest(-towards), second.farthest(towards));
         let corner = Corner { difference: a - b, first: a, second: b };
         let length = towards.norm();
@@ -89,7 +84,7 @@ pub(crate) fn hull_distance(first: Placed<'_>, second: Placed<'_>, beyond: f64, 
         if let Some(known) = &nearest {
             let gained = known.square - towards.dot(corner.difference);
             let again = simplex.iter().any(|known| known.difference == corner.difference);
-            if again || gained <= ACCURACY * known.square {
+            if again || gained <= RELATIVE_TOLERANCE * known.square {
                 break;
             }
         }
@@ -98,7 +93,7 @@ pub(crate) fn hull_distance(first: Placed<'_>, second: Placed<'_>, beyond: f64, 
         if let Some(known) = &nearest
             && found.square >= known.square
         {
-            // Rounding: no nearer any more.
+            // No further decrease because of rounding.
             break;
         }
         let largest =
@@ -127,7 +122,6 @@ pub(crate) fn hull_distance(first: Placed<'_>, second: Placed<'_>, beyond: f64, 
     HullDistance { distance_m, points, direction: towards.scale(1.0 / towards.norm()) }
 }
 
-/// The best so far.
 struct Nearest {
     square: f64,
     points: [Vec3; 2],
@@ -141,11 +135,10 @@ fn overlapping(first: Placed<'_>, second: Placed<'_>) -> HullDistance {
     HullDistance { distance_m: 0.0, points, direction }
 }
 
-/// The point of a simplex nearest to the origin.
 struct SimplexPoint {
     point: Vec3,
     square: f64,
-    /// Shares of the corners, zero for those that play no part.
+    /// Barycentric shares of the corners; zero for unused corners.
     shares: [f64; 4],
 }
 
@@ -171,7 +164,6 @@ fn of_shares(simplex: &[Corner], shares: [f64; 4]) -> SimplexPoint {
     SimplexPoint { point, square: point.dot(point), shares }
 }
 
-/// Shares of the ends of a segment at its point nearest to the origin.
 fn on_segment(a: Vec3, b: Vec3) -> [f64; 2] {
     let along = b - a;
     let length2 = along.dot(along);
@@ -179,7 +171,7 @@ fn on_segment(a: Vec3, b: Vec3) -> [f64; 2] {
     [1.0 - t, t]
 }
 
-/// Shares of the corners of a triangle at its point nearest to the origin (Ericson, *Real-Time Collision Detection*
+/// Barycentric shares at the point of a triangle nearest to the origin (Ericson, *Real-Time Collision Detection*
 /// (2005), section 5.1.5).
 fn on_triangle(a: Vec3, b: Vec3, c: Vec3) -> [f64; 3] {
     let (ab, ac) = (b - a, c - a);
@@ -214,7 +206,7 @@ fn on_triangle(a: Vec3, b: Vec3, c: Vec3) -> [f64; 3] {
     if sum > 0.0 { [va / sum, vb / sum, vc / sum] } else { [1.0, 0.0, 0.0] }
 }
 
-/// The whole tetrahedron where it holds the origin, else the nearest of its faces.
+/// The tetrahedron itself if it contains the origin, else the nearest of its faces.
 fn on_tetrahedron(simplex: &[Corner]) -> SimplexPoint {
     let at = |k: usize| simplex[k].difference;
     let [a, b, c, d] = [0, 1, 2, 3].map(at);
@@ -246,8 +238,8 @@ mod tests {
     use dynident_model::Mat3;
     use dynident_model::sample::Random;
 
-    /// The least distance by moving shares from the worst corner to the best (Mitchell, Demyanov and Malozemov 1974):
-    /// another algorithm, slow and simple, with a bound from below.
+    /// Distance by moving weight from the worst corner to the best (Mitchell, Demyanov and Malozemov 1974): an
+    /// independent, slow and simple algorithm with a lower bound.
     fn by_shares(first: &[Vec3], second: &[Vec3]) -> [f64; 2] {
         let corners: Vec<Vec3> = first.iter().flat_map(|a| second.iter().map(|b| *a - *b)).collect();
         let mut shares = vec![0.0; corners.len()];
@@ -273,7 +265,7 @@ mod tests {
     }
 
     fn hull(random: &mut Random, corners: usize) -> Vec<Vec3> {
-        // Half of the coordinates on a coarse grid: faces and edges that are parallel occur.
+        // Half of the coordinates are on a coarse grid, so that parallel faces and edges occur.
         let mut coordinate = || {
             let x = random.uniform(-1.0, 1.0);
             if random.uniform(0.0, 1.0) < 0.5 { (2.0 * x).round() / 2.0 } else { x }
@@ -296,10 +288,9 @@ mod tests {
             let other = Placed { corners: &second, at: &Transform::IDENTITY };
             let placed: Vec<Vec3> = first.iter().map(|corner| at.point(*corner)).collect();
             let [below, above] = by_shares(&placed, &second);
-            // A guess from anywhere changes nothing.
             let mut guess = if case % 2 == 0 { Vec3::ZERO } else { random.direction() };
             let found = hull_distance(one, other, f64::INFINITY, &mut guess);
-            // The oracle closes its own gap to 1e-7 where hulls do not overlap.
+            // The oracle's bounds differ by at most 1e-7 for separate hulls.
             assert!(found.distance_m < above + 1e-9 && found.distance_m > below - 1e-9, "{found:?} {below} {above}");
             if found.distance_m > 1e-6 {
                 let apart = found.points[0] - found.points[1];

@@ -1,4 +1,4 @@
-//! What a user says about limits: plain numbers by joint and link name.
+//! Limits as a user states them: numbers by joint and link name.
 
 use super::known_torque::KnownTorque;
 use super::link_points::LinkPoint;
@@ -7,7 +7,7 @@ use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Every limit of an experiment. What is absent does not limit.
+/// All limits of an experiment. Absent entries do not limit.
 ///
 /// In a study file:
 ///
@@ -28,49 +28,49 @@ use std::collections::BTreeMap;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
-    /// Limits of single joints, at most one entry a joint.
+    /// Limits of single joints, at most one entry per joint.
     pub joints: Vec<JointLimit>,
-    /// Boxes that points of the arm must not leave (the paper's workspace S).
+    /// Boxes that points of the arm must not leave (workspace S of the paper).
     pub boxes: Vec<BoxLimit>,
-    /// A floor that points of the arm must stay above.
+    /// Floor that points of the arm must stay above.
     pub floor: Option<FloorLimit>,
-    /// A vertical column, such as the robot's own pedestal, that points of the arm must stay out of.
+    /// Vertical column, such as the robot's pedestal, that points of the arm must not enter.
     pub column: Option<ColumnLimit>,
-    /// Distances between the arm's own links.
+    /// Minimum distances between the arm's own links.
     pub self_collision: Option<SelfCollision>,
-    /// Torque beyond the rigid bodies' that torque and power limits include. Not in files: it comes from the robot
-    /// description and from what else is known of the drives.
+    /// Torque in addition to that of the rigid bodies that torque and power limits include. Not part of files: it comes
+    /// from the robot description and from other knowledge about the drives.
     #[serde(skip)]
     pub known_torque: KnownTorque,
 }
 
-/// Limits of one joint; rad (m), seconds, Nm (N), W. Rates and torques are largest magnitudes.
+/// Limits of one joint; rad (m), seconds, Nm (N), W. Rates and torques are maximum magnitudes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct JointLimit {
     /// Name of the joint.
     pub joint: String,
-    /// Lowest and highest position, rad or m.
+    /// Minimum and maximum position, rad or m.
     #[serde(default)]
     pub position: Option<[f64; 2]>,
-    /// Highest velocity, rad/s or m/s.
+    /// Maximum velocity, rad/s or m/s.
     #[serde(default)]
     pub speed: Option<f64>,
-    /// Highest acceleration, rad/s² or m/s².
+    /// Maximum acceleration, rad/s² or m/s².
     #[serde(default)]
     pub acceleration: Option<f64>,
-    /// Highest jerk, rad/s³ or m/s³.
+    /// Maximum jerk, rad/s³ or m/s³.
     #[serde(default)]
     pub jerk: Option<f64>,
-    /// Highest torque by the model's prior inertial parameters and the known torque of friction, drives and springs, Nm
-    /// or N.
+    /// Maximum torque, computed with the prior inertial parameters of the model and the known torque of friction,
+    /// drives and springs, Nm or N.
     #[serde(default)]
     pub torque: Option<f64>,
-    /// Part of the torque limit kept free for what the prior does not know, 0 (nothing) to below 1.
+    /// Margin for torque that the prior does not include, as a share of the torque limit, from 0 to below 1.
     #[serde(default)]
     pub torque_margin: f64,
-    /// Highest mechanical power `|τ q̇|`, W.
+    /// Maximum mechanical power `|τ q̇|`, W.
     #[serde(default)]
     pub power_w: Option<f64>,
 }
@@ -80,7 +80,7 @@ pub struct JointLimit {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct BoxLimit {
-    /// Range along the base frame's x, m; absent: free.
+    /// Range along the base frame's x, m; without it unlimited.
     #[serde(default)]
     pub x_m: Option<[f64; 2]>,
     /// Range along y, m.
@@ -89,7 +89,7 @@ pub struct BoxLimit {
     /// Range along z, m.
     #[serde(default)]
     pub z_m: Option<[f64; 2]>,
-    /// The points; none: the origins of all moving bodies.
+    /// The points; if empty, the origins of all moving bodies.
     #[serde(default)]
     pub points: Vec<LinkPoint>,
 }
@@ -101,38 +101,40 @@ pub struct BoxLimit {
 pub struct FloorLimit {
     /// Height of the floor in the base frame, m.
     pub height_m: f64,
-    /// The points; none: the shapes below, and without these the origins of all moving bodies.
+    /// The points; if empty, the shapes below, or without these the origins of all moving bodies.
     #[serde(default)]
     pub points: Vec<LinkPoint>,
-    /// Shapes of links that must stay above it.
+    /// Shapes of links that must stay above the floor.
     #[serde(default)]
     pub shapes: Vec<LinkShape>,
-    /// By how much the floor is lower for the shapes of single links, m: what stands lower in every posture.
+    /// Amount by which the floor is lower for the shapes of single links, m, for links that are below it in every
+    /// posture.
     #[serde(default)]
     pub lowered_m: BTreeMap<String, f64>,
 }
 
-/// A cylinder about a line parallel to the base frame's z that points (with their radius) must stay out of: from far
-/// below up to `height_m`, endless without it.
+/// A cylinder around a line parallel to the base frame's z that points (with their radius) must not enter. It extends
+/// from far below up to `height_m`, or without limit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ColumnLimit {
     /// Radius of the cylinder, m.
     pub radius_m: f64,
-    /// Where it ends, z in the base frame, m; by default nowhere: it is endlessly high.
+    /// Height of its upper end, z in the base frame, m; unlimited by default.
     #[serde(default)]
     pub height_m: Option<f64>,
-    /// Where its axis stands: x and y in the base frame, m.
+    /// Position of its axis: x and y in the base frame, m.
     #[serde(default)]
     pub axis_xy_m: [f64; 2],
-    /// The points that must stay out. To be chosen: points near the base are inside by construction.
+    /// The points that must stay outside; no default, because points near the base are always inside.
     pub points: Vec<LinkPoint>,
 }
 
 impl Limits {
-    /// The description's own limits: position where both ends are given, velocity, torque from `effort`, which includes
-    /// the description's friction, drive inertia and springs. Acceleration, jerk, power and space stay free.
+    /// Limits of the robot description: position if both ends are given, velocity, and torque from `effort`, which
+    /// includes the description's friction, drive inertia and springs. Acceleration, jerk, power and space are
+    /// unlimited.
     pub fn from_model(model: &Model) -> Self {
         let joints = model.joints().iter().map(|joint| JointLimit {
             joint: joint.name.clone(),
@@ -145,8 +147,8 @@ impl Limits {
         Self { joints: joints.collect(), known_torque, ..Self::default() }
     }
 
-    /// These limits with `other` laid over them: what `other` says wins, joint by joint and value by value; its boxes
-    /// are added. Its known torque wins where it has any.
+    /// These limits overridden by those of `other`, joint by joint and value by value. The boxes of `other` are added,
+    /// and its known torque has priority unless it is empty.
     pub fn overlaid(mut self, other: &Self) -> Self {
         for over in &other.joints {
             let Some(under) = self.joints.iter_mut().find(|under| under.joint == over.joint) else {
@@ -173,7 +175,7 @@ impl Limits {
         self
     }
 
-    /// The entry of one joint, if there is one.
+    /// Entry of one joint.
     pub fn of(&self, joint: &str) -> Option<&JointLimit> {
         self.joints.iter().find(|limit| limit.joint == joint)
     }

@@ -1,153 +1,153 @@
-//! What can be wrong with limits before any motion is looked for.
+//! Errors in limits that are found before a motion is searched for.
 
 use super::kind::LimitKind;
 use thiserror::Error;
 
-/// Why limits cannot be used.
+/// Reason why limits cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LimitError {
-    /// A joint that the robot does not have.
-    #[error("limits name joint `{joint}`, which the robot does not have; its joints are: {}", known.join(", "))]
+    /// Unknown joint.
+    #[error("unknown joint `{joint}` in the limits; the robot's joints are: {}", known.join(", "))]
     UnknownJoint {
-        /// The name.
+        /// Name in the limits.
         joint: String,
-        /// The names that exist.
+        /// Names of the robot's joints.
         known: Vec<String>,
     },
     /// Known torque of a joint that the robot does not have.
-    #[error("known torque {term} acts on a joint that the robot of {joints} joints does not have")]
+    #[error("known torque {term} acts on a missing joint; the robot has {joints} joints")]
     TorqueOfNoJoint {
-        /// The term's symbol.
+        /// Symbol of the term.
         term: String,
-        /// Joints of the robot.
+        /// Number of joints of the robot.
         joints: usize,
     },
     /// Two entries for one joint.
-    #[error("limits name joint `{joint}` twice: join the entries into one")]
+    #[error("duplicate limits of joint `{joint}`: merge the entries")]
     DuplicateJoint {
-        /// The name.
+        /// Name of the joint.
         joint: String,
     },
-    /// A link that the robot does not have.
-    #[error("{what} names link `{link}`, which the robot does not have; its links are: {}", known.join(", "))]
+    /// Unknown link.
+    #[error("unknown link `{link}` in {what}; the robot's links are: {}", known.join(", "))]
     UnknownLink {
-        /// Which limit.
+        /// The limit.
         what: String,
-        /// The name.
+        /// Name in the limits.
         link: String,
-        /// The names that exist.
+        /// Names of the robot's links.
         known: Vec<String>,
     },
-    /// A NaN or an infinite number.
-    #[error("{what} is {value}: give a finite number, or leave the limit out for none")]
+    /// A value that is not finite.
+    #[error("{what} is {value}: give a finite number, or omit the limit")]
     NotFinite {
-        /// Which limit.
+        /// The limit.
         what: String,
-        /// The number.
+        /// The value.
         value: f64,
     },
-    /// A limit at or below zero, which nothing that moves can keep.
-    #[error("{what} is {value}: it must be above 0 (leave it out for no limit; lock a joint that must not move)")]
+    /// A limit that is not positive.
+    #[error("{what} is {value}: it must be above 0 (omit it for no limit; lock a joint that must not move)")]
     NotPositive {
-        /// Which limit.
+        /// The limit.
         what: String,
-        /// The number.
+        /// The value.
         value: f64,
     },
-    /// A number outside its meaningful range.
+    /// A value outside its range.
     #[error("{what} is {value}: it must be at least {at_least} and below {below}")]
     OutOfRange {
-        /// Which number.
+        /// The quantity.
         what: String,
         /// Its value.
         value: f64,
-        /// Lowest value allowed.
+        /// Minimum value.
         at_least: f64,
-        /// First value not allowed.
+        /// First value above the range.
         below: f64,
     },
-    /// A range upside down.
-    #[error("{what}: the lower end {lower} is above the upper end {upper}: exchange them")]
+    /// A range whose ends are exchanged.
+    #[error("{what}: the lower end {lower} exceeds the upper end {upper}: exchange them")]
     LowerAboveUpper {
-        /// Which range.
+        /// The range.
         what: String,
         /// Its lower end.
         lower: f64,
         /// Its upper end.
         upper: f64,
     },
-    /// A joint that may not move at all.
-    #[error("joint `{joint}` may only stand at {position}: widen its position range, or lock the joint")]
+    /// A position range of zero width.
+    #[error("joint `{joint}` cannot leave position {position}: widen its position range, or lock the joint")]
     ZeroRange {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// The only position.
+        /// Its only position, rad or m.
         position: f64,
     },
-    /// A box without room for the point (with its radius).
-    #[error("{what}: the range {lower} to {upper} m leaves no room for a point of radius {radius_m} m")]
+    /// A box that is too small for a point with its radius.
+    #[error("{what}: the range {lower} to {upper} m is too small for a point of radius {radius_m} m")]
     NoRoom {
-        /// Which box, axis and point.
+        /// Box, axis and point.
         what: String,
-        /// Lower end.
+        /// Lower end, m.
         lower: f64,
-        /// Upper end.
+        /// Upper end, m.
         upper: f64,
-        /// Radius of the point.
+        /// Radius of the point, m.
         radius_m: f64,
     },
-    /// A list that must not be empty.
-    #[error("{what} has no points: name the links that it limits")]
+    /// An empty list of points.
+    #[error("{what} has no points: list the links that it limits")]
     NoPoints {
-        /// Which limit.
+        /// The limit.
         what: String,
     },
-    /// Torque or power limits without the inertial parameters to compute torque from.
+    /// A torque or power limit without the inertial parameters to compute torque.
     #[error(
-        "joint `{joint}` has a {kind} limit, but the inertial parameters of {} are unknown: give them (rough values and a torque margin will do) or leave the limit out",
+        "joint `{joint}` has a {kind} limit, but the inertial parameters of {} are unknown: give them (rough values with a torque margin are sufficient) or omit the limit",
         bodies.join(", ")
     )]
     MissingPrior {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
         /// Torque or power.
         kind: LimitKind,
-        /// Bodies that the joint carries without a prior.
+        /// Bodies without a prior that the joint carries.
         bodies: Vec<String>,
     },
     /// A vector of the wrong length.
     #[error("{what}: expected {expected} numbers, found {found}")]
     Length {
-        /// What it was.
+        /// The vector.
         what: &'static str,
-        /// How many are needed.
+        /// Required length.
         expected: usize,
-        /// How many were given.
+        /// Given length.
         found: usize,
     },
-    /// The start posture, at rest, already breaks a limit.
-    #[error("the start breaks the {kind} limit of `{subject}`: {amount}; move the start or widen the limit")]
+    /// A start posture that violates a limit at rest.
+    #[error("the start violates the {kind} limit of `{subject}`: {amount}; move the start or widen the limit")]
     StartOutside {
-        /// What is limited.
+        /// Kind of the limit.
         kind: LimitKind,
-        /// Where.
+        /// Joint, point or pair of links.
         subject: String,
-        /// By how much, in words.
+        /// Description of the violation.
         amount: String,
     },
-    /// No motion with rest at both ends fits into the time.
+    /// A duration too short for a motion with rest at both ends.
     #[error(
-        "{duration_s} s is too short: joint `{joint}`, from rest to rest over {displacement} within its limits, takes at least {shortest_s:.4} s; lengthen the motion or raise the limits"
+        "a duration of {duration_s} s is too short: joint `{joint}` needs at least {shortest_s:.4} s to move {displacement} from rest to rest within its limits; lengthen the motion or raise the limits"
     )]
     TooShort {
         /// The slowest joint.
         joint: String,
-        /// The duration asked for.
+        /// Requested duration, s.
         duration_s: f64,
-        /// The displacement that each joint must be able to make, rad or m.
+        /// Displacement that each joint must be able to make, rad or m.
         displacement: f64,
-        /// The least time it takes.
+        /// Shortest possible duration, s.
         shortest_s: f64,
     },
 }

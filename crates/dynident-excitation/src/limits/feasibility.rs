@@ -1,4 +1,4 @@
-//! What can be seen to be infeasible before any search: a start outside the limits, a time too short for any motion.
+//! Infeasibility that is detected before a search: a start outside the limits, or a duration too short for any motion.
 
 use super::description::Limits;
 use super::error::LimitError;
@@ -7,16 +7,16 @@ use super::set::LimitSet;
 use crate::motion::Motion;
 use dynident_model::Model;
 
-/// Rounding of a start that stands exactly on a limit.
-const ON_THE_LIMIT: f64 = 1e-9;
+/// Tolerance for the rounding of a start exactly on a limit.
+const START_TOLERANCE: f64 = 1e-9;
 
 impl Limits {
-    /// Checks that the robot may stand at `q` (rad or m): position, places, distances, and gravity within the torque
+    /// Checks that the robot can rest at `q` (rad or m): position, places, distances, and gravity within the torque
     /// limits.
     ///
     /// # Errors
-    /// As [`validate`](Limits::validate); the first limit that the posture breaks; a wrong length or a number that is
-    /// not finite.
+    /// Errors of [`validate`](Limits::validate); the first limit that the posture violates; a wrong length or a value
+    /// that is not finite.
     pub fn check_start(&self, model: &Model, q: &[f64]) -> Result<(), LimitError> {
         let set = LimitSet::new(self, model)?;
         if q.len() != model.dof() {
@@ -30,7 +30,7 @@ impl Limits {
         rest.q.copy_from_slice(q);
         let mut values = Vec::new();
         set.values(&mut set.workspace(), &rest, &mut values);
-        let broken = set.constraints().iter().zip(&values).find(|(_, c)| **c > ON_THE_LIMIT);
+        let broken = set.constraints().iter().zip(&values).find(|(_, c)| **c > START_TOLERANCE);
         broken.map_or(Ok(()), |(constraint, &c)| {
             Err(LimitError::StartOutside {
                 kind: constraint.kind,
@@ -40,12 +40,12 @@ impl Limits {
         })
     }
 
-    /// Checks that every joint can go `displacement` (rad or m, less if its range is smaller) from rest to rest within
-    /// `duration_s`, by its velocity, acceleration and jerk limits.
+    /// Checks that every joint can move by `displacement` (rad or m, less if its range is smaller) from rest to rest
+    /// within `duration_s`, by its velocity, acceleration and jerk limits.
     ///
     /// # Errors
-    /// As [`validate`](Limits::validate); the slowest joint, if it needs longer; a duration or displacement that is not
-    /// finite and positive.
+    /// Errors of [`validate`](Limits::validate); the slowest joint, if it needs longer; a duration or displacement that
+    /// is not finite and positive.
     pub fn check_duration(&self, model: &Model, duration_s: f64, displacement: f64) -> Result<(), LimitError> {
         self.validate(model)?;
         positive("duration", duration_s)?;
@@ -67,25 +67,24 @@ impl Limits {
     }
 }
 
-/// The least time, s, from rest to rest over `displacement` (rad or m, not negative) with the given largest velocity,
-/// acceleration and jerk; `None` is no limit.
+/// Shortest duration, s, from rest to rest over `displacement` (rad or m, not negative) within the given velocity,
+/// acceleration and jerk limits; `None` is no limit.
 ///
 /// Double-S profile (Biagiotti and Melchiorri, *Trajectory Planning for Automatic Machines and Robots* (2008), section
-/// 3.4, rest at both ends); without a jerk limit the trapezoid. Zero when nothing limits.
+/// 3.4, rest at both ends); without a jerk limit the trapezoid. Zero without limits.
 fn shortest_duration_s(displacement: f64, speed: Option<f64>, acceleration: Option<f64>, jerk: Option<f64>) -> f64 {
     let d = displacement;
     if d <= 0.0 {
         return 0.0;
     }
-    // Time at the top velocity, were there no ramps, and the times to reach v from rest and back by acceleration and
-    // jerk.
+    // Time from rest to velocity v by acceleration and jerk.
     let ramp = |v: f64| match (acceleration, jerk) {
         (Some(a), Some(j)) if v * j >= a * a => a / j + v / a,
         (_, Some(j)) => 2.0 * (v / j).sqrt(),
         (Some(a), None) => v / a,
         (None, None) => 0.0,
     };
-    // Two ramps without a stretch between them cover v · ramp(v).
+    // Two ramps without constant velocity between them cover v · ramp(v).
     if let Some(v) = speed
         && v * ramp(v) <= d
     {
@@ -106,7 +105,8 @@ fn shortest_duration_s(displacement: f64, speed: Option<f64>, acceleration: Opti
 mod tests {
     use super::shortest_duration_s;
 
-    /// Bang-bang jerk, integrated: how far a symmetric profile with these ramp times gets, and what it reaches.
+    /// Bang-bang jerk, integrated: distance, peak velocity and peak acceleration of a symmetric profile with these ramp
+    /// times.
     fn profile(jerk: f64, jerking: f64, steady: f64, cruise: f64) -> (f64, f64, f64) {
         let phases = [
             (jerk, jerking),
@@ -130,11 +130,10 @@ mod tests {
 
     #[test]
     fn each_regime_is_the_integrated_bang_bang_profile() {
-        // (jerking, steady, cruise): all phases, no steady acceleration, no cruise, jerk only.
         for (jerking, steady, cruise) in [(0.2, 0.3, 0.5), (0.4, 0.0, 0.7), (0.3, 0.6, 0.0), (0.5, 0.0, 0.0)] {
             let (distance, speed, acceleration) = profile(7.0, jerking, steady, cruise);
             let duration = 4.0 * jerking + 2.0 * steady + cruise;
-            // A limit that the profile touches (or one it does not reach) must give its duration.
+            // A limit that the profile just reaches, or does not reach, must result in its duration.
             let speed_limit = if cruise > 0.0 { speed } else { 2.0 * speed };
             let acceleration_limit = if steady > 0.0 { acceleration } else { 2.0 * acceleration };
             let found = shortest_duration_s(distance, Some(speed_limit), Some(acceleration_limit), Some(7.0));
@@ -148,7 +147,6 @@ mod tests {
         assert_eq!(shortest_duration_s(1.0, Some(2.0), None, None), 0.5);
         assert_eq!(shortest_duration_s(1.0, None, Some(4.0), None), 1.0);
         assert_eq!(shortest_duration_s(4.0, None, None, Some(2.0)), 4.0);
-        // Top velocity not reached, and reached.
         assert_eq!(shortest_duration_s(1.0, Some(2.0), Some(4.0), None), 1.0);
         assert_eq!(shortest_duration_s(1.0, Some(1.0), Some(4.0), None), 1.25);
     }

@@ -1,14 +1,14 @@
-//! Shapes of links above the floor.
+//! Minimum height of the shapes of links above the floor.
 
 use super::description::FloorLimit;
 use super::error::LimitError;
 use super::kind::{Constraint, LimitKind};
 use super::pairs::arm_length_m;
 use super::solids::LinkSolid;
-use super::term::{Inputs, Pull, Term};
+use super::term::{Adjoint, Inputs, Term};
 use dynident_model::{Model, Vec3};
 
-/// `(lowest - z) / L` with `z` the height of a link's lowest point and `L` the arm's length: one row per link.
+/// `(lowest - z) / L`, where `z` is the height of a link's lowest point and `L` the arm's length: one row per link.
 #[derive(Clone, Debug)]
 pub(crate) struct FloorShapes(Vec<(LinkSolid, Constraint)>);
 
@@ -38,12 +38,12 @@ impl Term for FloorShapes {
         }
     }
 
-    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], adjoint: &mut Adjoint<'_>) {
         let bodies = inputs.bodies;
         for ((solid, constraint), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
             for (sample, &weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
                 let (_, place) = solid.lowest(&inputs.placement(solid.body, sample));
-                pull.point(solid.body, bodies, sample, place, Vec3([0.0, 0.0, -weight / constraint.size]));
+                adjoint.point(solid.body, bodies, sample, place, Vec3([0.0, 0.0, -weight / constraint.size]));
             }
         }
     }

@@ -1,14 +1,14 @@
-//! Position and velocity of joints that follow others, within the description's limits: bands on sums of the motion.
+//! Position and velocity limits of joints that follow others, from the robot description: bands on sums of the motion.
 
 use super::kind::{Constraint, LimitKind};
-use super::term::{Inputs, Pull, Term};
+use super::term::{Adjoint, Inputs, Term};
 use super::validate::middle_and_half;
 use dynident_model::Model;
 
 /// `|Σ multiplier x + offset - middle| / half - 1`, where `x` are positions or velocities of the followed joints.
 #[derive(Clone, Debug)]
 struct FollowerBand {
-    /// Degree of freedom, multiplier.
+    /// Degree of freedom and multiplier of each followed joint.
     sources: Vec<(usize, f64)>,
     kind: LimitKind,
     offset: f64,
@@ -17,8 +17,7 @@ struct FollowerBand {
     unit: &'static str,
 }
 
-/// What the description limits of the joints that follow others. Joints that move by themselves have limits of their
-/// own, which may be stated.
+/// Limits of the followers in the robot description. Independent joints have separate limits, which a study can state.
 fn follower_bands(model: &Model) -> Vec<FollowerBand> {
     let Some(coupling) = model.coupling() else { return Vec::new() };
     let mut bands = Vec::new();
@@ -44,7 +43,6 @@ fn follower_bands(model: &Model) -> Vec<FollowerBand> {
     bands
 }
 
-/// All bands.
 #[derive(Clone, Debug)]
 pub(crate) struct FollowerLimits(Vec<FollowerBand>);
 
@@ -80,13 +78,13 @@ impl Term for FollowerLimits {
         }
     }
 
-    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], adjoint: &mut Adjoint<'_>) {
         let motion = inputs.motion;
         for (band, row) in self.0.iter().zip(weights.chunks_exact(motion.samples)) {
             let (middle, half) = middle_and_half(band.range);
             let is_position = band.kind == LimitKind::Position;
             let from = if is_position { &motion.q } else { &motion.dq };
-            let to = if is_position { &mut pull.motion.q } else { &mut pull.motion.dq };
+            let to = if is_position { &mut adjoint.motion.q } else { &mut adjoint.motion.dq };
             for (sample, weight) in row.iter().enumerate() {
                 let at = |joint: usize| motion.of(joint).start + sample;
                 let x: f64 = band.sources.iter().map(|&(joint, share)| share * from[at(joint)]).sum();

@@ -1,4 +1,4 @@
-//! Few corners in place of many.
+//! Reduction of a shape to a few corners.
 
 use super::convex::{Placed, hull_distance};
 use super::pieces::spiral;
@@ -6,21 +6,20 @@ use super::self_collision_shapes::LinkShape;
 use dynident_model::collision::Solid;
 use dynident_model::{Transform, Vec3};
 
-/// Corners of a shape beyond which it is replaced by a coarser one that holds it.
-const MOST_CORNERS: usize = 32;
+/// Number of corners above which a shape is replaced by a coarser one that contains it.
+const MAX_EXACT_CORNERS: usize = 32;
 
-/// Directions in which corners are looked for.
+/// Directions in which the outermost corners are selected.
 const DIRECTIONS: usize = 40;
 
-/// Corners of a closer shape at most.
-const MOST_CLOSER: usize = 80;
+const MAX_CLOSE_CORNERS: usize = 80;
 
 impl LinkShape {
-    /// The solid on a link. One with many corners, such as a mesh, becomes the hull of its corners farthest out in 40
-    /// directions, with a radius that holds all others: it is never smaller than the solid.
+    /// The solid on a link. A solid with many corners, such as a mesh, is replaced by the hull of its outermost corners
+    /// in 40 directions, with a radius that contains all others: it is never smaller than the solid.
     pub fn holding(link: &str, solid: &Solid) -> Self {
         let Solid { corners_m, radius_m, .. } = solid;
-        let (corners, gap_m) = if corners_m.len() <= MOST_CORNERS {
+        let (corners, gap_m) = if corners_m.len() <= MAX_EXACT_CORNERS {
             (corners_m.clone(), 0.0)
         } else {
             let corners = outermost(corners_m);
@@ -34,12 +33,12 @@ impl LinkShape {
         }
     }
 
-    /// A closer shape about the hull of corners on a link: corners are added, always the one farthest out, until all
-    /// are within `gap_m` of the hull, or to 80 of them. The radius holds the rest.
+    /// A closer shape around the hull of corners on a link. The farthest corner is added until all are within `gap_m`
+    /// of the hull, or up to 80 corners; the radius contains the rest.
     pub(super) fn closely(link: &str, corners_m: &[Vec3], radius_m: f64, gap_m: f64) -> Self {
-        let mut hull = if corners_m.len() <= MOST_CORNERS { corners_m.to_vec() } else { outermost(corners_m) };
+        let mut hull = if corners_m.len() <= MAX_EXACT_CORNERS { corners_m.to_vec() } else { outermost(corners_m) };
         let mut outside = if hull.len() == corners_m.len() { Vec::new() } else { corners_m.to_vec() };
-        // The distance of corners that are near enough only shrinks when the hull grows.
+        // The distance of a corner only decreases when the hull grows.
         let mut near_m = 0.0_f64;
         let left_m = loop {
             let mut farthest = (0.0, None);
@@ -54,7 +53,7 @@ impl LinkShape {
                 apart > gap_m
             });
             match farthest {
-                (apart, Some(corner)) if apart > gap_m && hull.len() < MOST_CLOSER => hull.push(corner),
+                (apart, Some(corner)) if apart > gap_m && hull.len() < MAX_CLOSE_CORNERS => hull.push(corner),
                 (apart, _) => break apart.max(near_m),
             }
         };
@@ -66,7 +65,6 @@ impl LinkShape {
     }
 }
 
-/// The corners farthest out in evenly spread directions, each once.
 fn outermost(corners: &[Vec3]) -> Vec<Vec3> {
     let mut found: Vec<usize> = Vec::new();
     for direction in spiral(DIRECTIONS) {
@@ -84,7 +82,6 @@ fn outermost(corners: &[Vec3]) -> Vec<Vec3> {
     found.into_iter().map(|index| corners[index]).collect()
 }
 
-/// The largest distance of a point from a hull.
 fn farthest_from(hull: &[Vec3], points: &[Vec3]) -> f64 {
     let at = Transform::IDENTITY;
     let mut farthest = 0.0_f64;
@@ -102,9 +99,8 @@ mod tests {
     use dynident_model::sample::Random;
 
     #[test]
-    fn a_coarser_shape_holds_the_finer_one() {
+    fn the_coarser_shape_contains_the_finer_one() {
         let mut random = Random::new(5);
-        // Points on an ellipsoid: all of them corners.
         let corners_m: Vec<Vec3> = (0..2000)
             .map(|_| {
                 let [x, y, z] = random.direction().0;
@@ -118,7 +114,7 @@ mod tests {
         assert!(farthest_from(&hull, &corners_m) <= shape.radius_m);
         let closer = LinkShape::closely("rod", &corners_m, 0.0, 0.003);
         let hull: Vec<Vec3> = closer.corners_m.iter().map(|corner| Vec3(*corner)).collect();
-        assert!(hull.len() <= MOST_CLOSER && closer.radius_m < 0.5 * shape.radius_m, "{}", closer.radius_m);
+        assert!(hull.len() <= MAX_CLOSE_CORNERS && closer.radius_m < 0.5 * shape.radius_m, "{}", closer.radius_m);
         assert!(farthest_from(&hull, &corners_m) <= closer.radius_m);
     }
 }

@@ -1,8 +1,8 @@
-//! Position, velocity, acceleration and jerk of single joints: bands on the motion itself.
+//! Limits of position, velocity, acceleration and jerk of single joints: bands on the motion itself.
 
 use super::description::JointLimit;
 use super::kind::{Constraint, LimitKind};
-use super::term::{Inputs, Pull, Term};
+use super::term::{Adjoint, Inputs, Term};
 use super::validate::middle_and_half;
 use crate::motion::Motion;
 use dynident_model::Model;
@@ -17,7 +17,6 @@ struct Band {
     constraint: Constraint,
 }
 
-/// All bands.
 #[derive(Clone, Debug)]
 pub(crate) struct JointMotionLimits(Vec<Band>);
 
@@ -55,22 +54,21 @@ fn array(motion: &Motion, kind: LimitKind) -> &[f64] {
     }
 }
 
-/// One row of a [`LimitSet`](super::LimitSet) that bounds a single joint's position (order 0), velocity, acceleration
-/// or jerk (3): `c = |x - middle| / half - 1`.
+/// A row of a [`LimitSet`](super::LimitSet) that limits the position (order 0), velocity, acceleration or jerk (order
+/// 3) of a single joint: `c = |x - middle| / half - 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct JointBand {
-    /// The row.
+    /// Row of the set.
     pub row: usize,
-    /// The joint.
     pub joint: usize,
-    /// Derivative of the position that is bounded.
+    /// Order of the limited derivative of the position.
     pub order: usize,
-    /// Half the width of the band, rad/s^order (m/s^order).
+    /// Half width of the band, rad/s^order (m/s^order).
     pub half: f64,
 }
 
 impl JointMotionLimits {
-    /// The bands, when this term's rows come first.
+    /// The bands; this term must be the first of the set.
     pub(crate) fn bands(&self) -> Vec<JointBand> {
         let order = |kind| match kind {
             LimitKind::Position => 0,
@@ -103,15 +101,15 @@ impl Term for JointMotionLimits {
         }
     }
 
-    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], adjoint: &mut Adjoint<'_>) {
         let motion = inputs.motion;
         for (band, row) in self.0.iter().zip(weights.chunks_exact(motion.samples)) {
             let (scale, range) = (1.0 / band.half, motion.of(band.joint));
             let to = match band.kind {
-                LimitKind::Position => &mut pull.motion.q,
-                LimitKind::Speed => &mut pull.motion.dq,
-                LimitKind::Acceleration => &mut pull.motion.ddq,
-                _ => &mut pull.motion.dddq,
+                LimitKind::Position => &mut adjoint.motion.q,
+                LimitKind::Speed => &mut adjoint.motion.dq,
+                LimitKind::Acceleration => &mut adjoint.motion.ddq,
+                _ => &mut adjoint.motion.dddq,
             };
             for ((to, weight), x) in to[range.clone()].iter_mut().zip(row).zip(&array(motion, band.kind)[range]) {
                 *to += weight * scale * (x - band.middle).signum();

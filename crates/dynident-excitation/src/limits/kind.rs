@@ -1,9 +1,9 @@
-//! The kinds of limit, and how much of one a motion uses.
+//! Kinds of limits, and normalised constraint values.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// What is limited.
+/// Limited quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
@@ -16,7 +16,7 @@ pub enum LimitKind {
     Acceleration,
     /// Joint jerk.
     Jerk,
-    /// Joint torque by the prior model.
+    /// Joint torque computed with the prior model.
     Torque,
     /// Mechanical power of a joint.
     Power,
@@ -24,24 +24,23 @@ pub enum LimitKind {
     Box,
     /// The floor.
     Floor,
-    /// The column about the base.
+    /// The column around the base.
     Column,
     /// The distance between two links.
     SelfCollision,
 }
 
 impl LimitKind {
-    /// True for limits that change when the same path is run slower.
+    /// Whether the limit changes when the same path is run slower.
     pub(crate) fn depends_on_time(self) -> bool {
         matches!(self, Self::Speed | Self::Acceleration | Self::Jerk | Self::Torque | Self::Power)
     }
 
-    /// True for limits on where points of the arm are, which no single joint decides.
+    /// Whether the limit is on places of points of the arm, which depend on several joints.
     pub(crate) fn is_place(self) -> bool {
         matches!(self, Self::Box | Self::Floor | Self::Column | Self::SelfCollision)
     }
 
-    /// True where the limit is a least distance and not a largest magnitude.
     pub(crate) fn is_clearance(self) -> bool {
         matches!(self, Self::Floor | Self::Column | Self::SelfCollision)
     }
@@ -66,18 +65,18 @@ impl fmt::Display for LimitKind {
 
 /// One limit: a row of constraint values over the samples.
 ///
-/// Its value `c` is at most 0 when the limit holds: `|x - middle| / size - 1` for magnitudes and ranges, `1 - distance
+/// Its value `c` is at most 0 if the limit is kept: `|x - middle| / size - 1` for magnitudes and ranges, `1 - distance
 /// / size` for a column, `(clearance - distance) / size` between links (at least -0.25), and for the floor `(height +
-/// radius - z) / 1 m`, or per arm's length for shapes.
+/// radius - z) / size`, where size is the arm's length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Constraint {
-    /// What is limited.
+    /// Kind of the limit.
     pub kind: LimitKind,
-    /// Where: a joint, a point of a link, or a pair of links.
+    /// Joint, point of a link, or pair of links.
     pub subject: String,
     /// Middle of the range; zero for magnitudes and a column, the height for the floor, the clearance between links.
     pub middle: f64,
-    /// Half width of the range, largest magnitude, or least distance: what `c` is measured by.
+    /// Half width of the range, maximum magnitude, or minimum distance; the scale of `c`.
     pub size: f64,
     /// Unit of middle and size.
     pub unit: &'static str,

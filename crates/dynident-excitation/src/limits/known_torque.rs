@@ -1,5 +1,4 @@
-//! Torque beyond that of the rigid bodies which is known before a motion: friction, drive inertia, springs, declared
-//! torques.
+//! Known torque in addition to that of the rigid bodies: friction, drive inertia, springs and declared torques.
 
 use dynident_model::Model;
 use dynident_model::terms::{
@@ -7,20 +6,20 @@ use dynident_model::terms::{
     VelocityCurve, VelocityFriction,
 };
 
-/// Torque terms with their values. Together with the rigid bodies they give the torque that torque and power limits
-/// are compared with.
+/// Torque terms with their values. Torque and power limits apply to the sum of these terms and the rigid-body torque.
 ///
-/// Coulomb friction is a sign of the velocity here, also where a study estimates it with a smooth step. At rest it may
-/// have either sign, so the torque of a joint at a sample is a range `[low, high]`, whose ends differ at rest only.
-/// Friction with hysteresis (Maxwell slip) may have any value up to its yield torque at every sample. A change with the
-/// temperature is not included.
+/// Coulomb friction is a sign of the velocity here, also where a study estimates it with a smooth step. At rest it can
+/// have either sign, so the torque of a joint at a sample is a range `[low, high]`, whose ends differ only at rest.
+/// Friction with hysteresis (Maxwell slip) can have any value up to its yield torque at every sample. Temperature
+/// dependence is not included.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct KnownTorque {
     terms: Vec<(TorqueTerm, f64)>,
 }
 
 impl KnownTorque {
-    /// These terms with their values, in the unit of each term's parameter. Terms with the value zero are dropped.
+    /// Creates the known torque from terms and values, in the unit of each term's parameter. Terms with the value zero
+    /// are omitted.
     pub fn new(terms: impl IntoIterator<Item = (TorqueTerm, f64)>) -> Self {
         let mut known = Self::default();
         terms.into_iter().for_each(|(term, value)| known.add(term, value));
@@ -28,7 +27,7 @@ impl KnownTorque {
     }
 
     /// Known torque of the robot description: viscous and Coulomb friction, drive inertia and springs of its joints.
-    /// The friction and inertia of a joint that follows one or two others act on these.
+    /// The friction and inertia of a joint that follows one or two others act on those joints.
     pub fn of_description(model: &Model) -> Self {
         let mut known = Self::default();
         for (place, joint) in model.tree_joints().iter().enumerate() {
@@ -49,14 +48,14 @@ impl KnownTorque {
         known
     }
 
-    /// Friction or inertia of a joint of the tree that moves by `share` per unit of each of its drivers.
+    /// Adds friction or inertia of a joint of the tree that moves by `share` per unit of each of its drivers.
     fn add_of_joint(&mut self, name: &str, drivers: &[(usize, f64)], effect: CouplingEffect, value: f64) {
         let is_coulomb = matches!(effect, CouplingEffect::Coulomb(_));
         if let (&[(first, a), (second, b)], true) = (drivers, drivers.len() == 2) {
             let (name, ratios) = (name.to_owned(), [a, b]);
             self.add(TorqueTerm::Coupling(Coupling { name, first, second, ratios, effect }), value);
         }
-        // A coupling holds the cross terms of inertia and viscous friction, and all of Coulomb friction.
+        // A coupling contains the cross terms of inertia and viscous friction, and all Coulomb friction.
         if drivers.len() == 1 || (drivers.len() == 2 && !is_coulomb) {
             for &(joint, share) in drivers {
                 let (term, factor) = effect.of_joint(joint, share);
@@ -65,7 +64,7 @@ impl KnownTorque {
         }
     }
 
-    /// Adds a term; values of the same term add up.
+    /// Adds a term; values of equal terms are summed.
     fn add(&mut self, term: TorqueTerm, value: f64) {
         let term = term.with_step(|_| SIGN);
         if value == 0.0 {
@@ -77,7 +76,7 @@ impl KnownTorque {
         }
     }
 
-    /// The same with a term that has this value; an equal term that is there already gets it.
+    /// Sets the value of a term, replacing an equal term.
     #[must_use]
     pub fn with(mut self, term: TorqueTerm, value: f64) -> Self {
         let term = term.with_step(|_| SIGN);
@@ -86,7 +85,7 @@ impl KnownTorque {
         self
     }
 
-    /// The same without the friction of one joint.
+    /// Removes the friction of one joint.
     #[must_use]
     pub fn without_friction_of(mut self, joint: usize) -> Self {
         self.terms.retain(|(term, _)| !(term.is_joint_friction() && term.own_joint() == Some(joint)));
@@ -98,13 +97,13 @@ impl KnownTorque {
         &self.terms
     }
 
-    /// Whether no torque beyond the rigid bodies' is known.
+    /// Whether there is no known torque.
     pub fn is_empty(&self) -> bool {
         self.terms.is_empty()
     }
 
-    /// Lowest and highest torque of every joint at one state (q, q̇, q̈), Nm (N): `rigid` is that of the rigid bodies,
-    /// `low` and `high` are overwritten.
+    /// Computes the lowest and highest torque of every joint at one state (q, q̇, q̈), Nm (N). `rigid` is the torque of
+    /// the rigid bodies; `low` and `high` are overwritten.
     ///
     /// # Panics
     /// If lengths differ.
@@ -136,7 +135,6 @@ impl KnownTorque {
 
 const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
 
-/// Torque of one unit of a term on one joint at one sample.
 fn column(term: &TorqueTerm, joint: usize, motion: &JointMotion<'_>) -> f64 {
     let mut out = [0.0];
     let mut input = TermInput { load: None, temperature_c: None, memory: &mut HysteresisState::default() };
@@ -144,7 +142,7 @@ fn column(term: &TorqueTerm, joint: usize, motion: &JointMotion<'_>) -> f64 {
     out[0]
 }
 
-/// Torque of one unit of friction by the sign of a velocity on one joint: lowest and highest, both signs at rest.
+/// Torque of one unit of sign friction on one joint: lowest and highest, with both signs at rest.
 fn step(term: &TorqueTerm, friction: &VelocityFriction<'_>, joint: usize, dq: &[f64], rigid: &[f64]) -> [f64; 2] {
     let joints = term.joints();
     let velocity: f64 = joints.iter().zip(friction.ratios).map(|(&of, ratio)| ratio * dq[of]).sum();
@@ -167,7 +165,8 @@ mod tests {
     use super::*;
     use dynident_model::terms::{Coulomb, Offset, Stribeck};
 
-    /// Two joints that a third follows: `q3 = 2 q1 - q2`. Its torque acts on the first by 2 and on the second by -1.
+    /// Two joints with a follower: `q3 = 2 q1 - q2`. Its torque acts on the first with factor 2 and on the second with
+    /// -1.
     #[test]
     fn friction_of_a_follower_of_two_joints() {
         let mut known = KnownTorque::default();
@@ -178,13 +177,12 @@ mod tests {
             known.add_of_joint("third", &drivers, effect, value);
         }
         let (dq, ddq) = ([0.3, 0.9], [1.0, -2.0]);
-        // By hand: velocity 2·0.3 - 0.9 = -0.3, acceleration 2·1 + 2 = 4.
+        // Computed by hand: velocity 2·0.3 - 0.9 = -0.3, acceleration 2·1 + 2 = 4.
         let of_third = 0.5 * 4.0 + 3.0 * -0.3 - 4.0;
         let (mut low, mut high) = ([0.0; 2], [0.0; 2]);
         known.range(&[10.0, 20.0], [&[0.0; 2], &dq, &ddq], &mut low, &mut high);
         assert_eq!(low, high);
         assert!((low[0] - (10.0 + 2.0 * of_third)).abs() < 1e-12 && (low[1] - (20.0 - of_third)).abs() < 1e-12);
-        // At rest either sign.
         known.range(&[0.0; 2], [&[0.0; 2], &[0.0; 2], &[0.0; 2]], &mut low, &mut high);
         assert_eq!((low, high), ([-8.0, -4.0], [8.0, 4.0]));
     }

@@ -1,10 +1,10 @@
-//! Points of the description, found on the model's bodies.
+//! Points of links, resolved to the model's bodies.
 
 use super::error::LimitError;
 use dynident_model::{Model, Transform, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// A sphere fixed to a link, in most cases of radius zero: the point whose place is limited.
+/// A sphere fixed to a link, usually of radius zero: the point whose place is limited.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -23,13 +23,11 @@ pub struct LinkPoint {
 #[derive(Clone, Debug)]
 pub(crate) struct BodyPoint {
     pub(crate) body: Option<usize>,
-    /// Place in the body's frame, m.
     pub(crate) at: Vec3,
     pub(crate) radius_m: f64,
     pub(crate) name: String,
 }
 
-/// The body that carries the link called `name` and `body_from_link`.
 pub(crate) fn link_place(model: &Model, name: &str, what: &str) -> Result<(Option<usize>, Transform), LimitError> {
     let bodies = core::iter::once((None, model.base()))
         .chain(model.bodies().iter().enumerate().map(|(index, body)| (Some(index), body)));
@@ -45,7 +43,7 @@ pub(crate) fn link_place(model: &Model, name: &str, what: &str) -> Result<(Optio
     Err(LimitError::UnknownLink { what: what.to_owned(), link: name.to_owned(), known })
 }
 
-/// The points on their bodies; of an empty list the origins of all moving bodies.
+/// The points on their bodies; for an empty list the origins of all moving bodies.
 pub(crate) fn body_points(model: &Model, points: &[LinkPoint], what: &str) -> Result<Vec<BodyPoint>, LimitError> {
     if points.is_empty() {
         let origins = model.bodies().iter().enumerate().map(|(index, body)| BodyPoint {

@@ -1,10 +1,10 @@
-//! **Where may it move?** Limits as a user states them, as values and derivatives for optimisers, and in words when
-//! they cannot be kept.
+//! **Limits of the motion**: as a user states them, as values and derivatives for optimisers, and as a diagnosis of
+//! infeasible motions.
 //!
-//! [`Limits`] is the description. [`LimitSet`] prepares it for a robot: normalised values `c <= 0` over a block of
-//! samples and the way back from multipliers to the motion. [`peaks()`] finds the true extremes between samples,
-//! [`diagnose()`] says what binds and what would help. The final word has [`check`](crate::check), which shares none of
-//! this.
+//! [`Limits`] is the user's description. [`LimitSet`] prepares it for a robot: normalised values `c <= 0` over a block
+//! of samples, and the adjoint from multipliers to the motion. [`peaks()`] finds the extremes between samples, and
+//! [`diagnose()`] reports violated limits and sufficient changes. The independent [`check`](crate::check) shares none
+//! of this code.
 
 mod assumed;
 mod combined;
@@ -39,7 +39,7 @@ mod torque_range;
 mod validate;
 mod wrench;
 
-pub use assumed::{AssumedLimits, LimitsInForce, ShapesOfLinks, StartPositions};
+pub use assumed::{AssumedLimits, AssumptionThresholds, LimitsInForce, ShapesOfLinks, StartPositions};
 pub use description::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits};
 pub use diagnose::{Diagnosis, diagnose, diagnose_until};
 pub(crate) use diagnose::{Widened, relaxation};

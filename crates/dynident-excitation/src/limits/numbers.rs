@@ -2,8 +2,8 @@
 
 use super::error::LimitError;
 
-/// Below this a limit is zero for every purpose, and its reciprocal may overflow.
-const SMALLEST: f64 = 1e-100;
+/// Smallest positive limit; the reciprocal of a smaller one could overflow.
+const MIN_POSITIVE: f64 = 1e-100;
 
 pub(super) fn finite(what: &str, value: f64) -> Result<(), LimitError> {
     if value.is_finite() { Ok(()) } else { Err(LimitError::NotFinite { what: what.to_owned(), value }) }
@@ -11,7 +11,7 @@ pub(super) fn finite(what: &str, value: f64) -> Result<(), LimitError> {
 
 pub(super) fn positive(what: &str, value: f64) -> Result<(), LimitError> {
     finite(what, value)?;
-    if value > SMALLEST { Ok(()) } else { Err(LimitError::NotPositive { what: what.to_owned(), value }) }
+    if value > MIN_POSITIVE { Ok(()) } else { Err(LimitError::NotPositive { what: what.to_owned(), value }) }
 }
 
 pub(super) fn not_negative(what: &str, value: f64) -> Result<(), LimitError> {

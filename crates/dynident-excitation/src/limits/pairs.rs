@@ -1,4 +1,4 @@
-//! Which links must stay apart, and how far.
+//! Pairs of links that must keep a distance, and the distances.
 
 use super::error::LimitError;
 use super::self_collision_shapes::SelfCollision;
@@ -7,40 +7,34 @@ use dynident_dynamics::{Workspace, body_placements};
 use dynident_model::sample::Random;
 use dynident_model::{Model, Transform};
 
-/// The links of a robot as solids and which of them must stay apart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct SolidPairs {
     pub solids: Vec<LinkSolid>,
     pub pairs: Vec<SolidPair>,
-    /// Pairs of links that are not checked although they are no neighbours and nobody ignores them, because their
-    /// shapes stand in each other: give shapes of their own to links that can really touch.
+    /// Pairs that are neither adjacent nor ignored, but not checked because their shapes overlap. Define other shapes
+    /// for links that can collide.
     pub left_out: Vec<[String; 2]>,
-    /// Pairs that are always nearer than the clearance and touch in no posture tried: they run close by each other by
-    /// design, and are not checked either.
+    /// Pairs that are always closer than the clearance but touch in no tested posture: they are close by design and not
+    /// checked.
     pub close: Vec<[String; 2]>,
 }
 
-/// Two solids that must stay apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SolidPair {
-    /// Places among the solids.
+    /// Indices of the solids.
     pub of: [usize; 2],
-    /// Least distance from surface to surface, m.
+    /// Minimum distance between the surfaces, m.
     pub clearance_m: f64,
-    /// What a lack of distance is measured by, m.
+    /// Scale of a missing distance, m.
     pub size_m: f64,
 }
 
-/// Postures tried to find links that stand in each other.
 const POSTURES: usize = 256;
 
-/// Share of the postures in which links must touch, beside the neutral one, to be left out.
-const MOSTLY: f64 = 0.5;
+/// Minimum scale of a missing distance, as a share of the arm's length.
+const MIN_RELATIVE_SIZE: f64 = 0.05;
 
-/// A lack of distance is measured by this share of the arm's length at least.
-const LEAST_SIZE: f64 = 0.05;
-
-/// The longest chain of joints from the base, m: what lengths of a machine are measured by.
+/// Length of the longest chain of joints from the base, m; the characteristic length of a machine.
 pub(crate) fn arm_length_m(model: &Model) -> f64 {
     let mut lengths: Vec<f64> = Vec::with_capacity(model.body_count());
     for joint in model.tree_joints() {
@@ -58,7 +52,7 @@ pub(crate) fn arm_length_m(model: &Model) -> f64 {
     lengths.into_iter().enumerate().map(tip).fold(0.0, f64::max)
 }
 
-/// Every joint at zero, or as near to it as the description's limits allow.
+/// Every joint at zero, or as close to zero as the limits of the robot description allow.
 pub(crate) fn neutral_posture(model: &Model) -> Vec<f64> {
     let nearest = |joint: &dynident_model::Joint| {
         let (lower, upper) = (joint.limits.lower.unwrap_or(0.0), joint.limits.upper.unwrap_or(0.0));
@@ -67,7 +61,8 @@ pub(crate) fn neutral_posture(model: &Model) -> Vec<f64> {
     model.joints().iter().map(nearest).collect()
 }
 
-/// Seeded postures within the description's limits: a joint without any turns all the way, or slides half a metre.
+/// Seeded postures within the limits of the robot description; without limits a full turn, or half a metre to either
+/// side.
 pub(crate) fn random_postures(model: &Model, count: usize) -> Vec<Vec<f64>> {
     let mut random = Random::new(1);
     let mut posture = || {
@@ -82,12 +77,12 @@ pub(crate) fn random_postures(model: &Model, count: usize) -> Vec<Vec<f64>> {
 }
 
 impl SelfCollision {
-    /// The shapes on their bodies and the pairs to keep apart: all but those on one body, on neighbours (parent and
-    /// child) and those ignored. Of **fitted** capsules also those are left out that overlap in each of 256 seeded
-    /// postures within the position limits of the description; with `leave_out_touching` those that it describes.
+    /// Resolves the shapes to their bodies and determines the pairs that must keep a distance: all except those on one
+    /// body, adjacent ones (parent and child) and ignored ones. For **fitted** capsules, pairs that overlap in each of
+    /// 256 seeded postures are also omitted; with `leave_out_touching` those that its documentation describes.
     ///
     /// # Errors
-    /// As [`validate`](SelfCollision::validate).
+    /// Errors of [`validate`](SelfCollision::validate).
     pub(crate) fn resolve(&self, model: &Model) -> Result<SolidPairs, LimitError> {
         self.validate(model)?;
         let solids = LinkSolid::gather(model, &self.all_shapes(model), "a shape of the self-collision limit")?;
@@ -98,7 +93,7 @@ impl SelfCollision {
         let is_ignored = |a: &str, b: &str| {
             self.ignored.iter().any(|[first, second]| (first == a && second == b) || (first == b && second == a))
         };
-        let least_size = LEAST_SIZE * arm_length_m(model);
+        let least_size = MIN_RELATIVE_SIZE * arm_length_m(model);
         let mut pairs = Vec::new();
         for (second, b) in solids.iter().enumerate() {
             for (first, a) in solids[..second].iter().enumerate() {
@@ -113,26 +108,25 @@ impl SelfCollision {
         }
         let mut resolved = SolidPairs { solids, pairs, left_out: Vec::new(), close: Vec::new() };
         if self.fitted() || self.leave_out_touching {
-            resolved.leave_out(model, self.leave_out_touching);
+            resolved.leave_out(model, self.leave_out_touching, self.min_overlap_share);
         }
         Ok(resolved)
     }
 
-    /// Pairs of links that are not kept apart although they are no neighbours, because their shapes stand in each
-    /// other.
+    /// Pairs of links that are not checked although they are not adjacent, because their shapes overlap.
     ///
     /// # Errors
-    /// As [`validate`](SelfCollision::validate).
+    /// Errors of [`validate`](SelfCollision::validate).
     pub fn left_out(&self, model: &Model) -> Result<Vec<[String; 2]>, LimitError> {
         Ok(self.resolve(model)?.left_out)
     }
 }
 
 impl SolidPairs {
-    /// Leaves out pairs that stand in each other, and lets those that cannot have their clearance have less.
-    fn leave_out(&mut self, model: &Model, touching: bool) {
+    /// Omits pairs whose shapes overlap, and reduces the clearance of pairs that cannot keep it.
+    fn leave_out(&mut self, model: &Model, touching: bool, min_overlap_share: f64) {
         let mut workspace = Workspace::new(model);
-        // For each pair: whether it touches in the neutral posture, in how many others, and the farthest apart.
+        // For each pair: contact in the neutral posture, number of other postures with contact, and largest distance.
         let mut seen = vec![(false, 0_usize, f64::NEG_INFINITY); self.pairs.len()];
         let postures = core::iter::once(neutral_posture(model)).chain(random_postures(model, POSTURES));
         for (number, q) in postures.enumerate() {
@@ -156,18 +150,17 @@ impl SolidPairs {
         let mut kept = Vec::with_capacity(self.pairs.len());
         for (pair, (neutral, touched, farthest)) in self.pairs.iter().zip(seen) {
             let always = touched == POSTURES;
-            if always || (touching && neutral && touched as f64 > MOSTLY * POSTURES as f64) {
+            if always || (touching && neutral && touched as f64 > min_overlap_share * POSTURES as f64) {
                 self.left_out.push(pair.of.map(|place| self.solids[place].link.clone()));
             } else if touching && farthest < pair.clearance_m {
-                // They run close by each other by design: where some posture brings them together they must not touch.
+                // They are close by design; if they touch in some posture, they must not touch.
                 if neutral || touched > 0 {
                     kept.push(SolidPair { clearance_m: 0.0, ..*pair });
                 } else {
                     self.close.push(pair.of.map(|place| self.solids[place].link.clone()));
                 }
             } else {
-                // Links that are never far apart keep at most half of their largest distance: more would leave no
-                // room to move.
+                // Links that are never far apart keep at most half of their largest distance, so that they can move.
                 let most = if touching { 0.5 * farthest } else { pair.clearance_m };
                 kept.push(SolidPair { clearance_m: pair.clearance_m.min(most), ..*pair });
             }
@@ -189,7 +182,7 @@ mod tests {
             fitted.pairs.iter().map(|pair| pair.of.map(|index| fitted.solids[index].link.as_str())).collect();
         assert!(names.contains(&["shoulder_link", "forearm_link"]), "{names:?}");
         assert!(names.contains(&["upper_arm_link", "wrist_3_link"]), "{names:?}");
-        // The wrist's axes are 0.115 m apart, less than two radii, in every posture.
+        // The wrist's axes are 0.115 m apart in every posture, less than two radii.
         assert!(
             fitted.left_out.iter().any(|[a, b]| a == "forearm_link" && b == "wrist_2_link"),
             "{:?}",

@@ -1,55 +1,53 @@
-//! The true extremes of every limit along a motion, not only at samples.
+//! Extremes of every limit along a motion, also between samples.
 
 use super::set::{LimitSet, LimitWorkspace};
 use crate::motion::Motion;
 
-/// Where a row is largest.
+/// Largest value of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Peak {
-    /// The row of the set.
+    /// Row of the set.
     pub row: usize,
     /// Largest value; infinite if the motion is not finite.
     pub value: f64,
     /// Largest value at the given times.
     pub sampled: f64,
-    /// When, s.
+    /// Time of the largest value, s.
     pub at_s: f64,
 }
 
-/// How peaks are found.
+/// Settings of [`peaks()`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeakSettings {
-    /// Sampled maxima further than this below the row's largest sample are not refined.
+    /// Largest difference to the row's largest sample of sampled maxima that are refined.
     pub band: f64,
-    /// Golden-section steps; each narrows the place of a peak by 0.618.
+    /// Golden-section steps; each reduces the bracket by 0.618.
     pub steps: usize,
 }
 
 impl Default for PeakSettings {
-    /// A band of 0.1, and 32 steps: two sampling steps shrink to 4e-7 of one.
+    /// Band 0.1 and 32 steps, which reduce two sampling steps to 4e-7 of one.
     fn default() -> Self {
         Self { band: 0.1, steps: 32 }
     }
 }
 
-/// A local maximum that is being narrowed.
 struct Bracket {
     row: usize,
     from: f64,
     to: f64,
-    /// The two inner places and the values there.
     inner: [(f64, f64); 2],
     best: (f64, f64),
 }
 
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// The largest value of every row over all time from the first to the last of `times_s` (ascending), refined from the
-/// samples by golden section around every sampled maximum that comes near the row's largest. `motion` gives the exact
-/// motion at any list of times, as [`Family::motion`](crate::Family::motion) does.
+/// Finds the largest value of every row between the first and the last of `times_s` (ascending). It refines every
+/// sampled maximum close to the row's largest by golden section. `motion` writes the exact motion at any list of times,
+/// as [`Family::motion`](crate::Family::motion) does.
 ///
-/// Finds every extreme that the samples see as a local maximum; of a jump (in jerk) it finds the side on which samples
-/// stand higher. All brackets advance together, so the cost is `steps` blocks of as many samples as there are maxima.
+/// Finds every extreme that is a local maximum of the samples; at a jump (in jerk) it finds the side with the larger
+/// samples. All brackets advance together, so the cost is `steps` blocks with one sample per maximum.
 pub fn peaks(
     set: &LimitSet,
     workspace: &mut LimitWorkspace,
@@ -83,7 +81,7 @@ fn peaks_of(
     }
     let mut times = Vec::with_capacity(brackets.len() * 2);
     for step in 0..settings.steps {
-        // The first step needs both inner values of a bracket, later ones only the new one.
+        // The first step evaluates both inner values of a bracket, later ones only the new one.
         times.clear();
         for bracket in &brackets {
             times.extend(bracket.inner.iter().filter(|(_, value)| value.is_nan()).map(|(at, _)| *at));
@@ -119,7 +117,6 @@ fn peaks_of(
     found
 }
 
-/// The largest sample of a row.
 fn sampled_peak(row: usize, values: &[f64], times_s: &[f64]) -> Peak {
     let mut peak = Peak { row, value: f64::NEG_INFINITY, sampled: f64::NEG_INFINITY, at_s: times_s[0] };
     for (&value, &at_s) in values.iter().zip(times_s) {
@@ -137,7 +134,6 @@ fn bracket_maxima(peak: &Peak, values: &[f64], times_s: &[f64], band: f64, brack
     for (sample, &value) in values.iter().enumerate() {
         let before = sample.saturating_sub(1);
         let after = (sample + 1).min(values.len() - 1);
-        // A flat stretch has no maximum.
         let stands_out = value > values[before] || value > values[after];
         if value.is_finite() && stands_out && value >= worth && value >= values[before] && value >= values[after] {
             let (from, to) = (times_s[before], times_s[after]);
@@ -148,7 +144,7 @@ fn bracket_maxima(peak: &Peak, values: &[f64], times_s: &[f64], band: f64, brack
 }
 
 impl Bracket {
-    /// Drops the outer part beside the lower inner value.
+    /// Removes the outer part next to the lower inner value.
     fn narrow(&mut self) {
         let [left, right] = self.inner;
         if left.1 >= right.1 {

@@ -1,26 +1,24 @@
-//! A surface in convex pieces.
+//! Decomposition of a surface into convex pieces.
 //!
-//! The surface is cut by planes across the coordinate axes. Each cut is the one that makes the convex hulls of all
-//! pieces smallest together; a convex surface is not cut. A cut passes through triangles, so that the hulls of the
-//! pieces hold every point of the surface, and all of the solid inside a closed one: a part of a solid on one side of
-//! a plane is the hull of at most its surface there. The greedy choice of planes is as in Mamou and Ghorbel, *A simple
-//! and efficient approach for 3D mesh approximate convex decomposition* (ICIP 2009), by the volume of hulls in place
-//! of their concavity and without voxels.
+//! The surface is cut by planes normal to the coordinate axes. Each cut minimises the total volume of the convex hulls
+//! of all pieces; a convex surface is not cut. Triangles are split at the plane, so that the hulls of the pieces
+//! contain every point of the surface, and the inside of a closed one. The greedy selection of planes follows Mamou and
+//! Ghorbel, *A simple and efficient approach for 3D mesh approximate convex decomposition* (ICIP 2009), with the volume
+//! of hulls instead of their concavity and without voxels.
 
 use dynident_model::Vec3;
 
-/// Slabs of a piece along each axis: their borders are the planes that are tried.
+/// Slabs of a piece along each axis; their borders are the candidate planes.
 const SLABS: usize = 16;
 
-/// Directions whose outermost points measure the volume of a hull.
+/// Directions whose outermost points approximate the volume of a hull.
 const DIRECTIONS: usize = 48;
 
-/// A cut must make the hulls smaller by this share of the first hull's volume.
-const LEAST_GAIN: f64 = 0.02;
+/// Minimum reduction of the hull volume by a cut, as a share of the first hull's volume.
+const MIN_RELATIVE_GAIN: f64 = 0.02;
 
 type Triangle = [Vec3; 3];
 
-/// A part of the surface and the best way to cut it.
 struct Piece {
     triangles: Vec<Triangle>,
     cut: Option<Cut>,
@@ -33,7 +31,7 @@ struct Cut {
     at: f64,
 }
 
-/// Corners of at most `most` convex pieces whose hulls hold all triangles.
+/// Corners of at most `most` convex pieces whose hulls contain all triangles.
 pub(super) fn convex_pieces(triangles: Vec<Triangle>, most: usize) -> Vec<Vec<Vec3>> {
     let directions = spiral(DIRECTIONS);
     let (whole, cut) = best_cut(&triangles, &directions);
@@ -42,7 +40,7 @@ pub(super) fn convex_pieces(triangles: Vec<Triangle>, most: usize) -> Vec<Vec<Ve
         let gain = |piece: &Piece| piece.cut.map_or(0.0, |cut| cut.gain);
         let best = (0..pieces.len()).reduce(|a, b| if gain(&pieces[b]) > gain(&pieces[a]) { b } else { a });
         let Some((place, cut)) = best.and_then(|place| Some((place, pieces[place].cut?))) else { break };
-        if cut.gain < LEAST_GAIN * whole {
+        if cut.gain < MIN_RELATIVE_GAIN * whole {
             break;
         }
         let halves = [-1.0, 1.0].map(|side| {
@@ -56,7 +54,6 @@ pub(super) fn convex_pieces(triangles: Vec<Triangle>, most: usize) -> Vec<Vec<Ve
     pieces.into_iter().map(|piece| distinct(piece.triangles)).collect()
 }
 
-/// The corners of triangles, each once.
 fn distinct(triangles: Vec<Triangle>) -> Vec<Vec3> {
     let mut corners: Vec<[u64; 3]> = triangles.into_iter().flatten().map(|corner| corner.0.map(f64::to_bits)).collect();
     corners.sort_unstable();
@@ -64,7 +61,7 @@ fn distinct(triangles: Vec<Triangle>) -> Vec<Vec3> {
     corners.into_iter().map(|bits| Vec3(bits.map(f64::from_bits))).collect()
 }
 
-/// Evenly spread directions (a spiral on the sphere).
+/// Evenly distributed directions (a spiral on the sphere).
 pub(super) fn spiral(count: usize) -> Vec<Vec3> {
     let golden = core::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let direction = |k: usize| {
@@ -76,7 +73,6 @@ pub(super) fn spiral(count: usize) -> Vec<Vec3> {
     (0..count).map(direction).collect()
 }
 
-/// The outermost points of a set in all directions.
 #[derive(Clone)]
 struct Outermost(Vec<(f64, Vec3)>);
 
@@ -113,7 +109,6 @@ impl Outermost {
     }
 }
 
-/// The volume of the hull of a piece, and its best cut.
 fn best_cut(triangles: &[Triangle], directions: &[Vec3]) -> (f64, Option<Cut>) {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for corner in triangles.iter().flatten() {
@@ -134,7 +129,7 @@ fn best_cut(triangles: &[Triangle], directions: &[Vec3]) -> (f64, Option<Cut>) {
                 let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
                 let (from, to) = (slab(a[axis]), slab(b[axis]));
                 slabs[axis][from].add(a, directions);
-                // Where the edge crosses borders of slabs.
+                // Points where the edge crosses borders of slabs.
                 for border in from.min(to)..from.max(to) {
                     let at = low[axis] + width * (border + 1) as f64;
                     let share = ((at - a[axis]) / (b[axis] - a[axis])).clamp(0.0, 1.0);
@@ -175,7 +170,6 @@ fn best_cut(triangles: &[Triangle], directions: &[Vec3]) -> (f64, Option<Cut>) {
     (whole, best)
 }
 
-/// The part of the triangles below (`side` -1) or above a plane, as triangles.
 fn half(triangles: &[Triangle], cut: Cut, side: f64) -> Vec<Triangle> {
     let mut kept = Vec::with_capacity(triangles.len() / 2);
     for triangle in triangles {
@@ -195,7 +189,7 @@ fn half(triangles: &[Triangle], cut: Cut, side: f64) -> Vec<Triangle> {
                 polygon.push(triangle[k] + (triangle[next] - triangle[k]).scale(share));
             }
         }
-        // A corner or an edge on the plane is kept as well: the hulls of both sides hold it.
+        // A corner or an edge on the plane is kept too, because the hulls of both sides must contain it.
         match polygon.as_slice() {
             [] => {}
             [a] => kept.push([*a; 3]),
@@ -206,8 +200,8 @@ fn half(triangles: &[Triangle], cut: Cut, side: f64) -> Vec<Triangle> {
     kept
 }
 
-/// The volume of the convex hull of a few points, m³; 0 where they lie in a plane. One point after the other, each
-/// with the faces that it sees replaced by those to their border.
+/// Volume of the convex hull of a few points, m³; 0 for coplanar points. Each point replaces the faces that are visible
+/// from it by faces to their border.
 fn hull_volume(points: &[Vec3]) -> f64 {
     let Some(mut faces) = first_tetrahedron(points) else { return 0.0 };
     let size = points.iter().fold(0.0_f64, |size, point| size.max((*point - points[0]).norm()));
@@ -234,7 +228,7 @@ fn hull_volume(points: &[Vec3]) -> f64 {
     faces.iter().map(part).sum::<f64>().max(0.0)
 }
 
-/// The faces, seen from outside counter-clockwise, of a tetrahedron of far points; `None` where all lie in a plane.
+/// Faces of a tetrahedron of distant points, counter-clockwise seen from outside; `None` for coplanar points.
 fn first_tetrahedron(points: &[Vec3]) -> Option<Vec<[usize; 3]>> {
     let farthest = |measure: &dyn Fn(Vec3) -> f64| {
         let best = (0..points.len()).max_by(|&a, &b| measure(points[a]).total_cmp(&measure(points[b])))?;
@@ -262,7 +256,6 @@ mod tests {
     use dynident_model::Transform;
     use dynident_model::sample::Random;
 
-    /// The surface of a box as triangles.
     fn block(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
         let corner =
             |k: usize| Vec3(core::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] }));
@@ -278,7 +271,6 @@ mod tests {
         let tetrahedron = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Vec3);
         assert!((hull_volume(&tetrahedron) - 1.0 / 6.0).abs() < 1e-15);
         assert_eq!(hull_volume(&tetrahedron[..3]), 0.0);
-        // Points inside change nothing.
         let mut random = Random::new(3);
         let mut more = corners;
         more.extend((0..50).map(|_| Vec3([1.0, 2.0, 3.0].map(|high| random.uniform(0.0, high)))));
@@ -303,7 +295,6 @@ mod tests {
         let sum: f64 = pieces.iter().map(|piece| volume(piece)).sum();
         // The legs have 0.019 m³, their hull 0.06.
         assert!(sum < 0.024, "{sum}");
-        // Every point of the surface is in the hull of one piece.
         let mut random = Random::new(4);
         for triangle in &angle {
             for _ in 0..20 {

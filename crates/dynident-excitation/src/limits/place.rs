@@ -1,42 +1,40 @@
-//! Box, floor and column: limits on where points of the arm may be, in the base frame.
+//! Box, floor and column: limits on places of points of the arm, in the base frame.
 
 use super::description::{BoxLimit, ColumnLimit, FloorLimit};
 use super::error::LimitError;
 use super::kind::{Constraint, LimitKind};
 use super::link_points::{BodyPoint, body_points};
 use super::pairs::arm_length_m;
-use super::term::{Inputs, Pull, Term};
+use super::term::{Adjoint, Inputs, Term};
 use super::validate::middle_and_half;
 use dynident_model::{Model, Vec3};
 
-/// Where one point may be.
 #[derive(Clone, Debug)]
-enum Room {
+enum AllowedRegion {
     /// `|p[axis] - middle| / half - 1`.
     Slab { axis: usize, middle: f64, half: f64 },
     /// `(lowest - p_z) / length`.
     Above { lowest: f64, length: f64 },
-    /// `1 - |p_xy - axis| / least`, or `(top - p_z) / least` where that is less: beside a column or above it.
+    /// `1 - |p_xy - axis| / least`, or `(top - p_z) / least` if that is smaller: next to a column or above it.
     Outside { axis: [f64; 2], least: f64, top: f64 },
 }
 
-impl Room {
-    /// The place on the straight way from `here` to `next` that counts, and its share of the way: nearest to the axis
-    /// of a column, and `here` itself for everything that is not thin.
+impl AllowedRegion {
+    /// Critical place on the straight path from `here` to `next`, and its share of the path: the place nearest to the
+    /// axis of a column; otherwise `here`.
     fn nearest(&self, here: Vec3, next: Option<Vec3>) -> (Vec3, f64) {
         let (Self::Outside { axis, least, top }, Some(next)) = (self, next) else { return (here, 0.0) };
         let (x, y) = (here[0] - axis[0], here[1] - axis[1]);
         let (dx, dy) = (next[0] - here[0], next[1] - here[1]);
         let length = dx * dx + dy * dy;
         let share = if length > 0.0 { (-(x * dx + y * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
-        // As high as its lower end: whether that is above the column decides for the whole way.
+        // The height of the lower end, which decides for the whole path whether it is above the column.
         let place = Vec3([here[0] + share * dx, here[1] + share * dy, here[2].min(next[2])]);
         let beside = 1.0 - (place[0] - axis[0]).hypot(place[1] - axis[1]) / least;
         let above = (top - place[2]) / least;
         (place, if beside <= above { share } else { f64::from(u8::from(next[2] < here[2])) })
     }
 
-    /// The constraint's value at a place, and its gradient.
     fn value(&self, place: Vec3) -> (f64, Vec3) {
         let mut gradient = Vec3::ZERO;
         let value = match *self {
@@ -51,7 +49,7 @@ impl Room {
             Self::Outside { axis, least, top } => {
                 let (x, y) = (place[0] - axis[0], place[1] - axis[1]);
                 let distance = x.hypot(y);
-                // On the axis itself every way out is as good: take x.
+                // On the axis the direction is arbitrary.
                 let (nx, ny) = if distance > 0.0 { (x / distance, y / distance) } else { (1.0, 0.0) };
                 let (beside, above) = (1.0 - distance / least, (top - place[2]) / least);
                 gradient = if beside <= above {
@@ -66,19 +64,17 @@ impl Room {
     }
 }
 
-/// Where a point is at a sample, and where it goes next if samples follow one another.
-fn way(inputs: &Inputs<'_>, point: &BodyPoint, sample: usize) -> (Vec3, Option<Vec3>) {
+/// Place of a point at a sample, and at the next one if samples are consecutive.
+fn path(inputs: &Inputs<'_>, point: &BodyPoint, sample: usize) -> (Vec3, Option<Vec3>) {
     let at = |sample| inputs.placement(point.body, sample).point(point.at);
     let follows = inputs.swept && sample + 1 < inputs.motion.samples;
     (at(sample), follows.then(|| at(sample + 1)))
 }
 
-/// Rows of points and the room that each must keep to.
 #[derive(Clone, Debug)]
-pub(crate) struct PlaceLimits(Vec<(BodyPoint, Room, Constraint)>);
+pub(crate) struct PlaceLimits(Vec<(BodyPoint, AllowedRegion, Constraint)>);
 
 impl PlaceLimits {
-    /// A box: one row per point and limited axis.
     pub(crate) fn boxed(model: &Model, limit: &BoxLimit) -> Result<Self, LimitError> {
         let mut rows = Vec::new();
         for point in body_points(model, &limit.points, "a box")? {
@@ -88,13 +84,13 @@ impl PlaceLimits {
                 let half = half - point.radius_m;
                 let subject = format!("{}, {}", point.name, ["x", "y", "z"][axis]);
                 let constraint = Constraint { kind: LimitKind::Box, subject, middle, size: half, unit: "m" };
-                rows.push((point.clone(), Room::Slab { axis, middle, half }, constraint));
+                rows.push((point.clone(), AllowedRegion::Slab { axis, middle, half }, constraint));
             }
         }
         Ok(Self(rows))
     }
 
-    /// A floor: one row per point, by arm's lengths.
+    /// Floor limits: one row per point, scaled by the arm's length.
     pub(crate) fn floor(model: &Model, limit: &FloorLimit) -> Result<Self, LimitError> {
         if limit.points.is_empty() && !limit.shapes.is_empty() {
             return Ok(Self(Vec::new()));
@@ -104,19 +100,18 @@ impl PlaceLimits {
             let lowest = limit.height_m + point.radius_m;
             let subject = point.name.clone();
             let constraint = Constraint { kind: LimitKind::Floor, subject, middle: lowest, size: length, unit: "m" };
-            (point, Room::Above { lowest, length }, constraint)
+            (point, AllowedRegion::Above { lowest, length }, constraint)
         };
         Ok(Self(body_points(model, &limit.points, "the floor")?.into_iter().map(row).collect()))
     }
 
-    /// A column: one row per point.
     pub(crate) fn column(model: &Model, limit: &ColumnLimit) -> Result<Self, LimitError> {
         let row = |point: BodyPoint| {
             let least = limit.radius_m + point.radius_m;
             let subject = point.name.clone();
             let constraint = Constraint { kind: LimitKind::Column, subject, middle: 0.0, size: least, unit: "m" };
             let top = limit.height_m.map_or(f64::INFINITY, |height| height + point.radius_m);
-            (point, Room::Outside { axis: limit.axis_xy_m, least, top }, constraint)
+            (point, AllowedRegion::Outside { axis: limit.axis_xy_m, least, top }, constraint)
         };
         Ok(Self(body_points(model, &limit.points, "the column")?.into_iter().map(row).collect()))
     }
@@ -128,27 +123,26 @@ impl Term for PlaceLimits {
     }
 
     fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
-        for ((point, room, _), row) in self.0.iter().zip(out.chunks_exact_mut(inputs.motion.samples)) {
+        for ((point, region, _), row) in self.0.iter().zip(out.chunks_exact_mut(inputs.motion.samples)) {
             for (sample, c) in row.iter_mut().enumerate() {
-                let (here, next) = way(inputs, point, sample);
-                *c = room.value(room.nearest(here, next).0).0;
+                let (here, next) = path(inputs, point, sample);
+                *c = region.value(region.nearest(here, next).0).0;
             }
         }
     }
 
-    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
-        for ((point, room, _), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], adjoint: &mut Adjoint<'_>) {
+        for ((point, region, _), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
             for (sample, &weight) in row.iter().enumerate() {
                 if weight != 0.0 {
-                    let (here, next) = way(inputs, point, sample);
-                    let (place, share) = room.nearest(here, next);
-                    let gradient = room.value(place).1.scale(weight);
+                    let (here, next) = path(inputs, point, sample);
+                    let (place, share) = region.nearest(here, next);
+                    let gradient = region.value(place).1.scale(weight);
                     let bodies = inputs.bodies;
-                    // The nearest place moves with both ends; its own sliding along the way changes nothing to first
-                    // order.
-                    pull.point(point.body, bodies, sample, here, gradient.scale(1.0 - share));
+                    // The nearest place moves with both ends; its change along the path has no effect to first order.
+                    adjoint.point(point.body, bodies, sample, here, gradient.scale(1.0 - share));
                     if let Some(next) = next {
-                        pull.point(point.body, bodies, sample + 1, next, gradient.scale(share));
+                        adjoint.point(point.body, bodies, sample + 1, next, gradient.scale(share));
                     }
                 }
             }

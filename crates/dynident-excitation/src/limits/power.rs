@@ -1,8 +1,8 @@
-//! Mechanical power of a joint, known torque of friction and drives included.
+//! Mechanical power of a joint, including the known torque of friction and drives.
 
 use super::description::JointLimit;
 use super::kind::{Constraint, LimitKind};
-use super::term::{Inputs, Pull, Term};
+use super::term::{Adjoint, Inputs, Term};
 use dynident_model::Model;
 
 /// `max(|τ_low q̇|, |τ_high q̇|) / limit - 1`.
@@ -36,7 +36,7 @@ impl Term for PowerLimits {
         }
     }
 
-    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], adjoint: &mut Adjoint<'_>) {
         let motion = inputs.motion;
         for ((joint, constraint), row) in self.0.iter().zip(weights.chunks_exact(motion.samples)) {
             let scale = 1.0 / constraint.size;
@@ -44,10 +44,10 @@ impl Term for PowerLimits {
                 let (low, high, dq) = (inputs.torque.low[at], inputs.torque.high[at], motion.dq[at]);
                 let is_high = high.abs() >= low.abs();
                 let (tau, to) =
-                    if is_high { (high, &mut pull.torque.high[at]) } else { (low, &mut pull.torque.low[at]) };
+                    if is_high { (high, &mut adjoint.torque.high[at]) } else { (low, &mut adjoint.torque.low[at]) };
                 let signed = weight * scale * (tau * dq).signum();
                 *to += signed * dq;
-                pull.motion.dq[at] += signed * tau;
+                adjoint.motion.dq[at] += signed * tau;
             }
         }
     }

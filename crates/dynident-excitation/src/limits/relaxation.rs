@@ -1,30 +1,29 @@
-//! The limits that a motion breaks, and changes that would make it feasible.
+//! Violated limits of a motion, and changes that make it feasible.
 
 use super::kind::{Constraint, LimitKind};
 use super::set::{LimitSet, LimitWorkspace};
 use crate::motion::Motion;
 
-/// A limit is broken above this value, as in the final check.
+/// Value above which a limit is violated, as in the final check.
 pub(super) const TOLERANCE: f64 = 1e-6;
 
-/// The slowest run that is considered, as a multiple of the duration.
-pub(super) const LARGEST_STRETCH: f64 = 1000.0;
+pub(super) const MAX_STRETCH: f64 = 1000.0;
 
-/// A limit that the best motion found still breaks.
+/// A limit that the best motion found violates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrokenLimit {
     /// The limit.
     pub constraint: Constraint,
     /// Its largest value, above 0.
     pub value: f64,
-    /// When, s.
+    /// Time of the largest value, s.
     pub at_s: f64,
 }
 
-/// What to change in one limit: `(subject, limit now, limit needed, unit)`. Ranges count from their middle.
+/// Change of one limit: `(subject, present limit, required limit, unit)`. Ranges are given as half widths.
 pub type LimitChange = (String, f64, f64, &'static str);
 
-/// One change that would make the motion feasible as it is.
+/// A change that makes the motion feasible.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Relaxation {
     /// The same path run slower: `q(t / factor)`.
@@ -34,32 +33,31 @@ pub enum Relaxation {
         /// The longer duration, s.
         duration_s: f64,
     },
-    /// Other values of the limits of one kind.
+    /// Wider limits of one kind.
     Limits {
-        /// The kind.
+        /// Kind of the limits.
         kind: LimitKind,
-        /// What to change.
+        /// Changes of single limits.
         changes: Vec<LimitChange>,
     },
-    /// Other values of the limits of one kind, with which another motion is possible.
+    /// Wider limits of one kind that make another motion possible.
     OtherMotion {
-        /// The kind.
+        /// Kind of the limits.
         kind: LimitKind,
-        /// What to change.
+        /// Changes of single limits.
         changes: Vec<LimitChange>,
     },
-    /// Several changes at once, where no single one would do: those with the smallest sum of relative changes.
+    /// Several changes with the smallest sum of relative changes, if no single change is sufficient.
     Combined {
-        /// Factor on the duration; 1 if a slower run is no part of it.
+        /// Factor on the duration; 1 without a slower run.
         factor: f64,
-        /// The duration with it, s.
+        /// Resulting duration, s.
         duration_s: f64,
-        /// Limits that must give as well.
+        /// Additional wider limits.
         changes: Vec<(LimitKind, LimitChange)>,
     },
 }
 
-/// The limits that a motion breaks, worst first.
 pub(super) fn broken_limits(
     set: &LimitSet,
     workspace: &mut LimitWorkspace,
@@ -81,7 +79,6 @@ pub(super) fn broken_limits(
     broken
 }
 
-/// The change of one limit that makes room for the motion.
 pub(super) fn change(broken: &BrokenLimit) -> LimitChange {
     let Constraint { kind, subject, middle, size, unit } = &broken.constraint;
     let needed = broken.constraint.quantity(broken.value);
@@ -89,7 +86,7 @@ pub(super) fn change(broken: &BrokenLimit) -> LimitChange {
     (subject.clone(), now, needed, unit)
 }
 
-/// The motion of `q(t / factor)` at the stretched times.
+/// Motion of `q(t / factor)` at the stretched times.
 pub(super) fn stretched(motion: &Motion, factor: f64) -> Motion {
     let scaled = |values: &[f64], by: f64| values.iter().map(|x| x * by).collect();
     let inverse = 1.0 / factor;

@@ -5,15 +5,15 @@ use super::kind::{Constraint, LimitKind};
 use super::pairs::{SolidPair, SolidPairs};
 use super::self_collision_shapes::SelfCollision;
 use super::solids::{LinkSolid, SolidDistance, solid_distance};
-use super::term::{Inputs, Pull, Term};
+use super::term::{Adjoint, Inputs, Term};
 use dynident_model::{Model, Vec3};
 
-/// A lack of distance below minus this share of a pair's size is not told apart: links are then far enough from each
-/// other for every purpose of a search, and a bound of their distance is found at once.
-const FAR: f64 = 0.25;
+/// Excess of distance, as a share of a pair's size, above which all distances are treated as equal: the search needs no
+/// exact value there, and a bound is computed quickly.
+const MAX_RELATIVE_EXCESS: f64 = 0.25;
 
-/// `(clearance - d) / size` with `d` the distance of the two links from surface to surface, and no less than -[`FAR`]:
-/// all that are farther apart are alike.
+/// `(clearance - d) / size`, where `d` is the distance between the surfaces of the two links, and at least
+/// -[`MAX_RELATIVE_EXCESS`].
 #[derive(Clone, Debug)]
 pub(crate) struct SelfCollisionLimits {
     solids: Vec<LinkSolid>,
@@ -41,7 +41,7 @@ impl SelfCollisionLimits {
     fn apart(&self, pair: &SolidPair, inputs: &Inputs<'_>, sample: usize, guesses: &mut Vec<Vec3>) -> SolidDistance {
         let [first, second] = pair.of.map(|place| &self.solids[place]);
         let [one, other] = [first, second].map(|solid| inputs.placement(solid.body, sample));
-        solid_distance(first, &one, second, &other, pair.clearance_m + FAR * pair.size_m, guesses)
+        solid_distance(first, &one, second, &other, pair.clearance_m + MAX_RELATIVE_EXCESS * pair.size_m, guesses)
     }
 }
 
@@ -52,7 +52,7 @@ impl Term for SelfCollisionLimits {
 
     fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
         let samples = inputs.motion.samples;
-        // Most links are far from each other most of the time: balls about them say so.
+        // Most links are far apart most of the time; their bounding balls show this.
         let centre = |solid: &LinkSolid, sample: usize| match solid.body {
             Some(body) => inputs.placements[sample * inputs.bodies + body].point(solid.centre),
             None => solid.centre,
@@ -63,20 +63,20 @@ impl Term for SelfCollisionLimits {
             let mut guesses = Vec::new();
             let [first, second] = pair.of.map(|place| &centres[place * samples..(place + 1) * samples]);
             let [reach, other_reach] = pair.of.map(|place| self.solids[place].reach_m);
-            let far = reach + other_reach + pair.clearance_m + FAR * pair.size_m;
+            let far = reach + other_reach + pair.clearance_m + MAX_RELATIVE_EXCESS * pair.size_m;
             for (sample, c) in row.iter_mut().enumerate() {
                 let between = first[sample] - second[sample];
                 if between.dot(between) > far * far {
-                    *c = -FAR;
+                    *c = -MAX_RELATIVE_EXCESS;
                     continue;
                 }
                 let apart = self.apart(pair, inputs, sample, &mut guesses);
-                *c = ((pair.clearance_m - apart.surface_m) / pair.size_m).max(-FAR);
+                *c = ((pair.clearance_m - apart.surface_m) / pair.size_m).max(-MAX_RELATIVE_EXCESS);
             }
         }
     }
 
-    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], adjoint: &mut Adjoint<'_>) {
         let bodies = inputs.bodies;
         for ((pair, _), row) in self.rows.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
             for (sample, &weight) in row.iter().enumerate() {
@@ -85,13 +85,13 @@ impl Term for SelfCollisionLimits {
                 }
                 let SolidDistance { surface_m, points, direction, slope } =
                     self.apart(pair, inputs, sample, &mut Vec::new());
-                if surface_m >= pair.clearance_m + FAR * pair.size_m {
+                if surface_m >= pair.clearance_m + MAX_RELATIVE_EXCESS * pair.size_m {
                     continue;
                 }
                 let gradient = direction.scale(-weight * slope / pair.size_m);
                 let [first, second] = pair.of.map(|place| self.solids[place].body);
-                pull.point(first, bodies, sample, points[0], gradient);
-                pull.point(second, bodies, sample, points[1], -gradient);
+                adjoint.point(first, bodies, sample, points[0], gradient);
+                adjoint.point(second, bodies, sample, points[1], -gradient);
             }
         }
     }

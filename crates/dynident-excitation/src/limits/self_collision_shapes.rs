@@ -1,4 +1,4 @@
-//! Self-collision as a study describes it: shapes on links, given or fitted.
+//! Self-collision limits as a study states them: shapes on links, given or fitted.
 
 use super::error::LimitError;
 use super::link_points::link_place;
@@ -6,31 +6,35 @@ use super::numbers::{finite, not_negative, positive};
 use dynident_model::{Model, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// Distances between the arm's own links, which are taken as convex shapes.
+/// Distances between the arm's own links, which are modelled as convex shapes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SelfCollision {
     /// Radius of fitted capsules, m.
     pub radius_m: f64,
-    /// Least distance between surfaces, m.
+    /// Minimum distance between surfaces, m.
     pub clearance_m: f64,
-    /// Capsules in place of fitted ones, which lead from each body's origin to the origins of the joints that it
-    /// carries.
+    /// Capsules that replace the fitted ones. Fitted capsules extend from each body's origin to the origins of the
+    /// joints that it carries.
     pub capsules: Vec<LinkCapsule>,
-    /// Other convex shapes, beside the capsules.
+    /// Other convex shapes, in addition to the capsules.
     pub shapes: Vec<LinkShape>,
-    /// Pairs of links that may touch, besides neighbours.
+    /// Pairs of links that may touch, in addition to adjacent links.
     pub ignored: Vec<[String; 2]>,
-    /// Also leave out pairs that touch both in the neutral posture (every joint at zero, or as near to it as its limits
-    /// allow) and in most of 256 others within the limits: links whose shapes stand in each other. Pairs that are
-    /// nearer than `clearance_m` in all of these postures are left out if they touch in none, and else must not touch.
-    /// Of pairs that are nearer than twice `clearance_m` in all of them, half of the largest distance is required.
+    /// Also omits pairs that touch both in the neutral posture (every joint at zero, or as close as its limits allow)
+    /// and in most of 256 others within the limits, because their shapes overlap. Pairs that are closer than
+    /// `clearance_m` in all of these postures are omitted if they touch in none, otherwise they must not touch. Pairs
+    /// that are closer than twice `clearance_m` in all of them must keep half of their largest distance.
     pub leave_out_touching: bool,
+    /// Share of the random postures in which a pair must touch, in addition to the neutral one, to be omitted with
+    /// `leave_out_touching`. Default 0.5; not part of study files.
+    #[serde(skip)]
+    pub min_overlap_share: f64,
 }
 
 impl Default for SelfCollision {
-    /// Fitted capsules of 0.06 m radius (the tube of a 5 to 15 kg arm), no extra clearance.
+    /// Fitted capsules of 0.06 m radius (the tube of a 5 to 15 kg arm), no additional clearance.
     fn default() -> Self {
         Self {
             radius_m: 0.06,
@@ -39,6 +43,7 @@ impl Default for SelfCollision {
             shapes: Vec::new(),
             ignored: Vec::new(),
             leave_out_touching: false,
+            min_overlap_share: 0.5,
         }
     }
 }
@@ -52,13 +57,13 @@ pub struct LinkCapsule {
     pub link: String,
     /// One end of the segment, m.
     pub from_m: [f64; 3],
-    /// The other end, m; equal ends make a sphere.
+    /// The other end, m; equal ends form a sphere.
     pub to_m: [f64; 3],
     /// Radius, m.
     pub radius_m: f64,
 }
 
-/// A convex shape in a link's frame: all points within `radius_m` of the hull of its corners. Two corners make a
+/// A convex shape in a link's frame: all points within `radius_m` of the hull of its corners. Two corners form a
 /// capsule, eight a box.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -68,7 +73,7 @@ pub struct LinkShape {
     pub link: String,
     /// Corners, m; at least one.
     pub corners_m: Vec<[f64; 3]>,
-    /// What is laid about their hull, m.
+    /// Radius around their hull, m.
     #[serde(default)]
     pub radius_m: f64,
 }
@@ -87,13 +92,12 @@ impl LinkShape {
 }
 
 impl SelfCollision {
-    /// Checks numbers and names.
     ///
     /// # Errors
-    /// If a link is unknown, a number is not finite, a radius or the clearance negative, or a pair has no size at all
-    /// to keep apart.
+    /// An unknown link, a value that is not finite, a negative radius or clearance, or a share out of range.
     pub fn validate(&self, model: &Model) -> Result<(), LimitError> {
         not_negative("clearance of the self-collision limit", self.clearance_m)?;
+        not_negative("overlap share of the self-collision limit", self.min_overlap_share)?;
         if self.fitted() {
             positive("radius of the fitted capsules", self.radius_m)?;
         }
@@ -112,12 +116,10 @@ impl SelfCollision {
         Ok(())
     }
 
-    /// Whether capsules are fitted, since none is given.
     pub(crate) fn fitted(&self) -> bool {
         self.capsules.is_empty() && self.shapes.is_empty()
     }
 
-    /// All shapes.
     pub(crate) fn all_shapes(&self, model: &Model) -> Vec<LinkShape> {
         if self.fitted() {
             return fitted_capsules(model, self.radius_m);
@@ -132,12 +134,11 @@ impl SelfCollision {
 }
 
 /// Capsules from each body's origin to the origins of the joints it carries; at a tip to the farthest fixed link, or a
-/// sphere. Those of the base begin at its frame.
+/// sphere. Those of the base start at its frame.
 pub(crate) fn fitted_capsules(model: &Model, radius_m: f64) -> Vec<LinkShape> {
     (0..=model.body_count()).flat_map(|index| body_capsules(model, index.checked_sub(1), radius_m)).collect()
 }
 
-/// The fitted capsules of one body, in the frame of its first link.
 pub(crate) fn body_capsules(model: &Model, body: Option<usize>, radius_m: f64) -> Vec<LinkShape> {
     let links = &body.map_or(model.base(), |body| &model.bodies()[body]).links;
     let Some(link) = links.first() else { return Vec::new() };

@@ -1,4 +1,4 @@
-//! All limits of an experiment as rows of constraint values over a motion, and the way back to the motion.
+//! All limits of an experiment as rows of constraint values over a motion, and their adjoint to the motion.
 
 use super::description::Limits;
 use super::error::LimitError;
@@ -9,16 +9,16 @@ use super::kind::Constraint;
 use super::place::PlaceLimits;
 use super::power::PowerLimits;
 use super::self_collision::SelfCollisionLimits;
-use super::term::{Inputs, Pull, Term};
+use super::term::{Adjoint, Inputs, Term};
 use super::torque::{TorqueLimits, torque_adjoint};
 use super::torque_range::{SmoothTorque, TorqueRange};
-use super::wrench::{Wrench, pull_wrenches};
+use super::wrench::{Wrench, apply_wrenches};
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_dynamics::{BatchWorkspace, Workspace, body_placements, inverse_dynamics_batch};
 use dynident_model::{Model, Transform};
 
-/// Limits prepared for an optimiser. Row `r` at sample `s` stands at `r * samples + s`; a value `c <= 0` keeps the
-/// limit (see [`Constraint`]).
+/// Limits prepared for an optimiser. The value of row `r` at sample `s` has index `r * samples + s`; a value `c <= 0`
+/// keeps the limit (see [`Constraint`]).
 #[derive(Debug)]
 pub struct LimitSet {
     model: Model,
@@ -31,13 +31,12 @@ pub struct LimitSet {
     placements: bool,
 }
 
-/// Scratch of one thread for one [`LimitSet`]; torques and placements of the last motion stay in it, so that
-/// [`apply_adjoint`](LimitSet::apply_adjoint) after [`values`](LimitSet::values) does not repeat them.
+/// Scratch of one thread for one [`LimitSet`]. It stores torques and placements of the last motion, so that
+/// [`apply_adjoint`](LimitSet::apply_adjoint) after [`values`](LimitSet::values) does not compute them again.
 #[derive(Debug)]
 pub struct LimitWorkspace {
     batch: BatchWorkspace,
     single: Workspace,
-    /// The motion that torques and placements belong to.
     motion: Motion,
     /// Torque of the rigid bodies.
     tau: Vec<f64>,
@@ -52,24 +51,24 @@ pub struct LimitWorkspace {
 }
 
 impl LimitWorkspace {
-    /// From now on samples are consecutive times of one motion, and columns are also looked for on the straight way
-    /// from one sample to the next: an arm would else pass through a thin one unseen.
+    /// Declares samples as consecutive times of one motion. Columns are then also tested on the straight path from one
+    /// sample to the next, so that an arm cannot pass through a thin column between samples.
     pub fn sweep(&mut self) {
         self.swept = true;
     }
 }
 
 impl LimitSet {
-    /// The limits on this robot.
+    /// Prepares the limits for this robot.
     ///
     /// # Errors
-    /// As [`Limits::validate`].
+    /// Errors of [`Limits::validate`].
     pub fn new(limits: &Limits, model: &Model) -> Result<Self, LimitError> {
         limits.validate(model)?;
         let joint_motion = JointMotionLimits::new(model, &limits.joints);
         let bands = joint_motion.bands();
         let mut terms: Vec<Box<dyn Term>> = vec![
-            // First, so that the rows of the bands are the set's own.
+            // First, so that the row numbers of the bands are those of the set.
             Box::new(joint_motion),
             Box::new(TorqueLimits::new(model, &limits.joints)),
             Box::new(PowerLimits::new(model, &limits.joints)),
@@ -103,17 +102,16 @@ impl LimitSet {
         })
     }
 
-    /// The rows.
+    /// Constraints of the rows.
     pub fn constraints(&self) -> &[Constraint] {
         &self.constraints
     }
 
-    /// The rows that bound a single joint's motion.
     pub(crate) fn bands(&self) -> &[JointBand] {
         &self.bands
     }
 
-    /// Whether the places of points are limited: boxes, floor, column, self-collision.
+    /// Whether places of points are limited: boxes, floor, column, self-collision.
     pub(crate) fn has_places(&self) -> bool {
         self.placements
     }
@@ -141,7 +139,7 @@ impl LimitSet {
         }
     }
 
-    /// Constraint values of all rows at all samples.
+    /// Computes the constraint values of all rows at all samples.
     ///
     /// # Panics
     /// If the motion has another number of joints.
@@ -163,9 +161,9 @@ impl LimitSet {
         }
     }
 
-    /// Adds to `adjoint` what a cost with derivatives `weights` by the [`values`](LimitSet::values) pulls on the
-    /// motion. Exact, but for the corners of `|x|` at zero and of distances between parallel segments, where it is one
-    /// of the one-sided derivatives.
+    /// Adds to `adjoint` the derivatives of a cost with respect to the motion, given its derivatives `weights` with
+    /// respect to the [`values`](LimitSet::values). Exact except at the corners of `|x|` at zero and of distances
+    /// between parallel segments, where it is one of the one-sided derivatives.
     ///
     /// # Panics
     /// If sizes differ.
@@ -194,8 +192,8 @@ impl LimitSet {
         let mut rest = weights;
         for (term, rows) in self.terms.iter().zip(&self.rows_of) {
             let (own, others) = rest.split_at(rows * samples);
-            let mut pull = Pull { motion: &mut *adjoint, torque: &mut *by_range, wrenches };
-            term.apply_adjoint(&inputs, own, &mut pull);
+            let mut adjoint = Adjoint { motion: &mut *adjoint, torque: &mut *by_range, wrenches };
+            term.apply_adjoint(&inputs, own, &mut adjoint);
             rest = others;
         }
         if self.torque {
@@ -212,7 +210,7 @@ impl LimitSet {
                     continue;
                 }
                 by_position.fill(0.0);
-                pull_wrenches(&self.model, &placements[of.clone()], &mut wrenches[of], by_position);
+                apply_wrenches(&self.model, &placements[of.clone()], &mut wrenches[of], by_position);
                 for (joint, pulled) in by_position.iter().enumerate() {
                     adjoint.q[joint * samples + sample] += pulled;
                 }
@@ -220,7 +218,7 @@ impl LimitSet {
         }
     }
 
-    /// Torques and placements of the motion, unless the workspace has them.
+    /// Computes torques and placements of the motion, unless the workspace contains them.
     fn prepare(&self, workspace: &mut LimitWorkspace, motion: &Motion) {
         let (dof, samples) = (self.model.dof(), motion.samples);
         assert_eq!(motion.joints, dof, "the motion has another number of joints than the robot");

@@ -1,4 +1,4 @@
-//! Links as solids: the distance between the surfaces of two, and how low one reaches.
+//! Links as solids: distance between the surfaces of two, and the lowest point of one.
 
 use super::convex::{Placed, hull_distance};
 use super::error::LimitError;
@@ -11,9 +11,7 @@ use dynident_model::{Model, Transform, Vec3};
 pub(crate) struct BodyShape {
     pub corners: Vec<Vec3>,
     pub radius_m: f64,
-    /// Mean of the corners.
     centre: Vec3,
-    /// Radius of a sphere about the centre that holds the shape, m.
     reach_m: f64,
 }
 
@@ -25,26 +23,26 @@ pub(crate) struct LinkSolid {
     pub shapes: Vec<BodyShape>,
     /// Mean of all corners.
     pub centre: Vec3,
-    /// Radius of a ball about it that holds all shapes, m.
+    /// Radius of a ball around the centre that contains all shapes, m.
     pub reach_m: f64,
 }
 
-/// How far two links are apart.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolidDistance {
-    /// From surface to surface, m; negative where they overlap, then a measure of how deeply. Beyond the distance asked
-    /// for a lower bound.
+    /// Distance between the surfaces, m; negative if they overlap, then a measure of the depth. Beyond the requested
+    /// distance a lower bound.
     pub surface_m: f64,
-    /// Points of the two that the distance changes with.
+    /// Points of the two links that determine the change of the distance.
     pub points: [Vec3; 2],
-    /// Unit vector from the second's point to the first's.
+    /// Unit vector from the second point to the first.
     pub direction: Vec3,
-    /// Change of `surface_m` by the distance of the points: 1, but for hulls that overlap.
+    /// Derivative of `surface_m` with respect to the distance of the points: 1, except for overlapping hulls.
     pub slope: f64,
 }
 
-/// Weight of the distance of centres where hulls overlap: it says where out is, and never balances a contact.
-const DEEP: f64 = 0.2;
+/// Weight of the distance of the centres for overlapping hulls. It defines the direction out of the overlap, and is too
+/// small to balance a contact.
+const CENTRE_DISTANCE_WEIGHT: f64 = 0.2;
 
 impl BodyShape {
     fn new(corners: Vec<Vec3>, radius_m: f64) -> Self {
@@ -53,7 +51,6 @@ impl BodyShape {
     }
 }
 
-/// Mean of the points, and how far one of them is from it.
 fn ball(points: &[Vec3]) -> (Vec3, f64) {
     let sum = points.iter().fold(Vec3::ZERO, |sum, point| sum + *point);
     let centre = sum.scale(1.0 / points.len().max(1) as f64);
@@ -61,10 +58,10 @@ fn ball(points: &[Vec3]) -> (Vec3, f64) {
 }
 
 impl LinkSolid {
-    /// Shapes by link name, gathered link by link in the order of first appearance.
+    /// Collects shapes by link name, in the order of first appearance.
     ///
     /// # Errors
-    /// A link that the robot does not have.
+    /// An unknown link.
     pub(crate) fn gather(model: &Model, shapes: &[LinkShape], what: &str) -> Result<Vec<Self>, LimitError> {
         let mut solids: Vec<Self> = Vec::new();
         for shape in shapes {
@@ -88,7 +85,7 @@ impl LinkSolid {
         Ok(solids)
     }
 
-    /// The lowest point above the plane z = 0 of the base frame, m, and where it is.
+    /// Height of the lowest point above the plane z = 0 of the base frame, m, and its position.
     pub(crate) fn lowest(&self, at: &Transform) -> (f64, Vec3) {
         let down = at.rotation.transpose_mul_vec(Vec3([0.0, 0.0, 1.0]));
         let mut lowest = (f64::INFINITY, Vec3::ZERO);
@@ -104,8 +101,8 @@ impl LinkSolid {
     }
 }
 
-/// The distance of two links from surface to surface. What is above `beyond` need not be exact. `guesses`: what
-/// [`hull_distance`] keeps of each two shapes.
+/// Distance between the surfaces of two links. A distance above `beyond` need not be exact. `guesses` contains the
+/// guess of [`hull_distance`] for each pair of shapes.
 pub(crate) fn solid_distance(
     first: &LinkSolid,
     first_at: &Transform,
@@ -144,12 +141,12 @@ pub(crate) fn solid_distance(
                         slope: 1.0,
                     }
                 } else {
-                    let inside = DEEP * balls.surface_m.min(0.0);
-                    SolidDistance { surface_m: inside - radii, slope: DEEP, ..balls }
+                    let inside = CENTRE_DISTANCE_WEIGHT * balls.surface_m.min(0.0);
+                    SolidDistance { surface_m: inside - radii, slope: CENTRE_DISTANCE_WEIGHT, ..balls }
                 }
             };
             if found.surface_m > beyond {
-                // A bound, or farther than what is known.
+                // A bound, or farther than the nearest known pair.
                 if bound.is_none_or(|bound| found.surface_m < bound.surface_m) {
                     bound = Some(found);
                 }
@@ -161,7 +158,6 @@ pub(crate) fn solid_distance(
     if nearest.surface_m.is_finite() { nearest } else { bound.unwrap_or(nearest) }
 }
 
-/// The distance of two balls.
 fn by_balls(first: Vec3, first_reach: f64, second: Vec3, second_reach: f64) -> SolidDistance {
     let apart = first - second;
     let length = apart.norm();

@@ -1,37 +1,31 @@
-//! Whether two surfaces of triangles come nearer than a distance: exact, by a tree of boxes about the triangles.
+//! Exact test whether two triangle surfaces are closer than a distance, with a tree of bounding boxes.
 
 use super::convex::{Placed, hull_distance};
 use dynident_model::collision::Solid;
 use dynident_model::{Transform, Vec3};
 
-/// Elements of a leaf.
-const LEAF: usize = 4;
+const MAX_LEAF_ELEMENTS: usize = 4;
 
-/// A convex element of a surface: a triangle, or a whole convex shape with the radius about it.
 #[derive(Clone, Debug)]
 struct Element {
-    /// Range among the corners.
     first: usize,
     end: usize,
     radius_m: f64,
 }
 
-/// A box along the axes that holds elements.
 #[derive(Clone, Debug)]
 struct Node {
     centre: Vec3,
     half: Vec3,
-    /// Two nodes below, or elements.
-    below: Below,
+    below: Children,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Below {
+enum Children {
     Nodes([usize; 2]),
     Elements(usize, usize),
 }
 
-/// All surfaces of one link, in the frame of its body.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surface {
     corners: Vec<Vec3>,
@@ -40,7 +34,6 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// The triangles of meshes, and convex shapes as they are.
     pub(super) fn new<'a>(solids: impl IntoIterator<Item = &'a Solid>) -> Self {
         let mut surface = Self::default();
         for solid in solids {
@@ -69,7 +62,6 @@ impl Surface {
         }
     }
 
-    /// The box about some elements.
     fn node(&self, elements: &[usize]) -> Node {
         let (mut low, mut high) = (Vec3([f64::INFINITY; 3]), Vec3([f64::NEG_INFINITY; 3]));
         for place in elements {
@@ -81,13 +73,14 @@ impl Surface {
                 }
             }
         }
-        Node { centre: (low + high).scale(0.5), half: (high - low).scale(0.5), below: Below::Elements(0, 0) }
+        Node { centre: (low + high).scale(0.5), half: (high - low).scale(0.5), below: Children::Elements(0, 0) }
     }
 
-    /// Splits a node by the median along its longest axis; `order` are its elements, which begin at `start` of all.
+    /// Splits a node at the median along its longest axis; `order` contains its elements, the first of which has index
+    /// `start`.
     fn split(&mut self, node: usize, order: &mut [usize], start: usize) {
-        if order.len() <= LEAF {
-            self.nodes[node].below = Below::Elements(start, start + order.len());
+        if order.len() <= MAX_LEAF_ELEMENTS {
+            self.nodes[node].below = Children::Elements(start, start + order.len());
             return;
         }
         let half = self.nodes[node].half;
@@ -102,14 +95,14 @@ impl Surface {
         let below = [self.nodes.len(), self.nodes.len() + 1];
         let nodes = [self.node(lower), self.node(upper)];
         self.nodes.extend(nodes);
-        self.nodes[node].below = Below::Nodes(below);
+        self.nodes[node].below = Children::Nodes(below);
         let between = start + lower.len();
         self.split(below[0], lower, start);
         self.split(below[1], upper, between);
     }
 
-    /// Whether some point of this surface and some point of the other are nearer than `distance_m` (0 included: they
-    /// touch). A surface inside a closed one is not near it.
+    /// Whether the distance to the other surface is at most `distance_m` (0: they touch). A surface inside a closed one
+    /// is not considered close.
     pub(super) fn is_within(&self, at: &Transform, other: &Self, other_at: &Transform, distance_m: f64) -> bool {
         if self.nodes.is_empty() || other.nodes.is_empty() {
             return false;
@@ -122,7 +115,7 @@ impl Surface {
                 continue;
             }
             match (a.below, b.below) {
-                (Below::Elements(from, to), Below::Elements(other_from, other_to)) => {
+                (Children::Elements(from, to), Children::Elements(other_from, other_to)) => {
                     for one in &self.elements[from..to] {
                         for two in &other.elements[other_from..other_to] {
                             let corners = [&self.corners[one.first..one.end], &other.corners[two.first..two.end]];
@@ -138,9 +131,9 @@ impl Surface {
                         }
                     }
                 }
-                (Below::Nodes(below), Below::Elements(..)) => stack.extend(below.map(|node| (node, second))),
-                (Below::Elements(..), Below::Nodes(below)) => stack.extend(below.map(|node| (first, node))),
-                (Below::Nodes(below), Below::Nodes(other_below)) => {
+                (Children::Nodes(below), Children::Elements(..)) => stack.extend(below.map(|node| (node, second))),
+                (Children::Elements(..), Children::Nodes(below)) => stack.extend(below.map(|node| (first, node))),
+                (Children::Nodes(below), Children::Nodes(other_below)) => {
                     if a.half.dot(a.half) >= b.half.dot(b.half) {
                         stack.extend(below.map(|node| (node, second)));
                     } else {
@@ -153,7 +146,7 @@ impl Surface {
     }
 }
 
-/// A lower bound of the distance of two boxes: the second as the box along the first's axes that holds it.
+/// Lower bound of the distance of two boxes; the second is replaced by its bounding box along the first one's axes.
 fn apart(a: &Node, b: &Node, here_from_other: &Transform) -> f64 {
     let centre = here_from_other.point(b.centre) - a.centre;
     let rows = &here_from_other.rotation.0;
@@ -170,7 +163,6 @@ mod tests {
     use dynident_model::Mat3;
     use dynident_model::sample::Random;
 
-    /// A rough sheet of triangles.
     fn sheet(random: &mut Random, steps: u32) -> Solid {
         let corner = |random: &mut Random, i: u32, j: u32| {
             Vec3([f64::from(i), f64::from(j), random.uniform(0.0, 1.5)]).scale(1.0 / f64::from(steps))

@@ -1,4 +1,4 @@
-//! What each kind of limit offers to the set: values over a block of samples, and the way back.
+//! Interface of the kinds of limits: values over a block of samples, and their adjoint.
 
 use super::kind::Constraint;
 use super::torque_range::TorqueRange;
@@ -7,16 +7,15 @@ use crate::motion::{Motion, MotionAdjoint};
 use core::fmt::Debug;
 use dynident_model::{Transform, Vec3};
 
-/// What a limit may look at. Torques are joint-major as the motion; placements (`base_from_body`) stand sample by
-/// sample, and are empty where no limit asked for them.
+/// Inputs of a limit. Torques are joint-major like the motion; placements (`base_from_body`) are stored sample by
+/// sample, and empty if no limit needs them.
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a> {
     pub(crate) motion: &'a Motion,
     pub(crate) torque: &'a TorqueRange,
     pub(crate) placements: &'a [Transform],
-    /// Placements of one sample.
     pub(crate) bodies: usize,
-    /// Samples are consecutive times of one motion: obstacles are also looked for between them.
+    /// Whether samples are consecutive times of one motion, so that obstacles are also tested between them.
     pub(crate) swept: bool,
 }
 
@@ -27,17 +26,16 @@ impl Inputs<'_> {
     }
 }
 
-/// Where derivatives of the cost go: by the motion, by the torques, and by the places of points as forces on the
-/// bodies.
-pub(crate) struct Pull<'a> {
+/// Derivatives of the cost with respect to the motion, the torques, and the places of points (as forces on the bodies).
+pub(crate) struct Adjoint<'a> {
     pub(crate) motion: &'a mut MotionAdjoint,
     pub(crate) torque: &'a mut TorqueRange,
     /// Sample by sample, one per body.
     pub(crate) wrenches: &'a mut [Wrench],
 }
 
-impl Pull<'_> {
-    /// Adds the derivative of the cost by the place of a point of a body (base frame).
+impl Adjoint<'_> {
+    /// Adds the derivative of the cost with respect to the place of a point of a body (base frame).
     pub(crate) fn point(&mut self, body: Option<usize>, bodies: usize, sample: usize, place: Vec3, gradient: Vec3) {
         if let Some(body) = body {
             self.wrenches[sample * bodies + body].add(place, gradient);
@@ -45,23 +43,18 @@ impl Pull<'_> {
     }
 }
 
-/// Constraints of one kind.
 pub(crate) trait Term: Debug + Send + Sync {
-    /// The rows, in the order of the values.
     fn constraints(&self) -> Vec<Constraint>;
 
-    /// Writes `rows × samples` values.
     fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]);
 
-    /// Adds what a cost with derivatives `weights` by the values pulls.
-    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>);
+    /// Adds the derivatives of a cost, given its derivatives `weights` with respect to the values.
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], adjoint: &mut Adjoint<'_>);
 
-    /// True if the values need torques.
     fn needs_torque(&self) -> bool {
         false
     }
 
-    /// True if the values need placements.
     fn needs_placements(&self) -> bool {
         false
     }

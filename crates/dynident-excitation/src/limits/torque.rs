@@ -1,9 +1,8 @@
-//! Joint torque by the prior model and the known torque of friction and drives, less the margin kept free for what
-//! neither knows.
+//! Joint torque by the prior model and the known torque of friction and drives, with a margin for unknown torque.
 
 use super::description::JointLimit;
 use super::kind::{Constraint, LimitKind};
-use super::term::{Inputs, Pull, Term};
+use super::term::{Adjoint, Inputs, Term};
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_dynamics::{Workspace, inverse_dynamics_derivatives};
 use dynident_model::Model;
@@ -47,14 +46,14 @@ impl Term for TorqueLimits {
         }
     }
 
-    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], adjoint: &mut Adjoint<'_>) {
         for ((joint, constraint), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
             let scale = 1.0 / constraint.size;
             for (at, weight) in inputs.motion.of(*joint).zip(row) {
                 if inputs.torque.high[at] >= -inputs.torque.low[at] {
-                    pull.torque.high[at] += weight * scale;
+                    adjoint.torque.high[at] += weight * scale;
                 } else {
-                    pull.torque.low[at] -= weight * scale;
+                    adjoint.torque.low[at] -= weight * scale;
                 }
             }
         }
@@ -65,8 +64,9 @@ impl Term for TorqueLimits {
     }
 }
 
-/// Adds to `adjoint` what a cost with derivatives `by_torque` (joint-major) by the rigid-body torques pulls:
-/// `(∂τ/∂q)ᵀ w`, `(∂τ/∂q̇)ᵀ w`, `Mᵀ w` at every sample where a weight is not zero.
+/// Adds to `adjoint` the derivatives of a cost with respect to the motion, given its derivatives `by_torque`
+/// (joint-major) with respect to the rigid-body torques: `(∂τ/∂q)ᵀ w`, `(∂τ/∂q̇)ᵀ w`, `Mᵀ w` at every sample with a
+/// nonzero weight.
 ///
 /// # Panics
 /// If sizes differ.

@@ -1,7 +1,8 @@
-//! Lowest and highest torque of a motion for a search: known torque with continuous steps that lie outside the signs.
+//! Lowest and highest torque of a motion for a search: known torque with continuous steps that bound the sign
+//! functions.
 //!
-//! A sign has no slope to follow. In the highest torque the step from -1 to 1 is a ramp that ends where the velocity
-//! becomes zero from below, in the lowest one it begins there: both ranges hold the sign's, and differ from it only at
+//! A sign function has no useful slope. In the highest torque the step from -1 to 1 is a ramp that ends at zero
+//! velocity; in the lowest torque the ramp begins there. Both bound the sign function, and differ from it only at
 //! velocities below the width of the ramp.
 
 use super::known_torque::KnownTorque;
@@ -17,7 +18,7 @@ pub(crate) struct TorqueRange {
 }
 
 impl TorqueRange {
-    /// The range where nothing beyond the rigid bodies' torque `rigid` is known.
+    /// Sets the range to the rigid-body torque `rigid`, without known torque.
     pub(crate) fn of_bodies(&mut self, rigid: &[f64]) {
         for values in [&mut self.low, &mut self.high] {
             values.clear();
@@ -25,7 +26,6 @@ impl TorqueRange {
         }
     }
 
-    /// All zeros.
     pub(crate) fn reset(&mut self, count: usize) {
         for values in [&mut self.low, &mut self.high] {
             values.clear();
@@ -34,7 +34,6 @@ impl TorqueRange {
     }
 }
 
-/// Known torque of a robot, prepared for a search.
 #[derive(Clone, Debug)]
 pub(crate) struct SmoothTorque {
     terms: Vec<SmoothTerm>,
@@ -46,7 +45,7 @@ struct SmoothTerm {
     term: TorqueTerm,
     value: f64,
     joints: Vec<usize>,
-    /// Of friction that follows the sign of a velocity.
+    /// Step of friction that depends on the sign of a velocity.
     step: Option<Step>,
 }
 
@@ -99,7 +98,7 @@ impl SmoothTorque {
         self.terms.is_empty()
     }
 
-    /// Widens the range, which holds the rigid bodies' torque `rigid`, by the known torque along `motion`.
+    /// Widens the range, which contains the rigid-body torque `rigid`, by the known torque along `motion`.
     pub(crate) fn add(&self, motion: &Motion, rigid: &[f64], range: &mut TorqueRange) {
         let mut column = vec![0.0; motion.samples];
         for SmoothTerm { term, value, joints, step } in &self.terms {
@@ -136,8 +135,9 @@ impl SmoothTorque {
         }
     }
 
-    /// Adds what a cost with derivatives `by_range` by the two ends of the range pulls: on the motion to `adjoint`, and
-    /// on the rigid bodies' torque to `by_torque`, but for its direct share, which is the sum of both ends.
+    /// Adds the derivatives of a cost, given its derivatives `by_range` with respect to both ends of the range: with
+    /// respect to the motion to `adjoint`, and with respect to the rigid-body torque to `by_torque`, except for the
+    /// direct share, which is the sum of both ends.
     pub(crate) fn apply_adjoint(
         &self,
         motion: &Motion,
@@ -187,7 +187,7 @@ impl Step {
         joints.iter().zip(self.ratios).map(|(joint, ratio)| ratio * motion.dq[joint * motion.samples + sample]).sum()
     }
 
-    /// The lower and the higher step, each with its slope.
+    /// The lower and the upper ramp, each with its slope.
     fn at(&self, joints: &[usize], motion: &Motion, sample: usize) -> [(f64, f64); 2] {
         let velocity = self.velocity(joints, motion, sample);
         let [forward, backward] = self.ends;
@@ -205,7 +205,7 @@ impl Step {
         [ramp(0.0), ramp(-self.width)]
     }
 
-    /// Factor of the step in the torque of the joint at `place`, and the factor's derivative by the velocity.
+    /// Factor of the step in the torque of the joint at `place`, and its derivative with respect to the velocity.
     fn size(&self, place: usize, value: f64, velocity: f64, rigid: f64) -> (f64, f64) {
         let size = value * self.ratios[place] * if self.by_load { rigid.abs() } else { 1.0 };
         let Some([speed, exponent]) = self.fading else { return (size, 0.0) };

@@ -1,4 +1,4 @@
-//! Contradictions in limits, found before anything moves.
+//! Validation of limits.
 
 use super::description::{BoxLimit, JointLimit, Limits};
 use super::error::LimitError;
@@ -12,9 +12,9 @@ impl Limits {
     /// Checks every number and name against the robot.
     ///
     /// # Errors
-    /// The first contradiction: an unknown or doubled joint, an unknown link, a number that is not finite or not
-    /// positive, a range upside down or empty, a torque or power limit over bodies without inertial parameters, a box
-    /// without room.
+    /// The first contradiction: an unknown or duplicate joint, an unknown link, a value that is not finite or not
+    /// positive, an empty or inverted range, a torque or power limit over bodies without inertial parameters, a box
+    /// that is too small.
     pub fn validate(&self, model: &Model) -> Result<(), LimitError> {
         for (index, limit) in self.joints.iter().enumerate() {
             let joint = model.joint_index(&limit.joint).ok_or_else(|| LimitError::UnknownJoint {
@@ -78,7 +78,7 @@ fn validate_joint(limit: &JointLimit) -> Result<(), LimitError> {
     let name = &limit.joint;
     if let Some(position) = limit.position {
         range(&format!("position of joint `{name}`"), position)?;
-        // Half the width must be a number to divide by, and the ends far enough apart to be separated from rounding.
+        // The half width is a divisor, and the ends must differ by more than rounding.
         let (middle, half) = middle_and_half(position);
         if half <= 1e-12 * middle.abs().max(1.0) {
             return Err(LimitError::ZeroRange { joint: name.clone(), position: position[0] });
@@ -104,7 +104,6 @@ fn validate_joint(limit: &JointLimit) -> Result<(), LimitError> {
     Ok(())
 }
 
-/// Middle and half width of a range, without overflow.
 pub(super) fn middle_and_half(range: [f64; 2]) -> (f64, f64) {
     let [lower, upper] = range;
     (0.5 * lower + 0.5 * upper, 0.5 * upper - 0.5 * lower)

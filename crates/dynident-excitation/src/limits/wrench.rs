@@ -1,9 +1,9 @@
-//! Derivatives by places in space, pulled back to joint positions.
+//! Derivatives with respect to places in space, mapped to joint positions.
 
 use dynident_model::{Model, Transform, Vec3};
 
-/// Force and moment about the base origin, base frame: the derivative of a cost by the places of a body's points is a
-/// force at each.
+/// Force and moment about the base origin in the base frame: the derivative of a cost with respect to the place of a
+/// body's point is a force at that point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wrench {
     force: Vec3,
@@ -13,17 +13,21 @@ pub(crate) struct Wrench {
 impl Wrench {
     pub(crate) const ZERO: Self = Self { force: Vec3::ZERO, moment: Vec3::ZERO };
 
-    /// Adds a force at a place.
     pub(crate) fn add(&mut self, place: Vec3, force: Vec3) {
         self.force += force;
         self.moment += place.cross(force);
     }
 }
 
-/// Adds `Jᵀ f` of one sample to `by_position[joint]`: a joint about axis `a` through `o` sees `a · (n - o × f)` of the
-/// wrench on everything it carries, a sliding one `a · f`; what a joint that follows others sees is theirs. One inward
-/// sweep; the wrenches are used up.
-pub(crate) fn pull_wrenches(model: &Model, placements: &[Transform], wrenches: &mut [Wrench], by_position: &mut [f64]) {
+/// Adds `Jᵀ f` of one sample to `by_position[joint]`. For a wrench on the bodies that a joint carries, a revolute joint
+/// about axis `a` through `o` gets `a · (n - o × f)`, a prismatic one `a · f`; followers pass their share to the joints
+/// that they follow. One inward sweep, which consumes the wrenches.
+pub(crate) fn apply_wrenches(
+    model: &Model,
+    placements: &[Transform],
+    wrenches: &mut [Wrench],
+    by_position: &mut [f64],
+) {
     for (body, map) in model.maps().iter().enumerate().rev() {
         let Wrench { force, moment } = wrenches[body];
         wrenches[body] = Wrench::ZERO;

@@ -1,192 +1,25 @@
 //! Minimisation under smooth constraints with exact gradients: augmented Lagrangian over a projected L-BFGS.
 
+use super::constrained_problem::{
+    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, AugmentedLagrangianStatus,
+    ConstrainedProblem, CurvatureFacts,
+};
 use super::projected_lbfgs::{Effort, End, Smooth, projected_lbfgs};
-use super::{OptimiserError, Progress, Step, Watch, check_bounds, check_length, setting};
+use super::{OptimiserError, Progress, Step, Watch, check_bounds, check_length};
 
-/// minimise f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints,
-/// c_i(x) <= 0 for the others, and lower <= x <= upper.
-///
-/// Evaluation is split in two so that one adjoint sweep gives the gradient of f and of any number of constraints
-/// together, reusing what the values needed. Constraints work best when scaled to order one (limit reached = 0, limit
-/// exceeded by its own size = 1).
-pub(crate) trait ConstrainedProblem {
-    /// Number of variables.
-    fn variables(&self) -> usize;
-    /// Lower and upper bound of each variable; infinite where there is none.
-    fn bounds(&self) -> Vec<[f64; 2]>;
-    /// Number of constraints.
-    fn constraints(&self) -> usize;
-    /// How many of them, the first ones, are equalities.
-    fn equalities(&self) -> usize {
-        0
-    }
-    /// Writes c(x) and returns f(x), at an `x` inside the bounds. Not finite where they are not defined; the search
-    /// then takes a shorter step.
-    fn values(&mut self, x: &[f64], constraints: &mut [f64]) -> f64;
-    /// Writes the gradient of `f + Σ weights_i c_i` at the `x` of the last [`values`](ConstrainedProblem::values). Most
-    /// weights are zero.
-    fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]);
-    /// What gradients are measured by, at an objective f: max(1, |f|), for an objective whose zero has a meaning.
-    fn objective_scale(&self, objective: f64) -> f64 {
-        objective.abs().max(1.0)
-    }
-    /// Optional: takes up a positive definite model of the augmented Lagrangian's curvature at the `x` of the last
-    /// [`gradient`](ConstrainedProblem::gradient), from which the quasi-Newton matrix starts at every step. Returns
-    /// whether there is a model.
-    fn prepare_metric(&mut self, _known: &CurvatureFacts<'_>) -> bool {
-        false
-    }
-    /// Multiplies with the inverse of the model of the last [`prepare_metric`](ConstrainedProblem::prepare_metric).
-    fn divide_by_metric(&self, _vector: &mut [f64]) {}
-}
-
-/// What is known of the augmented Lagrangian at a point, for a model of its curvature.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct CurvatureFacts<'a> {
-    /// For every constraint the penalty where it pushes, 0 where it does not.
-    pub pushing: &'a [f64],
-    /// Gradient.
-    pub gradient: &'a [f64],
-    /// Variables that no bound holds; a model must not couple the others with them.
-    pub free: &'a [bool],
-    /// The last step, if any is remembered.
-    pub last: Option<Step<'a>>,
-}
-
-/// Settings of [`augmented_lagrangian()`].
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct AugmentedLagrangianSettings {
-    /// A point is feasible if no constraint is violated by more. Default 1e-8.
-    pub feasibility_tolerance: f64,
-    /// Converged if the projected gradient of the Lagrangian has no entry above this times
-    /// [`objective_scale`](ConstrainedProblem::objective_scale). Default 1e-6.
-    pub optimality_tolerance: f64,
-    /// Evaluations at most. Default 20,000.
-    pub max_evaluations: usize,
-    /// Updates of the multipliers at most. Default 100.
-    pub max_outer_iterations: usize,
-    /// Descent steps between two updates of the multipliers at most. Default 200.
-    pub max_inner_iterations: usize,
-    /// Differences that L-BFGS remembers. Default 12.
-    pub memory: usize,
-    /// First penalty; none: from the sizes of f and c at the start, between 1e-6 and 10. Default none.
-    pub initial_penalty: Option<f64>,
-    /// Factor of the penalty when an update did not halve the violation. Default 10.
-    pub penalty_growth: f64,
-    /// The problem is declared infeasible when the penalty would go beyond. Default 1e12.
-    pub max_penalty: f64,
-}
-
-impl Default for AugmentedLagrangianSettings {
-    fn default() -> Self {
-        Self {
-            feasibility_tolerance: 1e-8,
-            optimality_tolerance: 1e-6,
-            max_evaluations: 20_000,
-            max_outer_iterations: 100,
-            max_inner_iterations: 200,
-            memory: 12,
-            initial_penalty: None,
-            penalty_growth: 10.0,
-            max_penalty: 1e12,
-        }
-    }
-}
-
-impl AugmentedLagrangianSettings {
-    /// Whether every setting is in its range.
-    ///
-    /// # Errors
-    /// [`OptimiserError::Setting`] names the first that is not.
-    pub(crate) fn validate(&self) -> Result<(), OptimiserError> {
-        let positive = |name, value: f64| setting(name, value, value > 0.0 && value.is_finite(), "positive and finite");
-        positive("feasibility_tolerance", self.feasibility_tolerance)?;
-        positive("optimality_tolerance", self.optimality_tolerance)?;
-        positive("max_evaluations", self.max_evaluations as f64)?;
-        positive("max_outer_iterations", self.max_outer_iterations as f64)?;
-        positive("max_inner_iterations", self.max_inner_iterations as f64)?;
-        positive("memory", self.memory as f64)?;
-        positive("initial_penalty", self.initial_penalty.unwrap_or(1.0))?;
-        positive("max_penalty", self.max_penalty)?;
-        let growth = self.penalty_growth;
-        setting("penalty_growth", growth, growth > 1.0 && growth.is_finite(), "finite and above 1")
-    }
-}
-
-/// Where a search stands, so that another can go on from there.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct AugmentedLagrangianState {
-    /// The point.
-    pub x: Vec<f64>,
-    /// Multipliers of the constraints: what the objective would gain per unit of relaxation. Empty for zeros.
-    pub multipliers: Vec<f64>,
-    /// The penalty; none for that of the settings.
-    pub penalty: Option<f64>,
-}
-
-impl From<Vec<f64>> for AugmentedLagrangianState {
-    /// A point of which nothing else is known.
-    fn from(x: Vec<f64>) -> Self {
-        Self { x, ..Self::default() }
-    }
-}
-
-/// How a search ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum AugmentedLagrangianStatus {
-    /// Feasible and stationary within the tolerances.
-    Converged,
-    /// Feasible, and no lower value can be found in double precision, though the gradient is above its tolerance.
-    PrecisionLimit,
-    /// Outer iterations or evaluations used up.
-    IterationLimit,
-    /// The penalty reached its end and constraints are still violated: no feasible point near.
-    Infeasible,
-    /// The callback ended it.
-    Stopped,
-}
-
-/// What [`augmented_lagrangian()`] found.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct AugmentedLagrangianResult {
-    /// How it ended.
-    pub status: AugmentedLagrangianStatus,
-    /// The feasible point of the lowest objective among all that were evaluated; if none was feasible, the one with the
-    /// smallest violation.
-    pub best: Vec<f64>,
-    /// Objective there.
-    pub value: f64,
-    /// Largest violation of a constraint there, max(c_i, 0) or |c_i|.
-    pub violation: f64,
-    /// Whether that is within the tolerance.
-    pub feasible: bool,
-    /// The last iterate with its multipliers and penalty. While constraints are still violated it determines more than
-    /// [`best`](Self::best), which may be an early point that kept them by standing still.
-    pub end: AugmentedLagrangianState,
-    /// `f + Σ λ_i c_i` there over the violated constraints: to first order the objective that is left once they are
-    /// kept.
-    pub lagrangian: f64,
-    /// Largest violation there.
-    pub end_violation: f64,
-    /// Updates of the multipliers.
-    pub outer_iterations: usize,
-    /// Evaluations of objective and constraints.
-    pub evaluations: usize,
-}
-
-/// Minimises a [`ConstrainedProblem`] from `state`, a point that is first moved into the bounds, or the end of an
+/// Minimises a [`ConstrainedProblem`] from `state`: a point, which is first clamped to the bounds, or the end of an
 /// earlier search.
 ///
-/// Powell, Hestenes and Rockafellar's function L = f + Σ_eq (λ c + ρ c²/2) + Σ_ineq [max(0, λ + ρ c)² - λ²] / 2ρ is
-/// minimised inside the bounds by L-BFGS with projected steps; then λ ← λ + ρ c (not below 0 for inequalities), and ρ
-/// grows when the violation was not halved (Birgin and Martínez, *Practical Augmented Lagrangian Methods*, 2014,
+/// The function of Powell, Hestenes and Rockafellar, L = f + Σ_eq (λ c + ρ c²/2) + Σ_ineq [max(0, λ + ρ c)² - λ²] / 2ρ,
+/// is minimised inside the bounds by L-BFGS with projected steps; then λ ← λ + ρ c (not below 0 for inequalities), and
+/// ρ grows if the violation was not halved (Birgin and Martínez, *Practical Augmented Lagrangian Methods*, 2014,
 /// algorithm 4.1). Finds a local solution.
 ///
-/// Deterministic. `watch` hears the best point so far after every evaluation.
+/// Deterministic. `watch` is called with the best point so far after every evaluation.
 ///
 /// # Errors
-/// A setting out of range, a start of the wrong length or where the problem is not defined, multipliers of another
-/// number, empty bounds.
+/// A setting out of range, a start of the wrong length or where the problem is undefined, a wrong number of
+/// multipliers, empty bounds.
 pub(crate) fn augmented_lagrangian(
     problem: &mut impl ConstrainedProblem,
     state: &AugmentedLagrangianState,
@@ -198,13 +31,12 @@ pub(crate) fn augmented_lagrangian(
     let mut x: Vec<f64> = state.x.iter().zip(&bounds).map(|(x, &[lower, upper])| x.clamp(lower, upper)).collect();
     let mut search = Search::new(problem, settings, watch);
     search.begin(state, &x)?;
-    // A search that goes on starts near its end.
+    // A continued search starts near its end.
     let tolerance = if state.multipliers.is_empty() { 0.1 } else { 1e-4 };
     let status = search.descend(&bounds, &mut x, tolerance);
     Ok(search.result(x, status))
 }
 
-/// The bounds of a problem, checked together with the state from which its search begins.
 fn checked_bounds(
     problem: &impl ConstrainedProblem,
     state: &AugmentedLagrangianState,
@@ -222,7 +54,7 @@ fn checked_bounds(
     Ok(bounds)
 }
 
-/// The augmented Lagrangian as a function, and the record of what was seen.
+/// The augmented Lagrangian as a function, and the best point so far.
 struct Search<'a, 'w, P: ConstrainedProblem> {
     problem: &'a mut P,
     settings: &'a AugmentedLagrangianSettings,
@@ -265,7 +97,7 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         }
     }
 
-    /// Takes over multipliers and penalty of `state`, or chooses a penalty at the first point `x`.
+    /// Takes multipliers and penalty from `state`, or chooses a penalty at the first point `x`.
     fn begin(&mut self, state: &AugmentedLagrangianState, x: &[f64]) -> Result<(), OptimiserError> {
         if !state.multipliers.is_empty() {
             self.multipliers.clone_from(&state.multipliers);
@@ -281,8 +113,8 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         Ok(())
     }
 
-    /// Descents of the augmented Lagrangian with updates of the multipliers between them; moves `x` to the end of the
-    /// last. `tolerance` is the first descent's.
+    /// Runs descents of the augmented Lagrangian with multiplier updates between them, and moves `x` to the end of the
+    /// last. `tolerance` is that of the first descent.
     fn descend(&mut self, bounds: &[[f64; 2]], x: &mut [f64], mut tolerance: f64) -> AugmentedLagrangianStatus {
         let settings = self.settings;
         let mut last_measure = f64::INFINITY;
@@ -295,8 +127,7 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
             if self.halted() {
                 break;
             }
-            // Values and constraints at the point where the descent ended; the last evaluation may have been a
-            // rejected trial.
+            // The last evaluation may have been a rejected trial, so the end point is evaluated again.
             self.value(x);
             self.outer += 1;
             let measure = self.update_multipliers();
@@ -320,15 +151,13 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         AugmentedLagrangianStatus::IterationLimit
     }
 
-    /// The result of a search that ended at `x`.
     fn result(mut self, x: Vec<f64>, mut status: AugmentedLagrangianStatus) -> AugmentedLagrangianResult {
         if self.stopped {
             status = AugmentedLagrangianStatus::Stopped;
         }
-        // The last evaluation may have been a rejected trial.
         self.objective = self.problem.values(&x, &mut self.c);
         let end_violation = (0..self.c.len()).fold(0.0, |worst: f64, i| worst.max(self.violation_of(i)));
-        // Slack is not included: multipliers of a search that has not converged may weigh it absurdly.
+        // Only violated constraints: the multipliers of an unconverged search can be wrong for slack ones.
         let pushing =
             self.multipliers.iter().zip(&self.c).map(|(multiplier, c)| (multiplier * c).max(0.0)).sum::<f64>();
         let feasible = self.best_violation <= self.settings.feasibility_tolerance;
@@ -353,8 +182,8 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         if i < self.equalities { self.c[i].abs() } else { self.c[i].max(0.0) }
     }
 
-    /// Takes up the constraints at the current c: their forces into the weights. Returns what they add to the augmented
-    /// Lagrangian, which is not finite where a constraint is not, and the largest violation.
+    /// Writes the gradient weights of the constraints at the current c. Returns their part of the augmented Lagrangian,
+    /// which is not finite if a constraint is not, and the largest violation.
     fn push(&mut self) -> (f64, f64) {
         let (equal, above) = self.c.split_at(self.equalities);
         let (of_equal, of_above) = self.multipliers.split_at(self.equalities);
@@ -366,8 +195,7 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         (squares / (2.0 * self.penalty), worst)
     }
 
-    /// Keeps the point, whose largest violation is `violation`, if it is better: feasible before infeasible, then by
-    /// value or violation.
+    /// Stores the point if it is better: feasible before infeasible, then by value or violation.
     fn record(&mut self, x: &[f64], violation: f64) {
         let tolerance = self.settings.feasibility_tolerance;
         let better = if violation <= tolerance {
@@ -382,7 +210,7 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         }
     }
 
-    /// First-order update at the current c. Returns how far feasibility and complementarity are missed.
+    /// First-order update at the current c. Returns the violation of feasibility and complementarity.
     fn update_multipliers(&mut self) -> f64 {
         let mut measure: f64 = 0.0;
         for i in 0..self.c.len() {
@@ -399,12 +227,12 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
     }
 }
 
-/// Sums over constraints, of which there are thousands: each lane has its own, so that they are made side by side.
+/// Sums over thousands of constraints, with one partial sum per lane.
 #[derive(Default)]
 struct PushSums {
     /// `w² - λ²`.
     squares: [f64; LANES],
-    /// `0 c`: zero, or no number where c is not a finite one.
+    /// `0 c`: zero, or NaN if c is not finite.
     undefined: [f64; LANES],
     worst: [f64; LANES],
 }
@@ -412,7 +240,7 @@ struct PushSums {
 const LANES: usize = 8;
 
 impl PushSums {
-    /// Makes the weights `push(λ + ρ c)` of constraints `c` with multipliers `λ`.
+    /// Computes the weights `push(λ + ρ c)` of constraints `c` with multipliers `λ`.
     fn take(
         &mut self,
         c: &[f64],
@@ -442,7 +270,7 @@ impl PushSums {
         }
     }
 
-    /// The sum of squares, not finite where a constraint is not, and the largest violation.
+    /// Sum of squares, not finite if a constraint is not, and the largest violation.
     fn of_all_lanes(&self) -> (f64, f64) {
         let squares: f64 = self.squares.iter().zip(&self.undefined).map(|(a, b)| a + b).sum();
         (squares, self.worst.iter().copied().fold(0.0, f64::max))
@@ -472,7 +300,7 @@ impl<P: ConstrainedProblem> Smooth for Search<'_, '_, P> {
 
     fn gradient(&mut self, gradient: &mut [f64]) {
         self.problem.gradient(&self.weights, gradient);
-        // A rejected trial may follow; the curvature belongs to the point of the gradient.
+        // The curvature belongs to the point of the gradient, and a rejected trial may follow.
         self.curvature.clear();
         let (equal, above) = self.weights.split_at(self.equalities);
         self.curvature.resize(equal.len(), self.penalty);

@@ -9,7 +9,6 @@ fn never(_: &Progress<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// A problem of closures: values, and the gradients of f and of every constraint.
 struct Textbook {
     bounds: Vec<[f64; 2]>,
     equalities: usize,
@@ -74,13 +73,13 @@ fn hock_and_schittkowski_71() {
     let settings = AugmentedLagrangianSettings::default();
     let result = augmented_lagrangian(&mut hs71(), &at(&[1.0, 5.0, 5.0, 1.0]), &settings, &mut never).unwrap();
     assert_eq!(result.status, AugmentedLagrangianStatus::Converged, "{result:?}");
-    // The published solution to its printed digits.
+    // The published solution, to its printed digits.
     assert!((result.value - 17.014_017_3).abs() < 1e-6, "{}", result.value);
     for (x, published) in result.best.iter().zip([1.0, 4.742_999_4, 3.821_150_3, 1.379_408_2]) {
         assert!((x - published).abs() < 1e-5, "{x} against {published}");
     }
     assert!(result.feasible && result.violation <= 1e-8);
-    // The multipliers' sizes, 0.161469 and 0.552294, as interior-point programs print them for this problem.
+    // The multipliers 0.161469 and 0.552294, as interior-point programs print them for this problem.
     assert!((result.end.multipliers[0] - 0.161_468_6).abs() < 1e-5, "{:?}", result.end.multipliers);
     assert!((result.end.multipliers[1] - 0.552_293_7).abs() < 1e-5, "{:?}", result.end.multipliers);
 }
@@ -123,8 +122,8 @@ fn hock_and_schittkowski_43() {
     }
 }
 
-/// As many constraints as a sampled trajectory has: the smallest disc's centre problem, a bowl cut by 7000 half-planes
-/// that leave a disc of radius 1.
+/// As many constraints as a sampled trajectory has: the nearest point of a disc of radius 1 bounded by 7000
+/// half-planes.
 struct ManyHalfPlanes(Vec<f64>);
 
 impl ConstrainedProblem for ManyHalfPlanes {
@@ -162,13 +161,13 @@ fn thousands_of_constraints() {
     let settings = AugmentedLagrangianSettings::default();
     let result = augmented_lagrangian(&mut ManyHalfPlanes(Vec::new()), &at(&[0.0; 50]), &settings, &mut never).unwrap();
     assert!(result.feasible, "{:?} {}", result.status, result.violation);
-    // The polygon lies between the discs of radius 1 and 1/cos(π/7000) = 1 + 1e-7: distance from (3, 4) is 4 within
-    // that, the value 16 within 1e-6.
+    // The polygon is between the discs of radius 1 and 1/cos(π/7000) = 1 + 1e-7: the distance from (3, 4) is 4 within
+    // that, and the value 16 within 1e-6.
     assert!((result.value - 16.0).abs() < 2e-6, "{} {:?}", result.value, result.status);
     assert!((result.best[0] - 0.6).abs() < 1e-3 && (result.best[1] - 0.8).abs() < 1e-3);
 }
 
-/// x1 >= 1 and x1 <= -1: nothing is feasible, and the least violation is 1.
+/// x1 >= 1 and x1 <= -1: infeasible, with a minimum violation of 1.
 fn contradiction() -> Textbook {
     Textbook {
         bounds: vec![[-10.0, 10.0]; 2],
@@ -229,9 +228,9 @@ fn a_search_goes_on_where_another_ended() {
     let rest = augmented_lagrangian(&mut hs71(), &first.end, &settings, &mut never).unwrap();
     assert_eq!(rest.status, AugmentedLagrangianStatus::Converged);
     assert!((rest.value - whole.value).abs() < 1e-6, "{} and {}", rest.value, whole.value);
-    // At a solution the multipliers of what pushes weigh violations of the size of the tolerance: the two values agree.
+    // At a solution the two values agree, because the remaining violations are within the tolerance.
     assert!((rest.lagrangian - rest.value).abs() < 1e-6, "{rest:?}");
-    // From the solution itself little is left to do.
+    // From the solution itself few evaluations are needed.
     let again = augmented_lagrangian(&mut hs71(), &whole.end, &settings, &mut never).unwrap();
     assert!(again.evaluations < whole.evaluations / 2, "{} of {}", again.evaluations, whole.evaluations);
     let other = AugmentedLagrangianState { multipliers: vec![0.0; 5], ..whole.end };

@@ -1,4 +1,4 @@
-//! The paper's genetic algorithm: binary coding, roulette by 1/H, one-point crossover, mutation of single bits.
+//! The paper's genetic algorithm: binary coding, roulette wheel selection by 1/H, one-point crossover, bit mutation.
 
 use super::{Objective, OptimiserError, Progress, Watch, check_bounds, evaluate_all, setting};
 use dynident_model::sample::Random;
@@ -10,21 +10,20 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct BinaryGeneticSettings {
-    /// Binary digits of one variable, 1 to 52. Default 20.
+    /// Bits per variable, 1 to 52. Default 20.
     pub bits: usize,
-    /// Individuals, an even number of at least 2. Default 40.
+    /// Number of individuals, even and at least 2. Default 40.
     pub population: usize,
-    /// Generations that are evaluated. Default 500.
+    /// Number of evaluated generations. Default 500.
     pub generations: usize,
-    /// Probability that a pair of parents is crossed. Default 0.5.
+    /// Crossover probability of a pair of parents. Default 0.5.
     pub crossover: f64,
-    /// Probability of a flip, of every single bit in every generation. The paper does not say whether its 0.01 is per
-    /// bit or per individual; here it is per bit. Default 0.01.
+    /// Flip probability of every bit in every generation. The paper does not state whether its 0.01 is per bit or per
+    /// individual; here it is per bit. Default 0.01.
     pub mutation: f64,
-    /// Whether the best individual of a generation passes unchanged to the next. The paper mentions no elite. Default
-    /// false.
+    /// Whether the best individual of a generation is copied to the next. The paper mentions no elite. Default false.
     pub elite: bool,
-    /// Seed of all chance. Default 0.
+    /// Seed of the random numbers. Default 0.
     pub seed: u64,
 }
 
@@ -35,10 +34,10 @@ impl Default for BinaryGeneticSettings {
 }
 
 impl BinaryGeneticSettings {
-    /// Whether every setting is in its range.
+    /// Checks the range of every setting.
     ///
     /// # Errors
-    /// [`OptimiserError::Setting`] names the first that is not.
+    /// [`OptimiserError::Setting`] with the first invalid one.
     pub fn validate(&self) -> Result<(), OptimiserError> {
         setting("bits", self.bits as f64, (1..=52).contains(&self.bits), "between 1 and 52")?;
         let even = (2..=1_000_000).contains(&self.population) && self.population.is_multiple_of(2);
@@ -53,39 +52,39 @@ impl BinaryGeneticSettings {
 /// One generation of the search: a point of the paper's Fig. 7.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Generation {
-    /// The lowest objective in this generation.
+    /// Lowest objective in this generation.
     pub best: f64,
-    /// The lowest objective in this and all earlier generations.
+    /// Lowest objective in this and all earlier generations.
     pub best_so_far: f64,
-    /// Mean objective of this generation, over the individuals where it is finite.
+    /// Mean of the finite objectives of this generation.
     pub mean: f64,
 }
 
-/// What [`binary_genetic()`] found.
+/// Result of [`binary_genetic()`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BinaryGeneticResult {
-    /// The best point of all generations.
+    /// Best point of all generations.
     pub best: Vec<f64>,
-    /// Its objective; infinite if no individual ever had a finite one.
+    /// Its objective; infinite if no individual had a finite one.
     pub value: f64,
-    /// One entry a generation, in order.
+    /// One entry per generation, in order.
     pub history: Vec<Generation>,
-    /// Evaluations of the objective.
+    /// Number of evaluations of the objective.
     pub evaluations: usize,
-    /// Whether the callback ended the search before the last generation.
+    /// Whether the callback stopped the search before the last generation.
     pub stopped: bool,
 }
 
 /// Minimises a positive `objective` over the box `bounds` by the paper's genetic algorithm.
 ///
-/// A variable is a binary number of `bits` digits, most significant first, `x = lower + (upper - lower) k / (2^bits -
-/// 1)`; an individual is its variables' digits one after another. Every generation: parents are drawn by roulette, with
-/// probability proportional to 1/H; neighbours in the drawing are crossed at one random place with probability
-/// `crossover`; every bit of the children flips with probability `mutation`; the children replace all parents (but for
-/// the elite, if asked).
+/// A variable is a binary number of `bits` bits, most significant first, `x = lower + (upper - lower) k / (2^bits -
+/// 1)`; an individual is the sequence of the bits of its variables. In every generation parents are drawn by roulette
+/// wheel, with probability proportional to 1/H; consecutive parents are crossed at one random place with probability
+/// `crossover`; every bit of the children flips with probability `mutation`; the children replace all parents (except
+/// the elite, if enabled).
 ///
-/// Candidates are evaluated in parallel; the result depends on the seed alone. An infinite or undefined objective is
-/// never drawn unless all are.
+/// Candidates are evaluated in parallel; the result depends only on the seed. A candidate with an infinite or undefined
+/// objective is never drawn unless all are.
 ///
 /// # Errors
 /// A setting out of range, or a range that is empty or infinite.
@@ -146,7 +145,6 @@ fn evolved(
     Ok(result)
 }
 
-/// The point of an individual.
 fn decode(individual: &[bool], bounds: &[[f64; 2]], bits: usize) -> Vec<f64> {
     let largest = ((1_u64 << bits) - 1) as f64;
     individual
@@ -154,13 +152,12 @@ fn decode(individual: &[bool], bounds: &[[f64; 2]], bits: usize) -> Vec<f64> {
         .zip(bounds)
         .map(|(digits, &[lower, upper])| {
             let number = digits.iter().fold(0_u64, |number, &digit| 2 * number + u64::from(digit));
-            // The end itself, free of rounding, at the largest number.
+            // Exactly the end of the range at the largest number.
             (lower + (upper - lower) * (number as f64 / largest)).min(upper)
         })
         .collect()
 }
 
-/// The next generation.
 fn children(
     parents: &[Vec<bool>],
     values: &[f64],
@@ -177,7 +174,7 @@ fn children(
         })
         .collect();
     if !(cumulated > 0.0 && cumulated.is_finite()) {
-        // Nobody is fit, or an objective is not positive: everybody has the same chance.
+        // All individuals get the same probability if none is fit or an objective is not positive.
         wheel = (1..=values.len()).map(|count| count as f64).collect();
     }
     let total = wheel[wheel.len() - 1];
@@ -211,7 +208,6 @@ mod tests {
     use super::*;
     use core::ops::ControlFlow;
 
-    /// Bowl with its lowest value 1 at (0.3, -2).
     fn bowl(x: &[f64]) -> f64 {
         1.0 + (x[0] - 0.3).powi(2) + (x[1] + 2.0).powi(2)
     }
@@ -224,18 +220,17 @@ mod tests {
         assert_eq!(decode(&[true; 20], &bounds, 20), [3.0]);
         let mut one = [false; 20];
         one[19] = true;
-        // One step of the grid, within rounding of the two numbers.
+        // One step of the grid, up to rounding of the two numbers.
         assert!((decode(&one, &bounds, 20)[0] - 0.1 - 2.9 / 1_048_575.0).abs() < 1e-15);
     }
 
     #[test]
-    fn finds_the_bowl_and_keeps_its_word_on_history() {
+    fn finds_the_bowl_and_reports_its_history() {
         for elite in [false, true] {
             let settings = BinaryGeneticSettings { elite, generations: 200, seed: 5, ..Default::default() };
             let result = binary_genetic(bowl, &BOX, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
             assert_eq!((result.history.len(), result.evaluations), (200, 8000));
-            // 8000 points in 80 square units leave a nearest one within about 0.06; the search must do no worse than
-            // blind.
+            // The nearest of 8000 random points in 80 square units is within about 0.06; the search must not be worse.
             assert!(result.value < 1.01, "{}", result.value);
             assert_eq!(bowl(&result.best), result.value);
             let mut lowest = f64::INFINITY;
@@ -243,14 +238,13 @@ mod tests {
                 lowest = lowest.min(generation.best);
                 assert_eq!(generation.best_so_far, lowest);
                 assert!(generation.best <= generation.mean);
-                // With an elite no generation is worse than the one before.
                 assert!(!elite || generation.best == lowest);
             }
         }
     }
 
     #[test]
-    fn the_seed_decides_whatever_the_number_of_threads() {
+    fn only_the_seed_decides_on_any_number_of_threads() {
         let run = |threads, seed| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let settings = BinaryGeneticSettings { seed, generations: 30, ..Default::default() };

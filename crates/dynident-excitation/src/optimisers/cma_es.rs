@@ -13,21 +13,21 @@ use std::collections::VecDeque;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct CmaEsSettings {
-    /// Candidates of a generation, at least 4; none: 4 + ⌊3 ln n⌋. Default none.
+    /// Candidates of a generation, at least 4; `None`: 4 + ⌊3 ln n⌋. Default `None`.
     pub population: Option<usize>,
-    /// Restarts after a run has ended by itself, each from a random place with twice the candidates (IPOP, Auger and
-    /// Hansen 2005). Default 0.
+    /// Restarts after the end of a run, each from a random place with twice the candidates (IPOP, Auger and Hansen
+    /// 2005). Default 0.
     pub restarts: usize,
-    /// No generation is begun after this many evaluations, all runs together. Default 100,000.
+    /// Number of evaluations of all runs after which no generation begins. Default 100,000.
     pub max_evaluations: usize,
-    /// The search ends at an objective this low. Default none.
+    /// Objective at which the search ends. Default none.
     pub target: Option<f64>,
-    /// A run ends when the best values of the last 10 + ⌈30 n/λ⌉ generations and all of the present one differ by less.
-    /// Default 1e-12.
+    /// Minimum difference between the best values of the last 10 + ⌈30 n/λ⌉ generations and all values of the present
+    /// one; below it a run ends. Default 1e-12.
     pub function_tolerance: f64,
-    /// A run ends when its steps are this small, as a share of the first ones. Default 1e-12.
+    /// Minimum step size as a share of the first one; below it a run ends. Default 1e-12.
     pub step_tolerance: f64,
-    /// Seed of all chance. Default 0.
+    /// Seed of the random numbers. Default 0.
     pub seed: u64,
 }
 
@@ -46,10 +46,10 @@ impl Default for CmaEsSettings {
 }
 
 impl CmaEsSettings {
-    /// Whether every setting is in its range.
+    /// Checks the range of every setting.
     ///
     /// # Errors
-    /// [`OptimiserError::Setting`] names the first that is not.
+    /// [`OptimiserError::Setting`] with the first invalid one.
     pub fn validate(&self) -> Result<(), OptimiserError> {
         let population = self.population.unwrap_or(4);
         let usable = population >= 4 && (self.population.is_none() || population <= self.max_evaluations);
@@ -64,65 +64,64 @@ impl CmaEsSettings {
     }
 }
 
-/// How a run of [`cma_es()`] ended.
+/// Reason for the end of a run of [`cma_es()`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CmaEsStatus {
-    /// The objective is at the target.
+    /// The objective has reached the target.
     TargetReached,
     /// The objective no longer changes.
     FunctionTolerance,
-    /// The steps are too small to matter, or to change the mean in double precision.
+    /// The steps are below the tolerance, or too small to change the mean in double precision.
     StepTolerance,
-    /// The covariance has a condition number beyond 1e14.
+    /// The condition number of the covariance exceeds 1e14.
     IllConditioned,
-    /// Steps grew 10,000-fold: the start was far away or the objective has no lowest point.
+    /// The step size grew by a factor of 10,000: the start was far away or the objective is unbounded below.
     Diverged,
-    /// Evaluations used up.
+    /// The evaluations are used up.
     EvaluationLimit,
-    /// The callback ended it.
+    /// The callback stopped the search.
     Stopped,
 }
 
-/// One run, from a start to its end.
+/// One run of the strategy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CmaEsRun {
     /// Candidates of a generation.
     pub population: usize,
-    /// Evaluations in this run.
+    /// Number of evaluations in this run.
     pub evaluations: usize,
-    /// The lowest objective of this run.
+    /// Lowest objective of this run.
     pub value: f64,
-    /// How it ended.
+    /// Reason for its end.
     pub status: CmaEsStatus,
 }
 
-/// What [`cma_es()`] found.
+/// Result of [`cma_es()`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CmaEsResult {
-    /// The best point of all runs, inside the bounds.
+    /// Best point of all runs, inside the bounds.
     pub best: Vec<f64>,
-    /// Its objective; infinite if it was never a finite number.
+    /// Its objective; infinite if it was never finite.
     pub value: f64,
-    /// Evaluations, all runs together.
+    /// Number of evaluations of all runs.
     pub evaluations: usize,
-    /// How the last run ended.
+    /// Reason for the end of the last run.
     pub status: CmaEsStatus,
-    /// Every run, in order.
+    /// All runs, in order.
     pub runs: Vec<CmaEsRun>,
 }
 
-/// Minimises `objective` from `start` with first steps of standard deviation `steps` (one per variable), inside
-/// `bounds`.
+/// Minimises `objective` from `start` with initial standard deviations `steps` (one per variable), inside `bounds`.
 ///
 /// (μ/μ_w, λ)-CMA-ES with cumulative step-size adaptation, rank-one and rank-μ update (Hansen 2016, fig. 6). A
-/// candidate outside the bounds is evaluated at the nearest point inside, and ranked with the square of its distance
-/// (in the search's own scale) times the spread of the generation's values added (Hansen 2016, appendix B.5).
+/// candidate outside the bounds is evaluated at the nearest point inside, and ranked with a penalty: the square of its
+/// distance (in the scale of the search) times the spread of the generation's values (Hansen 2016, appendix B.5).
 ///
-/// Candidates are evaluated in parallel; the result depends on the seed alone.
+/// Candidates are evaluated in parallel; the result depends only on the seed.
 ///
 /// # Errors
-/// A setting out of range, vectors of different lengths, empty bounds, a step that is not positive, no variable.
+/// A setting out of range, vectors of different lengths, empty bounds, a step that is not positive, or no variable.
 pub fn cma_es(
     objective: impl Fn(&[f64]) -> f64 + Sync,
     start: &[f64],
@@ -158,7 +157,6 @@ fn minimised(
     for run in 0..=settings.restarts {
         let population = smallest << run;
         if run > 0 && population > settings.max_evaluations.saturating_sub(search.result.evaluations) {
-            // The evaluations do not suffice for another generation.
             search.result.status = CmaEsStatus::EvaluationLimit;
             break;
         }
@@ -193,12 +191,11 @@ fn check_input(
     Ok(())
 }
 
-/// The nearest point inside the bounds.
 fn clamped(x: &[f64], bounds: &[[f64; 2]]) -> Vec<f64> {
     x.iter().zip(bounds).map(|(x, b)| x.clamp(b[0], b[1])).collect()
 }
 
-/// All runs of a search, and the best point found up to now.
+/// All runs of a search, and the best point so far.
 struct Search<'a> {
     objective: &'a Objective<'a>,
     bounds: &'a [[f64; 2]],
@@ -209,7 +206,6 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// One run: generations until the strategy or the search ends.
     fn run(&mut self, mut strategy: Strategy, watch: &mut Watch<'_>) -> CmaEsRun {
         let before = self.result.evaluations;
         let mut lowest_of_run = f64::INFINITY;
@@ -253,7 +249,7 @@ impl Search<'_> {
         CmaEsRun { population: strategy.population, evaluations, value: lowest_of_run, status }
     }
 
-    /// A random start of the next run: anywhere inside finite bounds, else around the first start.
+    /// Random start of the next run: anywhere inside finite bounds, else around the first start.
     fn random_place(&mut self, start: &[f64], steps: &[f64]) -> Vec<f64> {
         (0..start.len())
             .map(|i| {
@@ -269,7 +265,7 @@ impl Search<'_> {
     }
 }
 
-/// The distribution N(mean, σ² C) and its evolution paths, in variables divided by the first steps.
+/// The distribution N(mean, σ² C) and its evolution paths, in variables divided by the initial steps.
 struct Strategy {
     steps: Vec<f64>,
     population: usize,
@@ -278,7 +274,7 @@ struct Strategy {
     mean: DVector<f64>,
     sigma: f64,
     covariance: DMatrix<f64>,
-    /// Eigenvectors of the covariance and the roots of its eigenvalues.
+    /// Eigenvectors of the covariance, and the square roots of its eigenvalues below.
     axes: DMatrix<f64>,
     lengths: DVector<f64>,
     path_sigma: DVector<f64>,
@@ -327,7 +323,6 @@ impl Strategy {
         y.iter().zip(&self.steps).map(|(y, step)| y * step).collect()
     }
 
-    /// The values by which candidates are ranked.
     fn penalised(&self, candidates: &[DVector<f64>], inside: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
         let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         finite.sort_by(f64::total_cmp);
@@ -338,7 +333,7 @@ impl Strategy {
             .map(|k| {
                 let distance: f64 = (0..self.mean.len())
                     .map(|i| (candidates[k][i] - inside[k][i] / self.steps[i]).powi(2))
-                    // The division back leaves rounding where nothing was moved.
+                    // Smaller distances are rounding errors of the division.
                     .filter(|d| *d > 1e-28 * variance)
                     .sum();
                 values[k] + spread * distance / variance
@@ -346,7 +341,7 @@ impl Strategy {
             .collect()
     }
 
-    /// Moves mean, paths, covariance and step size (Hansen 2016, equations 39 to 47 with positive weights).
+    /// Updates mean, paths, covariance and step size (Hansen 2016, equations 39 to 47 with positive weights).
     fn update(&mut self, candidates: &[DVector<f64>], ranked: &[f64]) {
         let n = self.mean.len() as f64;
         let mu_eff = self.mu_eff;
@@ -373,7 +368,7 @@ impl Strategy {
         self.path_sigma.axpy((c_sigma * (2.0 - c_sigma) * mu_eff).sqrt(), &whitened, 1.0);
         let length = self.path_sigma.norm();
         let settled = (1.0 - (1.0 - c_sigma).powi(2 * self.generation as i32)).sqrt();
-        // The path stands still while the step size catches up.
+        // The path is not updated while the step size catches up.
         let steady = length / settled < (1.4 + 2.0 / (n + 1.0)) * expected_length;
         self.path_c *= 1.0 - c_c;
         if steady {
@@ -386,7 +381,7 @@ impl Strategy {
             self.covariance.ger(c_mu * weight, offset, offset, 1.0);
         }
         self.sigma *= ((c_sigma / d_sigma) * (length / expected_length - 1.0)).exp();
-        // Decomposed only as often as the matrix changes much (Hansen 2016, appendix B.2).
+        // The matrix is decomposed only after significant changes (Hansen 2016, appendix B.2).
         let pause = 1.0 / (10.0 * n * (c_1 + c_mu));
         if (self.generation - self.decomposed_at) as f64 > pause {
             self.decompose();
@@ -401,7 +396,7 @@ impl Strategy {
         self.lengths = eigen.eigenvalues.map(|value| value.max(f64::MIN_POSITIVE).sqrt());
     }
 
-    /// Whether this run is over (Hansen 2016, appendix B.3).
+    /// Returns the reason if this run has ended (Hansen 2016, appendix B.3).
     fn end(&mut self, values: &[f64], settings: &CmaEsSettings) -> Option<CmaEsStatus> {
         let n = self.mean.len();
         let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
@@ -425,7 +420,7 @@ impl Strategy {
         }
         let oldest = self.recent.iter().copied().fold(f64::INFINITY, f64::min);
         let newest = self.recent.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Infinite everywhere is flat too, though the difference is no number.
+        // Equal infinite values are flat too, although their difference is NaN.
         let flat = |low: f64, high: f64| low == high || high - low <= settings.function_tolerance;
         (self.recent.len() == window && flat(oldest, newest) && flat(lowest, highest))
             .then_some(CmaEsStatus::FunctionTolerance)

@@ -22,13 +22,13 @@ fn finds_the_end_of_rosenbrocks_valley() {
     // A spread of 1e-12 in the values is about 1e-6 in the variables; the other local solution has the value 3.9.
     assert!(result.value < 1e-9, "{}", result.value);
     assert!(result.best.iter().all(|x| (x - 1.0).abs() < 1e-4), "{:?}", result.best);
-    // The tutorial's program needs about 3000 here; a broken covariance update needs ten times as much.
+    // The tutorial's program needs about 3000 evaluations; an incorrect covariance update needs ten times as many.
     assert!(result.evaluations < 8000, "{}", result.evaluations);
 }
 
 #[test]
 fn learns_axes_of_a_million_to_one() {
-    // A tilted ellipsoid: without the learnt covariance the evaluations would grow with the condition number.
+    // A tilted ellipsoid: without covariance adaptation the evaluations would grow with the condition number.
     let n = 8;
     let ellipsoid = |x: &[f64]| -> f64 {
         (0..n)
@@ -45,7 +45,7 @@ fn learns_axes_of_a_million_to_one() {
 }
 
 #[test]
-fn bounds_hold_and_may_bind() {
+fn bounds_are_kept_and_can_be_active() {
     let settings = CmaEsSettings { seed: 3, ..Default::default() };
     let bounds = [[-2.0, 0.5], [-3.0, 3.0]];
     let objective = |x: &[f64]| {
@@ -53,7 +53,7 @@ fn bounds_hold_and_may_bind() {
         rosenbrock(x)
     };
     let result = cma_es(objective, &[-1.0, 2.0], &[0.5, 0.5], &bounds, &settings, &mut never).unwrap();
-    // Lowest value inside: 0.25 at (0.5, 0.25).
+    // Minimum inside the bounds: 0.25 at (0.5, 0.25).
     assert!((result.value - 0.25).abs() < 1e-8, "{result:?}");
 }
 
@@ -70,7 +70,7 @@ fn restarts_leave_local_solutions() {
 }
 
 #[test]
-fn the_seed_decides_whatever_the_number_of_threads() {
+fn only_the_seed_decides_on_any_number_of_threads() {
     let run = |threads, seed| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let settings = CmaEsSettings { seed, restarts: 1, max_evaluations: 2000, ..Default::default() };
@@ -88,7 +88,7 @@ fn objectives_without_numbers_end_too() {
         assert_eq!(result.status, CmaEsStatus::FunctionTolerance);
         assert_eq!(result.value, f64::INFINITY);
     }
-    // No lowest point: the steps grow without end.
+    // Unbounded below: the steps grow without limit.
     let result = cma_es(|x| x[0], &[0.0; 2], &[1.0; 2], &[FREE; 2], &settings, &mut never).unwrap();
     assert_eq!(result.status, CmaEsStatus::Diverged);
 }
@@ -106,7 +106,7 @@ fn the_callback_ends_it_and_errors_name_the_input() {
     assert_eq!(error.to_string(), "setting `steps` is 0; it must be positive and finite");
 }
 
-/// The eigenvalue routine has to serve covariances close to the 1e14 at which a run ends.
+/// The eigenvalue routine must work for covariances close to the 1e14 at which a run ends.
 #[test]
 fn eigenvectors_of_a_stretched_covariance_are_true() {
     let n = 12;

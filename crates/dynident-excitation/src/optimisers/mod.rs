@@ -1,62 +1,61 @@
-//! **What looks for the best?** Optimisers, one file each: without derivatives ([`binary_genetic()`], [`cma_es()`]),
-//! and with exact gradients from many starts (augmented Lagrangian, projected L-BFGS), which
-//! [`design()`](crate::design()) runs.
+//! **Optimisers**, one file each: without derivatives ([`binary_genetic()`], [`cma_es()`]), and with exact gradients
+//! from many starts (augmented Lagrangian, projected L-BFGS), which [`design()`](crate::design()) uses.
 //!
-//! All are deterministic by their seed or start, on any number of threads, and anytime: a callback hears the best point
-//! so far and can stop them.
+//! All are deterministic for a given seed or start, on any number of threads, and can be stopped at any time: a
+//! callback gets the best point so far.
 
 mod augmented_lagrangian;
 mod binary_genetic;
 mod cma_es;
+mod constrained_problem;
 mod multi_start;
 mod projected_lbfgs;
 
-#[cfg(test)]
-pub(crate) use augmented_lagrangian::AugmentedLagrangianStatus;
-pub(crate) use augmented_lagrangian::{
-    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem,
-    CurvatureFacts, augmented_lagrangian,
-};
+pub(crate) use augmented_lagrangian::augmented_lagrangian;
 pub use binary_genetic::{BinaryGeneticResult, BinaryGeneticSettings, Generation, binary_genetic};
 pub use cma_es::{CmaEsResult, CmaEsRun, CmaEsSettings, CmaEsStatus, cma_es};
+#[cfg(test)]
+pub(crate) use constrained_problem::AugmentedLagrangianStatus;
+pub(crate) use constrained_problem::{
+    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem,
+    CurvatureFacts,
+};
 pub(crate) use multi_start::multi_start;
 pub(crate) use projected_lbfgs::Step;
 
 use core::ops::ControlFlow;
 use rayon::prelude::*;
 
-/// The state of a search, as its callback hears it.
+/// State of a search, passed to its callback.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
-    /// The best point so far: the feasible one of the lowest objective, or the least infeasible one while none is
-    /// feasible.
+    /// Best point so far: the feasible one of the lowest objective, or the least infeasible one.
     pub best: &'a [f64],
     /// Its objective.
     pub value: f64,
-    /// The largest violation of a constraint there; zero for optimisers that know bounds only.
+    /// Largest violation of a constraint; zero for optimisers with bounds only.
     pub violation: f64,
-    /// Generations or outer iterations done.
+    /// Number of completed generations or outer iterations.
     pub iteration: usize,
-    /// Evaluations of the objective done.
+    /// Number of evaluations of the objective.
     pub evaluations: usize,
 }
 
-/// What a search asks after every step: `Break` ends it with the best point so far.
+/// Callback after every step: `Break` ends the search with the best point so far.
 pub type Watch<'a> = dyn FnMut(&Progress<'_>) -> ControlFlow<()> + 'a;
 
-/// An objective without derivatives, evaluated from any thread.
 type Objective<'a> = dyn Fn(&[f64]) -> f64 + Sync + 'a;
 
-/// What an optimiser cannot start with.
+/// Invalid input of an optimiser.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OptimiserError {
-    /// A range that holds no number, or is infinite where it must not be.
+    /// An empty range, or an infinite one where a finite one is needed.
     #[error(
-        "variable {variable}: range {lower} to {upper} cannot be searched; give lower < upper (both finite for the genetic algorithm)"
+        "variable {variable}: cannot search the range {lower} to {upper}; give lower < upper (both finite for the genetic algorithm)"
     )]
     Bounds {
-        /// Number of the variable, from 0.
+        /// Index of the variable, from 0.
         variable: usize,
         /// Lower end.
         lower: f64,
@@ -66,37 +65,37 @@ pub enum OptimiserError {
     /// A vector of the wrong length.
     #[error("{what} has {found} entries, expected {expected}")]
     Length {
-        /// Which vector.
+        /// The vector.
         what: &'static str,
-        /// The number that fits.
+        /// Expected length.
         expected: usize,
-        /// The number given.
+        /// Given length.
         found: usize,
     },
     /// A setting outside its range.
     #[error("setting `{name}` is {value}; it must be {needed}")]
     Setting {
-        /// Name of the field.
+        /// Name of the setting.
         name: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Valid range.
         needed: &'static str,
     },
-    /// Objective or constraints are not finite numbers at the start.
-    #[error("the objective or a constraint is not a finite number at the start; start elsewhere")]
+    /// Objective or constraints are not finite at the start.
+    #[error("the objective or a constraint is not finite at the start; use another start")]
     Start,
 }
 
-/// Checks one setting; `needed` says in words what `valid` tests.
+/// Checks one setting; `needed` describes the range that `valid` tests.
 fn setting(name: &'static str, value: f64, valid: bool, needed: &'static str) -> Result<(), OptimiserError> {
     if valid { Ok(()) } else { Err(OptimiserError::Setting { name, value, needed }) }
 }
 
-/// Checks that every range holds more than one number and, if asked, ends.
+/// Checks that every range contains more than one number and, if required, is finite.
 fn check_bounds(bounds: &[[f64; 2]], finite: bool) -> Result<(), OptimiserError> {
     for (variable, &[lower, upper]) in bounds.iter().enumerate() {
-        // False for NaN too.
+        // The comparisons are false for NaN as well.
         let ordered = lower < upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
         if !ordered || (finite && !(upper - lower).is_finite()) {
             return Err(OptimiserError::Bounds { variable, lower, upper });
@@ -109,8 +108,7 @@ fn check_length(what: &'static str, expected: usize, found: usize) -> Result<(),
     if expected == found { Ok(()) } else { Err(OptimiserError::Length { what, expected, found }) }
 }
 
-/// The objective of every candidate, in parallel, in the candidates' order; what is not a number counts as infinitely
-/// bad.
+/// Evaluates all candidates in parallel, in their order; NaN is treated as infinity.
 fn evaluate_all(objective: &Objective<'_>, candidates: &[Vec<f64>]) -> Vec<f64> {
     candidates
         .par_iter()

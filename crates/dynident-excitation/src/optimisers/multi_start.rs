@@ -1,4 +1,4 @@
-//! Many starts of the augmented Lagrangian side by side; the best of them.
+//! Parallel starts of the augmented Lagrangian, with the best result.
 
 use super::{
     AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem,
@@ -9,22 +9,19 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
-/// What [`multi_start()`] found.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MultiStartResult {
-    /// The number of the best start: of the lowest objective among the feasible ones, else of the smallest violation.
+    /// Index of the best start: lowest objective among the feasible ones, else smallest violation.
     pub best_start: usize,
-    /// The results of all starts, in order; an error where the problem is not defined at the start.
+    /// Results of all starts, in order; an error if the problem is undefined at the start.
     pub runs: Vec<Result<AugmentedLagrangianResult, OptimiserError>>,
 }
 
 impl MultiStartResult {
-    /// The result of the best start; none if the problem was defined at no start.
     pub(crate) fn best(&self) -> Option<&AugmentedLagrangianResult> {
         self.runs.get(self.best_start)?.as_ref().ok()
     }
 
-    /// Evaluations of all starts together.
     pub(crate) fn evaluations(&self) -> usize {
         self.runs.iter().flatten().map(|run| run.evaluations).sum()
     }
@@ -32,10 +29,10 @@ impl MultiStartResult {
 
 /// Runs [`augmented_lagrangian()`] from every start, in parallel, each on its own problem from `problem`.
 ///
-/// `watch` hears the best over all starts whenever it improves, and is asked after every evaluation whether to go on;
-/// `iteration` and `evaluations` are those of the start that speaks. Unless it stops the search, the result does not
-/// depend on the number of threads: among equals the first start is best. Starts that have not begun when it is stopped
-/// are left out, as if the problem were not defined there.
+/// `watch` is called after every evaluation with the best point of all starts, and can stop the search; `iteration` and
+/// `evaluations` are those of the calling start. Unless stopped, the result does not depend on the number of threads:
+/// among equal results the first start is best. Starts that have not begun when the search is stopped are treated as
+/// undefined.
 ///
 /// # Errors
 /// No start; settings or bounds out of range.
@@ -56,7 +53,7 @@ pub(crate) fn multi_start<P: ConstrainedProblem>(
     let runs: Vec<_> = starts
         .par_iter()
         .map(|start| {
-            // The search can only be stopped after an evaluation: a best point exists.
+            // The search can only be stopped after an evaluation, so a best point exists.
             if stopped.load(Ordering::Relaxed) {
                 return Err(OptimiserError::Start);
             }
@@ -84,8 +81,7 @@ pub(crate) fn multi_start<P: ConstrainedProblem>(
     Ok(MultiStartResult { best_start, runs })
 }
 
-/// Whether a point of this value and violation is better than another: feasible before infeasible, then by value or
-/// violation.
+/// Whether a point (value, violation) is better than another: feasible before infeasible, then by value or violation.
 fn before(one: (f64, f64), other: (f64, f64), tolerance: f64) -> bool {
     match (one.1 <= tolerance, other.1 <= tolerance) {
         (true, true) => one.0 < other.0,

@@ -1,40 +1,34 @@
-//! Minimisation of a smooth function inside a box: limited-memory BFGS on the free variables, steps projected onto the
-//! box.
+//! Minimisation of a smooth function inside a box: limited-memory BFGS on the free variables, with steps projected onto
+//! the box.
 
 use std::collections::VecDeque;
 
-/// A smooth function that is asked for its gradient only where it was just evaluated, so that it can keep its
-/// intermediate values.
+/// A smooth function whose gradient is requested only at the last evaluated point, so that it can store intermediate
+/// values.
 pub(crate) trait Smooth {
-    /// The value at `x`; not a finite number where the function is not defined.
+    /// Value at `x`; not finite where the function is undefined.
     fn value(&mut self, x: &[f64]) -> f64;
-    /// The gradient at the point of the last [`value`](Smooth::value).
     fn gradient(&mut self, gradient: &mut [f64]);
-    /// Takes up a model of the curvature at the point of the last [`gradient`](Smooth::gradient), from the gradient and
-    /// the last step with its change of the gradient; false if there is none.
+    /// Prepares a model of the curvature at the point of the last [`gradient`](Smooth::gradient), from the gradient and
+    /// the last step with its change of the gradient; false without a model.
     fn prepare_metric(&mut self, _gradient: &[f64], _free: &[bool], _last: Option<Step<'_>>) -> bool {
         false
     }
-    /// Multiplies with the inverse of that model.
+    /// Multiplies by the inverse of that model.
     fn divide_by_metric(&self, _vector: &mut [f64]) {}
-    /// Whether the search must end now.
     fn halted(&self) -> bool;
 }
 
-/// Why the search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum End {
     /// The projected gradient is below the tolerance.
     Stationary,
-    /// The iterations are used up.
     IterationLimit,
-    /// No lower value along the steepest descent: the end of double precision.
+    /// No lower value along the steepest descent in double precision.
     NoDescent,
-    /// The function asked for it.
     Halted,
 }
 
-/// When to end, and how much to remember.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
     pub(crate) tolerance: f64,
@@ -42,7 +36,6 @@ pub(crate) struct Effort {
     pub(crate) memory: usize,
 }
 
-/// A step of a search, and how it changed the gradient.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Step<'a> {
     /// Difference of the points.
@@ -51,7 +44,6 @@ pub(crate) struct Step<'a> {
     pub gradient_change: &'a [f64],
 }
 
-/// One difference of points and of gradients.
 struct Pair {
     s: Vec<f64>,
     y: Vec<f64>,
@@ -59,16 +51,16 @@ struct Pair {
 
 /// Armijo's share of the predicted decrease and Wolfe's share of the slope (Nocedal and Wright, *Numerical
 /// Optimization*, 2006, section 3.1).
-const DECREASE: f64 = 1e-4;
-const SLOPE: f64 = 0.9;
-const TRIALS: usize = 40;
+const MIN_DECREASE_SHARE: f64 = 1e-4;
+const MAX_SLOPE_SHARE: f64 = 0.9;
+const MAX_TRIALS: usize = 40;
 
-/// Minimises from `x`, which must lie in the box and ends at the lowest point found. Returns why it ended and the
-/// largest entry of the projected gradient `P(x - g) - x`.
+/// Minimises from `x`, which must be inside the box, and moves it to the lowest point found. Returns the reason for the
+/// end and the largest entry of the projected gradient `P(x - g) - x`.
 ///
-/// Two-loop recursion (Nocedal and Wright 2006, algorithm 7.4) over the variables that are not held at a bound by the
-/// gradient (two-metric projection, Bertsekas 1982); line search for the weak Wolfe conditions by bisection and
-/// doubling (Lewis and Overton 2013) along the projected path.
+/// Two-loop recursion (Nocedal and Wright 2006, algorithm 7.4) over the variables that the gradient does not hold at a
+/// bound (two-metric projection, Bertsekas 1982); line search for the weak Wolfe conditions by bisection and doubling
+/// (Lewis and Overton 2013) along the projected path.
 pub(crate) fn projected_lbfgs(
     function: &mut impl Smooth,
     bounds: &[[f64; 2]],
@@ -101,7 +93,7 @@ pub(crate) fn projected_lbfgs(
         let mut direction = quasi_newton(&pairs, &at.gradient, &free, shape);
         let steep = dot(&direction, &at.gradient) < -1e-10 * norm(&direction) * norm(&at.gradient);
         if !pairs.is_empty() && !steep {
-            // Curvature that does not lead down (or not to numbers) is forgotten.
+            // The memory is reset if its direction does not descend or is not finite.
             pairs.clear();
             direction = quasi_newton(&pairs, &at.gradient, &free, shape);
         }
@@ -132,7 +124,6 @@ pub(crate) fn projected_lbfgs(
     (end, projected_gradient(x, &at.gradient, bounds))
 }
 
-/// A point with its value and gradient.
 #[derive(Clone)]
 struct Point {
     x: Vec<f64>,
@@ -140,8 +131,8 @@ struct Point {
     gradient: Vec<f64>,
 }
 
-/// Looks along `P(from + step·direction)` for a point that is lower enough and has a flatter slope. The last point that
-/// was lower enough, if any.
+/// Searches along `P(from + step·direction)` for a point with sufficient decrease and a flatter slope. Returns the last
+/// point with sufficient decrease.
 fn line_search(
     function: &mut impl Smooth,
     bounds: &[[f64; 2]],
@@ -152,7 +143,7 @@ fn line_search(
     let slope = dot(direction, &from.gradient);
     let (mut low, mut high, mut step) = (0.0, f64::INFINITY, first_step);
     let mut found: Option<Point> = None;
-    for _ in 0..TRIALS {
+    for _ in 0..MAX_TRIALS {
         let straight: Vec<f64> = from.x.iter().zip(direction).map(|(x, d)| x + step * d).collect();
         let x: Vec<f64> = straight.iter().zip(bounds).map(|(x, &[lower, upper])| x.clamp(lower, upper)).collect();
         if x == from.x {
@@ -160,14 +151,14 @@ fn line_search(
         }
         let value = function.value(&x);
         let predicted: f64 = (0..x.len()).map(|i| from.gradient[i] * (x[i] - from.x[i])).sum();
-        let lower_enough = value.is_finite() && predicted < 0.0 && value <= from.value + DECREASE * predicted;
+        let lower_enough = value.is_finite() && predicted < 0.0 && value <= from.value + MIN_DECREASE_SHARE * predicted;
         if lower_enough {
             let mut gradient = vec![0.0; x.len()];
             function.gradient(&mut gradient);
-            // A variable that stands at its bound goes no further along this path.
+            // A variable at its bound does not move further along this path.
             let ahead: f64 = (0..x.len()).filter(|&i| x[i] == straight[i]).map(|i| gradient[i] * direction[i]).sum();
             found = Some(Point { x, value, gradient });
-            if ahead >= SLOPE * slope {
+            if ahead >= MAX_SLOPE_SHARE * slope {
                 break;
             }
             low = step;
@@ -180,7 +171,7 @@ fn line_search(
         step = if high.is_infinite() {
             2.0 * step
         } else if low == 0.0 && value.is_finite() {
-            // The lowest point of the parabola through what is known.
+            // Minimum of the parabola through the known values.
             let parabola = -0.5 * slope * step * step / (value - from.value - slope * step);
             if parabola.is_finite() { parabola.clamp(0.1 * step, 0.5 * step) } else { 0.5 * step }
         } else {
@@ -190,15 +181,15 @@ fn line_search(
     found
 }
 
-/// Multiplies a vector with the matrix that the recursion starts from.
+/// Multiplies a vector by the initial matrix of the recursion.
 type Shape<'a> = dyn Fn(&mut [f64]) + 'a;
 
-/// `-H g` on the free variables by the two-loop recursion, zero on the others; from `shape`, or from a multiple of the
-/// identity.
+/// `-H g` on the free variables by the two-loop recursion, zero on the others; the initial matrix is `shape` or a
+/// multiple of the identity.
 fn quasi_newton(pairs: &VecDeque<Pair>, gradient: &[f64], free: &[bool], shape: Option<&Shape<'_>>) -> Vec<f64> {
     let masked = |v: &[f64], w: &[f64]| -> f64 { (0..v.len()).filter(|&i| free[i]).map(|i| v[i] * w[i]).sum() };
     let mut direction: Vec<f64> = gradient.iter().zip(free).map(|(&g, &free)| if free { -g } else { 0.0 }).collect();
-    // Pairs that lose their curvature when bound variables are left out say nothing here.
+    // Pairs without curvature in the free variables are not used.
     let useful: Vec<(&Pair, f64)> = pairs
         .iter()
         .map(|pair| (pair, masked(&pair.s, &pair.y)))
@@ -233,7 +224,7 @@ fn add(to: &mut [f64], factor: f64, v: &[f64], free: &[bool]) {
     }
 }
 
-/// The largest step, at most one, that moves no variable by more than one unit or a tenth of its range.
+/// Largest step, at most one, that moves no variable by more than one unit or a tenth of its range.
 fn cautious_step(direction: &[f64], bounds: &[[f64; 2]]) -> f64 {
     direction.iter().zip(bounds).fold(1.0, |step: f64, (d, &[lower, upper])| {
         let reach = (0.1 * (upper - lower)).min(1.0);
@@ -241,7 +232,7 @@ fn cautious_step(direction: &[f64], bounds: &[[f64; 2]]) -> f64 {
     })
 }
 
-/// Largest entry of `P(x - g) - x`: zero exactly where no step inside the box descends.
+/// Largest entry of `P(x - g) - x`: zero if no step inside the box descends.
 fn projected_gradient(x: &[f64], gradient: &[f64], bounds: &[[f64; 2]]) -> f64 {
     (0..x.len())
         .fold(0.0, |largest: f64, i| largest.max(((x[i] - gradient[i]).clamp(bounds[i][0], bounds[i][1]) - x[i]).abs()))
@@ -259,7 +250,7 @@ fn norm(a: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// The chained Rosenbrock function, lowest at (1, ..., 1).
+    /// The chained Rosenbrock function, with its minimum at (1, ..., 1).
     struct Rosenbrock(Vec<f64>);
     impl Smooth for Rosenbrock {
         fn value(&mut self, x: &[f64]) -> f64 {
@@ -291,8 +282,8 @@ mod tests {
     }
 
     #[test]
-    fn bounds_hold_and_may_bind() {
-        // With x1 <= 0.5 the lowest point is (0.5, 0.25) exactly (x2 = x1², slope in x1 is -1).
+    fn bounds_are_kept_and_can_be_active() {
+        // With x1 <= 0.5 the minimum is exactly (0.5, 0.25) (x2 = x1², slope in x1 is -1).
         let mut x = [-1.0, 2.0];
         let (end, _) = projected_lbfgs(&mut Rosenbrock(Vec::new()), &[[-2.0, 0.5], [-3.0, 3.0]], &mut x, &EFFORT);
         assert_eq!(end, End::Stationary);

@@ -1,10 +1,10 @@
-//! **One joint after another**: each makes a logistic stroke while the others rest.
+//! **Step-wise design**: each joint makes a logistic stroke while the others rest.
 //!
 //! *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, equations 9, 10 and 17 to 19, for
-//! any arm. A revolute joint that moves alone excites three parameters of all that it carries: the inertia about its
-//! axis and the two first moments across it, whose row is `[q̈, g cos q, -g sin q]` with the part g of gravity across
-//! the axis. Where gravity leans to zero position only turns the last two columns, which changes no condition number.
-//! So H = Σ cond over the joints, and the search falls apart into joints.
+//! any arm. A revolute joint that moves alone excites three parameters of the bodies that it carries: the inertia about
+//! its axis and the two first moments normal to it, with the row `[q̈, g cos q, -g sin q]`, where g is the gravity
+//! component normal to the axis. The zero position only rotates the last two columns, which does not change the
+//! condition number. So H = Σ cond over the joints, and the joints can be optimised separately.
 
 mod singular_values;
 mod smooth;
@@ -22,35 +22,34 @@ use dynident_model::sample::Random;
 use smooth::SmoothStroke;
 use thiserror::Error;
 
-/// Least part of gravity across an axis, as a share of all of it: below, the joint feels its inertia only.
-const LEAST_GRAVITY: f64 = 1e-6;
+/// Minimum share of gravity normal to an axis; below it the joint torque depends only on the inertia.
+const MIN_GRAVITY_SHARE: f64 = 1e-6;
 
-/// Numbers of one stroke: A, ω, δ.
-const EACH: usize = 3;
+const VARIABLES_PER_STROKE: usize = 3;
 
-/// Why a joint cannot be designed for alone.
+/// Reason why a joint cannot be designed separately.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum StepWiseError {
-    /// A joint that slides: its motion alone determines a mass, and no window is needed for that.
-    #[error("joint `{joint}` slides: step-wise designs are for revolute joints; name the joints that take part")]
+    /// A prismatic joint: its motion alone determines a mass, for any window.
+    #[error("joint `{joint}` is prismatic, but step-wise designs need revolute joints: list the revolute joints")]
     Slides {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
     },
-    /// A joint on which gravity does not act.
+    /// A joint without gravity torque.
     #[error(
-        "gravity does not act about joint `{joint}` while the others rest: its motion alone determines one parameter, for any stroke; name the joints that take part"
+        "gravity has no torque about joint `{joint}` while the others rest, so that its motion determines only one parameter: list the other joints"
     )]
     NoGravity {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
     },
 }
 
-/// The part of gravity, m/s², that acts across a revolute joint's axis while the robot stands at `rest` (rad, m).
+/// Gravity component, m/s², normal to the axis of a revolute joint while the robot rests at `rest` (rad, m).
 ///
 /// # Errors
-/// A joint that slides, or along whose axis gravity stands.
+/// A prismatic joint, or an axis parallel to gravity.
 ///
 /// # Panics
 /// If the joint does not exist or `rest` has another length.
@@ -64,19 +63,23 @@ pub fn gravity_across(model: &Model, joint: usize, rest: &[f64]) -> Result<f64, 
         body_placements(model, &mut workspace, rest)[model.body_of(joint)].rotation.mul_vec(model.joints()[joint].axis);
     let gravity = model.gravity();
     let across = (gravity - axis.scale(gravity.dot(axis) / axis.dot(axis))).norm();
-    if across > LEAST_GRAVITY * gravity.norm() { Ok(across) } else { Err(StepWiseError::NoGravity { joint: name() }) }
+    if across > MIN_GRAVITY_SHARE * gravity.norm() {
+        Ok(across)
+    } else {
+        Err(StepWiseError::NoGravity { joint: name() })
+    }
 }
 
-/// One joint's stroke: where it starts and what it must keep.
+/// Stroke of one joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepWiseJoint {
-    /// Number of the joint in the model.
+    /// Index of the joint in the model.
     pub joint: usize,
-    /// Its constants; positions count from the start of the stroke.
+    /// Constants of the stroke; positions are relative to its start.
     pub constants: StrokeConstants,
 }
 
-/// All strokes, in the order in which the joints move; its vector is A, ω, δ of each.
+/// All strokes, in the order of the joint motions; the variables are A, ω, δ of each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepWiseProblem {
     /// The joints.
@@ -84,10 +87,10 @@ pub struct StepWiseProblem {
 }
 
 impl StepWiseProblem {
-    /// Whether every constant is usable.
+    /// Checks every constant.
     ///
     /// # Errors
-    /// The first that is not, as [`StrokeConstants::validate`] names it.
+    /// The first error of [`StrokeConstants::validate`].
     pub fn validate(&self) -> Result<(), OptimiserError> {
         self.joints.iter().try_for_each(|joint| joint.constants.validate())
     }
@@ -97,12 +100,12 @@ impl StepWiseProblem {
         self.joints.iter().flat_map(|joint| joint.constants.bounds()).collect()
     }
 
-    /// The strokes of a vector.
+    /// Strokes of a vector of variables.
     ///
     /// # Panics
-    /// If `x` has fewer than three entries a joint.
+    /// If `x` has fewer than three entries per joint.
     pub fn strokes(&self, x: &[f64]) -> Vec<Stroke> {
-        x.chunks_exact(EACH).take(self.joints.len()).map(Stroke::of).collect()
+        x.chunks_exact(VARIABLES_PER_STROKE).take(self.joints.len()).map(Stroke::of).collect()
     }
 
     /// Condition number of each joint's window.
@@ -110,17 +113,17 @@ impl StepWiseProblem {
         self.joints.iter().zip(strokes).map(|(joint, stroke)| joint.constants.condition_number(stroke)).collect()
     }
 
-    /// Position, velocity, acceleration and rest of one stroke. What limits the arm's place is for the check of the
-    /// whole motion.
+    /// Position, velocity, acceleration and rest of one stroke. Limits of the arm's place are checked on the whole
+    /// motion.
     pub fn limits(&self, place: usize, stroke: &Stroke) -> [StrokeLimit; 5] {
         self.joints[place].constants.limits(stroke)
     }
 
-    /// H of equation 19: the sum of the condition numbers, with the penalty where a limit is broken (once, as in the
+    /// H of equation 19: the sum of the condition numbers, with the penalty if a limit is violated (once, as in the
     /// paper).
     ///
     /// # Panics
-    /// If `x` has fewer than three entries a joint.
+    /// If `x` has fewer than three entries per joint.
     pub fn fitness(&self, x: &[f64]) -> f64 {
         let strokes = self.strokes(x);
         let kept = (0..strokes.len()).all(|place| self.limits(place, &strokes[place]).iter().all(StrokeLimit::kept));
@@ -129,12 +132,12 @@ impl StepWiseProblem {
     }
 
     /// H with a penalty that grows with the violation: Σ cond + penalty · Σ max(0, value/limit - 1). Inside the limits
-    /// it is H, and its lowest point is the same, because the penalty outweighs what a violation gains. The step of
-    /// equation 19 hides from a search on which side of a limit to go, and lets evolution strategies die at the wall:
-    /// their covariance collapses before they have slid along it.
+    /// it equals H, and its minimum is the same, because the penalty exceeds the gain of a violation. The constant
+    /// penalty of equation 19 has no slope towards the limit, so that the covariance of evolution strategies collapses
+    /// there.
     ///
     /// # Panics
-    /// If `x` has fewer than three entries a joint.
+    /// If `x` has fewer than three entries per joint.
     pub fn graded_fitness(&self, x: &[f64]) -> f64 {
         let strokes = self.strokes(x);
         let broken = |place: usize| -> f64 {
@@ -144,8 +147,8 @@ impl StepWiseProblem {
         self.condition_numbers(&strokes).iter().sum::<f64>() + (0..strokes.len()).map(broken).sum::<f64>()
     }
 
-    /// The best strokes by exact gradients, joint by joint from `starts` random points of the ranges, and the number of
-    /// evaluations. They keep every limit if any start came inside.
+    /// Optimises the strokes by exact gradients, joint by joint, from `starts` random points of the ranges. Returns the
+    /// strokes and the number of evaluations. They keep every limit if any start became feasible.
     ///
     /// # Errors
     /// A constant out of range; no start.
@@ -169,7 +172,7 @@ impl StepWiseProblem {
                 .collect();
             let result = multi_start(|| smooth.clone(), &points, &AugmentedLagrangianSettings::default(), &watch)?;
             evaluations += result.evaluations();
-            best.extend_from_slice(&result.best().ok_or(OptimiserError::Start)?.best[..EACH]);
+            best.extend_from_slice(&result.best().ok_or(OptimiserError::Start)?.best[..VARIABLES_PER_STROKE]);
         }
         Ok((best, evaluations))
     }

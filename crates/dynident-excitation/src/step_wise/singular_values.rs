@@ -1,13 +1,12 @@
 //! Singular values of a tall matrix with three columns.
 
-/// The singular values, largest first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Singular3([f64; 3]);
 
 impl Singular3 {
-    /// Of the matrix with these rows: triangular factor by Givens rotations, row by row, then one-sided Jacobi
-    /// rotations of its columns (Golub and Van Loan, *Matrix Computations*, 2013, sections 5.2 and 8.6). No product of
-    /// the matrix with itself is formed, so condition numbers are good up to about 1e15.
+    /// Computes the singular values of the matrix with these rows: triangular factor by Givens rotations, row by row,
+    /// then one-sided Jacobi rotations of its columns (Golub and Van Loan, *Matrix Computations*, 2013, sections 5.2
+    /// and 8.6). The matrix is not squared, so that condition numbers up to about 1e15 are accurate.
     pub(super) fn of_rows(rows: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let mut r = [[0.0; 3]; 3];
         for mut row in rows {
@@ -15,7 +14,7 @@ impl Singular3 {
                 if row[k] == 0.0 {
                     continue;
                 }
-                // Plain square root: entries are of physical size, far from overflow.
+                // A plain square root is safe for entries of physical size.
                 let length = (r[k][k] * r[k][k] + row[k] * row[k]).sqrt();
                 let (cos, sin) = (r[k][k] / length, row[k] / length);
                 for column in k..3 {
@@ -56,7 +55,7 @@ impl Singular3 {
         Self(values)
     }
 
-    /// Largest over smallest singular value; infinite without full rank.
+    /// Ratio of the largest to the smallest singular value; infinite without full rank.
     pub(super) fn condition_number(&self) -> f64 {
         if self.0[2] > 0.0 { self.0[0] / self.0[2] } else { f64::INFINITY }
     }

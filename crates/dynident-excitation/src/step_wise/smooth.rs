@@ -1,46 +1,46 @@
-//! The stroke's problem without steps and kinks, with exact gradients.
+//! Smooth formulation of the stroke problem, with exact gradients.
 
 use super::stroke::{PEAK_OF_SECOND, Stroke, StrokeConstants};
 use crate::optimisers::ConstrainedProblem;
 
-/// Points of a window: the error of the condition number is below 1e-4 of itself.
+/// Samples of a window: the relative error of the condition number is below 1e-4.
 const POINTS: usize = 256;
 
-/// Minimise s over A, ω, δ, s, where s bounds the logarithm of the joint's condition number from above, under the
-/// limits of equations 17 and 18 as constraints value/limit - 1 <= 0. Joints that move one after another do not know of
-/// each other, so this is the whole of a joint's constants.
+/// Minimises s over A, ω, δ, s, where s is an upper bound of the logarithm of the joint's condition number, under the
+/// limits of equations 17 and 18 as constraints value/limit - 1 <= 0. Joints that move one after another are
+/// independent, so this covers one joint completely.
 ///
-/// [`StrokeConstants::condition_number`] jumps where δ takes in one sample more. Here every window holds the same
-/// number of samples, spread evenly from -δ to δ (the middles of equal parts), which has the same condition number up
-/// to the width of a sample; δ <= T/4 is a constraint. Limits are tightened by one part in a million, so that a
-/// solution within the optimiser's tolerance keeps them strictly.
+/// [`StrokeConstants::condition_number`] is discontinuous where δ includes one more sample. Here every window contains
+/// the same number of samples, distributed evenly from -δ to δ (the middles of equal parts), with the same condition
+/// number up to the width of a sample; δ <= T/4 is a constraint. Limits are tightened by 1e-6, so that a solution
+/// within the optimiser's tolerance keeps them strictly.
 ///
-/// The condition number itself has a kink, and the optimum lies on it: turned by A/2, the rows are [q̈, -g sin p | g
-/// cos p] with p = q - A/2, odd and even in time from the mid-point, so W splits into two blocks, and at the optimum
-/// the largest singular values of both are equal. Each block's singular values are smooth; so is the problem with one
-/// constraint ln σ_large - ln σ_small - s <= 0 for every pair that may be extreme.
+/// The condition number has a kink at the optimum: rotated by A/2, the rows are [q̈, -g sin p | g cos p] with p = q -
+/// A/2, odd and even in time from the mid-point, so that W splits into two blocks, whose largest singular values are
+/// equal at the optimum. The singular values of each block are smooth; so is the problem with one constraint ln σ_large
+/// - ln σ_small - s <= 0 for every pair that can be extreme.
 #[derive(Clone, Debug)]
 pub(super) struct SmoothStroke {
     constants: StrokeConstants,
     x: [f64; 4],
 }
 
-/// Three pairs of singular values; velocity, acceleration, both at rest, window.
+/// Constraints: three pairs of singular values; velocity, acceleration, both at rest, window.
 const PAIRS: usize = 3;
 const CONSTRAINTS: usize = PAIRS + 5;
-const MARGIN: f64 = 1e-6;
+const RELATIVE_MARGIN: f64 = 1e-6;
 
-/// A number and its gradient by A, ω, δ.
+/// A value and its gradient by A, ω, δ.
 type Slope = (f64, [f64; 3]);
 
-/// ln of the singular values of the odd block, large and small, and of the even one.
+/// Logarithms of the singular values of the odd block (large and small) and of the even one.
 struct LogSingular {
     odd: [Slope; 2],
     even: Slope,
 }
 
 impl LogSingular {
-    /// The pairs whose ratio may be the condition number, as differences of logarithms.
+    /// Pairs whose ratio can be the condition number, as differences of logarithms.
     fn pairs(&self) -> [Slope; PAIRS] {
         let [large, small] = self.odd;
         [(self.even, small), (large, small), (large, self.even)]
@@ -53,14 +53,14 @@ impl SmoothStroke {
         Self { constants: constants.clone(), x: [0.0; 4] }
     }
 
-    /// A, ω, δ with the smallest s that fits.
+    /// A, ω, δ with the smallest feasible s.
     pub(super) fn start(&self, x: &[f64]) -> Vec<f64> {
         let pairs = self.log_singular(&Stroke::of(x)).pairs();
         let bound = pairs.iter().fold(0.0, |largest: f64, pair| largest.max(pair.0));
         vec![x[0], x[1], x[2], bound]
     }
 
-    /// Sums over the later half of the window; the earlier one repeats them.
+    /// Sums over the later half of the window, because the earlier half repeats them.
     fn log_singular(&self, stroke: &Stroke) -> LogSingular {
         let Stroke { amplitude_rad: a, steepness_per_s: w, window_s } = *stroke;
         let gravity = self.constants.gravity;
@@ -86,7 +86,7 @@ impl SmoothStroke {
             .collect();
         let product = |i: usize, j: usize| -> f64 { rows.iter().map(|row| row[i].0 * row[j].0).sum() };
         let (aa, ab, bb, cc) = (product(0, 0), product(0, 1), product(1, 1), product(2, 2));
-        // The small eigenvalue of the odd block from its determinant aa·‖b - (ab/aa) a‖², where nothing cancels.
+        // The small eigenvalue of the odd block from its determinant aa·‖b - (ab/aa) a‖², without cancellation.
         let share = ab / aa;
         let rest: f64 = rows.iter().map(|row| (row[1].0 - share * row[0].0).powi(2)).sum();
         let half = 0.5 * (aa - bb);
@@ -127,7 +127,7 @@ impl SmoothStroke {
             (1.0 / quarter, [0, 1, 1]),
         ]
         .map(|(scale, powers)| {
-            let product = scale * (1.0 + MARGIN) * a.powi(powers[0]) * w.powi(powers[1]) * d.powi(powers[2]);
+            let product = scale * (1.0 + RELATIVE_MARGIN) * a.powi(powers[0]) * w.powi(powers[1]) * d.powi(powers[2]);
             let gradient = [
                 product * f64::from(powers[0]) / a,
                 product * f64::from(powers[1]) / w,
@@ -146,8 +146,8 @@ impl ConstrainedProblem for SmoothStroke {
     fn bounds(&self) -> Vec<[f64; 2]> {
         let mut bounds = self.constants.bounds().to_vec();
         // The stroke ends below A.
-        bounds[0][1] = bounds[0][1].min(self.constants.position_limit_rad * (1.0 - MARGIN));
-        // Condition numbers are at least 1; beyond e⁴⁰ there are no digits left.
+        bounds[0][1] = bounds[0][1].min(self.constants.position_limit_rad * (1.0 - RELATIVE_MARGIN));
+        // Condition numbers are at least 1; above e⁴⁰ no digits are significant.
         bounds.push([0.0, 40.0]);
         bounds
     }

@@ -1,5 +1,4 @@
-//! One joint's logistic stroke: how well the windows about its mid-points excite the joint's parameters, and its
-//! limits.
+//! Logistic stroke of one joint: condition number of the windows around its mid-points, and its limits.
 //!
 //! *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, equations 7 to 10 and 14 to 19,
 //! Fig. 6.
@@ -8,19 +7,18 @@ use super::singular_values::Singular3;
 use crate::optimisers::OptimiserError;
 use serde::{Deserialize, Serialize};
 
-/// The variables of one joint: the stroke of equation 14 with h = 0, and the window of Fig. 6.
+/// Variables of one joint: the stroke of equation 14 with h = 0, and the window of Fig. 6.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
-    /// Amplitude A in rad.
+    /// Amplitude A, rad.
     pub amplitude_rad: f64,
-    /// Steepness ω in 1/s.
+    /// Steepness ω, 1/s.
     pub steepness_per_s: f64,
-    /// Half width δ of the window about a mid-point, in s.
+    /// Half width δ of the window around a mid-point, s.
     pub window_s: f64,
 }
 
 impl Stroke {
-    /// A, ω, δ.
     pub(super) fn of(x: &[f64]) -> Self {
         Self { amplitude_rad: x[0], steepness_per_s: x[1], window_s: x[2] }
     }
@@ -34,12 +32,12 @@ impl Stroke {
     }
 }
 
-/// What the limits of equations 17 and 18 bound.
+/// Quantities that equations 17 and 18 limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum StrokeQuantity {
-    /// Highest position, A/(1 + e^(-ωT/4)), in rad. The lowest is above zero for every stroke.
+    /// Maximum position, A/(1 + e^(-ωT/4)), in rad. The minimum is above zero for every stroke.
     Position,
     /// Peak velocity A ω/4, in rad/s.
     Speed,
@@ -51,14 +49,14 @@ pub enum StrokeQuantity {
     RestAcceleration,
 }
 
-/// One limit and what a stroke makes of it.
+/// A limit and the peak of a stroke.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StrokeLimit {
-    /// What is bounded.
+    /// Limited quantity.
     pub quantity: StrokeQuantity,
-    /// Its peak on the whole stroke.
+    /// Peak on the whole stroke.
     pub value: f64,
-    /// What it must stay below.
+    /// The limit.
     pub limit: f64,
 }
 
@@ -68,12 +66,12 @@ impl StrokeLimit {
         self.value < self.limit
     }
 
-    /// By how much the limit is exceeded, as a share of it: 0.68 for 68 % too much, negative inside.
+    /// Relative excess over the limit: 0.68 for 68 % too much, negative inside.
     pub fn excess(&self) -> f64 {
         self.value / self.limit - 1.0
     }
 
-    /// The excess, zero inside, counted a touch early, so that the lowest point of a graded penalty keeps the limits
+    /// The excess with a margin of 1e-6, zero inside, so that the minimum of a graded penalty keeps the limits
     /// strictly.
     pub(super) fn violation(&self) -> f64 {
         let excess = self.excess();
@@ -81,24 +79,24 @@ impl StrokeLimit {
     }
 }
 
-/// What is given of one joint's stroke.
+/// Constants of one joint's stroke.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StrokeConstants {
-    /// The part of gravity that acts across the joint's axis, m/s² ([`gravity_across`](super::gravity_across)).
+    /// Gravity component normal to the joint's axis, m/s² ([`gravity_across`](super::gravity_across)).
     pub gravity: f64,
-    /// Samples a second; the clock ticks at every mid-point.
+    /// Sampling rate, Hz; every mid-point is a sample.
     pub rate_hz: f64,
     /// T ω, period times steepness. At 40 velocity and acceleration at rest are below 1e-4 for every slow stroke.
     pub period_times_steepness: f64,
-    /// Positions, counted from the start of the stroke, are between 0 and this, rad.
+    /// Maximum position relative to the start of the stroke, rad; the minimum is 0.
     pub position_limit_rad: f64,
-    /// Highest velocity, rad/s.
+    /// Maximum velocity, rad/s.
     pub speed_limit: f64,
-    /// Highest acceleration, rad/s².
+    /// Maximum acceleration, rad/s².
     pub acceleration_limit: f64,
-    /// Bound of velocity (rad/s) and acceleration (rad/s²) at rest (equation 17).
+    /// Maximum velocity (rad/s) and acceleration (rad/s²) at rest (equation 17).
     pub rest_limit: f64,
-    /// ε of equation 19 where a limit is broken.
+    /// Penalty ε of equation 19 for a violated limit.
     pub penalty: f64,
     /// Range of A, rad.
     pub amplitude_range: [f64; 2],
@@ -112,10 +110,10 @@ pub struct StrokeConstants {
 pub(super) const PEAK_OF_SECOND: f64 = 0.096_225_044_864_937_63;
 
 impl StrokeConstants {
-    /// Whether every constant is usable.
+    /// Checks every constant.
     ///
     /// # Errors
-    /// [`OptimiserError::Setting`] names the first that is not; [`OptimiserError::Bounds`] an empty range.
+    /// [`OptimiserError::Setting`] with the first invalid one; [`OptimiserError::Bounds`] for an empty range.
     pub fn validate(&self) -> Result<(), OptimiserError> {
         let needed = "positive and finite";
         for (name, value) in [
@@ -153,24 +151,24 @@ impl StrokeConstants {
         [self.amplitude_range, self.steepness_range, self.window_range]
     }
 
-    /// The stroke's share of a period on either side of its mid-point, T/4, in s: there a window meets the next.
+    /// Maximum half width of a window, T/4, in s, at which it meets the next one.
     pub fn longest_window_s(&self, stroke: &Stroke) -> f64 {
         0.25 * self.period_times_steepness / stroke.steepness_per_s
     }
 
-    /// Condition number of the observation matrix of the joint while the others rest: M and Q of equations 7 to 10 are
-    /// then the same function of the moving joint, with the rows [q̈, g cos q, -g sin q] (φ11 to φ13; φ24 to φ26),
-    /// whatever the links' lengths.
+    /// Condition number of the joint's observation matrix while the others rest. M and Q of equations 7 to 10 are then
+    /// the same function of the moving joint, with the rows [q̈, g cos q, -g sin q] (φ11 to φ13; φ24 to φ26), for any
+    /// lengths of the links.
     ///
     /// Rows are the samples k/rate from a mid-point with |k|/rate <= δ. Falling strokes and further periods repeat the
-    /// same rows, which changes no condition number, so one rising stroke is enough. Infinite for a matrix without full
+    /// same rows, which does not change the condition number, so one rising stroke is sufficient. Infinite without full
     /// rank.
     pub fn condition_number(&self, stroke: &Stroke) -> f64 {
         let reach = stroke.window_s.min(self.longest_window_s(stroke));
         if !(reach >= 0.0 && reach * self.rate_hz <= 1e6) {
             return f64::INFINITY;
         }
-        // A window of a whole number of samples must not lose its ends to rounding.
+        // Rounding must not remove the last sample of a window.
         let last = (reach * self.rate_hz * (1.0 + 1e-12)).floor() as i64;
         let rows = (-last..=last).map(|k| {
             let (q, ddq) = stroke.position_and_acceleration(k as f64 / self.rate_hz);
@@ -180,9 +178,9 @@ impl StrokeConstants {
         Singular3::of_rows(rows).condition_number()
     }
 
-    /// Every limit of equations 17 and 18.
+    /// Limits of equations 17 and 18.
     pub fn limits(&self, stroke: &Stroke) -> [StrokeLimit; 5] {
-        // At rest the stroke stands at f(-ωT/4).
+        // At rest the stroke is at f(-ωT/4).
         let rest = 1.0 / (1.0 + (0.25 * self.period_times_steepness).exp());
         let (rest_speed, rest_acceleration) = (rest * (1.0 - rest), rest * (1.0 - rest) * (1.0 - 2.0 * rest));
         let Stroke { amplitude_rad: a, steepness_per_s: w, .. } = *stroke;

@@ -10,7 +10,7 @@ fn never(_: &Progress<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// A level joint with the limits of the paper's equation 18.
+/// A joint with horizontal axis and the limits of the paper's equation 18.
 fn level() -> StrokeConstants {
     StrokeConstants {
         gravity: 9.8,
@@ -27,12 +27,11 @@ fn level() -> StrokeConstants {
     }
 }
 
-/// The planar arm, tip first.
 fn planar() -> StepWiseProblem {
     StepWiseProblem { joints: [1, 0].map(|joint| StepWiseJoint { joint, constants: level() }).to_vec() }
 }
 
-/// The best stroke inside the limits, by an independent program.
+/// The best stroke inside the limits, computed by an independent program.
 const KNOWN: Stroke = Stroke { amplitude_rad: 1.991, steepness_per_s: 1.046, window_s: 5.74 };
 
 #[test]
@@ -47,14 +46,13 @@ fn the_known_optimum_is_inside_the_limits_with_the_known_condition_number() {
     }
     let x = [1.989, 1.046, 5.74, 1.989, 1.046, 5.74];
     assert!((problem.fitness(&x) - 2.0 * level().condition_number(&inside)).abs() < 1e-9);
-    // One broken limit costs the penalty, once.
+    // A violated limit adds the penalty once.
     let broken = [1.989, 1.2, 5.74, 1.989, 1.2, 5.74];
     let sum: f64 = problem.condition_numbers(&problem.strokes(&broken)).iter().sum();
     assert!((problem.fitness(&broken) - sum - 1000.0).abs() < 1e-9);
 }
 
-/// Condition number through the library's own regressor of the planar arm, its base columns and nalgebra's singular
-/// values.
+/// Condition number from the library's regressor of the planar arm, its base columns and nalgebra's singular values.
 fn condition_by_the_regressor(constants: &StrokeConstants, stroke: &Stroke, joint: usize) -> f64 {
     let mut random = Random::new(1);
     let model = planar_2r(1.0, random.body(), random.body());
@@ -84,7 +82,7 @@ fn closed_form_rows_are_those_of_the_arms_regressor() {
         for joint in 0..2 {
             let (here, there) =
                 (constants.condition_number(&stroke), condition_by_the_regressor(&constants, &stroke, joint));
-            // Two backward stable ways: condition times some roundings.
+            // Two backward stable algorithms: condition number times some roundings.
             assert!((here / there - 1.0).abs() < 1e-10, "joint {joint}: {here} against {there}");
         }
     }
@@ -92,7 +90,7 @@ fn closed_form_rows_are_those_of_the_arms_regressor() {
 
 #[test]
 fn three_columns_have_true_singular_values_up_to_huge_condition_numbers() {
-    // W = U diag V with known values: three orthonormal columns, scaled and turned.
+    // W = U diag V with known singular values: three orthonormal columns, scaled and rotated.
     let (sin, cos) = 0.7_f64.sin_cos();
     for ratio in [1.0, 1e3, 1e8, 1e12] {
         let values = [5.0, 2.0, 5.0 / ratio];
@@ -113,8 +111,8 @@ fn smooth_and_sampled_agree() {
     for x in [[1.989, 1.046, 5.74], [2.5, 0.4, 3.0], [0.5, 1.5, 1.2]] {
         let smooth = SmoothStroke::new(&level()).start(&x)[3].exp();
         let sampled = level().condition_number(&Stroke::of(&x));
-        // A window counts one sample more or less of its 241 or more: 1/241 in length, to the fourth power at most in
-        // the smallest singular value.
+        // A window differs by one of at least 241 samples: 1/241 in length, at most to the fourth power in the smallest
+        // singular value.
         assert!((smooth / sampled - 1.0).abs() < 4.0 / 241.0, "{smooth} against {sampled}");
     }
 }
@@ -126,7 +124,7 @@ fn gradients_are_those_of_the_values() {
     let bounds = smooth.bounds();
     let (count, mut c) = (smooth.constraints(), vec![0.0; smooth.constraints()]);
     for _ in 0..20 {
-        // Away from the corner where the matrix loses its rank and differences their digits.
+        // Away from the corner where the matrix loses its rank and differences are inaccurate.
         let x: Vec<f64> = bounds.iter().map(|[low, high]| random.uniform(low.max(0.5), high.min(4.0))).collect();
         let weights: Vec<f64> = (0..count).map(|_| random.uniform(0.0, 2.0)).collect();
         let mut gradient = vec![0.0; x.len()];
@@ -137,7 +135,7 @@ fn gradients_are_those_of_the_values() {
             value + c.iter().zip(&weights).map(|(c, w)| c * w).sum::<f64>()
         };
         for i in 0..x.len() {
-            // Five-point difference: truncation h⁴ and rounding cond·1e-16/h both below 1e-7 of the largest slopes
+            // Five-point difference: truncation h⁴ and rounding cond·1e-16/h are both below 1e-7 of the largest slopes
             // here.
             let h = 1e-3 * x[i];
             let mut at = |steps: f64| {
@@ -157,7 +155,7 @@ fn gradients_reach_the_known_optimum_from_every_seed() {
     for seed in 0..10 {
         let (x, _) = problem.gradient_solution(seed, 3, never).unwrap();
         let fitness = problem.fitness(&x);
-        // 161.3 is rounded to 0.05; 0.1 % is what the project asks for.
+        // 161.3 is rounded to 0.05; the project requires 0.1 %.
         assert!((161.15..161.3 * 1.001).contains(&fitness), "seed {seed}: {fitness}");
     }
 }
@@ -172,7 +170,7 @@ fn the_optimum_lies_on_the_kink_of_the_condition_number() {
     assert_eq!(best.status, AugmentedLagrangianStatus::Converged);
     let mut c = vec![0.0; smooth.constraints()];
     smooth.values(&best.best, &mut c);
-    // Both pairs of singular values and the acceleration limit bind, the velocity limit does not. Tolerance of a
+    // Both pairs of singular values and the acceleration limit are active, the velocity limit is not. Tolerance of a
     // converged solution; the gap of the velocity is 0.6 %.
     assert!(c[0].abs() < 1e-6 && c[1].abs() < 1e-6 && c[4].abs() < 1e-6, "{c:?}");
     assert!(c[3] < -0.003, "{c:?}");
@@ -194,7 +192,7 @@ fn unusable_constants_are_named() {
 fn gravity_across_an_axis() {
     let mut random = Random::new(1);
     let arm = planar_2r(1.0, random.body(), random.body());
-    // Both axes are level: all of 9.8 m/s². Rounding.
+    // Both axes are horizontal: all of 9.8 m/s², up to rounding.
     for joint in 0..2 {
         assert!((gravity_across(&arm, joint, &[0.3, -0.2]).unwrap() - 9.8).abs() < 1e-14);
     }

@@ -1,5 +1,5 @@
-//! Whole designs: feasible everywhere by code that shares nothing with the search, the same for any number of threads,
-//! and a forecast that comes true.
+//! Whole designs: feasible by independent code, equal for any number of threads, with a correct prediction of the error
+//! bars.
 
 use core::ops::ControlFlow;
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, regressor_panels};
@@ -66,13 +66,13 @@ fn a_design_keeps_every_limit_at_ten_kilohertz_and_does_not_depend_on_threads() 
     for report in reports {
         assert!(!report.violated, "{report:?}");
     }
-    // Random postures of this family reach 300 to 380; 439 is what an independent program needs a second for.
+    // Random postures of this family reach 300 to 380; an independent program reaches 439 in a second.
     let figure = -DOptimal.figure(&one.information).expect("every parameter is excited");
     assert!(figure > 435.0, "log det {figure}");
 }
 
 #[test]
-fn the_forecast_comes_true() {
+fn predicted_error_bars_agree_with_simulated_ones() {
     let (model, _, family, layout, design) = designed(2);
     let dof = model.dof();
     let times = grid(10.0, 1001);
@@ -88,8 +88,8 @@ fn the_forecast_comes_true() {
         .collect();
     let mut random = Random::new(77);
     let truth: Vec<f64> = (0..columns).map(|_| random.uniform(-1.0, 1.0)).collect();
-    // The 200 runs; the standard deviation of a standard deviation from 200 runs is 5 %, so single parameters
-    // scatter by more than the 10 % that hold for their mean square.
+    // 200 runs: the standard deviation of a standard deviation from 200 runs is 5 %, so single parameters vary by more
+    // than the 10 % tolerance of their mean square.
     let runs = 200;
     let mut squares = vec![0.0; columns];
     for _ in 0..runs {
@@ -118,7 +118,7 @@ fn the_forecast_comes_true() {
     let ratios: Vec<f64> =
         squares.iter().zip(&expected).map(|(square, std)| (square / f64::from(runs)).sqrt() / std).collect();
     let mean_square = (ratios.iter().map(|r| r * r).sum::<f64>() / columns as f64).sqrt();
-    assert!((mean_square - 1.0).abs() < 0.1, "empirical over forecast {mean_square}");
+    assert!((mean_square - 1.0).abs() < 0.1, "empirical over predicted {mean_square}");
     // Four standard deviations of the scatter for each of the 36.
     assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.2), "{ratios:?}");
 }

@@ -1,8 +1,8 @@
-//! A hundred random problems (in the long run; forty every day): each ends with a motion that keeps every limit by the
-//! independent check at 10 kHz, or with the limits that bind, or is refused by name before any search.
+//! A hundred random problems (in the long run; forty every day). Each ends with a motion that keeps every limit by the
+//! independent check at 10 kHz, with the violated limits, or with an error before any search.
 //!
-//! Three in five are built around a motion of the family: its peaks, 5 % wider, are the limits, so that something
-//! feasible is known to exist and must be found. The others have random limits.
+//! Three in five are built around a motion of the family: its peaks plus 5 % are the limits, so that a feasible
+//! motion exists and must be found. The others have random limits.
 
 use core::ops::ControlFlow;
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
@@ -18,10 +18,10 @@ use dynident_model::sample::{Random, planar_2r, random_tree};
 use dynident_model::{Model, load_robot};
 use dynident_testing::count;
 
-/// How much wider than the known motion's peaks the limits are.
-const ROOM: f64 = 1.05;
+/// Factor between the limits and the peaks of the known motion.
+const LIMIT_FACTOR: f64 = 1.05;
 
-/// Height that no arm here can keep every link above.
+/// Height above the reach of all arms here.
 const OUT_OF_REACH_M: f64 = 25.0;
 
 #[derive(Debug, PartialEq)]
@@ -35,7 +35,7 @@ struct Case {
     model: Model,
     limits: Limits,
     family: Box<dyn Family>,
-    /// Whether something feasible is known to exist.
+    /// Whether a feasible motion is known to exist.
     known: bool,
 }
 
@@ -65,9 +65,9 @@ fn family(index: usize, joints: usize, duration_s: f64) -> Box<dyn Family> {
     }
 }
 
-/// Limits of every kind that could be asked for, each at the known motion's own peak: found by the check with limits of
-/// 1 (position: -1 to 1), where a ratio is the peak.
-fn around(model: &Model, family: &dyn Family, parameters: &[f64], floor: bool) -> Limits {
+/// Limits of all kinds, each at the peak of the known motion, determined by the check with limits of 1 (position: -1 to
+/// 1), where a ratio equals the peak.
+fn limits_around(model: &Model, family: &dyn Family, parameters: &[f64], floor: bool) -> Limits {
     let unit = |joint: &String| JointLimit {
         joint: joint.clone(),
         position: Some([-1.0, 1.0]),
@@ -90,7 +90,7 @@ fn around(model: &Model, family: &dyn Family, parameters: &[f64], floor: bool) -
     for limit in &mut limits.joints {
         let peak = |kind: LimitKind| {
             let of = reports.iter().find(|report| report.kind == kind && report.joint == limit.joint);
-            ROOM * of.map_or(1.0, |report| report.worst_ratio).max(1e-3)
+            LIMIT_FACTOR * of.map_or(1.0, |report| report.worst_ratio).max(1e-3)
         };
         limit.position = Some([-peak(LimitKind::Position), peak(LimitKind::Position)]);
         limit.speed = Some(peak(LimitKind::Speed));
@@ -100,15 +100,14 @@ fn around(model: &Model, family: &dyn Family, parameters: &[f64], floor: bool) -
         limit.power_w = Some(peak(LimitKind::Power));
     }
     if let Some(floor) = &mut limits.floor {
-        // The ratio is one plus the arm's lengths below; a hair of 5 mm as room.
+        // The ratio is one plus the depth in arm lengths; 0.005 of margin.
         let deepest = reports.iter().filter(|report| report.kind == LimitKind::Floor);
         floor.height_m = 0.995 - deepest.fold(f64::NEG_INFINITY, |worst, report| worst.max(report.worst_ratio));
     }
     limits
 }
 
-/// Limits without regard to whether anything can keep them.
-fn anyhow(model: &Model, index: usize, random: &mut Random) -> Limits {
+fn random_limits(model: &Model, index: usize, random: &mut Random) -> Limits {
     let mut some = |low: f64, high: f64, chance: f64| {
         let value = low * (high / low).powf(random.uniform(0.0, 1.0));
         (random.uniform(0.0, 1.0) < chance).then_some(value)
@@ -140,16 +139,16 @@ fn case(index: usize) -> Case {
     let mut random = Random::new(4711 + index as u64);
     let model = arm(index, &mut random);
     let known = index % 5 < 3;
-    // Every second problem of random limits has hardly time to move at all.
+    // Every second problem with random limits is too short for most motions.
     let duration_s = if !known && index.is_multiple_of(2) { 0.6 } else { random.uniform(1.5, 5.0) };
-    // By blocks of ten and not by the index alone, so that arms and families meet.
+    // Varied by blocks of ten, so that all combinations of arms and families occur.
     let family = family(index / 10 + index, model.dof(), duration_s);
     let limits = if known {
         let ranges = vec![[-1.0, 1.0]; model.dof()];
         let parameters = family.random(&ranges, &vec![2.0; model.dof()], &mut random);
-        around(&model, &*family, &parameters, index.is_multiple_of(4))
+        limits_around(&model, &*family, &parameters, index.is_multiple_of(4))
     } else {
-        anyhow(&model, index, &mut random)
+        random_limits(&model, index, &mut random)
     };
     Case { model, limits, family, known }
 }
@@ -203,15 +202,15 @@ fn solve(index: usize, case: &Case) -> Outcome {
     motion(&times, &mut dense);
     let diagnosis = diagnose(&set, &times, &dense);
     assert!(!diagnosis.broken.is_empty(), "problem {index}: {reports:?}");
-    assert!(!diagnosis.relaxations.is_empty(), "problem {index}: nothing would help? {diagnosis:?}");
+    assert!(!diagnosis.relaxations.is_empty(), "problem {index}: no relaxation: {diagnosis:?}");
     assert!(diagnosis.sentences().len() > diagnosis.broken.len(), "problem {index}");
-    assert!(designed.violation > 0.0, "problem {index}: the search takes for feasible what the check does not");
+    assert!(designed.violation > 0.0, "problem {index}: feasible in the search, but not in the check");
     Outcome::Bound(broken)
 }
 
 #[test]
 fn a_hundred_random_problems() {
-    // Forty have each robot, family and kind of limits already.
+    // Forty problems already contain each robot, family and kind of limits.
     let problems = count(40, 100);
     let (mut feasible, mut bound, mut refused, mut missed) = (0, 0, 0, Vec::new());
     for index in 0..problems {
@@ -228,8 +227,7 @@ fn a_hundred_random_problems() {
         if case.known && outcome != Outcome::Feasible {
             missed.push((index, case.family.name(), case.model.dof(), outcome));
         } else if case.limits.floor.as_ref().is_some_and(|floor| floor.height_m >= OUT_OF_REACH_M) {
-            // Nothing keeps this; whatever else is broken beside it, it is named (unless the problem was refused
-            // already).
+            // This limit cannot be kept, so it must be reported, unless an error occurred before.
             assert!(
                 match &outcome {
                     Outcome::Feasible => false,
@@ -243,7 +241,7 @@ fn a_hundred_random_problems() {
     println!("{feasible} feasible, {bound} named infeasible, {refused} refused before the search");
     assert!(missed.is_empty(), "known to be feasible but not found: {missed:#?}");
     assert_eq!(feasible + bound + refused, problems);
-    // Each way out is taken; sixty in a hundred at least are feasible.
+    // Each outcome occurs; at least sixty in a hundred are feasible.
     let least = problems / 20;
     assert!(feasible >= 12 * least && bound >= least && refused >= least, "{feasible} {bound} {refused}");
 }

@@ -1,4 +1,4 @@
-//! Criteria and their derivatives by the motion, against central differences of the whole chain.
+//! Criteria and their derivatives with respect to the motion, against central differences of the whole chain.
 
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
 use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
@@ -25,7 +25,7 @@ fn derivatives_by_the_motion_equal_differences() {
             coulomb: Some(CoulombShape::Smooth { width: 0.5 }),
             offset: true,
         });
-        // Positions and velocities of other joints, in a column of one.
+        // A column that depends on positions and velocities of other joints.
         for (joint, text) in [(0, "sin(2 * q) * cos(q3) + q2"), (2, "exp(-q^2 / 4) * dq1 + q * dq")] {
             let expression = Expression::parse(text, &JointNames { own: Some(joint), names: &[] }).unwrap();
             let (name, law) = (format!("declared{joint}"), DeclaredLaw::Expression(expression));
@@ -64,9 +64,9 @@ fn derivatives_by_the_motion_equal_differences() {
                         [&mut moved.q, &mut moved.dq, &mut moved.ddq][which][entry] += step;
                         value(&moved)
                     };
-                    // Fourth-order differences. The least eigenvalue of D is known to 1e-16 times D's condition (1e6
-                    // here), so its logarithm to 1e-10 and its difference quotient to 1e-10 / h; the fifth derivatives
-                    // (some hundreds) leave h^4 times as much.
+                    // Fourth-order differences. The smallest eigenvalue of D has a relative error of 1e-16 times the
+                    // condition number (1e6 here), its logarithm 1e-10 and its difference quotient 1e-10 / h; the fifth
+                    // derivatives (some hundreds) contribute h^4 times their value.
                     let h = 5e-3;
                     let expected = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
                     let found = [&gradient.q, &gradient.dq, &gradient.ddq][which][entry];

@@ -1,5 +1,4 @@
-//! Whoever watches a search can end it at any moment: little is computed after that. Evaluations are counted, not
-//! seconds.
+//! A watcher can end a search at any time, after which little is computed. The tests count evaluations, not seconds.
 
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -16,7 +15,6 @@ use dynident_model::Model;
 use dynident_model::sample::{Random, planar_2r};
 use nalgebra::DMatrix;
 
-/// Evaluations and draws, of which those after `ended` are counted.
 #[derive(Debug, Default)]
 struct Counter {
     ended: AtomicBool,
@@ -35,7 +33,6 @@ impl Counter {
     }
 }
 
-/// D-optimality that counts.
 #[derive(Debug)]
 struct Counted<'a>(&'a Counter);
 
@@ -68,7 +65,6 @@ impl Criterion for Counted<'_> {
     }
 }
 
-/// A family whose random motions are counted.
 #[derive(Debug)]
 struct Drawn<'a>(Fourier, &'a Counter);
 
@@ -107,7 +103,7 @@ impl Family for Drawn<'_> {
     }
 }
 
-/// Two joints; with a box that the tip never reaches, no motion is possible and every round of a search is come to.
+/// Two joints; with a box that the tip cannot reach, no motion is feasible and the search runs every round.
 fn arm(possible: bool) -> (Model, LimitSet) {
     let mut random = Random::new(5);
     let model = planar_2r(1.0, random.body(), random.body());
@@ -136,7 +132,7 @@ fn settings() -> DesignSettings {
     }
 }
 
-/// Runs `of` with a task on which `counter` counts.
+/// Runs `of` with a task whose evaluations `counter` counts.
 fn with_task<T>(counter: &Counter, possible: bool, of: impl FnOnce(&DesignTask<'_>) -> T) -> T {
     let (model, set) = arm(possible);
     let family = Fourier::new(2, 6.0, &FourierSettings { harmonics: 3, ..FourierSettings::default() }).unwrap();
@@ -154,7 +150,7 @@ fn with_task<T>(counter: &Counter, possible: bool, of: impl FnOnce(&DesignTask<'
     })
 }
 
-/// Ends a search at the call number `at` of a round; what is computed after that.
+/// Ends a search at call number `at` of a round; returns the numbers of evaluations, assessments and draws after that.
 fn after_end(round: &str, at: usize, possible: bool) -> [usize; 3] {
     let (counter, calls) = (Counter::default(), AtomicUsize::new(0));
     let watch = |progress: &DesignProgress| {
@@ -164,20 +160,19 @@ fn after_end(round: &str, at: usize, possible: bool) -> [usize; 3] {
         if counter.ended.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let found = with_task(&counter, possible, |task| design(task, &settings(), watch)).unwrap();
-    assert!(counter.ended.load(Ordering::SeqCst), "the round {round} was never reported {at} times");
+    assert!(counter.ended.load(Ordering::SeqCst), "the round {round} was reported less than {at} times");
     assert!(found.parameters.iter().all(|p| p.is_finite()));
     assert!(!possible || found.violation <= 0.0 || round == "starts", "{round} {at}: {}", found.violation);
     counter.after_end()
 }
 
-/// One evaluation of each thread that is on its way and its last look, the short way back inside the limits (60), and
-/// the loss by it.
-const MOST_EVALUATIONS: usize = 80;
-/// The best, its way back, and each of up to three ways of taking it inside (shrinking ten times twice, ten steps
-/// towards another motion).
-const MOST_JUDGED: usize = 40;
-/// What stands still, for shrinking, and the start that was on its way.
-const MOST_DRAWN: usize = 5;
+/// One evaluation of each thread in progress and its last assessment, the short polish (60), and the loss of its
+/// result.
+const MAX_EVALUATIONS: usize = 80;
+/// The best, its polish, and each of up to three corrections (shrinking ten times twice, ten interpolation steps).
+const MAX_ASSESSMENTS: usize = 40;
+/// The motion at standstill for shrinking, and the start in progress.
+const MAX_DRAWS: usize = 5;
 
 #[test]
 fn a_search_ends_in_every_round() {
@@ -194,7 +189,7 @@ fn a_search_ends_in_every_round() {
         for (round, at) in rounds.into_iter().filter(|(round, at)| !possible || (*round != "starts" && *at < 200)) {
             let [evaluations, judged, drawn] = after_end(round, at, possible);
             let all = format!("{round} {at} {possible}: {evaluations} {judged} {drawn}");
-            assert!(evaluations <= MOST_EVALUATIONS && judged <= MOST_JUDGED && drawn <= MOST_DRAWN, "{all}");
+            assert!(evaluations <= MAX_EVALUATIONS && judged <= MAX_ASSESSMENTS && drawn <= MAX_DRAWS, "{all}");
         }
     }
     for at in [1, 50] {
@@ -217,7 +212,7 @@ fn a_search_without_gradients_ends_within_a_generation() {
         };
         with_task(&counter, true, |task| design_without_gradients(task, &settings(), &optimiser, watch)).unwrap();
         let [evaluations, judged, _] = counter.after_end();
-        // Those on their way on other threads; the best is judged once.
+        // Evaluations in progress on other threads; the best is assessed once.
         assert!(evaluations <= rayon::current_num_threads() && judged <= 1, "{optimiser:?}: {evaluations} {judged}");
     }
 }
@@ -239,7 +234,7 @@ fn a_search_for_single_changes_ends() {
             single_changes(task, &settings(), &start, &stop)
         });
         found.unwrap();
-        // Asked once by each of the loops inside each other.
+        // One call by each of the nested loops.
         assert!(looked.load(Ordering::SeqCst) <= 8 + rayon::current_num_threads(), "{at}: {looked:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Torque limits with friction, drive inertia and springs: in the search's values and derivatives, and in the check.
+//! Torque limits with friction, drive inertia and springs: values and derivatives of the search, and the check.
 
 use crate::common::{Harmonics, grid, ur10};
 use dynident_dynamics::{Workspace, inverse_dynamics};
@@ -61,7 +61,7 @@ fn all_terms() -> KnownTorque {
     ])
 }
 
-/// Slow motion lies on the ramps that stand in for signs, fast motion outside them.
+/// Slow motion is on the ramps that replace signs, fast motion outside them.
 #[test]
 fn the_derivatives_are_central_differences() {
     let model = ur10();
@@ -143,7 +143,7 @@ fn the_search_is_never_below_the_check_and_equal_away_from_rest() {
     assert!(equal > 100, "{equal}");
 }
 
-/// A pendulum with the description's damping, friction and drive inertia against its formula.
+/// Compares a pendulum with damping, friction and drive inertia in the robot description with its formula.
 #[test]
 fn the_check_has_the_torque_of_the_description() {
     let text = r#"<robot name="pendulum"><link name="base"/>
@@ -170,7 +170,6 @@ fn the_check_has_the_torque_of_the_description() {
     for step in 0..=30_000 {
         let [q, dq, ddq] = at(f64::from(step) / 10_000.0);
         let rigid = inverse_dynamics(&model, &mut workspace, &[q], &[dq], &[ddq])[0];
-        // Gravity and inertia of the rod about the hinge.
         assert!((rigid - ((0.2 + 2.0 * 0.25) * ddq + 2.0 * 9.81 * 0.5 * q.sin())).abs() < 1e-9);
         let all = rigid + 4.0 * dq + 3.0 * dq.signum();
         largest = [largest[0].max(rigid.abs()), largest[1].max(all.abs())];
@@ -182,7 +181,7 @@ fn the_check_has_the_torque_of_the_description() {
 
 /// Friction, armature and spring of an MJCF hinge.
 #[test]
-fn the_description_of_another_format_counts_as_well() {
+fn friction_of_another_description_format_is_included() {
     let text = r#"<mujoco><compiler angle="radian"/><worldbody><body name="rod"><inertial pos="0 0 -0.5" mass="2" diaginertia="0.2 0.2 0.01"/>
       <joint name="hinge" axis="0 1 0" armature="0.3" damping="2" frictionloss="1.5" stiffness="5" springref="0.4"/></body></worldbody></mujoco>"#;
     let model = dynident_model::read_robot(text.to_owned(), std::path::Path::new("rod.xml")).unwrap().model;

@@ -1,5 +1,4 @@
-//! Every way in which limits can contradict themselves or a motion has its own message; no numbers make a panic or a
-//! NaN.
+//! Every contradiction of limits, with itself or with a motion, has its own message; no input causes a panic or NaN.
 
 use crate::common::{Harmonics, all_limits, grid, ur10};
 use dynident_excitation::Motion;
@@ -12,7 +11,7 @@ use dynident_model::sample::{Random, planar_2r};
 use dynident_model::{Body, InertialParameters, Link, Mat3, Model, Transform, Vec3};
 use proptest::prelude::*;
 
-/// The UR10's limits with one change, and the error they give.
+/// The UR10's limits with one change, and the resulting error.
 fn error_of(change: impl FnOnce(&mut Limits)) -> (LimitError, String) {
     let model = ur10();
     let mut limits = Limits::from_model(&model);
@@ -79,7 +78,7 @@ fn torque_limits_need_a_prior_of_what_the_joint_carries() {
     let limits = Limits::from_model(&model);
     let error = limits.validate(&model).unwrap_err();
     assert!(error.to_string().contains("wrist_1_link"), "{error}");
-    // The joints beyond the unknown body do not carry it.
+    // The joints beyond the body without inertia do not carry it.
     let mut beyond = limits.clone();
     for limit in &mut beyond.joints[..4] {
         limit.torque = None;
@@ -144,19 +143,19 @@ fn first_joint(limit: &JointLimit) -> Limits {
 #[test]
 fn too_fast_a_path_gives_its_smallest_stretch() {
     let (model, times, motion) = swing(0.5, 4.0, 0.0);
-    // Peaks: velocity 2, acceleration 8. Velocity asks for 2 / 1.6 = 1.25, acceleration for √(8 / 4.5) = 4/3.
+    // Peaks: velocity 2, acceleration 8. The velocity needs 2 / 1.6 = 1.25, the acceleration √(8 / 4.5) = 4/3.
     let limits = first_joint(&JointLimit { speed: Some(1.6), acceleration: Some(4.5), ..JointLimit::default() });
     let diagnosis = diagnose(&LimitSet::new(&limits, &model).unwrap(), &times, &motion);
     assert_eq!(diagnosis.broken.len(), 2);
     let [Relaxation::Stretch { factor, duration_s }] = diagnosis.relaxations[..] else { panic!("{diagnosis:?}") };
-    // 1 kHz samples of sin(4t) miss its top by (4e-3 / 2)² / 2 at most; the stretch takes the root of that.
+    // 1 kHz samples of sin(4t) miss its peak by at most (4e-3 / 2)² / 2, and the stretch by the root of that.
     assert!((factor - 4.0 / 3.0).abs() < 4e-6 && (duration_s - 4.0 * factor).abs() < 1e-12, "{factor}");
     let text = diagnosis.sentences().join(" ");
     assert!(text.contains("acceleration limit of `joint1`") && text.contains("1.3333 times as long"), "{text}");
 }
 
 #[test]
-fn a_single_broken_kind_gives_the_limit_that_would_do() {
+fn a_single_violated_kind_gives_the_sufficient_limit() {
     let (model, times, motion) = swing(0.5, 4.0, 0.7);
     let limits = first_joint(&JointLimit { position: Some([-1.0, 1.0]), ..JointLimit::default() });
     let diagnosis = diagnose(&LimitSet::new(&limits, &model).unwrap(), &times, &motion);
@@ -164,7 +163,7 @@ fn a_single_broken_kind_gives_the_limit_that_would_do() {
         panic!("a slower run does not fix a position: {diagnosis:?}")
     };
     assert!((changes[0].2 - 1.2).abs() < 1e-5, "{changes:?}");
-    // sin(4t) is at its top first at π/8 s, and again with the same value later.
+    // The first maximum of sin(4t) is at π/8 s; it repeats later.
     let phase = (diagnosis.broken[0].at_s * 4.0).rem_euclid(core::f64::consts::TAU);
     assert!((phase - core::f64::consts::FRAC_PI_2).abs() < 4e-3);
 }
@@ -193,7 +192,7 @@ fn a_stretch_leaves_gravity() {
     };
     assert!(worst(factor) <= 1.0 + 2e-6, "{}", worst(factor));
     assert!(worst(factor * 0.999) > 1.0 + 1e-6);
-    // Held out level, gravity alone (1 kg at 0.5 m and 1 kg at 1.5 m: 19.6 Nm) breaks 10 Nm at any velocity.
+    // Held horizontally, gravity alone (1 kg at 0.5 m and 1 kg at 1.5 m: 19.6 Nm) violates 10 Nm at any velocity.
     let (model, times, motion) = swing(0.2, 8.0, 0.0);
     let limits = first_joint(&JointLimit { torque: Some(10.0), position: Some([-0.1, 0.1]), ..JointLimit::default() });
     let diagnosis = diagnose(&LimitSet::new(&limits, &model).unwrap(), &times, &motion);
@@ -201,7 +200,7 @@ fn a_stretch_leaves_gravity() {
         panic!("neither a slower run nor one kind of limit alone fixes both: {diagnosis:?}")
     };
     assert!(diagnosis.sentences().last().unwrap().starts_with("No single change"), "{:?}", diagnosis.sentences());
-    // The position needs half a range of 0.2 rad at any velocity. Whatever the factor, the relaxed limits must hold by
+    // The position needs a half range of 0.2 rad at any velocity. For any factor, the relaxed limits must be kept by
     // the independent check ...
     let relaxed = |scale: f64| {
         let needed = |wanted| changes.iter().find(|(kind, _)| *kind == wanted).unwrap().1.2 * scale;
@@ -215,8 +214,8 @@ fn a_stretch_leaves_gravity() {
         reports.unwrap().iter().filter(|report| report.violated).count()
     };
     assert_eq!((relaxed(1.0 + 1e-5), relaxed(0.999)), (0, 2));
-    // ... and no factor on a fine grid has a smaller sum of relative changes. At a slower run the torque nears
-    // gravity's 19.6 Nm at the level.
+    // ... and no factor on a fine grid has a smaller sum of relative changes. In a slower run the torque approaches
+    // gravity's 19.6 Nm.
     let cost = |factor: f64| {
         let family =
             Harmonics { joints: vec![(0.0, [[0.2, 8.0 / factor, 0.0], [0.0; 3], [0.0; 3]]), (0.0, [[0.0; 3]; 3])] };
@@ -226,7 +225,7 @@ fn a_stretch_leaves_gravity() {
     };
     let found = cost(*factor);
     for k in 0..200 {
-        // The sampled peak is good to 1e-5.
+        // The sampled peak has an error of up to 1e-5.
         assert!(found <= cost(1.0 + 0.02 * f64::from(k)) + 1e-4, "{found} at {factor}, less at step {k}");
     }
 }
@@ -254,6 +253,8 @@ fn unknown_keys_are_refused_and_overlays_win_value_by_value() {
     assert!(toml::from_str::<Limits>("joints = [{ joint = \"a\", acceleraton = 3.0 }]").is_err());
     let over: Limits =
         toml::from_str("joints = [{ joint = \"elbow_joint\", acceleration = 10.0, speed = 1.0 }]").unwrap();
+    let collision: Limits = toml::from_str("self_collision = { radius_m = 0.05 }").unwrap();
+    assert_eq!(collision.self_collision.unwrap().min_overlap_share, 0.5);
     let model = ur10();
     let under = Limits::from_model(&model);
     let both = under.clone().overlaid(&over);

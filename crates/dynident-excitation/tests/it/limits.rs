@@ -1,4 +1,4 @@
-//! Values, derivatives, peaks and the re-check of all limits, on random trees and a real arm.
+//! Values, derivatives, peaks and the independent check of all limits, on random trees and a real arm.
 
 use crate::common::{Harmonics, all_limits, grid, palletizer, ur10};
 use dynident_excitation::Motion;
@@ -30,7 +30,7 @@ fn gradient_agrees(model: &Model, seed: u64, swept: bool) {
     let mut random = Random::new(seed);
     let mut motion = Motion::default();
     Harmonics::random(&mut random, model.dof(), 0.8).motion(&grid(1.0, 8), &mut motion);
-    // Each row alone in turn with random weights, so that no kind hides behind a larger one.
+    // Each row alone with random weights, so that a larger one does not hide it.
     for row in 0..set.constraints().len() {
         let mut weights = vec![0.0; set.constraints().len() * motion.samples];
         for weight in &mut weights[row * motion.samples..(row + 1) * motion.samples] {
@@ -79,8 +79,7 @@ fn the_adjoint_equals_central_differences() {
     }
 }
 
-/// Half a turn in one step, straight over the column: both samples stand outside, and only the way between them
-/// determines.
+/// Half a turn in one step across the column: both samples are outside, and only the path between them intersects it.
 #[test]
 fn a_column_is_seen_between_two_samples() {
     let model = ur10();
@@ -98,7 +97,7 @@ fn a_column_is_seen_between_two_samples() {
     set.values(&mut set.workspace(), &motion, &mut sampled);
     set.values(&mut workspace(&set, true), &motion, &mut swept);
     assert!(sampled.iter().all(|c| *c < 0.0), "{sampled:?}");
-    // A half turn takes the point to the other side of the axis: the way goes through it.
+    // Half a turn moves the point to the other side of the axis, through the column.
     assert!((swept[0] - 1.0).abs() < 1e-9 && swept[1] == sampled[1], "{swept:?}");
 }
 
@@ -136,10 +135,10 @@ fn check_agrees_with_the_values_and_peaks_bound_both() {
         }
         assert_eq!(sampled.keys().collect::<Vec<_>>(), checked.keys().collect::<Vec<_>>());
         for (key, c) in &sampled {
-            // The re-check's search for the distance of rods closes to 1e-8 of a rod's length; the rest is rounding.
+            // The distance of rods in the check converges to 1e-8 of a rod's length; the rest is rounding.
             let links = key.0 == LimitKind::SelfCollision;
             let tolerance = if links { 1e-6 } else { 1e-10 };
-            // Links that are far apart are all alike to a search.
+            // The search treats all large distances as equal.
             let expected = if links { (checked[key] - 1.0).max(-0.25) } else { checked[key] - 1.0 };
             assert!((expected - c).abs() < tolerance * (1.0 + c.abs()), "{key:?}: {} {c}", checked[key]);
         }
@@ -170,13 +169,13 @@ fn a_peak_between_samples_is_found_to_its_last_digits() {
     let limit = dynident_excitation::limits::JointLimit { joint: name, speed: Some(2.0), ..Default::default() };
     let limits = dynident_excitation::limits::Limits { joints: vec![limit], ..Default::default() };
     let set = LimitSet::new(&limits, &model).unwrap();
-    // q̇ = 3 cos(t - 1.234): the top, 1.5 times the limit, stands between the samples at 1 and 1.5 s.
+    // q̇ = 3 cos(t - 1.234): the maximum, 1.5 times the limit, is between the samples at 1 and 1.5 s.
     let family = Harmonics { joints: vec![(0.0, [[3.0, 1.0, -1.234], [0.0; 3], [0.0; 3]])] };
     let found = peaks(&set, &mut set.workspace(), &grid(3.0, 6), PeakSettings::default(), |times, out| {
         family.motion(times, out);
     });
     assert!((found[0].value - 0.5).abs() < 1e-12, "{found:?}");
-    // The place of a flat top is known to the square root of rounding.
+    // The time of a flat maximum is accurate to the square root of rounding.
     assert!((found[0].at_s - 1.234).abs() < 1e-6, "{found:?}");
     assert!((found[0].sampled - (1.5 * 0.234_f64.cos() - 1.0)).abs() < 1e-12, "{found:?}");
 }

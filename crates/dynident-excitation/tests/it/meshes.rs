@@ -1,5 +1,5 @@
-//! Collision shapes in mesh files: concave links that only their convex hulls hold together, COLLADA, and files that
-//! cannot be used. The meshes are written here.
+//! Collision shapes in mesh files: concave links whose convex hulls overlap, COLLADA, and unusable files. The tests
+//! write the meshes.
 
 use core::fmt::Write;
 use core::ops::ControlFlow;
@@ -14,7 +14,6 @@ use std::path::Path;
 
 const DURATION_S: f64 = 6.0;
 
-/// The surface of a box as corners of triangles.
 fn block(low: [f64; 3], high: [f64; 3]) -> Vec<[f64; 3]> {
     let corner = |k: usize| core::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] });
     let faces = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
@@ -33,7 +32,7 @@ fn stl(corners: &[[f64; 3]]) -> Vec<u8> {
     bytes
 }
 
-/// A COLLADA file in centimetres whose node turns x into z.
+/// A COLLADA file in centimetres whose node maps x to z.
 fn collada(corners_cm: &[[f64; 3]]) -> String {
     let numbers = corners_cm.iter().flatten().fold(String::new(), |mut text, x| {
         let _ = write!(text, "{x} ");
@@ -76,7 +75,7 @@ fn joint(name: &str, [parent, child]: [&str; 2], xyz: &str, axis: &str, range: f
     )
 }
 
-/// A robot and its limits as a study without any of its own has them.
+/// A robot and its limits for a study without limits.
 fn in_force(folder: &Path, description: &str, pieces: usize) -> (Model, LimitsInForce) {
     let model = dynident_model::read_urdf(&format!("<robot name=\"arm\">{description}</robot>")).unwrap().model;
     let shapes = ShapesOfLinks::of(&model, folder);
@@ -86,7 +85,7 @@ fn in_force(folder: &Path, description: &str, pieces: usize) -> (Model, LimitsIn
     (model, limits)
 }
 
-/// A small search; what the check finds, and where all bodies are at 50 Hz.
+/// Runs a small search; returns the result of the check, and calls `look` with the placements of all bodies at 50 Hz.
 fn designed(model: &Model, limits: &Limits, mut look: impl FnMut(&[Transform])) -> Vec<LimitReport> {
     let robot = ParametricModel::new(model.clone(), Vec::new()).unwrap();
     let family = Fourier::new(model.dof(), DURATION_S, &FourierSettings::default()).unwrap();
@@ -121,7 +120,7 @@ fn broken(reports: &[LimitReport]) -> Vec<&LimitReport> {
     reports.iter().filter(|report| report.violated).collect()
 }
 
-/// A bar that turns inside a channel: the channel's convex hull always holds it, its walls do not.
+/// A bar that turns inside a channel: the channel's convex hull always contains it, its walls do not.
 #[test]
 fn links_apart_by_their_meshes_only_are_kept_apart_and_move() {
     let folder = tempfile::tempdir().unwrap();
@@ -154,11 +153,11 @@ fn links_apart_by_their_meshes_only_are_kept_apart_and_move() {
     assert!(broken(&reports).is_empty(), "{:?}", broken(&reports));
     assert!(reports.iter().any(|report| report.joint == "base / bar"), "{reports:?}");
     assert!(widest < 0.08, "the bar reaches {widest} m, the walls are at 0.08 m");
-    // It does not stand still either.
+    // The bar moves.
     assert!(widest > 0.03, "{widest}");
 }
 
-/// A rod whose only shape is a COLLADA file could turn through the column that carries the arm.
+/// A rod whose only shape is a COLLADA file and that could turn through the column of the arm.
 #[test]
 fn a_rod_from_collada_stays_out_of_the_column() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Where no motion keeps all limits, the smallest change of one of them is known in closed form, and found.
+//! If no motion keeps all limits, the search finds the smallest change of one limit, which is known in closed form
+//! here.
 
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
 use dynident_excitation::criteria::DOptimal;
@@ -6,7 +7,7 @@ use dynident_excitation::families::{Fourier, FourierSettings};
 use dynident_excitation::limits::{FloorLimit, JointLimit, LimitKind, LimitSet, Limits, LinkPoint, Relaxation};
 use dynident_excitation::{DesignSettings, DesignTask, Family, single_changes};
 
-/// Two rods of 0.5 m that stand upright at zero.
+/// Two rods of 0.5 m that are vertical at zero.
 const ARM: &str = r#"<robot name="arm"><link name="base"/><link name="upper"/><link name="fore"/><link name="tip"/>
   <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
     <limit lower="1" upper="2" velocity="2" effort="100"/></joint>
@@ -48,12 +49,12 @@ fn a_floor_that_is_too_high_is_lowered_to_what_the_arm_can_keep() {
     let settings = DesignSettings { search_samples: Some(33), ..DesignSettings::default() };
     let found = single_changes(&task, &settings, &parameters, &|| false).unwrap();
     let Some(Relaxation::OtherMotion { kind: LimitKind::Floor, changes }) = found.first() else { panic!("{found:?}") };
-    // With the shoulder at 1 rad and the forearm upright the tip is highest; the search stops within a hundredth of the
-    // missing height and what it leaves on samples.
+    // The tip is highest with the shoulder at 1 rad and the forearm vertical. The search stops within a hundredth of
+    // the missing height and its tolerance on samples.
     let highest = 0.5 * 1.0_f64.cos() + 0.5;
     let (_, now, needed, _) = &changes[0];
     assert_eq!(*now, 0.9);
     assert!(*needed < highest + 1e-6 && *needed > highest - 0.02, "{needed} for {highest}");
-    // Nothing is changed where nothing need be.
+    // A stopped search returns no change.
     assert!(single_changes(&task, &settings, &parameters, &|| true).unwrap().is_empty());
 }

@@ -1,4 +1,4 @@
-//! Computed torque.
+//! Computed torque controller.
 
 use super::{Controller, ControllerModel, FrictionCompensation, Measured, Target};
 use crate::error::SimulationError;
@@ -14,26 +14,26 @@ pub(super) const NAME: &str = "computed-torque";
 pub struct ComputedTorqueSettings {
     /// K_p, 1/s².
     pub kp: PerJoint,
-    /// K_d, 1/s; `2 √K_p` damps critically.
+    /// K_d, 1/s; `2 √K_p` is critical damping.
     pub kd: PerJoint,
-    /// Which friction of the model is compensated; default at the reference's velocity.
+    /// Compensated friction of the model; default at the velocity of the reference.
     #[serde(default)]
     pub friction: FrictionCompensation,
 }
 
 impl ComputedTorqueSettings {
-    /// Checks the gains for so many joints.
+    /// Checks the gains for a number of joints.
     ///
     /// # Errors
-    /// Gains that are negative or not finite, lists of another length.
+    /// Gains that are negative or not finite, lists of the wrong length.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.kp.gains("kp", joints)?;
         self.kd.gains("kd", joints).map(|_| ())
     }
 }
 
-/// `τ = M̂(q)(q̈_d + K_p e + K_d ė) + ĥ(q, q̇) + friction`: with an exact model every joint's error obeys `ë + K_d ė +
-/// K_p e = 0` (Luh, Walker and Paul 1980).
+/// `τ = M̂(q)(q̈_d + K_p e + K_d ė) + ĥ(q, q̇) + friction`: with an exact model the error of every joint satisfies `ë +
+/// K_d ė + K_p e = 0` (Luh, Walker and Paul 1980).
 #[derive(Clone, Debug)]
 pub struct ComputedTorque {
     model: ControllerModel,
@@ -43,10 +43,10 @@ pub struct ComputedTorque {
 }
 
 impl ComputedTorque {
-    /// The controller with a model.
+    /// Creates the controller with a model.
     ///
     /// # Errors
-    /// As [`ComputedTorqueSettings::validate`].
+    /// Errors of [`ComputedTorqueSettings::validate`].
     pub fn new(model: ControllerModel, settings: &ComputedTorqueSettings) -> Result<Self, SimulationError> {
         let joints = model.dof();
         let gains = [settings.kp.gains("kp", joints)?, settings.kd.gains("kd", joints)?];

@@ -1,4 +1,4 @@
-//! The paper's controller: computed torque with fractional powers of the errors.
+//! Finite-time controller of the paper: computed torque with fractional powers of the errors.
 
 use super::{Controller, ControllerModel, FrictionCompensation, Measured, Target};
 use crate::error::{SimulationError, require};
@@ -13,20 +13,20 @@ pub(super) const LITERAL_NAME: &str = "finite-time-literal";
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FiniteTimeSettings {
-    /// K_p of the power α₁ of the position error. The paper: 2 and 4.
+    /// Gain K_p of the power α₁ of the position error. The paper uses 2 and 4.
     pub kp: PerJoint,
-    /// K_d of the power α₂ of the velocity error. The paper: 20 and 4.
+    /// Gain K_d of the power α₂ of the velocity error. The paper uses 20 and 4.
     pub kd: PerJoint,
-    /// α₁, above 0 and at most 1 (1 is computed torque); default 0.7. `α₂ = 2 α₁/(1 + α₁)`.
+    /// Exponent α₁, above 0 and at most 1 (1 is computed torque); default 0.7. `α₂ = 2 α₁/(1 + α₁)`.
     #[serde(default = "alpha_1")]
     pub alpha: f64,
-    /// Position error below which the power becomes linear, rad (m); default 1e-3. Zero leaves the power as it is.
+    /// Position error below which the power is replaced by a line, rad (m); default 1e-3. Zero disables the line.
     #[serde(default = "blend")]
     pub blend_position: f64,
-    /// Velocity error below which the power becomes linear, rad/s (m/s); default 1e-2.
+    /// Velocity error below which the power is replaced by a line, rad/s (m/s); default 1e-2.
     #[serde(default = "blend_speed")]
     pub blend_speed: f64,
-    /// Which friction of the model is compensated; default at the reference's velocity.
+    /// Compensated friction of the model; default at the velocity of the reference.
     #[serde(default)]
     pub friction: FrictionCompensation,
 }
@@ -44,7 +44,7 @@ fn blend_speed() -> f64 {
 }
 
 impl FiniteTimeSettings {
-    /// The settings with these gains, else the defaults.
+    /// Settings with these gains and default values otherwise.
     pub fn with_gains(kp: impl Into<PerJoint>, kd: impl Into<PerJoint>) -> Self {
         Self {
             kp: kp.into(),
@@ -56,11 +56,11 @@ impl FiniteTimeSettings {
         }
     }
 
-    /// Checks the numbers for so many joints.
+    /// Checks the settings for a number of joints.
     ///
     /// # Errors
-    /// Gains that are negative or not finite, lists of another length, α₁ outside (0, 1], a blend that is negative or
-    /// not finite.
+    /// Gains that are negative or not finite, lists of the wrong length, α₁ outside (0, 1], a linear range that is
+    /// negative or not finite.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.kp.gains("kp", joints)?;
         self.kd.gains("kd", joints)?;
@@ -74,14 +74,13 @@ impl FiniteTimeSettings {
 
 /// `τ = M̂(q)(q̈_d + K_p Sig(e)^α₁ + K_d Sig(ė)^α₂) + Ĉ q̇ + ĝ`, `Sig(x)^α = |x|^α sign(x)`, `e = q_d - q`.
 ///
-/// Eq. 23 of the paper with its two signs fixed (as printed, with `e = q_d - q`, the feedback is positive:
-/// [`literal`](Self::literal)) and `α₂ = 2 α₁/(1 + α₁)`, of which the paper's formula is a misprint. With an exact
-/// model in continuous time the errors vanish in finite time (Su and Zheng, RCIM 27 (2011) 550; Bhat and Bernstein
-/// 2000).
+/// Eq. 23 of the paper with two corrected signs (as printed, with `e = q_d - q`, the feedback is positive:
+/// [`literal`](Self::literal)) and `α₂ = 2 α₁/(1 + α₁)`, which is misprinted in the paper. With an exact model in
+/// continuous time the errors vanish in finite time (Su and Zheng, RCIM 27 (2011) 550; Bhat and Bernstein 2000).
 ///
 /// The gain `K_p |e|^(α-1)` is infinite at zero, so that a sampled law ends in a limit cycle of about `(K_p
-/// dt²)^(1/(1-α₁))`. Inside `|x| < ε` the power is therefore replaced by the straight line that meets it at ε, `ε^(α-1)
-/// x`: continuous, and as stiff there as the power at ε.
+/// dt²)^(1/(1-α₁))`. Inside `|x| < ε` the power is therefore replaced by the line `ε^(α-1) x`, which is continuous at ε
+/// and as stiff as the power there.
 #[derive(Clone, Debug)]
 pub struct FiniteTime {
     model: ControllerModel,
@@ -92,7 +91,7 @@ pub struct FiniteTime {
     acceleration: Vec<f64>,
 }
 
-/// `Sig(x)^α` with its straight middle.
+/// `Sig(x)^α` with a linear middle.
 #[derive(Clone, Copy, Debug)]
 struct Power {
     alpha: f64,
@@ -102,7 +101,7 @@ struct Power {
 
 impl Power {
     fn new(alpha: f64, blend: f64) -> Self {
-        // At α = 1 the line is the power; without a blend the line is never used.
+        // At α = 1 the line equals the power; a linear range of zero is never used.
         Self { alpha, blend, slope: if blend > 0.0 { blend.powf(alpha - 1.0) } else { 0.0 } }
     }
 
@@ -112,10 +111,10 @@ impl Power {
 }
 
 impl FiniteTime {
-    /// The controller with a model.
+    /// Creates the controller with a model.
     ///
     /// # Errors
-    /// As [`FiniteTimeSettings::validate`].
+    /// Errors of [`FiniteTimeSettings::validate`].
     pub fn new(model: ControllerModel, settings: &FiniteTimeSettings) -> Result<Self, SimulationError> {
         let joints = model.dof();
         settings.validate(joints)?;
@@ -130,10 +129,10 @@ impl FiniteTime {
         })
     }
 
-    /// The law with the minus signs of Eq. 23: unstable, to be shown as that.
+    /// The law with the minus signs of Eq. 23, which is unstable; for demonstration.
     ///
     /// # Errors
-    /// As [`FiniteTimeSettings::validate`].
+    /// Errors of [`FiniteTimeSettings::validate`].
     pub fn literal(model: ControllerModel, settings: &FiniteTimeSettings) -> Result<Self, SimulationError> {
         Ok(Self { sign: -1.0, ..Self::new(model, settings)? })
     }
@@ -178,7 +177,7 @@ mod tests {
         let power = Power::new(0.7, 1e-3);
         assert!((power.of(0.5) - 0.5_f64.powf(0.7)).abs() < 1e-15);
         assert_eq!(power.of(-0.5), -power.of(0.5));
-        // Meets at ε: the step is one ulp of x times the slope.
+        // Continuous at ε: the step is one ulp of x times the slope.
         assert!((power.of(1e-3) - power.of(1e-3 * (1.0 - 1e-15))).abs() < 1e-15);
         assert!((power.of(1e-4) - 0.1 * power.of(1e-3)).abs() < 1e-15);
         assert_eq!(Power::new(0.7, 0.0).of(0.0), 0.0);

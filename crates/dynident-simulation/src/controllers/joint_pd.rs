@@ -1,4 +1,4 @@
-//! A proportional and derivative controller of every joint by itself.
+//! Independent proportional-derivative controller of every joint.
 
 use super::{Controller, Measured, Target};
 use crate::error::SimulationError;
@@ -19,10 +19,10 @@ pub struct JointPdSettings {
 }
 
 impl JointPdSettings {
-    /// Checks the gains for so many joints.
+    /// Checks the gains for a number of joints.
     ///
     /// # Errors
-    /// Gains that are negative or not finite, lists of another length.
+    /// Gains that are negative or not finite, lists of the wrong length.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.gains(joints).map(|_| ())
     }
@@ -32,17 +32,17 @@ impl JointPdSettings {
     }
 }
 
-/// `τ = K_p (q_d - q) + K_d (q̇_d - q̇)`: needs no model.
+/// `τ = K_p (q_d - q) + K_d (q̇_d - q̇)`, without a model.
 #[derive(Clone, Debug)]
 pub struct JointPd {
     gains: [Vec<f64>; 2],
 }
 
 impl JointPd {
-    /// The controller of so many joints.
+    /// Creates the controller for a number of joints.
     ///
     /// # Errors
-    /// As [`JointPdSettings::validate`].
+    /// Errors of [`JointPdSettings::validate`].
     pub fn new(joints: usize, settings: &JointPdSettings) -> Result<Self, SimulationError> {
         Ok(Self { gains: settings.gains(joints)? })
     }

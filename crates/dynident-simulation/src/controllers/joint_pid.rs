@@ -1,4 +1,4 @@
-//! Joint PD with the integral of the error, as drives have it.
+//! Joint PD with the integral of the error, as in many drives.
 
 use super::{Controller, Measured, Target};
 use crate::error::SimulationError;
@@ -18,37 +18,36 @@ pub struct JointPidSettings {
     pub ki: PerJoint,
     /// K_d, Nm s/rad (N s/m).
     pub kd: PerJoint,
-    /// Largest torque of the integral, Nm (N): it stops growing there. Default none.
+    /// Maximum torque of the integral, Nm (N). Default unlimited.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub integral_limit: Option<PerJoint>,
 }
 
 impl JointPidSettings {
-    /// Checks the gains for so many joints.
+    /// Checks the gains for a number of joints.
     ///
     /// # Errors
-    /// Gains that are negative or not finite, lists of another length.
+    /// Gains that are negative or not finite, lists of the wrong length.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         JointPid::new(joints, self).map(|_| ())
     }
 }
 
-/// `τ = K_p e + K_i ∫ e dt + K_d ė` with `e = q_d - q`; the integral by the trapezoidal rule from sample to sample.
+/// `τ = K_p e + K_i ∫ e dt + K_d ė` with `e = q_d - q`; trapezoidal integration between samples.
 #[derive(Clone, Debug)]
 pub struct JointPid {
     gains: [Vec<f64>; 3],
     limit: Vec<f64>,
-    /// Torque of the integral.
     integral: Vec<f64>,
     last_error: Vec<f64>,
     last_time_s: Option<f64>,
 }
 
 impl JointPid {
-    /// The controller of so many joints.
+    /// Creates the controller for a number of joints.
     ///
     /// # Errors
-    /// As [`JointPidSettings::validate`].
+    /// Errors of [`JointPidSettings::validate`].
     pub fn new(joints: usize, settings: &JointPidSettings) -> Result<Self, SimulationError> {
         let gains =
             [settings.kp.gains("kp", joints)?, settings.ki.gains("ki", joints)?, settings.kd.gains("kd", joints)?];

@@ -1,4 +1,4 @@
-//! Controllers that run at a fixed rate: the trait, and the registry of all that are offered.
+//! Controllers that run at a fixed rate: the trait, and the registry of the available ones.
 
 mod computed_torque;
 mod finite_time;
@@ -21,7 +21,7 @@ pub use slotine_li::{SlotineLi, SlotineLiSettings};
 use crate::error::SimulationError;
 use serde::{Deserialize, Serialize};
 
-/// What a joint controller should follow at one moment: rad, rad/s, rad/s² (m).
+/// Target of a joint controller at one time: rad, rad/s, rad/s² (m).
 #[derive(Clone, Copy, Debug)]
 pub struct Target<'a> {
     /// Positions.
@@ -32,7 +32,7 @@ pub struct Target<'a> {
     pub ddq: &'a [f64],
 }
 
-/// What a joint controller sees at one moment: rad, rad/s (m).
+/// Measurement of a joint controller at one time: rad, rad/s (m).
 #[derive(Clone, Copy, Debug)]
 pub struct Measured<'a> {
     /// Positions.
@@ -41,34 +41,34 @@ pub struct Measured<'a> {
     pub dq: &'a [f64],
 }
 
-/// A controller of joint torques. It is called once a sample, in the order of time; torque limits are the loop's
-/// business.
+/// A controller of joint torques. It is called once per sample, in the order of time; the loop applies the torque
+/// limits.
 pub trait Controller: core::fmt::Debug + Send {
-    /// Its name in study files and results.
+    /// Name of the controller in study files and results.
     fn name(&self) -> &'static str;
 
     /// Number of joints.
     fn joints(&self) -> usize;
 
-    /// Forgets the run so far: integrals and adapted parameters go back to their start.
+    /// Resets integrals and adapted parameters.
     fn reset(&mut self);
 
-    /// The drives' torques at `time_s`, Nm (N). Allocates nothing.
+    /// Computes the torques of the drives at `time_s`, Nm (N), without allocation.
     ///
     /// # Panics
-    /// If a vector has not one entry per joint.
+    /// If a vector does not have one entry per joint.
     fn torque(&mut self, time_s: f64, target: Target<'_>, measured: Measured<'_>, tau: &mut [f64]);
 
-    /// Takes another model for the next run. Controllers without a model ignore it.
+    /// Replaces the model for the next run. Controllers without a model ignore it.
     ///
     /// # Errors
-    /// A model of another number of joints.
+    /// A model with another number of joints.
     fn set_model(&mut self, _model: &ControllerModel) -> Result<(), SimulationError> {
         Ok(())
     }
 }
 
-/// The registry: what a study file may ask for under `controller`.
+/// Registry of controllers: values of `controller` in a study file.
 ///
 /// ```
 /// use dynident_simulation::controllers::ControllerSettings;
@@ -85,25 +85,24 @@ pub trait Controller: core::fmt::Debug + Send {
 pub enum ControllerSettings {
     /// [`JointPd`]: `τ = K_p e + K_d ė`.
     JointPd(JointPdSettings),
-    /// [`JointPid`]: with the error's integral.
+    /// [`JointPid`]: PD with the integral of the error.
     JointPid(JointPidSettings),
-    /// [`PdGravity`]: joint PD and the model's gravity torque.
+    /// [`PdGravity`]: joint PD and the gravity torque of the model.
     PdGravity(JointPdSettings),
     /// [`ComputedTorque`]: `τ = M̂ (q̈_d + K_p e + K_d ė) + ĥ`.
     ComputedTorque(ComputedTorqueSettings),
-    /// [`FiniteTime`]: the paper's law, with its signs fixed.
+    /// [`FiniteTime`]: the paper's law with corrected signs.
     FiniteTime(FiniteTimeSettings),
-    /// [`FiniteTime`] with the signs as Eq. 23 prints them: it drives the joints away from the path, and is here to
-    /// show that.
+    /// [`FiniteTime`] with the signs as printed in Eq. 23, for demonstration: it is unstable.
     FiniteTimeLiteral(FiniteTimeSettings),
-    /// [`SlotineLi`]: passivity-based, adaptive if asked.
+    /// [`SlotineLi`]: passivity-based, optionally adaptive.
     SlotineLi(SlotineLiSettings),
-    /// [`PositionLoop`]: the loop of the robot's own drives, with torque fed forward or with nothing but a path.
+    /// [`PositionLoop`]: the position loop of the robot's drives, with torque feed-forward or only with a path.
     PositionLoop(PositionLoopSettings),
 }
 
 impl ControllerSettings {
-    /// The name in files.
+    /// Name in files.
     pub fn name(&self) -> &'static str {
         match self {
             Self::JointPd(_) => joint_pd::NAME,
@@ -117,7 +116,7 @@ impl ControllerSettings {
         }
     }
 
-    /// Whether it needs a model of the robot.
+    /// Whether the controller needs a model of the robot.
     pub fn needs_model(&self) -> bool {
         match self {
             Self::JointPd(_) | Self::JointPid(_) => false,
@@ -130,7 +129,7 @@ impl ControllerSettings {
         }
     }
 
-    /// Whether its law is known here: that of a robot's own loop is only where its gains are stated.
+    /// Whether the control law is known; that of a robot's own loop is known only if its gains are stated.
     pub fn can_be_simulated(&self) -> bool {
         match self {
             Self::PositionLoop(settings) => settings.can_be_simulated(),
@@ -144,10 +143,10 @@ impl ControllerSettings {
         }
     }
 
-    /// Checks the numbers for so many joints.
+    /// Checks the settings for a number of joints.
     ///
     /// # Errors
-    /// Gains that are negative or not finite, lists of another length, exponents outside of their range.
+    /// Gains that are negative or not finite, lists of the wrong length, exponents out of range.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         match self {
             Self::JointPd(settings) | Self::PdGravity(settings) => settings.validate(joints),
@@ -159,10 +158,10 @@ impl ControllerSettings {
         }
     }
 
-    /// The controller of so many joints, with the model it needs.
+    /// Creates the controller for a number of joints, with the model if it needs one.
     ///
     /// # Errors
-    /// As [`validate`](Self::validate); [`SimulationError::NoModel`]; a model of another number of joints.
+    /// Errors of [`validate`](Self::validate); [`SimulationError::NoModel`]; a model with another number of joints.
     pub fn build(
         &self,
         joints: usize,

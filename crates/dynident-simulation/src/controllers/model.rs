@@ -1,4 +1,4 @@
-//! What a controller believes of the robot.
+//! Robot model of a controller.
 
 use super::{Measured, Target};
 use crate::error::{SimulationError, require, require_length};
@@ -7,23 +7,23 @@ use dynident_model::terms::{HysteresisState, JointMotion, TermInput, TorqueTerm}
 use dynident_model::{InertialParameters, Model};
 use serde::{Deserialize, Serialize};
 
-/// At which velocity a controller takes the friction of its model.
+/// Velocity at which a controller evaluates the friction of its model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum FrictionCompensation {
-    /// Not at all.
+    /// No friction compensation.
     None,
-    /// At the reference's: no noise and no feedback by friction.
+    /// Velocity of the reference: no noise and no feedback by friction.
     #[default]
     Reference,
-    /// At the measured: right while the joint lags, but a sign of a noisy velocity chatters.
+    /// Measured velocity: correct while the joint lags, but the sign of a noisy velocity chatters.
     Measured,
 }
 
 /// A robot model for control: bodies and terms with their parameters. Torques are linear in the parameters, so that a
-/// vector of base parameters alone is enough: see [`from_columns`](Self::from_columns). It need not be physically
-/// consistent.
+/// vector of base parameters is sufficient: see [`from_columns`](Self::from_columns). The parameters need not be
+/// physically consistent.
 pub struct ControllerModel {
     model: Model,
     terms: Vec<(TorqueTerm, f64)>,
@@ -49,10 +49,10 @@ impl Clone for ControllerModel {
 }
 
 impl ControllerModel {
-    /// The model with its own inertial parameters, and terms with theirs.
+    /// Creates the model from the inertial parameters of `model`, and terms with their parameters.
     ///
     /// # Errors
-    /// Counts that differ, numbers that are not finite, terms of joints that do not exist.
+    /// Different lengths, values that are not finite, terms of missing joints.
     pub fn new(model: &Model, terms: &[TorqueTerm], term_parameters: &[f64]) -> Result<Self, SimulationError> {
         require_length("parameters of terms", terms.len(), term_parameters.len())?;
         for (term, &value) in terms.iter().zip(term_parameters) {
@@ -64,11 +64,11 @@ impl ControllerModel {
         Ok(Self::assembled(model.clone(), terms.iter().cloned().zip(term_parameters.iter().copied()).collect()))
     }
 
-    /// The model with a vector of parameters: ten for each body from base to tip, then one for each term. Links and
-    /// lengths are `model`'s.
+    /// Creates the model from a vector of parameters: ten for each body from base to tip, then one for each term. The
+    /// geometry is that of `model`.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Errors of [`new`](Self::new).
     pub fn from_parameters(model: &Model, terms: &[TorqueTerm], parameters: &[f64]) -> Result<Self, SimulationError> {
         let bodies = model.inertial_count();
         require_length("parameters", bodies + terms.len(), parameters.len())?;
@@ -79,12 +79,12 @@ impl ControllerModel {
         Self::new(&model.with_inertials(&inertials)?, terms, &parameters[bodies..])
     }
 
-    /// The model with values of some columns of the regressor and zeros elsewhere, as an estimate of base parameters
-    /// gives them ([`BaseParameters::base_columns`](dynident_dynamics::BaseParameters::base_columns)): its torques are
-    /// exactly `W θ`.
+    /// Creates the model from values of some columns of the regressor, with zeros elsewhere, for example from an
+    /// estimate of base parameters ([`BaseParameters::base_columns`](dynident_dynamics::BaseParameters::base_columns)).
+    /// Its torques are exactly `W θ`.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Errors of [`new`](Self::new).
     pub fn from_columns(model: &Model, columns: &[Column], values: &[f64]) -> Result<Self, SimulationError> {
         require_length("values of columns", columns.len(), values.len())?;
         let mut inertials = vec![InertialParameters::ZERO; model.body_count()];
@@ -121,7 +121,7 @@ impl ControllerModel {
         self.zeros.len()
     }
 
-    /// The bodies.
+    /// Model of the bodies.
     pub fn model(&self) -> &Model {
         &self.model
     }
@@ -136,21 +136,22 @@ impl ControllerModel {
         self.model.parameter_vector().into_iter().chain(self.terms.iter().map(|(_, value)| *value)).collect()
     }
 
-    /// That the model has so many joints.
+    /// Checks the number of joints of the model.
     ///
     /// # Errors
-    /// If it has not.
+    /// A different number of joints.
     pub fn check_joints(&self, joints: usize) -> Result<(), SimulationError> {
         require_length("joints of the controller's model", joints, self.dof())
     }
 
-    /// Springs of friction are undeflected.
+    /// Resets the deflection of friction springs.
     pub(crate) fn restart(&mut self) {
         self.memories.iter_mut().for_each(HysteresisState::restart);
     }
 
-    /// `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, and the torques of the terms: inertia,
-    /// offset and declared torques always, these at the measured motion as the bodies', friction as asked.
+    /// Computes `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, plus the torques of the terms.
+    /// Inertia, offset and declared torques are always included; declared torques use the measured motion, friction the
+    /// selected velocity.
     pub fn torque(
         &mut self,
         measured: Measured<'_>,
@@ -188,13 +189,13 @@ impl ControllerModel {
         }
     }
 
-    /// The torques that a motion asks for, with all terms.
+    /// Computes the torques of a motion, with all terms.
     pub fn reference_torque(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &mut [f64]) {
         let (measured, target) = (Measured { q, dq }, Target { q, dq, ddq });
         self.torque(measured, target, ddq, FrictionCompensation::Reference, tau);
     }
 
-    /// `ĝ(q)`, constant torques, and declared ones at rest.
+    /// Computes `ĝ(q)`, constant torques, and declared torques at rest.
     pub(crate) fn gravity(&mut self, q: &[f64], out: &mut [f64]) {
         out.copy_from_slice(gravity_torque(&self.model, &mut self.workspace, q));
         let motion = JointMotion { samples: 1, q, dq: &self.zeros, ddq: &self.zeros };

@@ -5,8 +5,8 @@ use crate::error::SimulationError;
 
 pub(super) const NAME: &str = "pd-gravity";
 
-/// `τ = K_p e + K_d ė + ĝ(q)`: holds any posture without error where ĝ is right (Takegaki and Arimoto 1981). Constant
-/// torques of the model's terms belong to ĝ.
+/// `τ = K_p e + K_d ė + ĝ(q)`: holds any posture without error if ĝ is correct (Takegaki and Arimoto 1981). ĝ includes
+/// constant torques of the model's terms.
 #[derive(Clone, Debug)]
 pub struct PdGravity {
     pd: JointPd,
@@ -15,10 +15,10 @@ pub struct PdGravity {
 }
 
 impl PdGravity {
-    /// The controller with a model.
+    /// Creates the controller with a model.
     ///
     /// # Errors
-    /// As [`JointPdSettings::validate`].
+    /// Errors of [`JointPdSettings::validate`].
     pub fn new(model: ControllerModel, settings: &JointPdSettings) -> Result<Self, SimulationError> {
         let joints = model.dof();
         Ok(Self { pd: JointPd::new(joints, settings)?, gravity: vec![0.0; joints], model })

@@ -1,4 +1,4 @@
-//! The position loop that a robot's drives have themselves, with or without torque (or current) fed forward.
+//! Position loop of the robot's drives, with or without feed-forward of torque (or current).
 
 use super::{Controller, ControllerModel, FrictionCompensation, JointPd, JointPdSettings, Measured, Target};
 use crate::error::SimulationError;
@@ -12,14 +12,14 @@ pub(super) const NAME: &str = "position-loop";
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PositionLoopSettings {
-    /// Whether the model's torque along the reference is handed to the drives; true by default. Without it they get
-    /// nothing but a path.
+    /// Whether the drives get the model's torque along the reference as feed-forward; default true. Otherwise they get
+    /// only the path.
     #[serde(default = "fed_forward")]
     pub feed_forward: bool,
-    /// What the loop's stiffness is believed to be, Nm/rad (N/m), for simulations. The robot's own is in force.
+    /// Assumed stiffness of the loop, Nm/rad (N/m), for simulations. It does not change the robot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kp: Option<PerJoint>,
-    /// The same of its damping, Nm s/rad (N s/m).
+    /// Assumed damping of the loop, Nm s/rad (N s/m).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kd: Option<PerJoint>,
 }
@@ -29,17 +29,17 @@ fn fed_forward() -> bool {
 }
 
 impl PositionLoopSettings {
-    /// The drives' own loop, with the model's torque or with nothing but a path.
+    /// The drives' own loop without stated gains.
     pub fn of_robot(feed_forward: bool) -> Self {
         Self { feed_forward, kp: None, kd: None }
     }
 
-    /// Checks the gains for so many joints, if they are stated.
+    /// Checks the stated gains for a number of joints.
     ///
     /// # Errors
-    /// Gains that are negative or not finite, lists of another length.
+    /// Gains that are negative or not finite, lists of the wrong length.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
-        self.believed().map_or(Ok(()), |gains| gains.validate(joints))
+        self.stated_gains().map_or(Ok(()), |gains| gains.validate(joints))
     }
 
     /// Whether both gains are stated.
@@ -47,8 +47,8 @@ impl PositionLoopSettings {
         self.kp.is_some() && self.kd.is_some()
     }
 
-    /// What is stated, none elsewhere.
-    fn believed(&self) -> Option<JointPdSettings> {
+    /// The stated gains; a missing one is zero.
+    fn stated_gains(&self) -> Option<JointPdSettings> {
         let none = || PerJoint::All(0.0);
         (self.kp.is_some() || self.kd.is_some()).then(|| JointPdSettings {
             kp: self.kp.clone().unwrap_or_else(none),
@@ -57,9 +57,8 @@ impl PositionLoopSettings {
     }
 }
 
-/// The loop as it is believed to be, `τ = K_p e + K_d ė + τ̂(q_d, q̇_d, q̈_d)` with the model's torque along the
-/// reference where it is fed forward. On a robot it runs in the drives: what is handed over is the path, and that
-/// torque.
+/// Model of the loop, `τ = K_p e + K_d ė + τ̂(q_d, q̇_d, q̈_d)`, with the model's torque along the reference as
+/// optional feed-forward. On a robot the loop runs in the drives, which get the path and this torque.
 #[derive(Clone, Debug)]
 pub struct PositionLoop {
     pd: JointPd,
@@ -68,16 +67,16 @@ pub struct PositionLoop {
 }
 
 impl PositionLoop {
-    /// The loop of so many joints; `model` is what is fed forward.
+    /// Creates the loop for a number of joints; `model` computes the feed-forward.
     ///
     /// # Errors
-    /// Gains that are not stated, or as [`PositionLoopSettings::validate`].
+    /// Gains that are not stated, or errors of [`PositionLoopSettings::validate`].
     pub fn new(
         joints: usize,
         settings: &PositionLoopSettings,
         model: Option<ControllerModel>,
     ) -> Result<Self, SimulationError> {
-        let Some(gains) = settings.believed().filter(|_| settings.can_be_simulated()) else {
+        let Some(gains) = settings.stated_gains().filter(|_| settings.can_be_simulated()) else {
             return Err(SimulationError::OwnLoop);
         };
         Ok(Self { pd: JointPd::new(joints, &gains)?, model, ahead: vec![0.0; joints] })

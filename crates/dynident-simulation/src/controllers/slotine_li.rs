@@ -1,4 +1,4 @@
-//! Slotine and Li's passivity-based controller, adaptive if asked.
+//! Passivity-based controller of Slotine and Li, optionally adaptive.
 
 use super::{Controller, ControllerModel, FrictionCompensation, Measured, Target};
 use crate::error::{SimulationError, require};
@@ -19,19 +19,19 @@ pub struct SlotineLiSettings {
     pub lambda: PerJoint,
     /// K_D, Nm s/rad (N s/m).
     pub kd: PerJoint,
-    /// Γ: how fast every parameter is adapted, in the parameter's unit squared per joule. Default 0, no adaptation.
+    /// Adaptation gain Γ of every parameter, in the parameter's unit squared per joule. Default 0: no adaptation.
     #[serde(default)]
     pub gamma: f64,
-    /// Which friction of the model is compensated; default at the reference's velocity.
+    /// Compensated friction of the model; default at the velocity of the reference.
     #[serde(default)]
     pub friction: FrictionCompensation,
 }
 
 impl SlotineLiSettings {
-    /// Checks the numbers for so many joints.
+    /// Checks the settings for a number of joints.
     ///
     /// # Errors
-    /// Gains that are negative or not finite, lists of another length.
+    /// Gains that are negative or not finite, lists of the wrong length.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.lambda.gains("lambda", joints)?;
         self.kd.gains("kd", joints)?;
@@ -40,17 +40,17 @@ impl SlotineLiSettings {
     }
 }
 
-/// `τ = Y(q, q̇, q̇_r, q̈_r) θ̂ + K_D s` with `s = ė + Λ e`, `q̇_r = q̇_d + Λ e`, `q̈_r = q̈_d + Λ ė`; adapted by
-/// `θ̂' = Γ Yᵀ s` (Slotine and Li, IJRR 6 (1987) 49).
+/// `τ = Y(q, q̇, q̇_r, q̈_r) θ̂ + K_D s` with `s = ė + Λ e`, `q̇_r = q̇_d + Λ e`, `q̈_r = q̈_d + Λ ė`; adaptation `θ̂'
+/// = Γ Yᵀ s` (Slotine and Li, IJRR 6 (1987) 49).
 ///
-/// `Y` holds `C(q, q̇) q̇_r` with Christoffel's C, so that `Ṁ - 2C` is skew. That product is the symmetric bilinear
-/// form of the centrifugal torques, `C(q, u) v = c((u + v)/2) - c((u - v)/2)` with `c(w) = C(q, w) w`, and so a
-/// difference of two ordinary regressors. Adapted parameters start from the model's at every run and are those of the
-/// bodies, then of the terms. Load-dependent friction is left out: its torque is not linear in the parameters.
+/// `Y` contains `C(q, q̇) q̇_r` with C from the Christoffel symbols, so that `Ṁ - 2C` is skew-symmetric. This product
+/// is the symmetric bilinear form of the centrifugal torques, `C(q, u) v = c((u + v)/2) - c((u - v)/2)` with `c(w) =
+/// C(q, w) w`, that is a difference of two ordinary regressors. The adapted parameters (bodies, then terms) start from
+/// the model in every run. Load-dependent friction is omitted, because its torque is not linear in the parameters.
 #[derive(Debug)]
 pub struct SlotineLi {
     start: ControllerModel,
-    /// Without gravity: for the centrifugal torques.
+    /// Model without gravity, for the centrifugal torques.
     weightless: Model,
     gains: [Vec<f64>; 2],
     gamma: f64,
@@ -58,17 +58,17 @@ pub struct SlotineLi {
     workspace: Workspace,
     parameters: Vec<f64>,
     memories: Vec<HysteresisState>,
-    /// dof rows of Y.
+    /// Regressor Y, row-major, one row per joint.
     regressor: Vec<f64>,
     vectors: [Vec<f64>; 5],
     last_time_s: Option<f64>,
 }
 
 impl SlotineLi {
-    /// The controller with a model.
+    /// Creates the controller with a model.
     ///
     /// # Errors
-    /// As [`SlotineLiSettings::validate`].
+    /// Errors of [`SlotineLiSettings::validate`].
     pub fn new(model: ControllerModel, settings: &SlotineLiSettings) -> Result<Self, SimulationError> {
         let joints = model.dof();
         settings.validate(joints)?;
@@ -88,7 +88,7 @@ impl SlotineLi {
         })
     }
 
-    /// The parameters as adapted so far: ten for each body, then one for each term.
+    /// Present adapted parameters: ten for each body, then one for each term.
     pub fn parameters(&self) -> &[f64] {
         &self.parameters
     }
@@ -107,7 +107,7 @@ impl SlotineLi {
         for joint in 0..joints {
             regressor[joint * columns..][..bodies].copy_from_slice(&y[joint * bodies..][..bodies]);
         }
-        // The difference's half has neither gravity nor acceleration.
+        // The half difference has neither gravity nor acceleration.
         mean.fill(0.0);
         let y = torque_regressor(weightless, workspace, measured.q, half, mean);
         for joint in 0..joints {

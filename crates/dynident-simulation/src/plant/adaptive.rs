@@ -1,21 +1,21 @@
-//! Tight integration between two controller samples: Dormand and Prince's method of order 8(5,3) with error control, by
-//! the crate `differential-equations`.
+//! Adaptive integration between two controller samples: Dormand and Prince's method of order 8(5,3) with error control,
+//! from the crate `differential-equations`.
 //!
 //! Friction as in the fixed Runge-Kutta method: the integration stops where a sliding unit comes to rest (found on the
-//! method's dense output) and starts anew there.
+//! method's dense output) and restarts there.
 
 use super::equations::{Equations, StateView};
-use super::runge_kutta::{margin, rest};
+use super::runge_kutta::{min_sliding_speed, set_at_rest};
 use super::{PlantFault, State, euler};
 use core::cell::{Cell, RefCell};
 use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::ode::{ODE, solve_ode};
 use differential_equations::prelude::{ControlFlag, Interpolation, Solout, Solution};
 
-/// Stops between two samples, after which the rest is done by the implicit step.
-const STOPS: usize = 64;
+/// Maximum number of stops between two samples; the rest is integrated by the implicit step.
+const MAX_STOPS: usize = 64;
 
-/// `y = [q, q̇]`, time from the sample.
+/// Right-hand side for `y = [q, q̇]`, with the time since the sample.
 struct Field<'a> {
     equations: &'a RefCell<&'a mut Equations>,
     start_s: f64,
@@ -39,7 +39,7 @@ impl ODE<f64, Vec<f64>> for Field<'_> {
     }
 }
 
-/// Keeps the last state, and stops where a unit comes to rest.
+/// Stores the last state, and stops where a unit comes to rest.
 struct Watch<'a> {
     equations: &'a RefCell<&'a mut Equations>,
     dof: usize,
@@ -58,10 +58,10 @@ impl Solout<f64, Vec<f64>> for Watch<'_> {
         _solution: &mut Solution<f64, Vec<f64>>,
     ) -> ControlFlag<f64, Vec<f64>> {
         let equations = self.equations.borrow();
-        let of = |y: &[f64]| margin(&equations, &y[self.dof..]);
+        let of = |y: &[f64]| min_sliding_speed(&equations, &y[self.dof..]);
         self.last.0 = t_curr;
         self.last.1.copy_from_slice(y_curr);
-        // At a unit that starts from rest the margin is zero: only what has been above counts as a crossing.
+        // A unit that starts from rest has a margin of zero; a crossing requires a positive value before.
         if of(y_curr) >= 0.0 || t_curr <= t_prev {
             return ControlFlag::Continue;
         }
@@ -88,7 +88,6 @@ impl Solout<f64, Vec<f64>> for Watch<'_> {
     }
 }
 
-/// From the state over `duration_s` with constant torques.
 pub(super) fn advance(
     equations: &mut Equations,
     state: &mut State,
@@ -99,7 +98,7 @@ pub(super) fn advance(
 ) -> Result<(), PlantFault> {
     let dof = tau.len();
     let mut left = duration_s;
-    for _ in 0..STOPS {
+    for _ in 0..MAX_STOPS {
         let at = StateView { time_s: state.time_s, q: &state.q, dq: &state.dq, tau };
         equations.decide(at)?;
         let y = [&state.q[..], &state.dq].concat();
@@ -117,7 +116,7 @@ pub(super) fn advance(
         let (done, y) = watch.last;
         let stopped = watch.stopped;
         if stopped && done <= 0.0 {
-            // A unit that began at rest turned back at once.
+            // A unit that began at rest reversed immediately.
             return euler::step(equations, state, tau, left);
         }
         state.q.copy_from_slice(&y[..dof]);
@@ -130,8 +129,8 @@ pub(super) fn advance(
         if !stopped {
             return Ok(());
         }
-        let none = margin(equations, &state.dq).max(0.0);
-        rest(equations, &mut state.dq, none);
+        let zero_speed = min_sliding_speed(equations, &state.dq).max(0.0);
+        set_at_rest(equations, &mut state.dq, zero_speed);
         left -= done;
         if left <= 1e-14 {
             return Ok(());

@@ -1,19 +1,19 @@
-//! What the world does to the robot beside gravity.
+//! External torques and forces on the robot, in addition to gravity.
 
 use crate::error::{SimulationError, require};
 use dynident_dynamics::{Workspace, body_placements};
 use dynident_model::{Model, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// How a disturbance goes with time.
+/// Time dependence of a disturbance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum TimeCourse {
-    /// Always one.
+    /// Constant 1.
     Constant,
-    /// One from `from_s` to `until_s`, else zero.
+    /// 1 from `from_s` to `until_s`, otherwise 0.
     Pulse {
-        /// Begin, s.
+        /// Start, s.
         from_s: f64,
         /// End, s.
         until_s: f64,
@@ -29,7 +29,7 @@ pub enum TimeCourse {
 }
 
 impl TimeCourse {
-    /// The value at a time.
+    /// Value at a time.
     pub fn at(&self, time_s: f64) -> f64 {
         match *self {
             Self::Constant => 1.0,
@@ -53,29 +53,28 @@ impl TimeCourse {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "on", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Disturbance {
-    /// A torque (force) of one joint, Nm (N), beside the drive's.
+    /// A torque (force) on one joint, Nm (N), in addition to that of the drive.
     Joint {
-        /// The joint's name.
+        /// Name of the joint.
         joint: String,
         /// Size, Nm (N).
         torque: f64,
-        /// How it goes with time.
+        /// Time dependence.
         time: TimeCourse,
     },
     /// A force on a point of a moving body, in the base frame.
     Body {
         /// Name of the joint that moves the body.
         joint: String,
-        /// The point in the body's frame, m.
+        /// Point in the frame of the body, m.
         point_m: [f64; 3],
-        /// The force in the base's frame, N.
+        /// Force in the base frame, N.
         force_n: [f64; 3],
-        /// How it goes with time.
+        /// Time dependence.
         time: TimeCourse,
     },
 }
 
-/// A disturbance with its joint looked up.
 #[derive(Clone, Debug)]
 pub(super) struct JointDisturbance {
     joint: usize,
@@ -101,7 +100,7 @@ impl JointDisturbance {
     }
 
     /// Adds the joint torques (forces) of the disturbance at a time: for a force f at the point p, `axis · ((p - o) ×
-    /// f)` of every revolute joint on the way, `axis · f` of a sliding one.
+    /// f)` of every revolute joint on the path, `axis · f` of a prismatic one.
     pub(super) fn add(&self, model: &Model, workspace: &mut Workspace, time_s: f64, q: &[f64], torque: &mut [f64]) {
         match &self.disturbance {
             Disturbance::Joint { torque: size, time, .. } => torque[self.joint] += size * time.at(time_s),
@@ -138,8 +137,8 @@ mod tests {
     use super::*;
     use dynident_model::sample::random_tree;
 
-    /// Virtual work: the joint torques of a force do the work of the force when the point moves. Central differences of
-    /// 1e-6 leave 1e-9 or so of the force.
+    /// Virtual work: the joint torques of a force do the work of the force when the point moves. Central differences
+    /// with a step of 1e-6 have an error of about 1e-9 of the force.
     #[test]
     fn a_force_does_the_work_of_its_joint_torques() {
         for seed in 0..5 {

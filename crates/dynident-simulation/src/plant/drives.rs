@@ -1,36 +1,32 @@
-//! The terms of a simulated robot, sorted by what they do to the equation of motion.
+//! Torque terms of a simulated robot, sorted by their effect on the equation of motion.
 
 use super::friction_unit::FrictionUnit;
 use crate::error::{SimulationError, require, require_length};
 use dynident_model::Model;
 use dynident_model::terms::{HysteresisState, JointMotion, TermAction, TermInput, TorqueTerm};
 
-/// Terms with their parameters: constants of the mass matrix and of the torque, linear damping, springs that slip,
-/// declared torques, and friction that follows a velocity.
+/// Terms with their parameters: constants of the mass matrix and of the torque, linear damping, slipping springs,
+/// declared torques, and friction that depends on a velocity.
 #[derive(Clone, Debug)]
 pub(super) struct Drives {
     /// Entries (row, column, value) that drives add to the mass matrix.
     pub(super) inertia: Vec<(usize, usize, f64)>,
-    /// Constant torques.
     pub(super) constant: Vec<f64>,
-    /// Entries of the viscous matrix.
     pub(super) viscous: Vec<(usize, usize, f64)>,
-    /// Friction by velocities.
     pub(super) units: Vec<FrictionUnit>,
-    slips: Vec<Slip>,
+    springs: Vec<SlippingSpring>,
     states: Vec<StateTorque>,
     pub(super) by_load: bool,
 }
 
 #[derive(Clone, Debug)]
-struct Slip {
+struct SlippingSpring {
     joint: usize,
     term: TorqueTerm,
     value: f64,
     memory: HysteresisState,
 }
 
-/// A torque of one joint that follows positions and velocities.
 #[derive(Clone, Debug)]
 struct StateTorque {
     joint: usize,
@@ -47,11 +43,11 @@ impl Drives {
             constant: vec![0.0; dof],
             viscous: Vec::new(),
             units: Vec::new(),
-            slips: Vec::new(),
+            springs: Vec::new(),
             states: Vec::new(),
             by_load: false,
         };
-        // One unit for each joint, then those of drives that turn with two.
+        // One unit for each joint, then those of drives that move with two joints.
         let mut own: Vec<FrictionUnit> = (0..dof).map(|joint| FrictionUnit::new(vec![(joint, 1.0)])).collect();
         let mut used = vec![false; dof];
         for (term, &value) in terms.iter().zip(parameters) {
@@ -72,14 +68,18 @@ impl Drives {
                 TermAction::Damping { factor } => drives.viscous.extend(entries(factor)),
                 TermAction::Constant => joints.iter().for_each(|&joint| drives.constant[joint] += value),
                 TermAction::Hysteresis => {
-                    let slip =
-                        |&joint: &usize| Slip { joint, term: term.clone(), value, memory: HysteresisState::default() };
-                    drives.slips.extend(joints.iter().map(slip));
+                    let spring = |&joint: &usize| SlippingSpring {
+                        joint,
+                        term: term.clone(),
+                        value,
+                        memory: HysteresisState::default(),
+                    };
+                    drives.springs.extend(joints.iter().map(spring));
                 }
                 TermAction::State(_) => {
                     drives.states.extend(joints.iter().map(|&joint| StateTorque { joint, term: term.clone(), value }));
                 }
-                // Simulated drives are at their reference temperature.
+                // Simulated drives have their reference temperature.
                 TermAction::Temperature => {}
                 TermAction::Friction(friction) => {
                     if value < 0.0 {
@@ -102,16 +102,17 @@ impl Drives {
         Ok(drives)
     }
 
-    /// Takes the torques of slipping springs at positions `q` off `torque`. The deflection is that of the last
-    /// [`follow`](Self::follow) moved on to `q`.
-    pub(super) fn subtract_slips(&self, q: &[f64], torque: &mut [f64]) {
-        for slip in &self.slips {
-            torque[slip.joint] -= slip.value * deflection(&slip.term, slip.joint, q, &mut slip.memory.clone());
+    /// Subtracts the torques of slipping springs at positions `q` from `torque`. The deflection is that of the last
+    /// [`follow`](Self::follow), updated to `q`.
+    pub(super) fn subtract_springs(&self, q: &[f64], torque: &mut [f64]) {
+        for spring in &self.springs {
+            torque[spring.joint] -=
+                spring.value * deflection(&spring.term, spring.joint, q, &mut spring.memory.clone());
         }
     }
 
-    /// Takes declared torques at positions `q` and velocities `dq` off `torque`. One without a value is not a number:
-    /// the motion cannot be continued.
+    /// Subtracts declared torques at positions `q` and velocities `dq` from `torque`. An undefined torque is NaN, so
+    /// that the motion ends.
     pub(super) fn subtract_declared(&self, q: &[f64], dq: &[f64], torque: &mut [f64]) {
         let motion = JointMotion { samples: 1, q, dq, ddq: dq };
         for state in &self.states {
@@ -120,26 +121,24 @@ impl Drives {
         }
     }
 
-    /// The springs follow the joints to `q`.
     pub(super) fn follow(&mut self, q: &[f64]) {
-        for slip in &mut self.slips {
-            deflection(&slip.term, slip.joint, q, &mut slip.memory);
+        for spring in &mut self.springs {
+            deflection(&spring.term, spring.joint, q, &mut spring.memory);
         }
     }
 
-    /// Undeflected springs at `q`.
     pub(super) fn restart(&mut self, q: &[f64]) {
-        for slip in &mut self.slips {
-            slip.memory.restart();
+        for spring in &mut self.springs {
+            spring.memory.restart();
         }
         self.follow(q);
     }
 }
 
-/// Deflection of a slipping spring over its yield displacement.
+/// Deflection of a slipping spring, relative to its yield displacement.
 fn deflection(term: &TorqueTerm, joint: usize, q: &[f64], memory: &mut HysteresisState) -> f64 {
     let mut out = [0.0];
-    // Only positions count.
+    // Only positions are used.
     let motion = JointMotion { samples: 1, q, dq: q, ddq: q };
     term.column_following(joint, &motion, &mut TermInput { load: None, temperature_c: None, memory }, &mut out);
     out[0]

@@ -1,5 +1,5 @@
-//! The equation of motion of a simulated robot, put together at one state: `M q̈ = τ + d(t) - h(q, q̇) - τ₀ - springs -
-//! k f(q, q̇) - F_v q̇ - Cᵀ f`.
+//! Equation of motion of a simulated robot at one state: `M q̈ = τ + d(t) - h(q, q̇) - τ₀ - springs - k f(q, q̇) - F_v
+//! q̇ - Cᵀ f`.
 
 use super::PlantFault;
 use super::disturbance::JointDisturbance;
@@ -10,17 +10,15 @@ use super::friction_unit::FrictionUnit;
 use dynident_dynamics::{Workspace, mass_matrix_and_bias};
 use dynident_model::Model;
 
-/// What a friction unit does during an explicit step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mode {
-    /// It moves, or cannot hold: friction by its branch.
+    /// Moving, or unable to hold: friction of this branch.
     Forward,
     Backward,
-    /// At rest: whatever torque keeps it there.
+    /// At rest: the torque that keeps it there.
     Held,
 }
 
-/// A state of the robot as integrators see it.
 #[derive(Clone, Copy)]
 pub(super) struct StateView<'a> {
     pub(super) time_s: f64,
@@ -40,23 +38,21 @@ pub(super) struct Equations {
     matrix: Vec<f64>,
     /// Right-hand side, then accelerations.
     pub(super) acceleration: Vec<f64>,
-    /// Torque of the bodies at the last acceleration: the load of load-dependent friction.
+    /// Torque of the bodies at the last acceleration, the load of load-dependent friction.
     load: Vec<f64>,
     /// `M⁻¹ c_u` of every unit.
     responses: Vec<f64>,
-    /// `C M⁻¹ Cᵀ` of the units looked at.
+    /// `C M⁻¹ Cᵀ` of the chosen units.
     compliance: Vec<f64>,
     free: Vec<f64>,
     pub(super) solver: FrictionSolver,
     pub(super) modes: Vec<Mode>,
-    /// Units looked at.
     chosen: Vec<usize>,
-    /// How often friction torques had not settled.
+    /// Number of steps without convergence of the friction torques.
     pub(super) unsettled: usize,
 }
 
 impl Clone for Equations {
-    /// The same robot with scratch of its own.
     fn clone(&self) -> Self {
         Self {
             workspace: Workspace::with_level(&self.model, self.workspace.level()),
@@ -107,7 +103,7 @@ impl Equations {
         (&self.model, &mut self.workspace)
     }
 
-    /// Mass matrix `M + implicit · F_v` and right-hand side without friction by velocity.
+    /// Mass matrix `M + implicit · F_v`, and right-hand side without velocity-dependent friction.
     #[inline]
     pub(super) fn assemble(&mut self, at: StateView<'_>, implicit: f64) {
         let n = self.acceleration.len();
@@ -115,7 +111,7 @@ impl Equations {
         let (mass_matrix, bias) = mass_matrix_and_bias(model, workspace, at.q, at.dq);
         matrix.copy_from_slice(mass_matrix);
         if drives.by_load {
-            // The accelerations of the evaluation before.
+            // Uses the accelerations of the previous evaluation.
             for j in 0..n {
                 load[j] = bias[j] + (0..n).map(|k| matrix[j * n + k] * acceleration[k]).sum::<f64>();
             }
@@ -130,7 +126,7 @@ impl Equations {
             matrix[row * n + column] += implicit * value;
             acceleration[row] -= value * at.dq[column];
         }
-        drives.subtract_slips(at.q, acceleration);
+        drives.subtract_springs(at.q, acceleration);
         drives.subtract_declared(at.q, at.dq, acceleration);
         for disturbance in &self.disturbances {
             disturbance.add(model, workspace, at.time_s, at.q, acceleration);
@@ -153,12 +149,12 @@ impl Equations {
         }
     }
 
-    /// Takes the friction of the units that slide off the right-hand side.
-    pub(super) fn slide(&mut self, dq: &[f64]) {
+    /// Subtracts the friction of sliding units from the right-hand side.
+    pub(super) fn subtract_sliding_friction(&mut self, dq: &[f64]) {
         for (unit, mode) in self.drives.units.iter().zip(&self.modes) {
             let torque = match mode {
                 Mode::Held => continue,
-                // Without a jump the direction does not matter.
+                // Without a jump the direction has no effect.
                 mode => unit.sliding(unit.speed(dq), *mode == Mode::Forward),
             };
             for &(joint, ratio) in &unit.joints {
@@ -169,14 +165,14 @@ impl Equations {
         }
     }
 
-    /// Accelerations without the friction of units that were not taken off.
+    /// Accelerations without the friction of units that was not subtracted.
     #[inline]
     pub(super) fn factor_and_solve(&mut self) -> Result<(), PlantFault> {
         let n = self.acceleration.len();
         if factor_and_solve(&mut self.matrix, n, &mut self.acceleration) { Ok(()) } else { Err(PlantFault::MassMatrix) }
     }
 
-    /// Chooses the units for the next calls.
+    /// Chooses the units for the next calls; returns their number.
     pub(super) fn choose(&mut self, wanted: impl Fn(&FrictionUnit, Mode) -> bool) -> usize {
         self.chosen.clear();
         for (index, unit) in self.drives.units.iter().enumerate() {
@@ -208,9 +204,9 @@ impl Equations {
         }
     }
 
-    /// Friction of the chosen units so that `w = start + factor · acceleration` belongs to their maps; `start` gives a
-    /// unit's velocity, or nothing. With `jumps` the maps' jumps alone count.
-    pub(super) fn rub(&mut self, start: Option<&[f64]>, factor: f64, jumps: bool) {
+    /// Applies friction of the chosen units such that `w = start + factor · acceleration` belongs to their maps.
+    /// `start` contains the joint velocities, `None` for zero. With `jumps` only the jumps of the maps are used.
+    pub(super) fn apply_friction(&mut self, start: Option<&[f64]>, factor: f64, jumps: bool) {
         let count = self.chosen.len();
         self.couple();
         for (place, &index) in self.chosen.iter().enumerate() {
@@ -220,11 +216,10 @@ impl Equations {
         let Self { drives, compliance, free, solver, chosen, .. } = self;
         let settled = solver.solve(&drives.units, chosen, &compliance[..count * count], &free[..count], factor, jumps);
         self.unsettled += usize::from(!settled);
-        self.push_back();
+        self.subtract_friction_response();
     }
 
-    /// Takes what the chosen units' torques do off the accelerations.
-    fn push_back(&mut self) {
+    fn subtract_friction_response(&mut self) {
         let n = self.acceleration.len();
         for place in 0..self.chosen.len() {
             let torque = self.solver.torque[place];
@@ -235,26 +230,25 @@ impl Equations {
         }
     }
 
-    /// Calls `each(unit, speed after)` for the chosen units.
-    pub(super) fn after_rubbing(&mut self, mut each: impl FnMut(&FrictionUnit, &mut Mode, f64)) {
+    /// Calls `each(unit, mode, speed after)` for the chosen units.
+    pub(super) fn for_each_chosen(&mut self, mut each: impl FnMut(&FrictionUnit, &mut Mode, f64)) {
         for (place, &index) in self.chosen.iter().enumerate() {
             each(&self.drives.units[index], &mut self.modes[index], self.solver.speed[place]);
         }
     }
 
-    /// Accelerations with every unit in its mode.
     pub(super) fn in_modes(&mut self, at: StateView<'_>) -> Result<(), PlantFault> {
         self.assemble(at, 0.0);
         if self.drives.units.is_empty() {
             return self.factor_and_solve();
         }
-        self.slide(at.dq);
+        self.subtract_sliding_friction(at.dq);
         self.factor_and_solve()?;
         let count = self.choose(|_, mode| mode == Mode::Held);
         if count > 0 {
             self.couple();
-            // A joint and a drive that turns with it can be held at once, and then one of the two torques is free: the
-            // small diagonal shares it out.
+            // If a joint and a drive that moves with it are both held, their torques are not unique; the regularised
+            // diagonal distributes them.
             for place in 0..count {
                 self.compliance[place * count + place] *= 1.0 + 1e-13;
                 self.solver.torque[place] = self.drives.units[self.chosen[place]].speed(&self.acceleration);
@@ -262,7 +256,7 @@ impl Equations {
             if !eliminate(&mut self.compliance[..count * count], count, &mut self.solver.torque[..count]) {
                 self.solver.torque[..count].fill(0.0);
             }
-            self.push_back();
+            self.subtract_friction_response();
             for &index in &self.chosen {
                 if let [(joint, _)] = self.drives.units[index].joints[..] {
                     self.acceleration[joint] = 0.0;
@@ -272,8 +266,8 @@ impl Equations {
         Ok(())
     }
 
-    /// Decides at a state which units are held: those at rest (`w = 0`, or held until now) whose friction can. `true`
-    /// if any unit can hold.
+    /// Determines the held units: those at rest (`w = 0`, or held before) whose friction suffices. Returns whether any
+    /// unit can hold.
     pub(super) fn decide(&mut self, at: StateView<'_>) -> Result<bool, PlantFault> {
         let mut at_rest = false;
         for (unit, mode) in self.drives.units.iter().zip(&mut self.modes) {
@@ -287,11 +281,11 @@ impl Equations {
         }
         if at_rest {
             self.assemble(at, 0.0);
-            self.slide(at.dq);
+            self.subtract_sliding_friction(at.dq);
             self.factor_and_solve()?;
             self.choose(|_, mode| mode == Mode::Held);
-            self.rub(None, 1.0, true);
-            self.after_rubbing(|_, mode, acceleration| {
+            self.apply_friction(None, 1.0, true);
+            self.for_each_chosen(|_, mode, acceleration| {
                 if acceleration != 0.0 {
                     *mode = if acceleration > 0.0 { Mode::Forward } else { Mode::Backward };
                 }

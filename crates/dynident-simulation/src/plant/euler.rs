@@ -1,8 +1,8 @@
-//! Semi-implicit Euler: the new velocities move the joints.
+//! Semi-implicit Euler: the joints move with the new velocities.
 //!
-//! `(M + h F_v)(q̇' - q̇)/h = τ - h(q, q̇) - F_v q̇ - Cᵀ f`, `q' = q + h q̇'`: viscous friction implicit as in MuJoCo's
-//! Euler integrator, and all other friction implicit as well, `f` in the map of the velocities after the step. Dry
-//! friction then neither chatters nor creates energy at any step.
+//! `(M + h F_v)(q̇' - q̇)/h = τ - h(q, q̇) - F_v q̇ - Cᵀ f`, `q' = q + h q̇'`. Viscous friction is implicit as in
+//! MuJoCo's Euler integrator, and all other friction is implicit too, with `f` in the map of the velocities after the
+//! step. Dry friction therefore neither chatters nor creates energy, for any step size.
 
 use super::equations::{Equations, StateView};
 use super::{PlantFault, State};
@@ -11,19 +11,19 @@ pub(super) fn step(equations: &mut Equations, state: &mut State, tau: &[f64], h:
     let State { time_s, q, dq, .. } = state;
     equations.assemble(StateView { time_s: *time_s, q, dq, tau }, h);
     equations.factor_and_solve()?;
-    let rubs = !equations.drives.units.is_empty();
-    if rubs {
+    let has_friction = !equations.drives.units.is_empty();
+    if has_friction {
         equations.choose(|_, _| true);
-        equations.rub(Some(dq), h, false);
+        equations.apply_friction(Some(dq), h, false);
     }
     let mut finite = true;
     for (dq, a) in dq.iter_mut().zip(&equations.acceleration) {
         *dq += h * a;
         finite &= dq.is_finite();
     }
-    if rubs {
-        equations.after_rubbing(|unit, mode, speed| {
-            // What is held rests exactly.
+    if has_friction {
+        equations.for_each_chosen(|unit, mode, speed| {
+            // Held joints are exactly at rest.
             if speed == 0.0
                 && unit.holds()
                 && let [(joint, _)] = unit.joints[..]

@@ -1,18 +1,18 @@
-//! Factors of small symmetric positive definite matrices, row-major, without allocation.
+//! Factorisation of small symmetric positive definite matrices, row-major, without allocation.
 
 use dynident_lanes::Scalar;
 
-/// `A = L D Lᵀ` in the lower triangle of `a` (n × n); the diagonal holds 1/D_ii, the upper triangle is not used. False
-/// if `A` is not positive definite (or not a number).
+/// Factors `A = L D Lᵀ` in the lower triangle of `a` (n × n); the diagonal then contains 1/D_ii, the upper triangle is
+/// not used. Returns false if `A` is not positive definite or not finite.
 #[inline]
 pub(super) fn factor(a: &mut [f64], n: usize) -> bool {
     factor_over(a, n, is_pivot)
 }
 
-/// [`factor`] over other scalars: false where a pivot is not what `is_pivot` wants, which is asked of every one.
+/// [`factor`] for other scalars; returns false if `is_pivot`, which is called for every pivot, returned false.
 #[inline(always)]
 pub(super) fn factor_over<T: Scalar>(a: &mut [T], n: usize, is_pivot: impl FnMut(T) -> bool) -> bool {
-    // Sizes known to the compiler: arms have six or seven joints, and loops that end there are unrolled.
+    // Arms have six or seven joints. With a constant size the compiler unrolls the loops.
     match n {
         2 => factor_of::<T, 2>(a, is_pivot),
         6 => factor_of::<T, 6>(a, is_pivot),
@@ -70,7 +70,8 @@ fn factor_of_any_size<T: Scalar>(a: &mut [T], n: usize, mut is_pivot: impl FnMut
     fine
 }
 
-/// [`factor`] and [`solve`] at once, with the same numbers: while one column is divided, the right-hand side moves on.
+/// [`factor`] and [`solve`] together, with identical results; the right-hand side is processed during the divisions of
+/// a column.
 #[inline]
 pub(super) fn factor_and_solve(a: &mut [f64], n: usize, b: &mut [f64]) -> bool {
     match n {
@@ -135,7 +136,7 @@ pub(super) fn solve<T: Scalar>(l: &[T], n: usize, b: &mut [T]) {
                 }
             }
             for i in (0..n).rev() {
-                // As the standard library's sums begin.
+                // The initial value of the standard library's sums.
                 let mut sum = T::splat(-0.0);
                 for k in i + 1..n {
                     sum += l[k * n + i] * b[k];
@@ -167,8 +168,8 @@ fn solve_of<T: Scalar, const N: usize>(l: &[T], b: &mut [T]) {
     }
 }
 
-/// [`solve`] of several right-hand sides, one after the other in `b`, with the same numbers. Each alone is a chain of
-/// steps that wait for each other; together they keep the processor busy.
+/// [`solve`] of several right-hand sides, one after another in `b`, with identical results. A single one is a chain of
+/// dependent steps; several together use the processor better.
 #[inline]
 pub(super) fn solve_all(l: &[f64], n: usize, b: &mut [f64]) {
     match n {
@@ -185,7 +186,6 @@ fn solve_all_of<const N: usize>(l: &[f64], b: &mut [f64]) {
     let Ok(l) = <&[[f64; N]; N]>::try_from(rows) else { return };
     let (sides, _) = b.as_chunks_mut::<N>();
     for sides in sides.chunks_mut(N) {
-        // Entry by entry, each of all sides.
         let mut x = [[0.0; N]; N];
         for (at, side) in sides.iter().enumerate() {
             for i in 0..N {
@@ -221,8 +221,8 @@ fn solve_all_of<const N: usize>(l: &[f64], b: &mut [f64]) {
     }
 }
 
-/// Solves the general system `A x = b` by elimination with row pivots; `a` and `b` are used up, `b` holds x. False if a
-/// pivot is zero.
+/// Solves the general system `A x = b` by elimination with row pivots. `a` is overwritten, `b` then contains x. Returns
+/// false if a pivot is zero.
 pub(super) fn eliminate(a: &mut [f64], n: usize, b: &mut [f64]) -> bool {
     for k in 0..n {
         let Some(pivot) = (k..n).max_by(|&i, &j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs())) else {
@@ -261,7 +261,7 @@ mod tests {
     use super::*;
     use dynident_model::sample::Random;
 
-    /// A x of the solution gives b back: 30 roundings of a matrix with condition below 1e4, so 1e-10 is ample.
+    /// A x equals b: 30 roundings with a condition number below 1e4, so that 1e-10 is sufficient.
     #[test]
     fn solutions_solve() {
         let mut random = Random::new(1);

@@ -1,31 +1,28 @@
-//! The friction torques of all units at once.
+//! Solver for the friction torques of all units.
 //!
 //! Velocities (or accelerations) after a step are `w = r - c A f` with the units' inverse inertia `A = C M⁻¹ Cᵀ`, and
-//! every torque belongs to its unit's map: `f_u ∈ f_u(w_u)`, a jump at rest (implicit time stepping of dry friction:
-//! Moreau 1988; Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008). `A` is positive
-//! (semi-)definite and the maps are monotone, so that velocities are unique, friction takes energy, and a unit that its
-//! friction can hold stays at rest exactly.
+//! every torque belongs to the map of its unit: `f_u ∈ f_u(w_u)`, with a jump at rest (implicit time stepping of dry
+//! friction: Moreau 1988; Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008). `A` is
+//! positive (semi-)definite and the maps are monotone. The velocities are therefore unique, friction is dissipative,
+//! and a unit that its friction can hold stays exactly at rest.
 //!
-//! Newton's method on the pattern of units at rest, as long as it brings the torques nearer to their solution;
-//! Gauss-Seidel sweeps, which always do (they descend in a convex function), where it does not.
+//! Newton's method on the set of units at rest is used while it reduces the error; otherwise Gauss-Seidel sweeps, which
+//! always converge because they descend in a convex function.
 
 use super::factor::eliminate;
 use super::friction_unit::{FrictionParts, FrictionUnit};
 
-/// Sweeps after which the torques are taken as they are. Newton's method ends after two or three rounds in all that was
-/// seen.
-const ROUNDS: usize = 400;
-/// Share of the largest velocity below which a change counts as none.
-const SETTLED: f64 = 1e-13;
-/// Velocities below this are none: their products are too small for floating-point numbers.
-const NONE: f64 = 1e-250;
+const MAX_ROUNDS: usize = 400;
+/// Tolerance of the velocity change, relative to the largest velocity.
+const RELATIVE_TOLERANCE: f64 = 1e-13;
+/// Smaller velocities are treated as zero, because their products underflow.
+const MIN_SPEED: f64 = 1e-250;
 
-/// Torques and scratch, kept from step to step: the last solution is the next start.
+/// Torques and scratch. The last solution is the start of the next step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrictionSolver {
-    /// The torques of the units.
     pub(super) torque: Vec<f64>,
-    /// The units' velocities (accelerations) with them; exactly zero where a unit is held.
+    /// Velocities (accelerations) of the units; exactly zero for held units.
     pub(super) speed: Vec<f64>,
     trial: Vec<f64>,
     matrix: Vec<f64>,
@@ -37,11 +34,11 @@ impl FrictionSolver {
         Self { torque: zeros(), speed: zeros(), trial: zeros(), matrix: vec![0.0; units * units] }
     }
 
-    /// Solves `w = r - c A f`, `f_u ∈ f_u(w_u)`. False if the torques had not settled; they are within their maps all
-    /// the same.
+    /// Solves `w = r - c A f`, `f_u ∈ f_u(w_u)`. Returns false if the torques did not converge; they are within their
+    /// maps in any case.
     ///
-    /// `chosen` are the places of the units in `units`; `a` and `r` follow `chosen`. With `jumps` only the jumps of the
-    /// maps count.
+    /// `chosen` contains indices into `units`; `a` and `r` are in the order of `chosen`. With `jumps` only the jumps of
+    /// the maps are used.
     pub(super) fn solve(
         &mut self,
         units: &[FrictionUnit],
@@ -59,8 +56,8 @@ impl FrictionSolver {
             self.speed[..n].fill(0.0);
             return true;
         }
-        for _ in 0..ROUNDS {
-            if self.sweep(&problem) <= SETTLED * scale.max(NONE) {
+        for _ in 0..MAX_ROUNDS {
+            if self.sweep(&problem) <= RELATIVE_TOLERANCE * scale.max(MIN_SPEED) {
                 return true;
             }
             if self.newton(&problem) && problem.defect(&self.trial) < problem.defect(&self.torque) {
@@ -70,14 +67,14 @@ impl FrictionSolver {
         false
     }
 
-    /// One pass over the units, each solved exactly with the others' torques as they are. Returns the largest change,
+    /// One pass over the units, each solved exactly with the present torques of the others. Returns the largest change,
     /// as a velocity.
     fn sweep(&mut self, problem: &Problem<'_>) -> f64 {
         let mut change = 0.0_f64;
         for u in 0..problem.chosen.len() {
             let own = problem.own(u);
             if own <= 0.0 {
-                // A unit that nothing can turn (its joints are locked).
+                // A unit that cannot move, because its joints are locked.
                 (self.torque[u], self.speed[u]) = (0.0, 0.0);
                 continue;
             }
@@ -88,7 +85,7 @@ impl FrictionSolver {
         change
     }
 
-    /// The torques that solve the equations linearised at the last sweep, into `trial`.
+    /// Solves the equations linearised at the last sweep, into `trial`.
     fn newton(&mut self, problem: &Problem<'_>) -> bool {
         let n = problem.chosen.len();
         let Problem { a, r, c, .. } = *problem;
@@ -127,12 +124,11 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// `c A_uu`.
     fn own(&self, u: usize) -> f64 {
         self.c * self.a[u * self.chosen.len() + u]
     }
 
-    /// What unit `u` does with the others' torques as they are.
+    /// Solution of unit `u` with the present torques of the others.
     fn resolve(&self, u: usize, torque: &[f64]) -> FrictionParts {
         let n = self.chosen.len();
         let row = &self.a[u * n..(u + 1) * n];
@@ -142,7 +138,7 @@ impl Problem<'_> {
         if self.jumps { unit.resolve_jump(free, own) } else { unit.resolve(free, own) }
     }
 
-    /// How far each torque is from what its unit asks for with the others as they are: the largest, as a velocity.
+    /// Largest difference between a torque and the solution of its unit with the present torques, as a velocity.
     fn defect(&self, torque: &[f64]) -> f64 {
         (0..self.chosen.len())
             .filter(|&u| self.own(u) > 0.0)
@@ -157,8 +153,8 @@ mod tests {
     use dynident_model::sample::Random;
     use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
 
-    /// Strongly coupled units of all kinds: every torque is in its map to rounding (1e-11 of the largest velocity),
-    /// whatever the mixture of rest and motion.
+    /// Strongly coupled units of all kinds: every torque is in its map up to rounding (1e-11 of the largest velocity),
+    /// for any combination of rest and motion.
     #[test]
     fn torques_belong_to_their_speeds() {
         let mut random = Random::new(4);

@@ -1,41 +1,39 @@
-//! Friction of one velocity: of a joint, or of a drive that turns with two joints.
+//! Friction as a function of one velocity: of a joint, or of a drive that moves with two joints.
 
 use dynident_model::terms::{TermAction, TorqueTerm, VelocityCurve, VelocityFriction};
 
-/// A friction term with its parameter; a Stribeck or load-dependent one changes its size with the state.
+/// A friction term with its parameter; the size of a Stribeck or load-dependent term depends on the state.
 #[derive(Clone, Debug)]
 struct Term {
     kind: TorqueTerm,
     value: f64,
     by_load: bool,
-    /// Velocity and exponent of the Stribeck effect.
     fading: Option<[f64; 2]>,
-    /// For a sign, which at rest holds anything up to the level: in which directions it is felt.
+    /// For a sign function (which at rest holds any torque up to the level): the directions in which it acts.
     step: Option<[bool; 2]>,
-    /// Value with load and fading at the current state.
+    /// Value including load and Stribeck effect at the present state.
     size: f64,
 }
 
-/// All friction that follows one velocity `w = Σ ratio q̇`: the map `w ↦ f(w)`, set-valued at rest. The torque of a
+/// All friction that depends on one velocity `w = Σ ratio q̇`: the map `w ↦ f(w)`, set-valued at rest. The torque of a
 /// joint is `ratio f`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrictionUnit {
-    /// The joints that make the velocity, and their ratios.
+    /// Joints that determine the velocity, and their ratios.
     pub(super) joints: Vec<(usize, f64)>,
     terms: Vec<Term>,
-    /// Friction at rest is at most this in motion forward and backward.
+    /// Maximum friction at rest for forward and backward motion.
     level: [f64; 2],
     steps: bool,
     smooth: bool,
     pub(super) by_load: bool,
 }
 
-/// Where the friction of a unit ends up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FrictionParts {
     pub(super) speed: f64,
     pub(super) torque: f64,
-    /// None: at rest, held by the jump of the map. Else the map's slope at the velocity.
+    /// Slope of the map at the velocity; `None` if the unit is at rest, held by the jump of the map.
     pub(super) slope: Option<f64>,
 }
 
@@ -59,19 +57,17 @@ impl FrictionUnit {
         self.update(0.0, 0.0);
     }
 
-    /// Adds a term that follows a velocity.
     #[cfg(test)]
     pub(super) fn add_term(&mut self, term: &TorqueTerm, value: f64) {
         let TermAction::Friction(friction) = term.action() else { panic!("{term:?} follows no speed") };
         self.add(term, &friction, value);
     }
 
-    /// Whether it can hold a joint at rest.
     pub(super) fn holds(&self) -> bool {
         self.steps
     }
 
-    /// Takes the size of Stribeck and load-dependent terms at this velocity and load; they keep it until the next call.
+    /// Updates the size of Stribeck and load-dependent terms for this velocity and load.
     #[inline]
     pub(super) fn update(&mut self, speed: f64, load: f64) {
         let mut level = [0.0; 2];
@@ -92,13 +88,11 @@ impl FrictionUnit {
         self.level = level;
     }
 
-    /// Largest friction at rest against motion forward and backward.
     #[cfg(test)]
     pub(super) fn level(&self) -> [f64; 2] {
         self.level
     }
 
-    /// The part without jump and its slope.
     fn smooth(&self, speed: f64) -> [f64; 2] {
         let mut sum = [0.0; 2];
         if self.smooth {
@@ -114,23 +108,23 @@ impl FrictionUnit {
         sum
     }
 
-    /// Friction torque at `speed` in motion forward (or backward): the map's branch, also where the velocity has just
-    /// crossed zero.
+    /// Friction torque at `speed` on the forward or backward branch of the map, also if the velocity has just crossed
+    /// zero.
     #[inline]
     pub(super) fn sliding(&self, speed: f64, forward: bool) -> f64 {
         let jump = if forward { self.level[0] } else { -self.level[1] };
         jump + self.smooth(speed)[0]
     }
 
-    /// The solution of `w + c f(w) = r` for c > 0: unique, because the map is monotone.
+    /// Solution of `w + c f(w) = r` for c > 0, which is unique because the map is monotone.
     pub(super) fn resolve(&self, r: f64, c: f64) -> FrictionParts {
         let at_jump = self.resolve_jump(r, c);
         let (rest, jump) = (at_jump.speed, at_jump.torque);
         if !self.smooth || at_jump.slope.is_none() || !rest.is_finite() {
             return at_jump;
         }
-        // Between rest and `rest`: friction takes power, so that it brings the velocity nearer to zero. Newton from
-        // rest, kept inside the bracket.
+        // Friction is dissipative, so the velocity is between zero and `rest`. Newton's method from zero, kept inside
+        // the bracket.
         let (mut low, mut high) = if rest > 0.0 { (0.0, rest) } else { (rest, 0.0) };
         let mut speed = 0.0;
         let mut own = self.smooth(speed);
@@ -165,7 +159,6 @@ impl FrictionUnit {
         FrictionParts { speed: r - c * torque, torque, slope: Some(0.0) }
     }
 
-    /// Its velocity from the joints'.
     #[inline]
     pub(super) fn speed(&self, dq: &[f64]) -> f64 {
         self.joints.iter().map(|&(joint, ratio)| ratio * dq[joint]).sum()
@@ -177,7 +170,7 @@ mod tests {
     use super::*;
     use dynident_model::terms::{Coulomb, CoulombShape, Power, PowerExponent, Sigmoid, Stribeck};
 
-    /// The scalar problem is solved: w + c f(w) = r, for steep and flat maps alike. Rounding of r, with room.
+    /// The solution satisfies w + c f(w) = r, for steep and flat maps; tolerance above the rounding of r.
     #[test]
     fn resolved_speeds_fulfil_their_equation() {
         let mut unit = FrictionUnit::new(vec![(0, 1.0)]);
@@ -199,7 +192,6 @@ mod tests {
             for r in [-50.0, -1.0, -1e-3, 0.0, 1e-9, 0.2, 4.0, 900.0] {
                 let found = unit.resolve(r, c);
                 assert!((found.speed + c * found.torque - r).abs() <= 1e-12 * (1.0 + r.abs()), "{r} {c} {found:?}");
-                // Friction never pushes.
                 assert!(found.speed * found.torque >= 0.0);
                 if found.slope.is_none() {
                     assert!(found.torque.abs() <= 0.9 + 1e-12);

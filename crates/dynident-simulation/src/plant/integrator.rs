@@ -1,9 +1,9 @@
-//! Which integrator, and how fine.
+//! Selection and settings of the integrator.
 
 use crate::error::{SimulationError, require};
 use serde::{Deserialize, Serialize};
 
-/// How the simulated robot goes from one controller sample to the next; the torque is constant between them.
+/// Integration of the simulated robot between two controller samples, with constant torque.
 ///
 /// ```
 /// use dynident_simulation::Integrator;
@@ -16,18 +16,18 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Integrator {
-    /// Semi-implicit Euler, friction implicit: order 1, never chatters. With viscous friction alone the same as
+    /// Semi-implicit Euler with implicit friction: order 1, without chatter. With viscous friction alone equal to
     /// MuJoCo's `Euler`.
     SemiImplicitEuler {
-        /// Equal steps from sample to sample; default 1.
+        /// Number of equal steps between samples; default 1.
         #[serde(default = "one")]
         steps_per_sample: usize,
     },
-    /// Runge-Kutta of order 4, friction explicit with stops where a joint comes to rest: the same as MuJoCo's `RK4`
-    /// where there is none. Steep smooth friction needs short steps: `h` times its slope over the joint's inertia below
-    /// 2.7.
+    /// Runge-Kutta of order 4 with explicit friction, which stops where a joint comes to rest; without friction equal
+    /// to MuJoCo's `RK4`. Steep smooth friction needs short steps: `h` times its slope divided by the joint's inertia
+    /// below 2.7.
     Rk4 {
-        /// Equal steps from sample to sample; default 1.
+        /// Number of equal steps between samples; default 1.
         #[serde(default = "one")]
         steps_per_sample: usize,
     },
@@ -57,7 +57,7 @@ impl Default for Integrator {
 }
 
 impl Integrator {
-    /// Checks the numbers.
+    /// Checks the settings.
     ///
     /// # Errors
     /// No steps or more than 10,000, tolerances outside 1e-14 to 0.1.

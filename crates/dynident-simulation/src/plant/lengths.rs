@@ -1,10 +1,10 @@
-//! A robot whose links are not as long as its description says.
+//! Robots with link lengths that differ from the robot description.
 
 use crate::error::{SimulationError, require};
 use dynident_model::sample::Random;
 use dynident_model::{Joint, Mat3, Model, Transform};
 
-/// The same robot with other joint placements: `change(joint, placement)` gives the new `parent_from_child` of each.
+/// The same robot with other joint placements: `change(joint, placement)` returns the new `parent_from_child` of each.
 ///
 /// # Errors
 /// A placement that is not finite.
@@ -22,8 +22,8 @@ pub fn with_placements(
     Ok(changed.with_gravity(model.gravity())?)
 }
 
-/// The robot as built: every joint's placement off by a normal error of `length_std_m` in each direction and of
-/// `angle_std_rad` about a random axis. The same seed gives the same robot.
+/// A robot with manufacturing errors: every joint's placement has a normal error of `length_std_m` in each direction
+/// and of `angle_std_rad` about a random axis. The same seed results in the same robot.
 ///
 /// # Errors
 /// A standard deviation that is negative or not finite.
@@ -62,7 +62,6 @@ mod tests {
         assert_eq!(off, with_length_errors(&model, 1e-3, 1e-3, 1).unwrap());
         for (a, b) in off.joints().iter().zip(model.joints()) {
             let moved = (a.placement.translation + -b.placement.translation).norm();
-            // Six standard deviations.
             assert!(moved > 0.0 && moved < 6.0 * 3.0_f64.sqrt() * 1e-3);
         }
         assert!(with_length_errors(&model, -1.0, 0.0, 1).is_err());

@@ -27,8 +27,7 @@ use runge_kutta::Stages;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Why a simulated robot cannot go on. Its state is then that of the last moment which could be computed, or not a
-/// number.
+/// Reason why the simulation of a robot cannot continue. Its state is then the last computed one, or not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -36,15 +35,14 @@ pub enum PlantFault {
     /// The mass matrix is not positive definite.
     #[error("the mass matrix of the simulated robot is not positive definite")]
     MassMatrix,
-    /// Positions or velocities have grown beyond all numbers.
-    #[error("the simulated robot's motion has grown beyond all numbers")]
+    /// Positions or velocities are not finite.
+    #[error("the motion of the simulated robot is not finite")]
     NotFinite,
-    /// The adaptive integrator found no step that keeps its tolerance.
-    #[error("no integration step keeps the tolerance")]
+    /// The adaptive integrator found no step within its tolerance.
+    #[error("the adaptive integrator cannot keep its tolerance")]
     StepSize,
 }
 
-/// Time, positions and velocities.
 #[derive(Clone, Debug, PartialEq)]
 struct State {
     time_s: f64,
@@ -60,10 +58,10 @@ impl State {
 
 /// A simulated robot: rigid bodies, drives and friction, disturbances, locked joints.
 ///
-/// `M(q) q̈ + h(q, q̇) + terms = τ + d(t)`. Signs without smoothing (`CoulombShape::Sign`, its dead band ignored) are
-/// dry friction with stiction: a joint at rest stays at rest, exactly, until the other torques exceed its friction at
-/// rest (Coulomb and Stribeck together). A sign of a drive that turns with two joints holds that drive. Load-dependent
-/// friction takes the load of the evaluation before.
+/// `M(q) q̈ + h(q, q̇) + terms = τ + d(t)`. Sign functions without smoothing (`CoulombShape::Sign`, its dead band
+/// ignored) are dry friction with stiction: a joint at rest stays exactly at rest until the other torques exceed its
+/// friction at rest (Coulomb and Stribeck together). A sign function of a drive that moves with two joints holds that
+/// drive. Load-dependent friction uses the load of the previous evaluation.
 ///
 /// ```
 /// use dynident_simulation::{Integrator, Plant};
@@ -76,7 +74,7 @@ impl State {
 /// for _ in 0..1000 {
 ///     plant.advance(&[0.0, 0.0], 1e-3, Integrator::Rk4 { steps_per_sample: 1 }).unwrap();
 /// }
-/// // Falling freely, it keeps its energy.
+/// // In free fall the energy is constant.
 /// assert!((plant.energy_j() - before).abs() < 1e-8);
 /// # Ok::<(), dynident_simulation::SimulationError>(())
 /// ```
@@ -98,11 +96,12 @@ impl core::fmt::Debug for Plant {
 }
 
 impl Plant {
-    /// The robot with the model's own inertial parameters and the terms with theirs, at rest at zero.
+    /// Creates the robot with the inertial parameters of the model and the terms with their parameters, at rest at
+    /// zero.
     ///
     /// # Errors
-    /// Counts that differ, numbers that are not finite, friction or drive inertia below zero, terms of joints that do
-    /// not exist, or a mass matrix that is not positive definite at position zero.
+    /// Different lengths, values that are not finite, negative friction or drive inertia, terms of missing joints, or a
+    /// mass matrix that is not positive definite at position zero.
     pub fn new(model: &Model, terms: &[TorqueTerm], term_parameters: &[f64]) -> Result<Self, SimulationError> {
         let dof = model.dof();
         let drives = Drives::new(model, terms, term_parameters)?;
@@ -119,10 +118,10 @@ impl Plant {
         Ok(plant)
     }
 
-    /// The same robot under disturbances, in place of any it had.
+    /// Replaces the disturbances.
     ///
     /// # Errors
-    /// A joint that does not exist, a number that is not finite.
+    /// A missing joint, a value that is not finite.
     pub fn with_disturbances(mut self, disturbances: &[Disturbance]) -> Result<Self, SimulationError> {
         let placed = disturbances
             .iter()
@@ -132,11 +131,10 @@ impl Plant {
         Ok(self)
     }
 
-    /// The same robot with the named joints locked where they are when a run begins: they do not move whatever the
-    /// torques. In place of any that were locked.
+    /// Locks the named joints at their positions at the start of a run, and unlocks all others.
     ///
     /// # Errors
-    /// A joint that does not exist.
+    /// A missing joint.
     pub fn with_locked(mut self, joints: &[String]) -> Result<Self, SimulationError> {
         let mut locked = vec![false; self.dof()];
         for name in joints {
@@ -156,17 +154,17 @@ impl Plant {
         self.state.q.len()
     }
 
-    /// The true robot.
+    /// Model of the simulated robot.
     pub fn model(&self) -> &Model {
         &self.equations.model
     }
 
-    /// The true terms and their parameters.
+    /// Terms of the simulated robot and their parameters.
     pub fn terms(&self) -> (&[TorqueTerm], &[f64]) {
         (&self.terms.0, &self.terms.1)
     }
 
-    /// Time since the run's begin, s.
+    /// Time since the start of the run, s.
     pub fn time_s(&self) -> f64 {
         self.state.time_s
     }
@@ -181,16 +179,16 @@ impl Plant {
         &self.state.dq
     }
 
-    /// How many steps ended before the friction torques of several joints had settled to 1e-13 of the largest velocity.
-    /// Zero in all that was seen.
+    /// Number of steps in which the friction torques of several joints did not converge to 1e-13 of the largest
+    /// velocity. It has always been zero.
     pub fn unsettled_steps(&self) -> usize {
         self.equations.unsettled
     }
 
-    /// Puts the robot somewhere: a new run begins. Springs of friction are undeflected; locked joints have no velocity.
+    /// Sets the state and begins a new run. Friction springs are undeflected; locked joints have zero velocity.
     ///
     /// # Panics
-    /// If the vectors have not one entry per joint.
+    /// If the vectors do not have one entry per joint.
     pub fn set_state(&mut self, time_s: f64, q: &[f64], dq: &[f64]) {
         self.state.time_s = time_s;
         self.state.q.copy_from_slice(q);
@@ -207,10 +205,10 @@ impl Plant {
         self.equations.unsettled = 0;
     }
 
-    /// Checks positions and velocities that somebody gives, for [`set_state`](Self::set_state).
+    /// Checks positions and velocities for [`set_state`](Self::set_state).
     ///
     /// # Errors
-    /// Another number of joints, a number that is not finite.
+    /// Another number of joints, a value that is not finite.
     pub fn check_state(&self, q: &[f64], dq: &[f64]) -> Result<(), SimulationError> {
         for (what, values) in [("start positions", q), ("start speeds", dq)] {
             require_length(what, self.dof(), values.len())?;
@@ -221,14 +219,14 @@ impl Plant {
         Ok(())
     }
 
-    /// Accelerations under the drives' torques in the present state, with friction: at a joint at rest whatever holds
-    /// it, as far as it can.
+    /// Computes the accelerations for the drives' torques in the present state, with friction; a joint at rest is held
+    /// as far as its friction suffices.
     ///
     /// # Errors
     /// [`PlantFault`].
     ///
     /// # Panics
-    /// If the vectors have not one entry per joint.
+    /// If the vectors do not have one entry per joint.
     pub fn accelerations(&mut self, tau: &[f64], out: &mut [f64]) -> Result<(), PlantFault> {
         let State { time_s, q, dq } = &self.state;
         let at = StateView { time_s: *time_s, q, dq, tau };
@@ -238,13 +236,13 @@ impl Plant {
         if out.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(PlantFault::NotFinite) }
     }
 
-    /// Goes on for `duration_s` with constant torques of the drives. The fixed-step integrators allocate nothing.
+    /// Integrates over `duration_s` with constant torques of the drives. The fixed-step integrators do not allocate.
     ///
     /// # Errors
     /// [`PlantFault`]: the motion cannot be continued.
     ///
     /// # Panics
-    /// If `tau` has not one entry per joint.
+    /// If `tau` does not have one entry per joint.
     pub fn advance(&mut self, tau: &[f64], duration_s: f64, integrator: Integrator) -> Result<(), PlantFault> {
         let Self { equations, stages, state, .. } = self;
         match integrator {
@@ -262,7 +260,7 @@ impl Plant {
         }
     }
 
-    /// Sets the clock: a loop that counts samples keeps it free of rounding.
+    /// Sets the clock, so that a loop that counts samples can remove rounding errors of the time.
     pub fn set_time_s(&mut self, time_s: f64) {
         self.state.time_s = time_s;
     }

@@ -1,23 +1,21 @@
-//! The classical Runge-Kutta method of order 4, with stops where a joint comes to rest.
+//! Classical Runge-Kutta method of order 4 that stops where a joint comes to rest.
 //!
-//! During a step every friction unit slides one way or is held. Where a sliding unit's velocity crosses zero, the step
-//! ends there (found by false position on the step's length), the unit is at rest exactly, and whether its friction
-//! holds it is decided anew. Whether a held unit breaks away is looked at where a step begins.
+//! During a step every friction unit slides in one direction or is held. If the velocity of a sliding unit crosses
+//! zero, the step ends there (found by false position on the step length), the unit is exactly at rest, and whether its
+//! friction holds it is determined again. Breakaway of a held unit is tested at the beginning of a step.
 
 use super::equations::{Equations, Mode, StateView};
 use super::{PlantFault, State, euler};
 
-/// Stops in one step, after which the rest of it is done by the implicit step, which needs none.
-const STOPS: usize = 16;
+/// Maximum number of stops in one step; the rest is integrated by the implicit step.
+const MAX_STOPS: usize = 16;
 
-/// Stages of a step, allocated once.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stages {
     q: Vec<f64>,
     dq: Vec<f64>,
     speeds: [Vec<f64>; 3],
     accelerations: [Vec<f64>; 4],
-    /// The state after the step.
     q_next: Vec<f64>,
     dq_next: Vec<f64>,
 }
@@ -43,22 +41,22 @@ pub(super) fn step(
     tau: &[f64],
     h: f64,
 ) -> Result<(), PlantFault> {
-    let mut rest = h;
-    for _ in 0..STOPS {
+    let mut left_s = h;
+    for _ in 0..MAX_STOPS {
         let at = StateView { time_s: state.time_s, q: &state.q, dq: &state.dq, tau };
         let may_stop = equations.decide(at)?;
-        try_step(equations, stages, at, rest)?;
-        if !may_stop || margin(equations, &stages.dq_next) >= 0.0 {
-            return commit(equations, stages, state, rest);
+        try_step(equations, stages, at, left_s)?;
+        if !may_stop || min_sliding_speed(equations, &stages.dq_next) >= 0.0 {
+            return commit(equations, stages, state, left_s);
         }
-        let Some(done) = stop(equations, stages, at, rest)? else { break };
+        let Some(done) = shortened_to_stop(equations, stages, at, left_s)? else { break };
         commit(equations, stages, state, done)?;
-        rest -= done;
-        if rest <= 0.0 {
+        left_s -= done;
+        if left_s <= 0.0 {
             return Ok(());
         }
     }
-    euler::step(equations, state, tau, rest)
+    euler::step(equations, state, tau, left_s)
 }
 
 /// One step of length `h` with every unit in its mode, into the next state of `stages`.
@@ -85,8 +83,8 @@ fn try_step(equations: &mut Equations, stages: &mut Stages, at: StateView<'_>, h
     Ok(())
 }
 
-/// The least velocity of a sliding unit in its own direction: negative when one has crossed zero.
-pub(super) fn margin(equations: &Equations, dq: &[f64]) -> f64 {
+/// Smallest velocity of a sliding unit in its direction; negative after a zero crossing.
+pub(super) fn min_sliding_speed(equations: &Equations, dq: &[f64]) -> f64 {
     let units = equations.drives.units.iter().zip(&equations.modes).filter(|(unit, _)| unit.holds());
     units.fold(f64::INFINITY, |least, (unit, mode)| match mode {
         Mode::Forward => least.min(unit.speed(dq)),
@@ -95,26 +93,31 @@ pub(super) fn margin(equations: &Equations, dq: &[f64]) -> f64 {
     })
 }
 
-/// Shortens the step to where the first sliding unit comes to rest, and puts that unit to rest. None if the units that
-/// cross zero began at rest: there is no such place.
-fn stop(equations: &mut Equations, stages: &mut Stages, at: StateView<'_>, h: f64) -> Result<Option<f64>, PlantFault> {
-    let (mut low, mut at_low) = (0.0, margin(equations, at.dq));
-    let (mut high, mut at_high) = (h, margin(equations, &stages.dq_next));
+/// Shortens the step to the time when the first sliding unit comes to rest, and sets that unit at rest. `None` if the
+/// units that cross zero began at rest.
+fn shortened_to_stop(
+    equations: &mut Equations,
+    stages: &mut Stages,
+    at: StateView<'_>,
+    h: f64,
+) -> Result<Option<f64>, PlantFault> {
+    let (mut low, mut at_low) = (0.0, min_sliding_speed(equations, at.dq));
+    let (mut high, mut at_high) = (h, min_sliding_speed(equations, &stages.dq_next));
     if at_low <= 0.0 {
         return Ok(None);
     }
-    // A velocity that counts as none: rounding of those that the step began with.
-    let none = 1e-13 * at_low.max(-at_high);
+    // Velocity that is treated as zero: rounding of the velocities at the start of the step.
+    let zero_speed = 1e-13 * at_low.max(-at_high);
     let mut last_side = 0;
     for _ in 0..60 {
         let length = low + (high - low) * at_low / (at_low - at_high);
         try_step(equations, stages, at, length)?;
-        let found = margin(equations, &stages.dq_next);
-        if found.abs() <= none || (high - low) <= 1e-15 * h {
+        let found = min_sliding_speed(equations, &stages.dq_next);
+        if found.abs() <= zero_speed || (high - low) <= 1e-15 * h {
             (low, at_low) = (length, found);
             break;
         }
-        // False position with the weight of an end halved that stays twice (Illinois).
+        // False position that halves the weight of a repeated end (Illinois method).
         if found > 0.0 {
             (low, at_low) = (length, found);
             at_high *= if last_side == 1 { 0.5 } else { 1.0 };
@@ -126,16 +129,16 @@ fn stop(equations: &mut Equations, stages: &mut Stages, at: StateView<'_>, h: f6
         }
     }
     try_step(equations, stages, at, low)?;
-    rest(equations, &mut stages.dq_next, none.max(at_low.abs()));
+    set_at_rest(equations, &mut stages.dq_next, zero_speed.max(at_low.abs()));
     Ok(Some(low))
 }
 
-/// Puts units whose velocity in their direction is at most `none` to rest.
-pub(super) fn rest(equations: &mut Equations, dq: &mut [f64], none: f64) {
+/// Sets units at rest whose velocity in their direction is at most `zero_speed`.
+pub(super) fn set_at_rest(equations: &mut Equations, dq: &mut [f64], zero_speed: f64) {
     for (unit, mode) in equations.drives.units.iter().zip(&mut equations.modes) {
         let speed = unit.speed(dq);
         let along = if *mode == Mode::Backward { -speed } else { speed };
-        if *mode != Mode::Held && unit.holds() && along <= none {
+        if *mode != Mode::Held && unit.holds() && along <= zero_speed {
             let square: f64 = unit.joints.iter().map(|(_, ratio)| ratio * ratio).sum();
             for &(joint, ratio) in &unit.joints {
                 dq[joint] -= ratio * speed / square;

@@ -1,4 +1,4 @@
-//! The loop: limits, verdicts, sensors.
+//! The closed loop: limits, status, sensors.
 
 use dynident_excitation::Motion;
 use dynident_model::sample::planar_2r;
@@ -27,7 +27,7 @@ fn run(settings: &LoopSettings) -> Run {
 fn torques_are_cut_and_counted() {
     let limits = RunLimits { torque: Some(vec![3.0, 1e9].into()), ..RunLimits::default() };
     let own = run(&LoopSettings { limits, ..LoopSettings::default() });
-    // The weight of the arm asks for more than 3 Nm at most samples.
+    // The weight of the arm requires more than 3 Nm at most samples.
     assert!(own.saturated[0] > 500 && own.saturated[1] == 0);
     assert!(own.tau[own.of(0)].iter().all(|tau| tau.abs() <= 3.0));
 }
@@ -45,7 +45,6 @@ fn broken_limits_stop_the_run() {
         let own = run(&LoopSettings { limits, ..LoopSettings::default() });
         let RunStatus::LimitBroken { quantity, time_s, ref joint, .. } = own.status else { panic!("{}", own.status) };
         assert_eq!((quantity, joint.as_str()), (expected, "joint1"));
-        // What was is kept, and is what the whole run had.
         assert_eq!(own.samples, (time_s * 1000.0).round() as usize);
         assert_eq!(own.reference.samples, own.samples);
         for joint in 0..2 {
@@ -56,9 +55,9 @@ fn broken_limits_stop_the_run() {
     }
 }
 
-/// Gains far beyond what the rate allows: a verdict, and nothing but finite numbers.
+/// Gains far too high for the rate: divergence is reported, and all numbers are finite.
 #[test]
-fn a_blow_up_is_a_verdict() {
+fn divergence_is_reported() {
     let reference = Reference::standing(&[-1.2, 0.3], 100.0, 5.0).unwrap();
     for integrator in [
         Integrator::SemiImplicitEuler { steps_per_sample: 1 },
@@ -91,7 +90,7 @@ impl Controller for Broken {
 }
 
 #[test]
-fn a_controller_without_a_number_is_a_verdict() {
+fn a_nan_torque_is_reported() {
     let reference = Reference::standing(&[-1.2, 0.3], 1000.0, 1.0).unwrap();
     let own = closed_loop(&mut plant(), &mut Broken, &reference, &LoopSettings::default()).unwrap();
     assert!(matches!(own.status, RunStatus::Diverged { reason: Divergence::Torque { joint: 0 }, .. }));
@@ -109,8 +108,8 @@ fn accelerations_are_those_of_the_motion() {
     let own = run(&settings);
     for joint in 0..2 {
         let (dq, ddq) = (&own.dq[own.of(joint)], &own.ddq[own.of(joint)]);
-        // The mean of the interval against its start: half a step of the jerk, which is below 500 · 100 rad/s³ at the
-        // start and dies down.
+        // The mean acceleration of the interval differs from that at its start by half a step of the jerk, which is
+        // below 500 · 100 rad/s³ at the start and decays.
         let worst = (1000..1999).map(|k| ((dq[k + 1] - dq[k]) * 1000.0 - ddq[k]).abs()).fold(0.0, f64::max);
         assert!(worst < 0.05, "{worst}");
     }
@@ -143,7 +142,7 @@ fn perfect_sensors_record_the_truth() {
     let (plant, run, sensors) = sine_run(SensorSettings::default());
     let record = sensors.record(plant.model(), &run).unwrap();
     assert_eq!((&record.q, &record.tau, record.samples), (&run.q, &run.tau, run.samples));
-    // Between samples the cubic is off by h⁴/384 of a fourth derivative of some 1e3: below 1e-11.
+    // Between samples the cubic has an error of h⁴/384 of a fourth derivative of some 1e3: below 1e-11.
     let twice = SensorSettings { record_rate_hz: Some(2000.0), ..sensors };
     let fine = twice.record(plant.model(), &run).unwrap();
     assert_eq!(fine.samples, 20_001);
@@ -151,7 +150,6 @@ fn perfect_sensors_record_the_truth() {
         let (fine, own) = (&fine.q[fine.of(joint)], &run.q[run.of(joint)]);
         for k in 100..9900 {
             assert!((fine[2 * k] - own[k]).abs() < 1e-14);
-            // The middle of four neighbours, to fourth order.
             let middle = (9.0 * (own[k] + own[k + 1]) - own[k - 1] - own[k + 2]) / 16.0;
             assert!((fine[2 * k + 1] - middle).abs() < 1e-9);
         }
@@ -160,7 +158,7 @@ fn perfect_sensors_record_the_truth() {
     assert!(csv.starts_with("t_s,q1,q2,tau1,tau2\n0,") && csv.lines().count() == 10_002);
 }
 
-/// Settings may be of any size, a record's numbers are finite.
+/// Settings can have any size, but the numbers of a record are finite.
 #[test]
 fn a_record_that_would_not_be_finite_is_refused() {
     for (position_std, torque_std, torque_step) in [(0.0, 1e308, None), (1e308, 0.0, None), (0.0, 0.0, Some(1e-320))] {
@@ -168,7 +166,7 @@ fn a_record_that_would_not_be_finite_is_refused() {
             position_std: position_std.into(),
             torque_std: torque_std.into(),
             torque_step: torque_step.map(Into::into),
-            // Other instants than the controller's, whose own readings have no noise here.
+            // Instants that differ from the controller's, whose readings have no noise here.
             record_rate_hz: Some(2000.0),
             ..SensorSettings::default()
         };
@@ -192,17 +190,16 @@ fn encoders_quantise_and_noise_has_its_size() {
     let (plant, run, sensors) = sine_run(sensors);
     let record = sensors.record(plant.model(), &run).unwrap();
     assert_eq!(record, sensors.record(plant.model(), &run).unwrap());
-    // The same instants: what the controller saw.
     assert_eq!(record.q, run.measured_q);
     let step = core::f64::consts::TAU / 4096.0;
     assert!(record.q.iter().all(|q| (q / step - (q / step).round()).abs() < 1e-6));
     assert!(record.tau.iter().all(|tau| (tau / 1e-3 - (tau / 1e-3).round()).abs() < 1e-6));
     let std =
         |a: &[f64], b: &[f64]| (a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / a.len() as f64).sqrt();
-    // White noise and a uniform error of a step: σ² + Δ²/12, to five standard errors of 20,000 samples.
+    // White noise and a uniform error of a step: σ² + Δ²/12, within five standard errors of 20,000 samples.
     let expected = (1e-6 + step * step / 12.0).sqrt();
     assert!((std(&record.q, &run.q) / expected - 1.0).abs() < 0.03);
-    // Correlation leaves fewer independent samples: 20,000 · (1 - ρ²)/(1 + ρ²) = 2,100.
+    // Correlation reduces the number of independent samples: 20,000 · (1 - ρ²)/(1 + ρ²) = 2,100.
     assert!((std(&record.tau, &run.tau) / 0.2 - 1.0).abs() < 0.08);
     let error: Vec<f64> = record.tau.iter().zip(&run.tau).map(|(a, b)| a - b).collect();
     let product: f64 = error[..10_000].windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / 9_999.0;
@@ -211,7 +208,7 @@ fn encoders_quantise_and_noise_has_its_size() {
     assert_ne!(other.record(plant.model(), &run).unwrap().tau, record.tau);
 }
 
-/// Delays move channels, drift stretches time, jitter adds its velocity's share.
+/// Delays shift channels, drift stretches time, and jitter adds noise proportional to the velocity.
 #[test]
 fn channels_come_late_and_clocks_drift() {
     let (plant, run, _) = sine_run(SensorSettings::default());
@@ -239,8 +236,7 @@ fn channels_come_late_and_clocks_drift() {
     assert!((error / (1e-3 * speed) - 1.0).abs() < 0.05, "{error} {speed}");
 }
 
-/// Velocities by differences lag by half a sample and the filter's `1/(2πf)`; feedback that comes late makes the loop
-/// softer.
+/// Velocities from differences lag by half a sample and the filter's `1/(2πf)`; delayed feedback makes the loop softer.
 #[test]
 fn feedback_by_encoders_and_late() {
     let (_, own, _) = sine_run(SensorSettings {
@@ -254,7 +250,7 @@ fn feedback_by_encoders_and_late() {
     let share = lag_s * 1000.0 - late as f64;
     for k in 2000..10_000 {
         let expected = (1.0 - share) * truth[k - late] + share * truth[k - late - 1];
-        // The exact exponential's lag differs from 1/(2πf) by up to half a sample: 1e-3 s of 2 rad/s².
+        // The lag of the exact exponential differs from 1/(2πf) by up to half a sample: 1e-3 s of 2 rad/s².
         assert!((seen[k] - expected).abs() < 2e-3, "{k} {} {expected}", seen[k]);
     }
     let (_, delayed, _) = sine_run(SensorSettings { feedback_delay_samples: 3, ..SensorSettings::default() });
@@ -264,7 +260,7 @@ fn feedback_by_encoders_and_late() {
     assert_eq!(seen[..4], [truth[0]; 4]);
 }
 
-/// Settings go through TOML and JSON unchanged, those of a description with and without limits too.
+/// Settings are unchanged by TOML and JSON, also those of a robot description with and without limits.
 #[test]
 fn settings_can_be_stored() {
     let ur10 = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/ur10.urdf");

@@ -1,4 +1,4 @@
-//! Controllers against what theory says of them, and against the figures of the paper's reading notes.
+//! Controllers against theory, and against the simulation in the paper's reading notes.
 
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, Workspace, inverse_dynamics, mass_matrix};
 use dynident_excitation::Motion;
@@ -30,7 +30,6 @@ fn terms() -> (Vec<TorqueTerm>, Vec<f64>) {
     (terms, vec![0.5, 0.4, 0.3, 0.2, 0.1, -0.1, 0.6, 0.5])
 }
 
-/// Sines of both joints, exactly.
 fn sines(rate_hz: f64, duration_s: f64) -> Reference {
     let samples = (rate_hz * duration_s) as usize + 1;
     let mut motion = Motion::default();
@@ -53,8 +52,8 @@ fn run(plant: &mut Plant, controller: &mut dyn Controller, reference: &Reference
     closed_loop(plant, controller, reference, &settings).unwrap()
 }
 
-/// With an exact model the error obeys `ë + K_d ė + K_p e = 0`; critically damped from (e₀, 0): `e = e₀ (1 + λt)
-/// e^(-λt)`. The sampled loop delays by half a sample, so at 10 kHz the error may be off by some λ dt/2 of e₀.
+/// With an exact model the error satisfies `ë + K_d ė + K_p e = 0`; critically damped from (e₀, 0): `e = e₀ (1 + λt)
+/// e^(-λt)`. The sampled loop has a delay of half a sample, so at 10 kHz the error can deviate by λ dt/2 of e₀.
 #[test]
 fn computed_torque_is_linear_in_the_error() {
     let (terms, values) = terms();
@@ -79,8 +78,8 @@ fn computed_torque_is_linear_in_the_error() {
     }
 }
 
-/// The finite-time law with an exact model brings the error to the blend's width in finite time; the literal one drives
-/// the joints away, and the loop says so with finite numbers.
+/// With an exact model the finite-time law reduces the error to the linear range in finite time. The literal law
+/// diverges, and the loop reports it with finite numbers.
 #[test]
 fn the_papers_law_converges_and_its_print_does_not() {
     let mut plant = Plant::new(&paper_arm(), &[], &[]).unwrap();
@@ -102,7 +101,7 @@ fn the_papers_law_converges_and_its_print_does_not() {
     assert!(own.q.iter().chain(&own.dq).chain(&own.tau).all(|x| x.is_finite()));
 }
 
-/// Without the straight middle the sampled law ends in a limit cycle; with it the torque is calm.
+/// Without the linear range the sampled law ends in a limit cycle; with it the torque is smooth.
 #[test]
 fn the_blend_ends_the_chatter() {
     let mut plant = Plant::new(&paper_arm(), &[], &[]).unwrap();
@@ -124,7 +123,8 @@ fn the_blend_ends_the_chatter() {
     assert!(raw > 1e-2 && blended < 1e-9, "{raw:e} {blended:e}");
 }
 
-/// PD with gravity holds a posture without error, PD alone sags by g/K_p, the integral brings it back.
+/// PD with gravity compensation holds a posture without error, PD alone deviates by g/K_p, and the integral removes the
+/// deviation.
 #[test]
 fn gravity_and_integrals_remove_the_sag() {
     let mut plant = Plant::new(&paper_arm(), &[], &[]).unwrap();
@@ -138,15 +138,13 @@ fn gravity_and_integrals_remove_the_sag() {
         own.tracking_error(0).last().unwrap()
     };
     let sag = last(&ControllerSettings::JointPd(pd()));
-    // About (2 cos 0.3 + cos 0.7) g / K_p.
     assert!((sag - 9.8 * (2.0 * 0.3_f64.cos() + 0.7_f64.cos()) / 400.0).abs() < 0.1 * sag);
     assert!(last(&ControllerSettings::PdGravity(pd())).abs() < 1e-9);
-    // The integral's own time constant is a second.
     assert!(last(&ControllerSettings::JointPid(pid)).abs() < 1e-4);
 }
 
-/// Slotine and Li's C: `C(q, q̇) q̇` is the centrifugal torque, `C(q, u) v = C(q, v) u`, and `vᵀ (Ṁ - 2C) v = 0`, with
-/// Ṁ by central differences of the mass matrix (1e-6 of step: 1e-8).
+/// C of Slotine and Li: `C(q, q̇) q̇` is the centrifugal torque, `C(q, u) v = C(q, v) u`, and `vᵀ (Ṁ - 2C) v = 0`, with
+/// Ṁ by central differences of the mass matrix (step 1e-6: error 1e-8).
 #[test]
 fn slotine_li_has_the_skew_matrix() {
     let dof = 5;
@@ -183,7 +181,7 @@ fn slotine_li_has_the_skew_matrix() {
     assert!((rate - twice).abs() < 1e-6, "{rate} {twice}");
 }
 
-/// Adaptation learns: from no model at all, the error of the second half is a small part of that without adaptation.
+/// Adaptation without a model reduces the error of the second half to a small part of that without adaptation.
 #[test]
 fn slotine_li_adapts() {
     let (terms, values) = terms();
@@ -200,7 +198,7 @@ fn slotine_li_adapts() {
     };
     let (fixed, adapted) = (late(0.0), late(3.0));
     assert!(adapted < 0.1 * fixed, "{fixed} {adapted}");
-    // With the true model from the start there is nothing to learn: what is left is the sampling.
+    // With the exact model only the sampling error remains.
     let exact = ControllerModel::new(&paper_arm(), &terms, &values).unwrap();
     let settings =
         SlotineLiSettings { lambda: 5.0.into(), kd: 20.0.into(), gamma: 0.0, friction: FrictionCompensation::Measured };
@@ -209,7 +207,7 @@ fn slotine_li_adapts() {
     assert!(own.max_error[0] < 2e-3, "{}", own.max_error[0]);
 }
 
-/// Base parameters alone make the same controller as the whole model: torques are linear in them.
+/// Base parameters alone result in the same controller as the whole model, because torques are linear in them.
 #[test]
 fn base_parameters_are_enough() {
     let (terms, values) = terms();
@@ -245,10 +243,10 @@ fn base_parameters_are_enough() {
     }
 }
 
-/// Reading notes, 2: joint 2 of the paper's arm with T = 40/ω, 100 Hz, g = 9.8, window ±2.46 s about the middle of each
-/// stroke. First under PD with K_p = 16, K_d = 8, then under the paper's law with what the run before gave. The notes'
-/// own simulation gave largest tracking errors of 0.62, 0.12 and 0.001 rad (the paper's Fig. 12: 0.6, 0.15, 0) and θ4 =
-/// 0.369, 1.094, 0.996.
+/// Reading notes, 2: joint 2 of the paper's arm with T = 40/ω, 100 Hz, g = 9.8, window ±2.46 s around the middle of
+/// each stroke. First PD with K_p = 16, K_d = 8, then the paper's law with the estimate of the previous run. The
+/// simulation in the notes had largest tracking errors of 0.62, 0.12 and 0.001 rad (Fig. 12 of the paper: 0.6, 0.15, 0)
+/// and θ4 = 0.369, 1.094, 0.996.
 #[test]
 fn the_papers_three_runs() {
     let (amplitude, omega) = (2.094, 0.996);
@@ -312,7 +310,7 @@ fn least_squares(rows: &[[f64; 4]]) -> [f64; 3] {
 }
 
 #[test]
-fn bad_controllers_are_refused() {
+fn invalid_controllers_are_rejected() {
     let read = |text: &str| toml::from_str::<ControllerSettings>(text);
     assert!(read("kind = \"joint-pd\"\nkp = 1.0").is_err());
     assert!(read("kind = \"joint-pd\"\nkp = 1.0\nkd = 1.0\nki = 1.0").is_err());
@@ -325,7 +323,7 @@ fn bad_controllers_are_refused() {
     assert!(finite.build(3, Some(&model)).is_err());
     let steep = FiniteTimeSettings { alpha: 0.0, ..FiniteTimeSettings::with_gains(1.0, 1.0) };
     assert!(ControllerSettings::FiniteTime(steep).build(2, Some(&model)).is_err());
-    // All names lead back to their settings.
+    // All names can be read back.
     for settings in [pd(2.0), finite] {
         let text = toml::to_string(&settings).unwrap();
         assert_eq!(read(&text).unwrap(), settings);

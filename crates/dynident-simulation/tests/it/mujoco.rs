@@ -1,4 +1,4 @@
-//! The simulated robot against MuJoCo 4.0: 10 s of the Panda arm under joint PD at matched steps of 1 ms.
+//! The simulated robot against MuJoCo 4.0: 10 s of the Panda arm under joint PD with matched steps of 1 ms.
 
 use dynident_excitation::Motion;
 use dynident_model::load_robot;
@@ -8,15 +8,15 @@ use dynident_simulation::{Integrator, LoopSettings, Plant, Reference, closed_loo
 use serde_json::Value;
 use std::path::Path;
 
-/// The project's promise. Two programs with the same method differ by rounding alone, which a stable loop does not let
-/// grow: what is seen is far below.
-const PROMISE: f64 = 1e-6;
+/// Tolerance that the project guarantees. Two programs with the same method differ only by rounding, which a stable
+/// loop does not amplify; the observed differences are far smaller.
+const TOLERANCE: f64 = 1e-6;
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
 }
 
-/// The golden file's reference, so many samples of it.
+/// The reference of the golden file, with a number of samples.
 fn sines(golden: &Value, samples: usize) -> Reference {
     let [centre, amplitude, omega, phase] = ["centre", "amplitude", "omega", "phase"].map(|key| numbers(&golden[key]));
     let mut motion = Motion::default();
@@ -68,13 +68,13 @@ fn ten_seconds_of_panda_agree() {
             .fold(0.0, f64::max)
         });
         println!("{run}: {:.1e} rad, {:.1e} rad/s", worst[0], worst[1]);
-        assert!(worst[0] < PROMISE, "{run}: {:e} rad", worst[0]);
+        assert!(worst[0] < TOLERANCE, "{run}: {:e} rad", worst[0]);
     }
 }
 
-/// The free frictionless Panda arm falls for 5 s and keeps its energy: within some thousand times the tight
-/// integrator's tolerance of 1e-10, and within RK4's error of order 4 (light wrist joints spin at tens of rad/s: with
-/// four steps a millisecond a thousandth of a joule).
+/// The free frictionless Panda arm falls for 5 s with constant energy: within some thousand times the adaptive
+/// integrator's tolerance of 1e-10, and within RK4's error of order 4 (light wrist joints rotate at tens of rad/s: with
+/// four steps per millisecond a thousandth of a joule).
 #[test]
 fn the_free_panda_keeps_its_energy() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -96,9 +96,9 @@ fn the_free_panda_keeps_its_energy() {
     }
 }
 
-/// Panda with dry friction in every joint, stick and slip at every reversal, by all three integrators: Euler and RK4
-/// stay near the tight one, each to its order, and no step is left unsettled. Euler at 1 ms is off by about h times the
-/// velocities (2 rad/s); RK4 sees break-away at its steps only, up to 1 ms late.
+/// Panda with dry friction in every joint, which sticks and slides at every reversal, with all three integrators: Euler
+/// and RK4 deviate from the adaptive one by their order, and all steps converge. Euler at 1 ms deviates by about h
+/// times the velocities (2 rad/s); RK4 detects breakaway only at its steps, up to 1 ms late.
 #[test]
 fn panda_sticks_and_slips_the_same_by_all_integrators() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

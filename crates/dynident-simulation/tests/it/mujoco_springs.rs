@@ -1,4 +1,4 @@
-//! Declared torques against MuJoCo: a joint's spring and a cable that pulls beyond its length.
+//! Declared torques against MuJoCo: a joint spring and a cable that is stretched beyond its length.
 
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_model::read_mjcf;
@@ -7,7 +7,7 @@ use dynident_simulation::Plant;
 use serde_json::Value;
 use std::path::Path;
 
-/// Torques are some hundred Nm, of some hundred operations each in two programs.
+/// Torques of some hundred Nm, from some hundred operations in each of two programs.
 const TOLERANCE: f64 = 1e-10;
 
 fn pair(value: &Value) -> [f64; 2] {
@@ -15,7 +15,7 @@ fn pair(value: &Value) -> [f64; 2] {
 }
 
 #[test]
-fn springs_and_cables_are_those_of_mujoco() {
+fn springs_and_cables_agree_with_mujoco() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let golden: Value =
         serde_json::from_str(&std::fs::read_to_string(root.join("golden/springs.json")).unwrap()).unwrap();
@@ -26,11 +26,10 @@ fn springs_and_cables_are_those_of_mujoco() {
         let (name, law) = (name.to_owned(), DeclaredLaw::Expression(expression));
         TorqueTerm::Declared(Declared { name, joint, law, unit: "N/m".to_owned(), nominal: None, is_spring: false })
     };
-    // The cable from (0.1, 0.3) to 0.25 m along the link is sqrt(square) long; its torque is its force times the
+    // The cable from (0.1, 0.3) to 0.25 m along the link has the length sqrt(square); its torque is its force times the
     // derivative of its length.
     let square = "(0.1625 - 0.05 * cos(q) + 0.15 * sin(q))";
     let cable = format!("max(sqrt{square} - 0.3, 0) * (0.05 * sin(q) + 0.15 * cos(q)) / (2 * sqrt{square})");
-    // The spring is the description's own.
     let springs = Declared::springs(&model);
     assert_eq!((springs.len(), &*springs[0].name, springs[0].joint), (1, "k_elbow", 1));
     assert_eq!((springs[0].nominal, springs[0].is_spring), (Some(40.0), true));
@@ -51,7 +50,7 @@ fn springs_and_cables_are_those_of_mujoco() {
         for (found, expected) in tau.iter().zip(expected) {
             assert!((found - expected).abs() < TOLERANCE, "{q:?}: {found} {expected}");
         }
-        // The plant under MuJoCo's torques has MuJoCo's accelerations: torques over inertias of some 0.1 kg m².
+        // Under MuJoCo's torques the plant has MuJoCo's accelerations: torques divided by inertias of some 0.1 kg m².
         plant.set_state(0.0, &q, &dq);
         let mut accelerations = [f64::NAN; 2];
         plant.accelerations(&expected, &mut accelerations).unwrap();

@@ -1,4 +1,4 @@
-//! The simulated robot against mechanics: energy, analytic motions, the inverse dynamics, the reduced model.
+//! The simulated robot against mechanics: energy, analytic motions, inverse dynamics, the reduced model.
 
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_model::sample::{Random, planar_2r, random_tree};
@@ -22,7 +22,7 @@ fn point(mass: f64) -> InertialParameters {
     InertialParameters::from_centre_of_mass(mass, Vec3([1.0, 0.0, 0.0]), &Mat3::ZERO)
 }
 
-/// Unit inertia about joint 1 with joint 2 locked straight, no gravity: a flywheel.
+/// Unit inertia about joint 1 with joint 2 locked straight, without gravity: a flywheel.
 fn flywheel(terms: &[TorqueTerm], parameters: &[f64]) -> Plant {
     let model = planar_2r(1.0, point(1.0), InertialParameters::ZERO).with_gravity(Vec3::ZERO).unwrap();
     let terms: Vec<TorqueTerm> =
@@ -40,8 +40,8 @@ fn random_state(seed: u64, dof: usize) -> [Vec<f64>; 3] {
     core::array::from_fn(|_| (0..dof).map(|_| random.uniform(-1.0, 1.0)).collect())
 }
 
-/// A free frictionless tree keeps its energy: the tight integrator to its tolerance times some thousand steps, RK4 to
-/// its order (fast joints of light tips leave 1e-6).
+/// The energy of a free frictionless tree is constant: for the adaptive integrator up to its tolerance times some
+/// thousand steps, for RK4 up to its order (1e-6 with fast joints of light tips).
 #[test]
 fn free_trees_keep_their_energy() {
     for seed in 0..4 {
@@ -61,8 +61,8 @@ fn free_trees_keep_their_energy() {
     }
 }
 
-/// Both methods have their order: against the tight one, halving the step divides the error by 2 and by 16, within a
-/// factor of 1.5.
+/// Both methods have their order: halving the step divides the error, relative to the adaptive integrator, by 2 and by
+/// 16, within a factor of 1.5.
 #[test]
 fn methods_have_their_order() {
     let model = random_tree(2, 4);
@@ -86,8 +86,8 @@ fn methods_have_their_order() {
     }
 }
 
-/// Coulomb friction alone: a flywheel of inertia I at velocity v stops after I v/F, having turned I v²/(2F), and then
-/// rests, exactly. Runge-Kutta methods find the stop to rounding, Euler within a step.
+/// Coulomb friction alone: a flywheel of inertia I at velocity v stops after I v/F, after rotating by I v²/(2F), and
+/// then rests exactly. Runge-Kutta methods find the stop up to rounding, Euler within a step.
 #[test]
 fn a_flywheel_runs_down_and_rests() {
     let mut plant = flywheel(&[coulomb(0)], &[0.7]);
@@ -105,12 +105,10 @@ fn a_flywheel_runs_down_and_rests() {
         assert_eq!(plant.dq()[0], 0.0);
         let at = plant.q()[0];
         for step in 0..500 {
-            // Torques below the friction, in both directions.
             let tau = 0.69 * f64::from(step).sin();
             plant.advance(&[tau, 0.0], 1e-3, integrator).unwrap();
             assert_eq!((plant.q()[0], plant.dq()[0]), (at, 0.0));
         }
-        // Above it: I a = τ - F.
         for _ in 0..100 {
             plant.advance(&[-0.9, 0.0], 1e-3, integrator).unwrap();
         }
@@ -118,7 +116,7 @@ fn a_flywheel_runs_down_and_rests() {
     }
 }
 
-/// Break-away torque is Coulomb and Stribeck together; once in motion the Stribeck part fades.
+/// The breakaway torque is Coulomb plus Stribeck friction; in motion the Stribeck part vanishes.
 #[test]
 fn stribeck_friction_breaks_away() {
     let stribeck = TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.05, exponent: 2.0, shape: SIGN });
@@ -132,15 +130,15 @@ fn stribeck_friction_breaks_away() {
         for _ in 0..2000 {
             plant.advance(&[0.95, 0.0], 1e-3, integrator).unwrap();
         }
-        // Long after break-away all but 0.5 drives it.
+        // Long after breakaway the driving torque is reduced by 0.5.
         let mut ddq = [0.0; 2];
         plant.accelerations(&[0.95, 0.0], &mut ddq).unwrap();
         assert!((ddq[0] - 0.45).abs() < 1e-6, "{ddq:?}");
     }
 }
 
-/// An arm whose friction exceeds its weight hangs in the air, bit for bit, and one whose friction does not falls. Both
-/// joints at once, coupled.
+/// An arm whose friction exceeds its weight rests bitwise exactly, and one with less friction falls; both joints at
+/// once, coupled.
 #[test]
 fn an_arm_is_held_by_its_friction() {
     let model = planar_2r(1.0, point(1.0), point(1.0));
@@ -151,7 +149,6 @@ fn an_arm_is_held_by_its_friction() {
             plant.advance(&[0.0, 0.0], 1e-3, integrator).unwrap();
         }
         assert_eq!((plant.q(), plant.dq()), (&[0.1, 0.2][..], &[0.0, 0.0][..]));
-        // Joint 2 alone cannot hold: it falls, joint 1 still holds.
         let mut plant = Plant::new(&model, &[coulomb(0), coulomb(1)], &[60.0, 5.0]).unwrap();
         plant.set_state(0.0, &[0.1, 0.2], &[0.0, 0.0]);
         for _ in 0..300 {
@@ -161,8 +158,8 @@ fn an_arm_is_held_by_its_friction() {
     }
 }
 
-/// The methods agree on an arm that sticks and slides: RK4 with the tight one to its local error at the stops, Euler to
-/// its order.
+/// The methods agree on an arm that sticks and slides: RK4 with the adaptive one up to its local error at the stops,
+/// Euler up to its order.
 #[test]
 fn methods_agree_on_stick_and_slip() {
     let model = planar_2r(1.0, point(1.0), point(1.0));
@@ -172,7 +169,6 @@ fn methods_agree_on_stick_and_slip() {
     let mut end = |integrator, steps: i32| {
         plant.set_state(0.0, &[-1.0, 0.5], &[0.0, 0.0]);
         for step in 0..3 * steps {
-            // The same torque within each 1 ms, whatever the step.
             let time = (f64::from(step) * 1000.0 / f64::from(steps)).floor() / 1000.0;
             let tau = [5.0 * (2.0 * time).sin(), 3.0 * (5.0 * time).sin()];
             plant.advance(&tau, 1.0 / f64::from(steps), integrator).unwrap();
@@ -187,8 +183,9 @@ fn methods_agree_on_stick_and_slip() {
     assert!(coarse < 0.02 && fine < 0.4 * coarse, "Euler {coarse:e} and {fine:e}");
 }
 
-/// Friction of every kind takes energy. By the tight integrator it never grows by more than the tolerance; by Euler,
-/// with smooth friction a thousand times too steep for an explicit method, the arm comes to rest without chatter.
+/// Friction of every kind is dissipative. With the adaptive integrator the energy never increases by more than the
+/// tolerance; with Euler and smooth friction a thousand times too steep for an explicit method, the arm comes to rest
+/// without chatter.
 #[test]
 fn friction_creates_no_energy() {
     let weightless = random_tree(3, 4).with_gravity(Vec3::ZERO).unwrap();
@@ -213,7 +210,7 @@ fn friction_creates_no_energy() {
     let terms: Vec<TorqueTerm> = (0..4).map(|joint| TorqueTerm::Coulomb(Coulomb { joint, shape: steep })).collect();
     let mut plant = Plant::new(&weightless, &terms, &[2.0; 4]).unwrap();
     plant.set_state(0.0, &q, &dq);
-    // The slowest joint has some 20 kg m² about it: 2 Nm stop it within ten seconds.
+    // The slowest joint has about 20 kg m²: 2 Nm stop it within ten seconds.
     for _ in 0..12_000 {
         plant.advance(&[0.0; 4], 1e-3, EULER).unwrap();
     }
@@ -221,8 +218,8 @@ fn friction_creates_no_energy() {
     assert_eq!(plant.unsettled_steps(), 0);
 }
 
-/// In motion, the accelerations under the torque of the inverse dynamics and all laws are those that the torque was
-/// made for. Rounding times the mass matrix's condition (below 1e4).
+/// In motion, the accelerations under the torque of the inverse dynamics with all laws are the original ones.
+/// Tolerance: rounding times the condition number of the mass matrix (below 1e4).
 #[test]
 fn forward_after_inverse_with_every_term() {
     let model = random_tree(6, 4);
@@ -288,8 +285,8 @@ fn declared(name: &str, joint: usize, text: &str) -> TorqueTerm {
     TorqueTerm::Declared(Declared { name, joint, law, unit: "Nm".to_owned(), nominal: None, is_spring: false })
 }
 
-/// An undamped spring keeps its energy, `k q²/2` beside that of the bodies; the controller's model holds the robot
-/// where it stands, spring and weight together.
+/// An undamped spring conserves energy, including its `k q²/2`; the controller's model holds the robot in its posture,
+/// with spring and weight.
 #[test]
 fn a_spring_keeps_its_energy_and_the_model_holds_it() {
     let model = random_tree(6, 2);
@@ -302,7 +299,7 @@ fn a_spring_keeps_its_energy_and_the_model_holds_it() {
     for _ in 0..2000 {
         plant.advance(&[0.0; 2], 1e-3, Integrator::Rk4 { steps_per_sample: 1 }).unwrap();
     }
-    // Runge-Kutta's error of order h⁴ over two seconds, of some joules.
+    // Runge-Kutta error of order h⁴ over two seconds, of some joules.
     assert!((energy(&mut plant) - before).abs() < 1e-7 * (1.0 + before.abs()), "{} {before}", energy(&mut plant));
 
     let mut controller = ControllerModel::new(&model, &terms, &[stiffness]).unwrap();
@@ -313,13 +310,13 @@ fn a_spring_keeps_its_energy_and_the_model_holds_it() {
     let mut accelerations = [1.0; 2];
     plant.accelerations(&tau, &mut accelerations).unwrap();
     assert!(accelerations.iter().all(|a| a.abs() < 1e-10), "{accelerations:?}");
-    // Where the expression has no value the motion ends, and no number is made up.
+    // The motion ends where the expression is undefined.
     let mut plant = Plant::new(&model, &[declared("root", 1, "sqrt(q + 1)")], &[1.0]).unwrap();
     plant.set_state(0.0, &[0.0, -2.0], &still);
     assert_eq!(plant.accelerations(&[0.0; 2], &mut accelerations), Err(PlantFault::NotFinite));
 }
 
-/// A locked joint is a joint less: the others move as in the reduced model.
+/// With a locked joint the others move as in the reduced model.
 #[test]
 fn locked_joints_are_the_reduced_model() {
     let model = random_tree(9, 5);
@@ -338,12 +335,12 @@ fn locked_joints_are_the_reduced_model() {
         less.advance(&without(&tau), 1e-3, RK4).unwrap();
     }
     assert_eq!(whole.q()[2], 0.4);
-    // The same method on the same motion: rounding, grown over 0.3 s.
+    // The same method on the same motion: rounding, amplified over 0.3 s.
     assert!(without(whole.q()).iter().zip(less.q()).all(|(a, b)| (a - b).abs() < 1e-10));
 }
 
-/// A drive that turns with both joints and rubs at rest: what torques ask of the drive below its friction does not turn
-/// it, while the motion that leaves it still is free.
+/// A drive that moves with both joints and has friction at rest: torques on the drive below its friction do not move
+/// it, while the motion that does not move the drive is free.
 #[test]
 fn a_shared_drive_sticks() {
     let model = planar_2r(1.0, point(1.0), point(1.0)).with_gravity(Vec3::ZERO).unwrap();
@@ -365,7 +362,7 @@ fn a_shared_drive_sticks() {
     }
 }
 
-/// A spring that slips pushes back to where it began as long as it does not yield, and yields at W.
+/// A slipping spring returns to its origin unless it yields, and yields at W.
 #[test]
 fn slipping_springs_remember() {
     let slip = TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: 0.01 });
@@ -386,13 +383,13 @@ fn slipping_springs_remember() {
         for _ in 0..3000 {
             plant.advance(&[2.0, 0.0], 1e-3, integrator).unwrap();
         }
-        // Yielded: (2 - 1) Nm against 20 Nm s.
+        // Yielded: (2 - 1) Nm divided by 20 Nm s.
         assert!((plant.dq()[0] - 0.05).abs() < 1e-9);
     }
 }
 
-/// Load-dependent friction holds a share of the load: an arm with k above 1 does not fall, with a small k it slides off
-/// with the share taken off.
+/// Load-dependent friction holds a share of the load: an arm with k above 1 does not fall, with a small k it slides
+/// with the load reduced by that share.
 #[test]
 fn load_friction_follows_the_load() {
     let term = TorqueTerm::Load(LoadFriction { joint: 0, shape: SIGN });
@@ -414,7 +411,7 @@ fn load_friction_follows_the_load() {
     assert!(plant.q()[0].abs() < 1e-5, "{}", plant.q()[0]);
 }
 
-/// A sine torque on a flywheel: `q̇ = (1 - cos ωt)/(I ω)`. Tight and RK4 see it inside the step.
+/// A sine torque on a flywheel: `q̇ = (1 - cos ωt)/(I ω)`. The adaptive integrator and RK4 evaluate it inside the step.
 #[test]
 fn disturbances_act_in_time() {
     let disturbance = Disturbance::Joint {
@@ -434,7 +431,7 @@ fn disturbances_act_in_time() {
 }
 
 #[test]
-fn bad_robots_are_refused() {
+fn invalid_robots_are_rejected() {
     let model: Model = planar_2r(1.0, point(1.0), point(1.0));
     assert!(Plant::new(&model, &[coulomb(0)], &[]).is_err());
     assert!(Plant::new(&model, &[coulomb(0)], &[-0.1]).unwrap_err().to_string().contains("fc1"));

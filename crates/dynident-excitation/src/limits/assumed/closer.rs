@@ -1,4 +1,4 @@
-//! Convex pieces in place of hulls, for links that are near each other by their hulls only.
+//! Convex pieces instead of hulls, for links whose hulls come closer than their meshes.
 
 use super::super::error::LimitError;
 use super::super::link_points::link_place;
@@ -7,30 +7,27 @@ use super::super::pieces::convex_pieces;
 use super::super::self_collision_shapes::{LinkShape, SelfCollision};
 use super::super::solids::solid_distance;
 use super::super::surface::Surface;
+use super::{AssumedLimits, AssumptionThresholds};
 use dynident_dynamics::{Workspace, body_placements};
 use dynident_model::collision::Solid;
 use dynident_model::{Model, Transform, Vec3};
 
-/// Postures tried besides the neutral one.
 const POSTURES: usize = 256;
 
-/// Share of the postures in which only hulls may be too near: less does not keep a search from good motions.
-const WRONG_SHARE: f64 = 0.05;
+/// Maximum distance of the pieces beyond the mesh, as a share of the clearance.
+const MAX_RELATIVE_GAP: f64 = 0.1;
 
-/// How far closer shapes may reach beyond the mesh, as a share of the clearance.
-const GAP: f64 = 0.1;
-
-/// Closer shapes of links that need them; `solids` are the shapes of all links, `hulls` their simple forms.
+/// Convex pieces of the links that need them. `solids` are the shapes of all links, `hulls` their simplified forms.
 pub(super) fn closer_shapes(
     model: &Model,
     solids: &[(String, Solid)],
     hulls: &[LinkShape],
     clearance_m: f64,
-    pieces: usize,
+    settings: &AssumedLimits,
 ) -> Result<Vec<LinkShape>, LimitError> {
-    let gap_m = GAP * clearance_m;
+    let gap_m = MAX_RELATIVE_GAP * clearance_m;
     let mut closer = Vec::new();
-    for link in links_too_coarse(model, solids, hulls, clearance_m)? {
+    for link in links_too_coarse(model, solids, hulls, clearance_m, &settings.thresholds)? {
         for (_, solid) in solids.iter().filter(|(name, _)| *name == link) {
             if solid.triangles.is_empty() {
                 closer.push(LinkShape::holding(&link, solid));
@@ -38,7 +35,7 @@ pub(super) fn closer_shapes(
             }
             let corner = |place: &u32| solid.corners_m[*place as usize];
             let triangles = solid.triangles.iter().map(|[a, b, c]| [a, b, c].map(corner)).collect();
-            for piece in convex_pieces(triangles, pieces) {
+            for piece in convex_pieces(triangles, settings.mesh_pieces) {
                 closer.push(LinkShape::closely(&link, &piece, solid.radius_m, gap_m));
             }
         }
@@ -46,12 +43,13 @@ pub(super) fn closer_shapes(
     Ok(closer)
 }
 
-/// Links with meshes that are too near to another by hulls only, in the order of the shapes.
+/// Links with meshes that violate the clearance only because of their hulls, in the order of the shapes.
 fn links_too_coarse(
     model: &Model,
     solids: &[(String, Solid)],
     hulls: &[LinkShape],
     clearance_m: f64,
+    thresholds: &AssumptionThresholds,
 ) -> Result<Vec<String>, LimitError> {
     let has_mesh = |link: &str| solids.iter().any(|(name, solid)| name == link && !solid.triangles.is_empty());
     let limit = SelfCollision { clearance_m, shapes: hulls.to_vec(), ..SelfCollision::default() };
@@ -74,7 +72,7 @@ fn links_too_coarse(
                 continue;
             }
             wrong += 1;
-            if number == 0 || f64::from(wrong) > WRONG_SHARE * POSTURES as f64 {
+            if number == 0 || f64::from(wrong) > thresholds.max_hull_only_share * POSTURES as f64 {
                 return true;
             }
         }
@@ -94,7 +92,7 @@ fn links_too_coarse(
     Ok(coarse.map(|(solid, _)| solid.link.clone()).collect())
 }
 
-/// The surface of a link in the frame of its body: its solids, or its shapes if it has no solid (capsules).
+/// Surface of a link in the frame of its body: its solids, or its capsules if it has no solid.
 fn surface(model: &Model, link: &str, solids: &[(String, Solid)], hulls: &[LinkShape]) -> Result<Surface, LimitError> {
     let (_, body_from_link) = link_place(model, link, "a collision shape")?;
     let own = solids.iter().filter(|(name, _)| name == link).map(|(_, solid)| solid.placed(&body_from_link));

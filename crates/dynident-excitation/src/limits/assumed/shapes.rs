@@ -1,41 +1,42 @@
-//! The shapes of a robot's links, or what stands in for them.
+//! Collision shapes of a robot's links, or capsules instead.
 
 use super::super::error::LimitError;
 use super::super::pairs::arm_length_m;
 use super::super::self_collision_shapes::{LinkShape, body_capsules};
+use super::AssumedLimits;
 use super::closer::closer_shapes;
 use super::words::listed;
 use dynident_model::collision::Solid;
 use dynident_model::{Link, Model};
 use std::path::Path;
 
-/// Radius of a capsule that stands in for a link, as a share of the arm's length: the tube of a UR10 or an iiwa.
-const STAND_IN: f64 = 0.04;
+/// Radius of a capsule that replaces the shapes of a link, as a share of the arm's length; that of the tubes of a UR10
+/// or an iiwa.
+const CAPSULE_RADIUS_SHARE: f64 = 0.04;
 
 /// Shapes of all links.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShapesOfLinks {
-    /// The shapes.
+    /// Shapes of the links.
     pub shapes: Vec<LinkShape>,
-    /// Links with a capsule from joint to joint: all links of a description without shapes, and links with a shape that
-    /// cannot be used.
+    /// Links with a capsule from joint to joint: all links of a robot description without shapes, and links with an
+    /// unusable shape.
     pub stand_ins: Vec<String>,
-    /// Links without any shape in a description that has shapes elsewhere: those with a mass, and all bodies.
+    /// Links without a shape in a robot description that has shapes elsewhere: links with a mass, and one link of each
+    /// body without shapes.
     pub without: Vec<String>,
-    /// Shapes that cannot be used, each with its link, its file and the reason.
+    /// Unusable shapes, each with its link, file and reason.
     pub dropped: Vec<String>,
-    /// The shapes of the description in full detail, with their links.
     solids: Vec<(String, Solid)>,
-    /// Whether the description has any shape.
     described: bool,
 }
 
 impl ShapesOfLinks {
-    /// The collision shapes of the description in `folder`, with convex hulls of meshes. Links with a shape that cannot
-    /// be used, and all links of a description without shapes, get capsules from joint to joint with a radius of 4 % of
-    /// the arm's length.
+    /// Reads the collision shapes of the robot description in `folder`, with convex hulls of meshes. Links with an
+    /// unusable shape, and all links of a robot description without shapes, get capsules from joint to joint with a
+    /// radius of 4 % of the arm's length.
     pub fn of(model: &Model, folder: &Path) -> Self {
-        let radius_m = STAND_IN * arm_length_m(model);
+        let radius_m = CAPSULE_RADIUS_SHARE * arm_length_m(model);
         let bodies = || (0..=model.body_count()).map(|index| index.checked_sub(1));
         let links = |body: Option<usize>| &body.map_or(model.base(), |body| &model.bodies()[body]).links;
         let described = bodies().any(|body| links(body).iter().any(|link| !link.collision.is_empty()));
@@ -73,23 +74,23 @@ impl ShapesOfLinks {
         found
     }
 
-    /// The shapes with meshes cut into at most `pieces` convex pieces where convex hulls are too coarse, and the links
-    /// of these meshes. Hulls are too coarse where two links come nearer than `clearance_m` by their hulls only, and
-    /// not by their triangles, in the neutral posture or in more than 5 % of 256 random ones.
+    /// The shapes with meshes cut into convex pieces where their convex hulls are too coarse, and the links of these
+    /// meshes. Hulls are too coarse if two links come closer than `clearance_m` by their hulls but not by their
+    /// triangles, in the neutral posture or in more than a share of the random ones.
     ///
     /// # Errors
-    /// As [`Limits::validate`](super::super::description::Limits::validate) of the shapes.
+    /// Errors of [`Limits::validate`](super::super::description::Limits::validate) for the shapes.
     pub(super) fn refined(
         &self,
         model: &Model,
         clearance_m: f64,
-        pieces: usize,
+        settings: &AssumedLimits,
     ) -> Result<(Vec<LinkShape>, Vec<String>), LimitError> {
         let mut shapes = self.shapes.clone();
-        // A link with a capsule in place of a dropped shape stays as coarse as it is.
+        // A link with a capsule instead of an unusable shape keeps it.
         let is_whole = |(link, _): &&(String, Solid)| !self.stand_ins.contains(link);
         let solids: Vec<(String, Solid)> = self.solids.iter().filter(is_whole).cloned().collect();
-        let closer = closer_shapes(model, &solids, &self.shapes, clearance_m, pieces)?;
+        let closer = closer_shapes(model, &solids, &self.shapes, clearance_m, settings)?;
         let mut links: Vec<String> = closer.iter().map(|shape| shape.link.clone()).collect();
         links.dedup();
         shapes.retain(|shape| !links.contains(&shape.link));
@@ -97,11 +98,11 @@ impl ShapesOfLinks {
         Ok((shapes, links))
     }
 
-    /// Where the shapes are from; `in_pieces` are the links whose meshes are cut.
-    pub(super) fn in_words(&self, in_pieces: &[String]) -> String {
+    /// Describes the origin of the shapes; `in_pieces` are the links whose meshes are cut.
+    pub(super) fn description(&self, in_pieces: &[String]) -> String {
         const CAPSULES: &str = "capsules from joint to joint with a radius of 4 % of the arm's length";
         if !self.described {
-            return format!("{CAPSULES}, since the description has no collision shapes");
+            return format!("{CAPSULES}, because the robot description has no collision shapes");
         }
         let pieces = match in_pieces {
             [] => String::new(),
@@ -109,8 +110,8 @@ impl ShapesOfLinks {
         };
         let capsules = match self.stand_ins.as_slice() {
             [] => String::new(),
-            links => format!("; for {} {CAPSULES}, since a shape cannot be used", listed(links)),
+            links => format!("; for {} {CAPSULES}, because a shape cannot be used", listed(links)),
         };
-        format!("the description's collision shapes, convex hulls of meshes{pieces}{capsules}")
+        format!("the collision shapes of the robot description, convex hulls of meshes{pieces}{capsules}")
     }
 }

@@ -1,21 +1,21 @@
-//! How far turning joints without position limits may turn.
+//! Assumed position limits of revolute joints without position limits.
 
 use super::super::description::Limits;
 use super::words::listed;
 use core::f64::consts::PI;
 use dynident_model::Model;
 
-/// Positions that are known before a motion, rad (m), joint by joint in the model's order; empty where none is.
+/// Known positions before a motion, rad (m), one per joint in the model's order; empty if unknown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StartPositions {
-    /// Where the motion starts.
+    /// Positions at the start of the motion.
     pub start: Vec<Option<f64>>,
-    /// Where the robot waits before it.
+    /// Positions at which the robot waits before the motion.
     pub home: Vec<Option<f64>>,
 }
 
-/// Limits the positions of turning joints that neither the description nor `given` limits. Returns a sentence about
-/// them.
+/// Limits the positions of revolute joints that neither the robot description nor `given` limits. Returns a sentence
+/// about them.
 pub(super) fn bound_turns(
     under: &mut Limits,
     given: &Limits,
@@ -34,7 +34,7 @@ pub(super) fn bound_turns(
             continue;
         }
         let known = |of: &[Option<f64>]| of.get(place).copied().flatten();
-        // Any two positions of half the turns about a free start are no further apart than all of them.
+        // With half of the turns around a free start, any two positions are at most `turns` apart.
         let (about, reach) = match known(&starts.start) {
             Some(start) => (start, 2.0 * PI * turns),
             None => (known(&starts.home).unwrap_or(0.0), PI * turns),
@@ -44,7 +44,7 @@ pub(super) fn bound_turns(
     }
     (!bounded.is_empty()).then(|| {
         format!(
-            "joints without position limits turn at most {turns} turn(s) away from where they start: {} (defaults.continuous_turns)",
+            "joints without position limits move at most {turns} turn(s) from their start: {} (defaults.continuous_turns)",
             listed(&bounded)
         )
     })

@@ -1,6 +1,5 @@
-//! What the sentences share.
+//! Text shared by the sentences about assumptions.
 
-/// Names, of many only the first.
 pub(super) fn listed(names: &[String]) -> String {
     const SHOWN: usize = 8;
     match names.len().checked_sub(SHOWN) {

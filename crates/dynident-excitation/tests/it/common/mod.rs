@@ -1,17 +1,16 @@
-//! Machines, limits and motions that the tests share.
+//! Robots, limits and motions that the tests share.
 
 use dynident_excitation::Motion;
 use dynident_excitation::limits::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits, LinkPoint, SelfCollision};
 use dynident_model::sample::Random;
 use dynident_model::{LoopClosure, Model};
 
-/// The UR10 of the repository.
 pub(crate) fn ur10() -> Model {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
     dynident_model::load_robot(path).expect("the repository holds robots/ur10.urdf").model
 }
 
-/// A palletising arm with its two closed chains: four joints that follow others, with limits of their own.
+/// A palletising arm with two closed chains: four joints follow others and have separate limits.
 pub(crate) fn palletizer() -> Model {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/robots/palletizer.urdf");
     let tree = dynident_model::load_robot(path).expect("the repository holds the arm").model;
@@ -28,7 +27,6 @@ pub(crate) fn palletizer() -> Model {
     tree.with_followers(&followers).expect("what was found is there")
 }
 
-/// Every kind of limit on every joint and body.
 pub(crate) fn all_limits(model: &Model) -> Limits {
     let joint = |name: &String| JointLimit {
         joint: name.clone(),
