@@ -101,6 +101,37 @@ pub(crate) fn frictions(
     nearest
 }
 
+/// Notes on the terms of the identified robot that a form with the terms `kept` leaves out or replaces. Friction that
+/// other friction of the same joint replaces is noted if it depends on load or memory.
+pub fn notes_on_omitted(robot: &RobotModel, kept: &[TorqueTerm]) -> Vec<String> {
+    let omitted = robot.terms().filter(|(term, _)| !kept.contains(term));
+    omitted
+        .filter_map(|(term, value)| {
+            let (symbol, unit, joint) = (term.symbol(), term.unit(), joint_name(robot, term));
+            if term.own_joint().is_none() {
+                let effect = if term.is_friction() { "friction" } else { "inertia" };
+                Some(format!(
+                    "{effect} of a drive that is coupled to two joints, {symbol} = {value:?} {unit}, is left out."
+                ))
+            } else if let Some(law) = term.state_function() {
+                let law = law.description();
+                Some(format!("Torque {symbol} of joint {joint}, {value:?} {unit} times {law}, is left out: add it to the controller."))
+            } else if term.needs_load() || term.has_memory() {
+                Some(format!(
+                    "{symbol} = {value:?} {unit} ({}) of joint {joint} is replaced by the fitted friction.",
+                    term.kind_name()
+                ))
+            } else if term.is_drive_inertia() {
+                Some(format!("Drive inertia {symbol} = {value:?} {unit} of joint {joint} is left out."))
+            } else if term.constant_torque(term.own_joint().unwrap_or(0)) != 0.0 {
+                Some(format!("Offset {symbol} = {value:?} {unit} of joint {joint} is left out."))
+            } else {
+                None
+            }
+        })
+        .collect()
+}
+
 /// Notes on terms that a robot description cannot represent; springs only if the format has none.
 pub(crate) fn omitted_terms(robot: &RobotModel, holds_springs: bool) -> Vec<String> {
     let mut notes = Vec::new();

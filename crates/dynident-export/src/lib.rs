@@ -48,6 +48,7 @@ mod statements;
 mod symbol;
 mod target;
 
+pub use descriptions::notes_on_omitted;
 pub use error::ExportError;
 pub use exported::Exported;
 pub use model_file::{

@@ -31,11 +31,10 @@ pub struct StoredModel {
 }
 
 impl StoredModel {
-    /// The robot, with its own terms or those of a form.
-    pub(crate) fn robot(&self, form: Option<&FormResult>) -> Result<RobotModel, ExportError> {
-        let terms = form.map_or(&self.terms, |form| &form.terms);
-        self.robot
-            .robot(terms.iter().map(|one| one.term.clone()).collect(), terms.iter().map(|one| one.value).collect())
+    /// The robot with its terms.
+    pub(crate) fn robot(&self) -> Result<RobotModel, ExportError> {
+        let terms = self.terms.iter().map(|one| one.term.clone()).collect();
+        self.robot.robot(terms, self.terms.iter().map(|one| one.value).collect())
     }
 }
 

@@ -7,10 +7,13 @@ pub use simulator::{export_simulator, export_simulator_of};
 use crate::error::Error;
 use crate::jobs::recorded_velocities::recorded_velocities;
 use crate::jobs::violations::violations;
-use crate::result::{FormResult, ResultFile};
+use crate::result::ResultFile;
 use crate::study::{Folders, Study, StudyRobot};
-use dynident_export::{ExportError, Exported, PayloadBody, PayloadReader, RobotModel, Target, export, payload_command};
+use dynident_export::{
+    ExportError, Exported, PayloadBody, PayloadReader, RobotModel, Target, export, notes_on_omitted, payload_command,
+};
 use dynident_identification::Role;
+use dynident_model::terms::TorqueTerm;
 use dynident_model::{InertialParameters, Mat3, Vec3};
 use std::path::Path;
 
@@ -43,12 +46,7 @@ pub fn export_result(
     target: Target,
 ) -> Result<Exported, Error> {
     let robot = robot_model(stored, result_path, study, study_path, data)?;
-    let form = form_of(stored, target);
-    let made = match form {
-        Some(form) => of_form(&robot, form),
-        None => Ok(robot),
-    };
-    written(stored, result_path, made, form, target)
+    written(stored, result_path, &robot, target)
 }
 
 /// As [`export_result()`] without the study: for a result that holds its robot.
@@ -60,41 +58,30 @@ pub fn export_stored(stored: &ResultFile, result_path: &Path, target: Target) ->
         let message = "does not contain the robot: name the study that the result was made with (--study STUDY.toml)";
         return Err(Error::Result { path: result_path.to_owned(), message: message.to_owned() });
     };
-    let form = form_of(stored, target);
-    written(stored, result_path, model.robot(form), form, target)
+    let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
+    written(stored, result_path, &model.robot().map_err(cannot)?, target)
 }
 
-/// The fit for the class of terms that the form can hold.
-fn form_of(stored: &ResultFile, target: Target) -> Option<&FormResult> {
-    let class = target.class()?;
-    stored.forms.iter().find(|form| form.class == class)
-}
-
-fn written(
-    stored: &ResultFile,
-    result_path: &Path,
-    robot: Result<RobotModel, ExportError>,
-    form: Option<&FormResult>,
-    target: Target,
-) -> Result<Exported, Error> {
+/// The identified robot in a form, with the terms that were fitted for the class of the form.
+fn written(stored: &ResultFile, result_path: &Path, robot: &RobotModel, target: Target) -> Result<Exported, Error> {
     let mut notes = reservations(stored);
-    if let Some(form) = form {
-        if form.refitted {
-            let note = "This form cannot hold all torque terms of the result: friction and drives were fitted again to \
-                        the training logs.";
-            notes.push(note.to_owned());
+    let form = target.class().and_then(|class| stored.forms.iter().find(|form| form.class == class));
+    let made = match form {
+        None => export(robot, target, &notes),
+        Some(form) => {
+            if form.refitted {
+                let note = "This form cannot contain all torque terms of the result: friction and drives were fitted \
+                            again to the training logs.";
+                notes.push(note.to_owned());
+            }
+            notes.extend(form.sentences());
+            let terms: Vec<TorqueTerm> = form.terms.iter().map(|one| one.term.clone()).collect();
+            notes.extend(notes_on_omitted(robot, &terms));
+            let values = form.terms.iter().map(|one| one.value).collect();
+            RobotModel::new(robot.model().clone(), terms, values).and_then(|robot| export(&robot, target, &notes))
         }
-        notes.extend(form.sentences());
-    }
-    let made = robot.and_then(|robot| export(&robot, target, &notes));
+    };
     made.map_err(|source| Error::Export { path: result_path.to_owned(), source: Box::new(source) })
-}
-
-/// The robot with the torque terms of a form.
-fn of_form(robot: &RobotModel, form: &FormResult) -> Result<RobotModel, ExportError> {
-    let terms = form.terms.iter().map(|one| one.term.clone()).collect();
-    let values = form.terms.iter().map(|one| one.value).collect();
-    RobotModel::new(robot.model().clone(), terms, values)
 }
 
 fn reservations(stored: &ResultFile) -> Vec<String> {
