@@ -58,7 +58,7 @@ pub struct FormTerm {
 pub struct FormError {
     /// The log.
     pub log: String,
-    /// RMS error of the form's torque, percent of the spread of the measured torque; `None` if the torque is constant.
+    /// RMS error of the form's torque, percent of the RMS of the measured torque; `None` if the torque is zero.
     pub relative_error_percent: Option<f64>,
     /// The same of the identified model: of the consistent set, if there is one.
     pub model_relative_error_percent: Option<f64>,

@@ -20,6 +20,7 @@ mod estimators;
 mod excitation;
 mod exogeneity;
 mod factors;
+mod forms;
 mod friction_choice;
 mod friction_cutoff;
 mod in_memory;

@@ -1,0 +1,154 @@
+//! Exported files: each has the best drives for its bodies, and its printed error is the error of the file.
+
+use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
+use dynident::dynamics::{Workspace, inverse_dynamics};
+use dynident::export_stored;
+use dynident::model::{Model, load_robot};
+use dynident::result::{FormResult, ResultFile};
+use dynident_export::Target;
+use dynident_model::terms::TermClass;
+use std::path::Path;
+
+/// Standard deviation of the torque noise, Nm.
+const NOISE: f64 = 0.2;
+const RATE_HZ: f64 = 100.0;
+const SECONDS: f64 = 20.0;
+
+/// One sample of the simulated log: motion and noisy torque.
+struct Sample {
+    motion: [Vec<f64>; 3],
+    tau: Vec<f64>,
+}
+
+fn recorded(path: &Path, truth: &Truth, seed: u64) -> Vec<Sample> {
+    let (mut random, motion) = (Random(1000 + seed), Motion::new(truth.drive.len(), seed));
+    let mut samples: Vec<Sample> = Vec::new();
+    let noisy = |q: &[f64], tau: &[f64]| {
+        let tau: Vec<f64> = tau.iter().map(|tau| tau + NOISE * random.normal()).collect();
+        samples.push(Sample { motion: motion.at(samples.len() as f64 / RATE_HZ), tau: tau.clone() });
+        [q, &tau].concat()
+    };
+    write_log(path, truth, &motion, (RATE_HZ, SECONDS), &header(truth.drive.len()), noisy);
+    samples
+}
+
+/// Torque of damping, Coulomb friction and drive inertia of one joint, and its residual without them.
+fn rows(model: &Model, samples: &[Sample], joint: usize) -> Vec<([f64; 3], f64)> {
+    let mut workspace = Workspace::new(model);
+    let row = |sample: &Sample| {
+        let [q, dq, ddq] = &sample.motion;
+        let rigid = inverse_dynamics(model, &mut workspace, q, dq, ddq)[joint];
+        ([dq[joint], dq[joint].signum(), ddq[joint]], sample.tau[joint] - rigid)
+    };
+    samples.iter().map(row).collect()
+}
+
+fn squares(rows: &[([f64; 3], f64)], x: [f64; 3]) -> f64 {
+    rows.iter().map(|(columns, tau)| (tau - (0..3).map(|k| columns[k] * x[k]).sum::<f64>()).powi(2)).sum()
+}
+
+/// RMS error over the RMS torque, percent, over all joints.
+fn error_percent(model: &Model, samples: &[Sample], drives: &[[f64; 3]]) -> f64 {
+    let (mut error, mut torque) = (0.0, 0.0);
+    for (joint, &x) in drives.iter().enumerate() {
+        error += squares(&rows(model, samples, joint), x);
+        torque += samples.iter().map(|sample| sample.tau[joint].powi(2)).sum::<f64>();
+    }
+    100.0 * (error / torque).sqrt()
+}
+
+fn form(result: &ResultFile, class: TermClass) -> &FormResult {
+    result.forms.iter().find(|form| form.class == class).unwrap()
+}
+
+fn study(description: &Path, dof: usize, drive: &str) -> String {
+    format!(
+        "robot.file = {:?}\nlog = [{{ file = \"train.csv\" }}, {{ file = \"test.csv\", role = \"validate\" }}]\n\
+         [parallel_filter]\nenabled = false\n[drive]\n{drive}\n{}",
+        description.display().to_string(),
+        format(dof)
+    )
+}
+
+/// The referee knows the true motion and solves its own problem: values of the written files minimise the residual of
+/// the training log, and the printed errors are those of the files on the held-out log.
+#[test]
+fn files_have_the_best_drives_and_their_own_error() {
+    let (folder, description) = (tempfile::tempdir().unwrap(), repository("robots/ur10.urdf"));
+    let truth = Truth::near(&description, 0.1, true);
+    let dof = truth.drive.len();
+    let train = recorded(&folder.path().join("train.csv"), &truth, 1);
+    let test = recorded(&folder.path().join("test.csv"), &truth, 2);
+    let found = Job::new(folder.path(), &study(&description, dof, "")).identify();
+
+    let written = folder.path().join("identified.urdf");
+    std::fs::write(&written, found.urdf.as_ref().unwrap()).unwrap();
+    let urdf = load_robot(&written).unwrap().model;
+    let urdf_drives: Vec<[f64; 3]> =
+        urdf.joints().iter().map(|joint| [joint.damping.unwrap(), joint.friction.unwrap(), 0.0]).collect();
+    let mjcf = folder.path().join("exported.xml");
+    let path = folder.path().join("result.json");
+    std::fs::write(&mjcf, export_stored(&found.result, &path, Target::Mjcf).unwrap().text).unwrap();
+    let mujoco = load_robot(&mjcf).unwrap().model;
+    let of_mjcf = |joint: &dynident_model::Joint| {
+        [joint.damping.unwrap_or(0.0), joint.friction.unwrap_or(0.0), joint.drive_inertia.unwrap_or(0.0)]
+    };
+    let mjcf_drives: Vec<[f64; 3]> = mujoco.joints().iter().map(of_mjcf).collect();
+
+    let forms = [
+        (TermClass::DampingAndFriction, &urdf, &urdf_drives, 2),
+        (TermClass::DampingFrictionAndInertia, &mujoco, &mjcf_drives, 3),
+    ];
+    let mut errors = Vec::new();
+    for (class, model, drives, unknowns) in forms {
+        for (joint, &x) in drives.iter().enumerate() {
+            let rows = rows(model, &train, joint);
+            let least = squares(&rows, x);
+            // Any change of a value makes the residual larger, unless the value is at its bound of zero.
+            for k in 0..unknowns {
+                for step in [-0.01, 0.01] {
+                    let mut other = x;
+                    other[k] = (other[k] + step).max(0.0);
+                    assert!(squares(&rows, other) >= least * (1.0 - 1e-9), "{class:?} joint {joint}: {x:?} {k} {step}");
+                }
+            }
+        }
+        let printed = form(&found.result, class).held_out[0].relative_error_percent.unwrap();
+        let own = error_percent(model, &test, drives);
+        // Derivatives of the positions are exact to 1e-6; samples at the ends of the log are not used.
+        assert!((printed / own - 1.0).abs() < 0.01, "{class:?}: {printed} % printed, {own} % of the file");
+        errors.push(printed);
+    }
+    // The torque contains drive inertia, offsets and a smooth step.
+    let model = form(&found.result, TermClass::DampingAndFriction).held_out[0].model_relative_error_percent.unwrap();
+    assert!(errors[0] > errors[1] && errors[1] > model, "{errors:?} and {model}");
+    let code = form(&found.result, TermClass::FunctionsOfMotion);
+    assert!(!code.refitted || code.held_out[0].relative_error_percent.unwrap() < 1.1 * model);
+}
+
+/// Friction with memory and under load does not prevent any export; notes name what was replaced, and the error.
+#[test]
+fn friction_with_memory_is_replaced_in_code() {
+    let (folder, description) = (tempfile::tempdir().unwrap(), repository("robots/planar2r.urdf"));
+    let truth = Truth::near(&description, 0.1, false);
+    recorded(&folder.path().join("train.csv"), &truth, 1);
+    recorded(&folder.path().join("test.csv"), &truth, 2);
+    let drive =
+        "friction = \"stated\"\nviscous = true\nlaws = [{ law = \"maxwell-slip\", yield_displacements = [0.001] }]";
+    let found = Job::new(folder.path(), &study(&description, truth.drive.len(), drive)).identify();
+    let path = folder.path().join("result.json");
+    for target in Target::ALL {
+        let exported =
+            export_stored(&found.result, &path, target).unwrap_or_else(|error| panic!("{target:?}: {error}"));
+        let has_error = exported.notes.iter().any(|note| note.starts_with("Held-out torque error of this file: "));
+        assert_eq!(has_error, target.class().is_some(), "{target:?}: {:?}", exported.notes);
+        let names_slip = exported.notes.iter().any(|note| note.contains("slip1_0.001"));
+        assert_eq!(names_slip, target.class().is_some(), "{target:?}: {:?}", exported.notes);
+    }
+    let code = form(&found.result, TermClass::FunctionsOfMotion);
+    assert!(code.refitted && code.terms.iter().all(|one| !one.term.has_memory()));
+    // The true friction is a smooth step, so the step that replaces the slip is at least as good.
+    let error = &code.held_out[0];
+    let (form, model) = (error.relative_error_percent.unwrap(), error.model_relative_error_percent.unwrap());
+    assert!(form < 1.05 * model, "{form} and {model}");
+}
