@@ -1,25 +1,25 @@
-//! The same rows with friction of each log's own: what bodies and drives say when friction is another on another day.
+//! Separate friction parameters for each log, because friction varies from day to day.
 //!
-//! `τ_l = W_b θ_b + W_f θ_{f,l}` for the logs l: bodies and drives are one machine's, friction and offsets are free in
-//! every log ("fixed effects": Mundlak, Econometrica 46 (1978) 69).
+//! `τ_l = W_b θ_b + W_f θ_{f,l}` for the logs l: logs share bodies and drives; friction and offsets are free in every
+//! log ("fixed effects": Mundlak, Econometrica 46 (1978) 69).
 
 use dynident_dynamics::Column;
 use dynident_estimation::{EstimationError, LinearProblem, Unexcited};
 
-/// Friction is told apart between so many groups of logs at most; further logs share it with their neighbours, for
-/// every group adds its columns.
+/// Maximum number of log groups with separate friction. Neighbouring logs share a group, because every group adds
+/// columns.
 const MOST_GROUPS: usize = 8;
 
-/// Whether a base parameter is torque of a single joint, which can differ from day to day.
+/// Whether a base parameter is torque of a single joint, which can vary from day to day.
 pub(crate) fn is_friction_column(column: &Column) -> bool {
     matches!(column, Column::Term(term) if !term.is_drive_inertia())
 }
 
-/// The problem with further columns for the friction of logs behind the first group, whose columns stay as they are.
-/// `None` where nothing is to be told apart: one log, or a prior, which says nothing of the further columns.
+/// Adds friction columns for the log groups after the first, whose columns are unchanged. `None` for a single log, and
+/// with a prior, which does not cover the added columns.
 ///
 /// # Errors
-/// Columns that do not go together.
+/// Columns do not match.
 pub(crate) fn with_friction_by_log(
     problem: &LinearProblem,
     is_friction: &[bool],

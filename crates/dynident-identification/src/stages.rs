@@ -1,4 +1,4 @@
-//! The stages after the estimate: consistent parameters, examination, tests on held-out recordings, diagnosis.
+//! Stages after the estimate: consistent parameters, examination, held-out tests, diagnosis.
 
 use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
@@ -21,41 +21,41 @@ use dynident_rows::{Execution, Logs, Role};
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// Physically consistent parameters of an estimate, or why they do not exist.
+/// Physically consistent parameters of an estimate.
 #[derive(Clone, Debug)]
 pub struct ConsistentParameters {
-    /// The consistent set that explains the data best; none if it was not asked for or does not exist.
+    /// The consistent set with the best fit; `None` if not requested or not found.
     pub fit: Option<PhysicalFit>,
-    /// Why no consistent set was found; none where one was found or not requested.
+    /// Reason for a missing consistent set.
     pub failure: Option<String>,
-    /// All parameters, ten for each body and one for each term: the consistent set's, or else the set nearest to the
-    /// nominal one that has the estimated base parameters.
+    /// All parameters, ten for each body and one for each term. They belong to the consistent set, or otherwise to the
+    /// set nearest to the nominal one that has the estimated base parameters.
     pub parameters: Vec<f64>,
-    /// Standard deviation of each of `parameters` ([`parameter_std`]); none where there is no consistent set, and for
-    /// bodies that are not described.
+    /// Standard deviation of each of `parameters` ([`parameter_std`]); `None` without a consistent set, and for bodies
+    /// without nominal inertia.
     pub parameter_std: Vec<Option<f64>>,
-    /// Intervals of all parameters over all consistent sets that the data do not reject, if asked for.
+    /// Intervals of all parameters over all consistent sets that the data do not reject, if requested.
     pub intervals: Option<Vec<ParameterInterval>>,
-    /// Bodies whose nominal inertia is not physically consistent, with the least eigenvalue of their pseudo-inertia.
+    /// Bodies whose nominal inertia is not physically consistent, with the smallest eigenvalue of their pseudo-inertia.
     pub inconsistent_nominal: Vec<(String, f64)>,
 }
 
 /// Tests of the estimate on the training recordings.
 #[derive(Clone, Debug)]
 pub struct TrainingExamination {
-    /// For each training recording the delays of its torque, joint by joint; none where it does not determine one.
+    /// Delays of the torque of each training recording, by joint; `None` if not determined.
     pub delays: Vec<Vec<Option<TorqueLag>>>,
     /// Measured and predicted torque over time.
     pub traces: Vec<LogTrace>,
-    /// The delays of all recordings together, joint by joint.
+    /// Delays of all recordings together, by joint.
     pub pooled_delays: Vec<Option<TorqueLag>>,
-    /// How well consistent sets explain the torque with either sign; none where a fit fails, and for payloads.
+    /// Fit of consistent sets to the torque with either sign; `None` if a fit fails, and for payloads.
     pub sign: Option<TorqueSignCheck>,
-    /// The mean friction of every joint that has friction terms; empty for payloads on a known arm.
+    /// Mean friction of every joint with friction terms; empty for payloads on a known arm.
     pub friction_signs: Vec<FrictionSign>,
 }
 
-/// An estimate and what it was made from.
+/// An estimate with its inputs.
 pub(crate) struct Stage<'a> {
     pub(crate) task: &'a IdentificationTask,
     pub(crate) execution: Execution<'a>,
@@ -63,25 +63,25 @@ pub(crate) struct Stage<'a> {
     pub(crate) settings: &'a IdentificationSettings,
     pub(crate) training: &'a Training,
     pub(crate) estimate: &'a Estimate,
-    /// Rows and fit with friction as stated, where it was chosen.
+    /// Rows and fit with friction as stated, if friction was selected.
     pub(crate) stated_friction: Option<&'a (Training, Estimate)>,
-    /// Whether the arm's parameters are those of an earlier result.
+    /// Whether the arm's parameters come from an earlier result.
     pub(crate) arm_is_known: bool,
-    /// When the estimate was finished.
+    /// Time at which the estimate was finished.
     pub(crate) started: Instant,
 }
 
-/// The consistent parameters of an estimate, and its tests.
+/// Consistent parameters of an estimate, and its tests.
 pub(crate) struct Examined {
     pub(crate) consistent: ConsistentParameters,
-    /// Seconds from the estimate to the consistent parameters.
+    /// Time from the estimate to the consistent parameters, s.
     pub(crate) estimation_s: f64,
     pub(crate) held_out: Vec<HeldOutExamination>,
     pub(crate) examination: TrainingExamination,
 }
 
 impl Stage<'_> {
-    /// Consistent parameters and all tests, side by side where the execution is parallel.
+    /// Computes consistent parameters and all tests, in parallel if the execution allows it.
     pub(crate) fn examined(&self) -> Result<Examined, IdentificationError> {
         let Self { task, logs, settings, training, estimate, .. } = *self;
         let bodies = || -> Result<_, IdentificationError> {
@@ -95,7 +95,7 @@ impl Stage<'_> {
             let held_out = examine_all_held_out(logs, settings, training, estimate, physical);
             Ok((consistent, estimation_s, held_out))
         };
-        // The stated terms determine the sign: chosen friction has no wrong one, for such terms are left out.
+        // Stated terms determine the sign, because selection drops friction terms with a wrong sign.
         let signs = || match self.stated_friction {
             _ if self.arm_is_known => Ok((None, Vec::new())),
             Some((stated, plain)) => torque_signs(stated, plain),
@@ -113,7 +113,7 @@ impl Stage<'_> {
         Ok(Examined { consistent, estimation_s, held_out: held_out?, examination })
     }
 
-    /// Tests for mistakes in the study, if the settings require them or an examination gives reason to doubt it.
+    /// Tests for mistakes in the study, if the settings require it or an examination gives reason for doubt.
     pub(crate) fn diagnosis(
         &self,
         examined: &Examined,
@@ -134,7 +134,6 @@ impl Stage<'_> {
         }
     }
 
-    /// Whether an examination gives reason to doubt the study.
     fn is_doubted(&self, examined: &Examined, robot: &ParametricModel) -> bool {
         let Examined { consistent, held_out, examination, .. } = examined;
         let training = self.training;
@@ -150,11 +149,11 @@ impl Stage<'_> {
     }
 }
 
-/// Times the noise of the fit that a held-out log may be worse before it gives reason to doubt: friction that changes
-/// with the motion costs less.
+/// Ratio of held-out residual to noise of the fit above which the study is doubtful. Friction that changes with the
+/// motion causes less.
 const FAR_WORSE: f64 = 1.7;
 
-/// Whether the residual of a held-out log is far larger than that of the training logs, relative to each joint's noise.
+/// Whether the held-out residual is far larger than that of the training logs, relative to each joint's noise.
 fn is_far_worse(log: &LogValidation, sigma: &[f64]) -> bool {
     let in_fit_band = log.in_fit_band.as_ref().unwrap_or(&log.model);
     let joints = in_fit_band.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
@@ -162,8 +161,8 @@ fn is_far_worse(log: &LogValidation, sigma: &[f64]) -> bool {
     squares.iter().sum::<f64>() > FAR_WORSE * FAR_WORSE * squares.len() as f64
 }
 
-/// The bodies of a known arm, which are those of the earlier result. Their parameters here are the set nearest to the
-/// nominal one that has the estimated base parameters.
+/// Bodies of a known arm. They belong to the earlier result, so this is the set nearest to the nominal one that has the
+/// estimated base parameters.
 fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate) -> ConsistentParameters {
     let robot = &training.model.parametric;
     let settings = task.settings.consistency.as_ref();
@@ -177,11 +176,11 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
     }
 }
 
-/// Consistent parameters for an estimate over the columns of `training`: the best set, and its intervals if asked for.
+/// Finds consistent parameters for an estimate over the columns of `training`: the best set, and its intervals if
+/// requested. A missing consistent set is part of the result.
 ///
 /// # Errors
-/// Factors that do not belong to the estimate, intervals that cannot be had. That there is no consistent set is part of
-/// the result.
+/// The factors do not belong to the estimate, or the intervals cannot be computed.
 pub fn consistent_stage(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -199,7 +198,7 @@ pub fn consistent_stage(
         Err(reason) => (None, Some(reason.to_string())),
     };
     let intervals = match &settings.consistency {
-        // Where there is no consistent set, `failure` says why.
+        // A missing consistent set is explained by `failure`.
         Some(knowledge) if settings.intervals && fit.is_some() => {
             let progress = logs.execution.progress;
             let found = consistent_intervals(robot, problem, &arm, plain, knowledge, progress);
@@ -225,8 +224,8 @@ pub fn consistent_stage(
     })
 }
 
-/// The problem and the estimate without the columns of payloads and offsets of single logs; `None` where the problem
-/// has none.
+/// The problem and the estimate without the columns of payloads and offsets of single logs; `None` if the problem has
+/// no such columns.
 fn arm_alone(
     training: &Training,
     estimate: &Estimate,
@@ -236,7 +235,7 @@ fn arm_alone(
     Ok((alone, columns.arm_estimate(estimate)))
 }
 
-/// How well consistent sets explain the torque with either sign, none where a fit fails; and the sign of each joint's
+/// Fit of consistent sets to the torque with either sign (`None` if a fit fails), and the sign of each joint's
 /// friction.
 fn torque_signs(
     training: &Training,
@@ -248,7 +247,7 @@ fn torque_signs(
     Ok((sign_evidence(&training.model.parametric, problem, &arm), frictions))
 }
 
-/// [`examine_training`] of every training recording, side by side.
+/// Calls [`examine_training`] for every training recording, in parallel if possible.
 fn examine_all_training(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -270,11 +269,11 @@ fn examine_all_training(
     Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new() })
 }
 
-/// Number of time blocks of the training logs; each is predicted by the fit to the others. Few blocks, so that they
-/// differ in temperature and motion as a new log does.
+/// Number of time blocks of the training logs; each is predicted by the fit to the others. With few blocks, they differ
+/// in temperature and motion as a new log does.
 const LEFT_OUT_BLOCKS: usize = 4;
 
-/// [`examine_held_out`] of every recording to test on, side by side.
+/// Calls [`examine_held_out`] for every test recording, in parallel if possible.
 fn examine_all_held_out(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,

@@ -1,10 +1,10 @@
-//! The lag that is compensated before friction is selected.
+//! Decision: the lag that is compensated before friction is selected.
 //!
-//! Selecting friction takes most of the time, so the lag is first looked for with friction of a grid. Friction that is
-//! selected from rows with a lag can compensate it, above all Maxwell-slip friction, which acts late itself. Conversely,
-//! friction that no stated term describes looks like a lag. Two rules follow. A lag that shows with friction of all
-//! terms is estimated with friction without memory. A lag that shows only with the stated terms is accepted if the
-//! Bayesian information criterion of the fit with all terms is lower with it than without it.
+//! Selecting friction takes most of the time, so the lag is first estimated with friction on a grid. Friction that is
+//! selected from rows with a lag can compensate it, above all Maxwell-slip friction, which itself acts late.
+//! Conversely, friction outside of the stated terms looks like a lag. So a lag that is significant with all friction
+//! terms is estimated with friction without memory. A lag that is significant only with the stated terms is accepted if
+//! it lowers the Bayesian information criterion of the fit with all terms.
 
 use super::choices::FrictionChoice;
 use super::cutoff::Cutoff;
@@ -21,9 +21,9 @@ use crate::training::TrainingPasses;
 
 pub(super) struct LagBeforeFriction;
 
-/// A grid of all friction terms.
+/// Grid with all friction terms.
 const ALL_TERMS: [&dyn Decision; 3] = [&DriveInertia, &Cutoff, &GridOfFriction(GridTerms::All)];
-/// The lag with friction that has no memory.
+/// Lag with friction without memory.
 const WITHOUT_MEMORY: [&dyn Decision; 4] = [&DriveInertia, &Cutoff, &GridOfFriction(GridTerms::WithoutMemory), &Lag];
 
 impl Decision for LagBeforeFriction {
@@ -50,8 +50,8 @@ impl Decision for LagBeforeFriction {
             return Ok(Next::Proceed);
         }
 
-        // The common lag with friction without memory, until none shows. Lags of single joints can be estimated only
-        // with fully selected friction.
+        // Revise the common lag with memoryless friction until it is no longer significant. Lags of single joints need
+        // fully selected friction.
         let candidates = work.settings.lags;
         let common = without.choices.with_open_friction().with_lag(LagRounds::of(LagCandidates::Common));
         let mut late = without.look(common);
@@ -72,7 +72,7 @@ impl Decision for LagBeforeFriction {
     }
 }
 
-/// Whether the rows of the fit show a common lag that should be compensated.
+/// Whether the rows of the fit show a significant common lag.
 fn shows_lag(work: &mut Workspace<'_, '_>) -> Result<bool, IdentificationError> {
     let training = work.training;
     let fit = work.fit()?;
