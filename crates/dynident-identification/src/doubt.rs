@@ -1,28 +1,28 @@
-//! Do a fit's own figures give reason to read its recordings otherwise?
+//! Signs in a fit that the study may contain a mistake.
 
 use crate::diagnosis::{has_jumps, is_beyond_limits};
 use crate::training::Training;
 use dynident_model::Model;
 
-/// Per joint: what a consistent robot leaves more than parameters of each joint's own do, as a logarithm, before other
-/// readings are tried unasked. Simulated and well-described robots stay below 0.05.
+/// Mean over joints of `ln(residual of a consistent robot / residual of separate joint parameters)` above which
+/// alternative hypotheses are tested. Simulated and well-described robots stay below 0.05.
 const DOUBTFUL: f64 = 0.1;
-/// Rows for each parameter of a joint's own below which these follow the noise and tell nothing.
+/// Minimum number of rows per parameter of a joint; with fewer rows the separate fit follows the noise.
 const TELLING_ROWS: f64 = 4.0 / 3.0;
 
-/// Whether a training recording has jumps that no motion makes.
+/// Whether a training recording has jumps that no motion causes.
 pub(crate) fn have_jumps(training: &Training) -> bool {
     training.logs.iter().filter_map(|log| log.statistics.report.as_ref()).any(has_jumps)
 }
 
-/// Whether a training recording has a joint beyond its limits, or a rate that no recorder has.
+/// Whether a training recording has a joint beyond its limits or an impossible rate.
 pub(crate) fn break_limits(training: &Training, model: &Model) -> bool {
     let reports = training.logs.iter().filter_map(|log| log.statistics.report.as_ref());
     reports.into_iter().any(|report| is_beyond_limits(model, report))
 }
 
-/// Whether a consistent robot with base parameters `consistent` leaves clearly more of the torque than parameters of
-/// each joint's own, or there is no such robot, or there are too few rows to tell.
+/// Whether the residual of a consistent robot with base parameters `consistent` is clearly larger than that of separate
+/// parameters for each joint, or there is no such robot, or there are too few rows.
 pub(crate) fn is_doubtful(training: &Training, consistent: Option<&[f64]>) -> bool {
     let Some(theta) = consistent else { return true };
     let mut sums = vec![JointSums::default(); training.problem.joints().len()];
@@ -45,9 +45,9 @@ pub(crate) fn is_doubtful(training: &Training, consistent: Option<&[f64]>) -> bo
 /// Sums of squares of one joint's equations.
 #[derive(Clone, Copy, Default)]
 struct JointSums {
-    /// Left by the consistent robot, N² m².
+    /// Residual of the consistent robot, N² m².
     left: f64,
-    /// Left by parameters of the joint's own.
+    /// Residual of separate parameters for the joint.
     alone: f64,
     torque: f64,
     rows: f64,
@@ -55,10 +55,10 @@ struct JointSums {
 }
 
 impl JointSums {
-    /// The logarithm of what one robot for all joints leaves over what the joint's own parameters leave, these freed of
-    /// what they follow of the noise: `n / (n - p)` in the squares.
+    /// Logarithm of the ratio of both residuals. The joint's own residual is corrected for overfitting by `n / (n - p)`
+    /// in the squares.
     fn more_by_one_robot(&self) -> f64 {
-        // Below a hundredth of the torque nothing is left.
+        // Residuals below a hundredth of the torque are ignored.
         let floor = 1e-4 * self.torque;
         let noise = self.alone * self.rows / (self.rows - self.columns);
         (0.5 * (self.left.max(floor) / noise.max(floor)).ln()).max(0.0)

@@ -1,5 +1,5 @@
-//! Does the torque come late? The lag between motion and torque with its error bar, as an unknown of the fit: measured
-//! together with the parameters, chosen (none, one for all joints, or joints of their own), and taken off the rows.
+//! Lag between motion and torque with its error bar: estimated together with the parameters, selected (none, one for
+//! all joints, or separate ones), and compensated.
 
 mod choice;
 mod fit;

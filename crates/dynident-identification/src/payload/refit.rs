@@ -1,4 +1,3 @@
-//! Which parameters of a known arm are fitted again together with a payload.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +11,6 @@ pub enum Refit {
     Nothing,
     /// The joints' offsets.
     Offset,
-    /// Offsets and friction: both change with the temperature from run to run.
+    /// Offsets and friction, which change with temperature from run to run.
     Friction,
 }
