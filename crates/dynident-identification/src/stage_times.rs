@@ -1,4 +1,3 @@
-
 /// Time of the stages of an identification, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageTimes {

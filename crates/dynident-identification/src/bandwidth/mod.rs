@@ -1,12 +1,12 @@
-//! Which cut-off leaves the parameters the smallest error: tried on a simulated copy of the recordings.
+//! Selection of the cut-off with the smallest parameter error, by simulated copies of the recordings.
 //!
-//! A low cut-off takes from the positions what the torque still shows (the motion's highest frequencies, velocity about
-//! a reversal) and leaves few rows; a high one lets the noise of the positions into the regressor, twice
-//! differentiated. Neither can be read off the positions' spectrum alone. So the recordings stand in for themselves
-//! ([`StandIn`](stand_in::StandIn)): their motion with its noise removed as far as it can be, the torque of a first fit
-//! on it, then noise as in the recordings, and each candidate's fit is compared with the parameters that made the
-//! torque. That is a parametric bootstrap (Efron and Tibshirani, *An Introduction to the Bootstrap*, 1993, 6.5) of the
-//! error, filter bias and noise alike.
+//! A low cut-off removes motion from the positions that is still in the torque (its highest frequencies, the velocity
+//! near a reversal) and leaves few rows. A high cut-off lets position noise into the regressor, differentiated twice.
+//! The spectrum of the positions alone does not show the optimum. So copies of the recordings are simulated
+//! ([`StandIn`](stand_in::StandIn)): the denoised motion, the torque of a first fit for it, and noise as in the
+//! recordings. The fit with each candidate is compared with the parameters that generated the torque. This is a
+//! parametric bootstrap (Efron and Tibshirani, *An Introduction to the Bootstrap*, 1993, 6.5) of the error, including
+//! filter bias and noise.
 
 mod stand_in;
 mod thinned;
@@ -20,45 +20,45 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use stand_in::StandIn;
 
-/// Candidates are this far apart.
+/// Ratio of neighbouring candidates.
 const STEP: f64 = core::f64::consts::SQRT_2;
-/// The lowest candidate is this part of the lowest cut-off that a joint's spectrum asks for, the highest so many times
-/// the highest.
+/// Range of candidates: the lowest relative to the lowest cut-off of a joint's spectrum, the highest relative to the
+/// highest one.
 const SPAN: [f64; 2] = [0.7, 6.0];
-/// No candidate comes closer to the sampling rate than this part of it.
+/// Maximum ratio of candidate to sample rate.
 const HIGHEST: f64 = 0.4;
-/// Candidates whose predicted error is within this factor of the least count: what a copy cannot hold (friction that is
-/// not as modelled, elasticity) makes smaller differences mean little.
+/// Ratio of predicted errors within which candidates are treated as equal. Copies lack unmodelled friction and
+/// elasticity, so smaller differences are not significant.
 const ALIKE: f64 = 1.1;
 
-/// One cut-off that was tried.
+/// One candidate cut-off.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CutoffCandidate {
-    /// The cut-off of the positions.
+    /// Cut-off of the positions, hertz.
     pub cutoff_hz: f64,
-    /// Predicted error of the fitted model's torque on motion like the recordings', root mean square over joints, each
-    /// in percent of its torque's spread.
+    /// Predicted torque error of the fitted model on motion like that of the recordings: root mean square over joints,
+    /// each in percent of its torque's spread.
     pub predicted_error_percent: f64,
 }
 
-/// A cut-off chosen by the predicted error of the parameters.
+/// A cut-off selected by the predicted error of the parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CutoffByError {
-    /// The cut-off that was chosen. Where noise biases least squares all the same, `auto` lowers it afterwards with its
-    /// instruments ([`NoiseInRegressor::cutoff_before_hz`](crate::estimators::NoiseInRegressor)).
+    /// Selected cut-off, hertz. If noise still biases least squares, `auto` lowers it afterwards with its instruments
+    /// ([`NoiseInRegressor::cutoff_before_hz`](crate::estimators::NoiseInRegressor)).
     pub cutoff_hz: f64,
-    /// What the positions' spectra alone ask for: twice the highest frequency of the motion. Held-out figures are for
-    /// the torque below 0.7 of it, whatever cut-off the fit has.
+    /// Cut-off that the position spectra suggest, hertz: twice the highest frequency of the motion. Held-out figures
+    /// use the torque below 0.7 of it, for any cut-off of the fit.
     pub motion_hz: f64,
-    /// All that were tried, lowest first.
+    /// All candidates, lowest first.
     pub candidates: Vec<CutoffCandidate>,
 }
 
 impl CutoffByError {
-    /// The highest that serves the parameters nearly as well as the best: where friction is told best, whose details
-    /// are beyond the motion's band.
+    /// The highest cut-off with nearly the smallest error, hertz. It is best for friction, whose details lie above the
+    /// band of the motion.
     pub fn highest_alike_hz(&self) -> f64 {
         let errors = || self.candidates.iter().map(|candidate| candidate.predicted_error_percent);
         let least = errors().fold(f64::INFINITY, f64::min);
@@ -67,15 +67,15 @@ impl CutoffByError {
     }
 }
 
-/// Tries cut-offs on a simulated copy of the recordings `training` and returns the best; `None` where the cut-off is
-/// not left to the data, or where the recordings are too short for a copy to say anything.
+/// Compares cut-offs on simulated copies of the recordings `training` and returns the best one. `None` if the cut-off
+/// is stated, or if the recordings are too short for a copy.
 ///
-/// The error of a candidate is that of the torque `W (θ̂ - θ)`, each joint in units of its torque's spread, over a
-/// motion that the fit has not seen: the recordings' own without noise, each joint at another time. Payloads do not
-/// count: recordings with one are passed over.
+/// The error of a candidate is that of the torque `W (θ̂ - θ)`, each joint in units of its torque's spread, over motion
+/// that was not used for the fit: the denoised motion with each joint at another time. Recordings with a payload are
+/// skipped.
 ///
 /// # Errors
-/// Recordings that cannot be read.
+/// Recordings cannot be read.
 pub fn choose_cutoff(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -92,10 +92,9 @@ pub fn choose_cutoff(
     if !(lowest > 0.0 && lowest < highest) {
         return Ok(None);
     }
-    // The first fit and what noise there is.
     let Some(stand_in) = StandIn::of(logs, settings, model, training, highest)? else { return Ok(None) };
     let highest = highest.min(HIGHEST * stand_in.log_rate_hz());
-    // The pilot itself is among the candidates.
+    // The cut-off of the first fit is among the candidates.
     let below = ((motion_hz / lowest).ln() / STEP.ln()).floor() as i32;
     let above = ((highest / motion_hz).ln() / STEP.ln()).floor() as i32;
     let ladder: Vec<f64> = (-below..=above).map(|step| motion_hz * STEP.powi(step)).collect();
@@ -122,7 +121,7 @@ pub fn choose_cutoff(
         })
         .collect();
     let least = candidates.iter().map(|candidate| candidate.predicted_error_percent).fold(f64::INFINITY, f64::min);
-    // Of those alike the one that the spectra ask for, or else the lowest, which lets least noise in.
+    // Among equal candidates prefer the cut-off of the spectra, otherwise the lowest one, which passes the least noise.
     let mut alike = candidates.iter().filter(|candidate| candidate.predicted_error_percent <= ALIKE * least);
     let lowest = alike.clone().next();
     let Some(best) = alike.find(|candidate| candidate.cutoff_hz == motion_hz).or(lowest) else { return Ok(None) };
@@ -130,14 +129,14 @@ pub fn choose_cutoff(
     Ok(Some(CutoffByError { cutoff_hz, motion_hz, candidates }))
 }
 
-/// The settings without error bars, for fits of the copies.
+/// Settings without error bars for fits of the copies.
 fn plain_settings(settings: &IdentificationSettings) -> IdentificationSettings {
     let mut plain = settings.clone();
     plain.estimation.segments = SegmentSettings { max_segments: 2, first_length_rows: 1024 };
     plain
 }
 
-/// The parallel filter that goes with a cut-off, at the rate of the copy.
+/// Parallel filter for a cut-off at the rate of the copy.
 fn filter_of_copy(stand_in: &StandIn, cutoff_hz: f64) -> ParallelFilterSettings {
     let automatic = ParallelFilterSettings::default();
     match automatic.decimation(stand_in.log_rate_hz(), Some(cutoff_hz)) {

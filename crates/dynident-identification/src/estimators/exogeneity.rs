@@ -1,10 +1,10 @@
-//! Does noise in the regressor bias least squares, and with which instruments is the estimate free of it?
+//! Test for bias of least squares by noise in the regressor, and selection of instruments.
 //!
-//! Instruments of half the regressor's cut-off hold the motion and hardly any of the noise of its accelerations (with
-//! white noise of the positions three hundredths of its power). Least squares is found biased where torque does not
-//! follow what these instruments leave over ([`fast_motion`]) *and* the estimates differ by more than their error bars.
-//! Then the instruments' cut-off goes down, and the highest one is taken below which the estimate no longer moves
-//! (Lepski, Theory Probab. Appl. 35 (1990) 454): as little noise as shows, as much of the motion as there is.
+//! Instruments with half the regressor's cut-off contain the motion and hardly any noise of the accelerations (for
+//! white position noise 3 % of its power). Least squares is biased if the torque does not follow the fast motion, which
+//! these instruments remove ([`fast_motion`]), *and* the estimates differ by more than their error bars. Then the
+//! cut-off of the instruments is lowered. The highest cut-off is selected below which the estimate no longer changes
+//! (Lepski, Theory Probab. Appl. 35 (1990) 454): a compromise between noise and motion content.
 
 use super::band_motion::regressor_cutoff_hz;
 use super::instrumental::{BandEstimate, InstrumentSettings, fast_motion_problem, with_band};
@@ -15,26 +15,26 @@ use dynident_estimation::{
     weighted_least_squares,
 };
 
-/// Parts of the regressor's cut-off that are tried in turn until the instruments are strong.
+/// Ratios to the regressor's cut-off, tried in turn until the instruments are strong.
 const SHARES: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, 0.84];
-/// From band to band.
+/// Ratio of neighbouring bands.
 const STEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
-/// Bands below the first, at most: six octaves.
+/// Maximum number of bands below the first: six octaves.
 const MOST_BANDS: usize = 12;
-/// Torque that follows less than this of the fast motion says that noise is a good part of it.
+/// Maximum coefficient of the torque on the fast motion for the fast motion to be mostly noise.
 const FOLLOWED: f64 = 0.75;
-/// Two estimates agree where they differ by less than this, in error bars of the one that is nearer to the truth: root
-/// mean square over the parameters, and largest. Two independent ones with the same bars differ by 1.4.
+/// Maximum difference of two equal estimates, in error bars of the better one: root mean square over the parameters,
+/// and largest. Two independent estimates with the same error bars differ by 1.4.
 const AGREEMENT: [f64; 2] = [1.5, 3.0];
-/// Where the fast motion would need less than this share of the torque, instruments of the first band show what its
-/// noise does; where more, they may hold so much of it themselves that lower ones are asked in any case.
+/// Share of the torque of the fast motion above which lower bands are always tried, because the instruments of the
+/// first band may contain much noise themselves.
 const LARGE_SHARE: f64 = 0.1;
-/// Noise cannot move the parameters by more error bars (root mean square) than `√(Σ_j ‖V_j θ‖² / σ_j² / p)`: below this
-/// it is no matter. Small, for where noise is large, θ and with it this bound are too.
+/// Minimum shift of the parameters in error bars (root mean square) for noise to matter; the shift is at most `√(Σ_j
+/// ‖V_j θ‖² / σ_j² / p)`. The limit is small, because large noise also reduces θ and this bound.
 const LEAST_MOVE: f64 = 0.3;
 
-/// Least squares examined with the logs' own motion of a lower band, and the instruments' estimate in the band that
-/// suits best.
+/// Tests least squares with the logs' own motion in a lower band, and returns the instruments' estimate in the selected
+/// band.
 pub(super) fn examined(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -57,7 +57,7 @@ pub(super) fn examined(
     let verdict = if is_suspect && !agrees(&chosen) {
         NoiseVerdict::BiasesLeastSquares
     } else if fast.is_none() || chosen.found.instruments.weak {
-        // Weak instruments agree with least squares whatever is true.
+        // Weak instruments agree with least squares in any case.
         NoiseVerdict::Undecided
     } else {
         NoiseVerdict::Harmless
@@ -70,8 +70,8 @@ pub(super) fn examined(
     Ok((chosen.found, noise))
 }
 
-/// Whether noise can matter at all, from the torques alone that least squares' parameters need for the motion and for
-/// its part below half the cut-off: some milliseconds, where instruments take tens. None where they have to be asked.
+/// A fast test whether noise can matter, from the torques of the complete motion and of its part below half the cut-off
+/// (some milliseconds, compared with tens for instruments). `None` if instruments are needed.
 pub(super) fn harmless(
     rows: &TrainingRows<'_>,
     least_squares: &Estimate,
@@ -103,7 +103,7 @@ pub(super) fn harmless(
     Ok(Some(NoiseInRegressor { verdict: NoiseVerdict::Harmless, ..NoiseInRegressor::of_test(instruments, test) }))
 }
 
-/// The lowest of the shares whose instruments are strong, or the highest of them.
+/// The lowest cut-off ratio with strong instruments, or the highest ratio.
 fn first_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -120,7 +120,7 @@ fn first_band(
     Ok(band)
 }
 
-/// The highest band below which the estimate does not move any more.
+/// The highest band below which the estimate no longer changes.
 fn settled_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -129,7 +129,7 @@ fn settled_band(
 ) -> BandEstimate {
     let mut bands = vec![first];
     while let Some(last) = bands.last().filter(|_| bands.len() <= MOST_BANDS) {
-        // A piece may be too short for a low filter: the bands so far remain.
+        // If a piece is too short for a low filter, the previous bands are used.
         let Ok(band) = with_band(rows, settings, STEP * last.cutoff_hz) else { break };
         if !is_strong(&band, least_squares) {
             break;
@@ -144,7 +144,7 @@ fn settled_band(
     bands.swap_remove(place)
 }
 
-/// Whether the instruments tell all columns that least squares tells, and tell them well.
+/// Whether the instruments determine all columns that least squares determines, and are strong.
 fn is_strong(band: &BandEstimate, least_squares: &Estimate) -> bool {
     let found = &band.found;
     !found.instruments.weak && found.estimate.rank.fixed.len() <= least_squares.rank.fixed.len()

@@ -1,5 +1,4 @@
-//! A log's rows with their instruments, `[Z | W | τ]`: two motions through the same regressor and the same parallel
-//! filter.
+//! Rows of a log with their instruments, `[Z | W | τ]`: both motions pass the same regressor and parallel filter.
 
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
@@ -12,7 +11,7 @@ use dynident_rows::{
     predicted_torque, set_aside,
 };
 
-/// The factors of one log's `[Z | W | τ]`, one for each joint.
+/// Factors of `[Z | W | τ]` of one log, one for each joint.
 pub(super) fn instrumented_factors(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -21,8 +20,8 @@ pub(super) fn instrumented_factors(
     made_rows(rows, index, None, None, source).map(|made| made.factors)
 }
 
-/// The factors of `[(W − Z) θ | τ − Z θ]` of one log or of its first samples, one for each joint, and each joint's
-/// `‖(W − Z) θ‖²`.
+/// Factors of `[(W − Z) θ | τ − Z θ]` of one log or of its first samples, one for each joint, and each joint's `‖(W −
+/// Z) θ‖²`.
 pub(super) fn fast_motion_factors(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -66,22 +65,22 @@ fn made_rows<'r, 'a>(
     refused.map_or(Ok(builder), Err)
 }
 
-/// Rows of both motions as they come.
+/// Rows of both motions.
 struct InstrumentedRows<'r, 'a> {
     rows: &'r TrainingRows<'a>,
     log: String,
     label: String,
     places: Vec<usize>,
-    /// Parameters, where only the torques of both motions are asked for.
+    /// Parameters, if only the torques of both motions are needed.
     theta: Option<&'r [f64]>,
-    /// Columns of each joint's rows beside the last.
+    /// Columns of each joint's rows except the last.
     widths: Vec<usize>,
-    /// Each joint's sum of squares of its first column behind the filter.
+    /// Sum of squares of each joint's first filtered column.
     squares: Vec<f64>,
-    /// Made with the first block, which knows the rate.
+    /// Built with the first block, because it defines the rate.
     filters: Option<JointFilters>,
     factors: Vec<SegmentedFactor>,
-    /// What makes the rows of either motion, instruments first.
+    /// Row makers of both motions, instruments first.
     sides: [Side; 2],
     other: MotionBlock,
     temperature_c: Vec<f64>,
@@ -91,10 +90,10 @@ struct InstrumentedRows<'r, 'a> {
     segment: usize,
 }
 
-/// What makes the rows of one motion.
+/// Row maker of one motion.
 struct Side {
     workspace: BatchWorkspace,
-    /// What friction remembers.
+    /// State of friction with memory.
     history: TermHistory,
     panels: Panels,
     motion: [Vec<f64>; 3],
@@ -107,7 +106,7 @@ impl Side {
         Self { workspace, history, panels: Panels::default(), motion: Default::default() }
     }
 
-    /// The panels of some samples of `block`, whose joints stand at `places`.
+    /// Computes the panels of some samples of `block`, whose joints have the indices `places`.
     fn make(&mut self, model: &RegressorModel, block: &MotionBlock, places: &[usize], from: usize, samples: usize) {
         in_model_order(block, places, from, samples, &mut self.motion);
         let [q, dq, ddq] = &self.motion;
@@ -214,7 +213,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                     self.panel.extend_from_slice(&own.joint(joint)[..width]);
                     self.panel.extend(torque.iter().map(|torque| gain * torque));
                 }
-                // What does not count is left out of both motions and the torque alike, as in the rows of a fit.
+                // Mask invalid samples in both motions and the torque, as in the rows of a fit.
                 let left_out = set_aside(measured, place, from, samples);
                 let rows = filters.push(joint, &self.panel, samples, left_out).counted(&mut self.counted);
                 if rows.rows > 0 {

@@ -1,4 +1,4 @@
-//! Maximum likelihood for a motion that repeats: from logs to mean periods, their noise, and an estimate.
+//! Maximum likelihood for a repeated motion: mean periods of logs, their noise, and the estimate.
 
 use super::filtered_period::PeriodFilter;
 use super::row_pass::Stop;
@@ -16,18 +16,18 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// No motion repeats after more than eleven days, s.
+/// Maximum period of a motion, s: eleven days.
 const MOST_PERIOD_S: f64 = 1e6;
 
-/// A motion whose periods differ by more than this share of its own size does not repeat.
+/// Maximum difference of the periods relative to the size of the motion.
 const MOST_DIFFERENCE: f64 = 0.1;
-/// A motion smaller than this counts as none, rad (m).
+/// Minimum size of a motion, rad (m).
 const NO_MOTION: f64 = 1e-4;
-/// Noise of a torque counts as at least this share of its root mean square.
+/// Minimum torque noise relative to the root mean square of the torque.
 const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
-/// Least steps of central differences of the regressor by position, velocity and acceleration of a usual arm; it is
-/// linear in the last. Where the noise of the mean period is larger, so is the step: the slope of a step of friction is
-/// that over the noise.
+/// Minimum steps of central differences of the regressor by position, velocity and acceleration, for an arm of usual
+/// size; the regressor is linear in the last. A larger noise of the mean period gives a larger step, so that the slope
+/// of a friction step is averaged over the noise.
 const LEAST_STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
 
 /// The repeated motion.
@@ -35,32 +35,31 @@ const LEAST_STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct PeriodSettings {
-    /// After how many seconds the motion repeats; by default the length of the log's `reference`.
+    /// Period of the motion, s; by default the length of the log's `reference`.
     pub period_s: Option<f64>,
-    /// Seconds at the start of every log that are left out, until the motion repeats; 0 by default.
+    /// Time at the start of every log that is excluded until the motion repeats, s; 0 by default.
     pub skip_s: f64,
-    /// Harmonics of the motion's Fourier series, for the simultaneous fit alone; by default those that stand out of the
-    /// noise.
+    /// Harmonics of the motion's Fourier series, for the simultaneous fit only; by default those above the noise.
     pub harmonics: Option<usize>,
 }
 
-/// Settings of a repeated motion that are impossible.
+/// Invalid settings of a repeated motion.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PeriodError {
-    /// A period that is no time.
+    /// Invalid period.
     #[error("period_s = {period_s:?}: give the seconds after which the motion repeats, at most {MOST_PERIOD_S:e}")]
     Period {
-        /// What was given.
+        /// Value.
         period_s: f64,
     },
-    /// A start that is no time.
+    /// Invalid start.
     #[error("skip_s = {skip_s}: give 0 or more seconds")]
     Skip {
-        /// What was given.
+        /// Value.
         skip_s: f64,
     },
-    /// Too few or too many harmonics.
+    /// Invalid number of harmonics.
     #[error("harmonics = {harmonics}: give 1 to 200")]
     Harmonics {
         /// What was given.
@@ -69,10 +68,10 @@ pub enum PeriodError {
 }
 
 impl PeriodSettings {
-    /// Checks the numbers.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// The first number that is impossible.
+    /// The first invalid value.
     pub fn validate(&self) -> Result<(), PeriodError> {
         if let Some(period_s) = self.period_s.filter(|period| !(*period > 0.0 && *period <= MOST_PERIOD_S)) {
             return Err(PeriodError::Period { period_s });
@@ -87,44 +86,41 @@ impl PeriodSettings {
     }
 }
 
-/// What the periods of a repeated motion give.
+/// Results for the periods of a repeated motion.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PeriodicFit {
-    /// Their length, s.
+    /// Period, s.
     pub period_s: f64,
-    /// For each log how many whole periods were averaged.
+    /// Number of averaged periods of each log.
     pub periods: Vec<usize>,
-    /// Instants of all mean periods that were fitted to.
+    /// Instants of all mean periods in the fit.
     pub instants: usize,
-    /// For each joint the standard deviation of a single sample's smoothed position, velocity and acceleration, rad,
-    /// rad/s, rad/s² (m).
+    /// Standard deviation of a single sample's smoothed position, velocity and acceleration of each joint, rad, rad/s,
+    /// rad/s² (m).
     pub motion_std: Vec<[f64; 3]>,
-    /// For each joint the standard deviation of a single sample's torque behind the parallel filter, Nm (N).
+    /// Standard deviation of a single sample's filtered torque of each joint, Nm (N).
     pub torque_std: Vec<f64>,
-    /// The likelihood's cost.
+    /// Cost of the likelihood.
     pub cost: f64,
-    /// What it would be if model and noise were right. Where the cost is larger, the model leaves something out, and
-    /// the error bars were widened by the root of the ratio.
+    /// Expected cost for correct model and noise. A larger cost shows model errors, and the error bars grow by the root
+    /// of the ratio.
     pub degrees_of_freedom: usize,
 }
 
-/// The mean period of one log, joints in the model's order: for each joint position, velocity, acceleration, then the
-/// torques of all.
+/// Mean period of one log, joints in the order of the model: positions, velocities, accelerations and torques.
 struct MeanPeriod {
     averaged: AveragedPeriods,
     samples: usize,
-    /// Noise of a single sample between all channels behind the parallel filter.
+    /// Covariance of a single sample between all channels after the parallel filter.
     covariance: DMatrix<f64>,
-    /// Instants that are fitted to, with regressor and torque behind the parallel filter: between them it has left
-    /// nothing new.
+    /// Instants of the fit, with filtered regressor and torque, at the decimated rate.
     rows: Vec<(usize, DMatrix<f64>, DVector<f64>)>,
 }
 
-/// The estimate, and what the periods give.
+/// Computes the estimate and the results for the periods.
 ///
-/// Torque and regressor of the mean period pass the same parallel filter, and of the mean period as many instants count
-/// as it distinguishes.
+/// Torque and regressor of the mean period pass the same parallel filter, and the instants are decimated accordingly.
 pub(super) fn periodic(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
@@ -144,9 +140,9 @@ pub(super) fn periodic(
     let Some(first) = means.first() else { return Err(wrong("there is no log to fit to".to_owned())) };
     let (dof, most) = (model.model().dof(), first.averaged.periods);
     let sample_covariance = pooled(&means, |mean| mean.covariance.clone());
-    // Of the motion's variables before the parallel filter.
+    // Covariance of the motion before the parallel filter.
     let single = pooled(&means, |mean| matrix(&mean.averaged.sample_covariance));
-    // Covariance of the mean of as many periods as the first log has; the other logs' rows are scaled to it.
+    // Covariance of the mean over the number of periods of the first log; rows of the other logs are scaled to it.
     let mean_covariance = &sample_covariance / most as f64;
     let settings = MaximumLikelihoodSettings {
         motion_covariance: mean_covariance.view((0, 0), (3 * dof, 3 * dof)).into_owned(),
@@ -179,14 +175,14 @@ pub(super) fn periodic(
     Ok((estimate, fit))
 }
 
-/// The mean periods of all logs.
+/// Mean periods of all logs.
 struct Means {
-    /// The period; none without logs.
+    /// Period, s; `None` without logs.
     period_s: Option<f64>,
     means: Vec<MeanPeriod>,
 }
 
-/// Averages the periods of all logs. The period is that of the settings, else of the first commanded motion.
+/// Averages the periods of all logs. The period is stated, or otherwise that of the first commanded motion.
 fn mean_periods(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
@@ -212,7 +208,7 @@ fn mean_periods(
     Ok(Means { period_s, means })
 }
 
-/// Covariance of the torques of a mean period, whose deviations are at least a small share of the torques.
+/// Covariance of the torques of a mean period, with a lower limit relative to the torques.
 fn torque_covariance(means: &[MeanPeriod], mean_covariance: &DMatrix<f64>, dof: usize) -> DMatrix<f64> {
     let mut covariance = mean_covariance.view((3 * dof, 3 * dof), (dof, dof)).into_owned();
     for joint in 0..dof {
@@ -227,7 +223,7 @@ fn torque_covariance(means: &[MeanPeriod], mean_covariance: &DMatrix<f64>, dof: 
     covariance
 }
 
-/// Least step of the differences by a variable of the motion: positions of all joints, velocities, accelerations.
+/// Minimum step of the differences by a variable of the motion: positions of all joints, velocities, accelerations.
 fn least_step(model: &RegressorModel, variable: usize) -> f64 {
     let (model, dof) = (model.model(), model.model().dof());
     let own = model.own_scale();
@@ -244,7 +240,7 @@ fn matrix(rows: &[Vec<f64>]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), rows.len(), |a, b| rows[a][b])
 }
 
-/// A covariance of a single sample between all channels, over all logs.
+/// Covariance of a single sample between all channels, over all logs.
 fn pooled(means: &[MeanPeriod], covariance: impl Fn(&MeanPeriod) -> DMatrix<f64>) -> DMatrix<f64> {
     let channels = means.first().map_or(0, |mean| mean.averaged.mean.len());
     let (mut sum, mut degrees_of_freedom) = (DMatrix::zeros(channels, channels), 0.0);
@@ -256,7 +252,7 @@ fn pooled(means: &[MeanPeriod], covariance: impl Fn(&MeanPeriod) -> DMatrix<f64>
     sum / degrees_of_freedom.max(1.0)
 }
 
-/// The mean period of log number `index`.
+/// Mean period of log `index`.
 fn mean_period(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -317,7 +313,7 @@ fn mean_period(
     Ok(MeanPeriod { averaged, samples, covariance, rows })
 }
 
-/// Checks that the positions of all periods are alike; else what is wrong.
+/// Checks that the positions of all periods agree; returns a message otherwise.
 fn check_repeats(model: &RegressorModel, averaged: &AveragedPeriods, period_s: f64) -> Result<(), String> {
     for (joint, described) in model.model().joints().iter().enumerate() {
         let mean = &averaged.mean[joint];
@@ -335,8 +331,8 @@ fn check_repeats(model: &RegressorModel, averaged: &AveragedPeriods, period_s: f
     Ok(())
 }
 
-/// Channels from `from` on at steps of `step` samples, so that a period is a whole number of them: cubic interpolation
-/// where these lie between samples.
+/// Resamples channels from `from` on with a step of `step` samples, so that a period is a whole number of samples;
+/// cubic interpolation between samples.
 fn at_phases(channels: &[Vec<f64>], from: f64, step: f64) -> Vec<Vec<f64>> {
     let length = channels.first().map_or(0, Vec::len);
     let on_samples = (step - 1.0).abs() * (length as f64) < 1e-3;
@@ -363,7 +359,7 @@ struct Instants<'a> {
     model: &'a RegressorModel,
     workspace: BatchWorkspace,
     panels: Panels,
-    /// Of the central differences, variable by variable.
+    /// Steps of the central differences by variable.
     steps: Vec<f64>,
 }
 
@@ -372,8 +368,8 @@ impl<'a> Instants<'a> {
         Self { model, workspace: BatchWorkspace::new(model.model()), panels: Panels::default(), steps }
     }
 
-    /// Hands the instants of a mean period to `visit`. Rows of a mean over more periods count more; `weight` is the
-    /// root of how much.
+    /// Passes the instants of a mean period to `visit`. `weight` is the square root of the relative weight of a mean
+    /// over more periods.
     fn of(&mut self, mean: &MeanPeriod, weight: f64, visit: &mut InstantVisitor<'_>) -> Result<(), Stop> {
         let (model, layout) = (self.model.model(), self.model.layout());
         let (dof, columns) = (model.dof(), layout.columns().len());
@@ -412,7 +408,7 @@ impl<'a> Instants<'a> {
     }
 }
 
-/// As the other estimators' result. Error bars grow with what the model leaves beyond the noise.
+/// Converts to the result of the other estimators. Error bars grow if the residual exceeds the noise.
 fn estimate_of(found: MaximumLikelihoodEstimate, problem: &LinearProblem) -> Result<Estimate, EstimationError> {
     let joints = problem.joints().len();
     let degrees_of_freedom = found.degrees_of_freedom as f64;

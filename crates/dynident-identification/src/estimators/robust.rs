@@ -1,21 +1,21 @@
-//! Iteratively reweighted least squares: rows far off count less, or not at all.
+//! Iteratively reweighted least squares: outliers get less weight, or none.
 
 use super::row_pass::{KeptRows, Stop};
 use super::{EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, RobustSettings, RowWeight, robust_least_squares};
 use serde::{Deserialize, Serialize};
 
-/// What a robust estimator thought of the rows, joint by joint.
+/// Weights of the rows in a robust estimator, by joint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct GrossErrors {
-    /// Share of rows whose weight is below one half.
+    /// Share of rows with a weight below one half.
     pub share: Vec<f64>,
     /// Mean weight of the rows.
     pub mean_weight: Vec<f64>,
 }
 
-/// The estimate with one pass over the rows for every reweighting.
+/// The estimate with one pass over the rows per reweighting.
 pub(super) fn robust(rows: &TrainingRows<'_>, weight: RowWeight) -> Result<(Estimate, Findings), EstimatorError> {
     let estimation = rows.settings;
     let settings = RobustSettings {

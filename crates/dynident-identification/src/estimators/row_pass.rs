@@ -1,10 +1,10 @@
-//! Every row of the training logs once more, for estimators that reweight them.
+//! Repeated passes over the rows of training logs, for estimators that reweight them.
 
 use super::{EstimatorError, TrainingRows};
 use dynident_estimation::{EstimationError, RowBlock, RowVisitor};
 use dynident_rows::{JointRows, LogError, RowConsumer};
 
-/// What stops an estimator that comes back to the logs: itself, or what reads or simulates them.
+/// Error of the estimator, or of the code that reads or simulates logs for it.
 pub(crate) enum Stop {
     Estimator(EstimationError),
     Log(EstimatorError),
@@ -16,11 +16,10 @@ impl From<EstimationError> for Stop {
     }
 }
 
-/// Numbers of filtered rows that are kept at most, 256 MiB.
+/// Maximum number of values of filtered rows that are kept (256 MiB).
 const MOST_KEPT_NUMBERS: usize = 1 << 25;
 
-/// Rows of the training logs for estimators that come back to them: made once and kept if they fit, else made anew in
-/// every pass.
+/// Rows of the training logs for repeated passes; kept if they fit, otherwise computed again in every pass.
 pub(super) struct KeptRows {
     blocks: Option<Vec<KeptBlock>>,
     complete: bool,
@@ -38,7 +37,7 @@ impl KeptRows {
         Self { blocks: Some(Vec::new()), complete: false }
     }
 
-    /// One pass: every row of every training log.
+    /// Passes every row of every training log to `visit`.
     pub(super) fn every_row(&mut self, rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), Stop> {
         if let (Some(blocks), true) = (&self.blocks, self.complete) {
             for KeptBlock { log, joint, rows, panel } in blocks {
@@ -72,7 +71,7 @@ impl KeptRows {
     }
 }
 
-/// Hands a log's rows to a visitor.
+/// Passes the rows of a log to a visitor.
 struct VisitorConsumer<'a, 'b> {
     log: usize,
     visit: &'a mut RowVisitor<'b>,

@@ -1,4 +1,4 @@
-//! DIDIM, CLIE and CLOE: from a controller and the commanded motion to an estimate.
+//! DIDIM, CLIE and CLOE: estimates from a controller and the commanded motion.
 
 use super::simulated_loop::{ComparedSignal, LoopLog, SimulatedLoop};
 use super::{EstimatorError, TrainingRows};
@@ -13,76 +13,74 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Noise of the compared signal counts as at least this share of the signal's root mean square, so that noise-free data
-/// have weights.
+/// Minimum noise relative to the root mean square of the compared signal, so that noise-free data have finite weights.
 const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
-/// Rows times columns that are held in memory, of 8 bytes each.
+/// Maximum number of matrix entries (rows times columns) in memory, 8 bytes each.
 const MOST_ENTRIES: usize = 100_000_000;
-/// The noise of the joints is judged anew so often at most, until no joint's changes by more than a tenth.
+/// Maximum number of updates of the joints' noise.
 const ROUNDS: usize = 3;
 const SETTLED: f64 = 0.1;
 
-/// Where the iteration begins.
+/// Start of the iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum SimulationStart {
-    /// At the one of the two below whose simulation is nearer to the record; at the other if that leads nowhere.
+    /// The one of the two below whose simulation is closer to the record; the other one if that fails.
     #[default]
     Nearer,
-    /// The consistent set that fits the measured rows best: a simulation with negative masses would get nowhere.
+    /// The consistent set with the best fit to the measured rows; a simulation with negative masses would fail.
     Estimate,
-    /// The robot's description.
+    /// The robot description.
     Description,
 }
 
-/// The experiment to simulate, and how the fit to it goes.
+/// The simulated experiment, and settings of the fit.
 #[derive(Clone, Debug)]
 pub struct SimulatedLoopSettings {
-    /// The controller that drove the robot.
+    /// Controller that drove the robot.
     pub controller: ControllerSettings,
-    /// Samples a second of the controller.
+    /// Rate of the controller, hertz.
     pub rate_hz: f64,
     /// Integrator, velocities and delays of the feedback, start and torque limits of the loop. Noise is not simulated.
     pub loop_settings: LoopSettings,
-    /// Where the iteration begins.
+    /// Start of the iteration.
     pub start: SimulationStart,
     /// Length of a step, in error bars over all directions, at which the iteration ends; 1e-3 is usual.
     pub tolerance: f64,
-    /// Most steps; 30 are usual.
+    /// Maximum number of steps; 30 are usual.
     pub max_iterations: usize,
     /// Step of the differences of CLIE and CLOE, relative to each parameter's size; 1e-4 is usual.
     pub difference: f64,
 }
 
-/// How a fit to the simulated closed loop went.
+/// Result of a fit to the simulated closed loop.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SimulatedFit {
-    /// The controller.
+    /// Name of the controller.
     pub controller: String,
-    /// Its samples a second.
+    /// Rate of the controller, hertz.
     pub rate_hz: f64,
-    /// What was compared: `torque` or `position`.
+    /// Compared signal: `torque` or `position`.
     pub compared: String,
-    /// Where the iteration began: at the `estimate` (the physically consistent set that fits the measured rows best) or
+    /// Start of the iteration: the `estimate` (the physically consistent set with the best fit to the measured rows) or
     /// the `description`.
     pub start: String,
-    /// Steps.
+    /// Number of steps.
     pub iterations: usize,
-    /// Simulations of all logs.
+    /// Number of simulations of all logs.
     pub simulations: usize,
-    /// For each joint the standard deviation of what the simulation leaves, Nm (N), or rad (m) where positions are
-    /// compared.
+    /// Standard deviation of each joint's residual, Nm (N), or rad (m) for positions.
     pub residual_std: Vec<f64>,
 }
 
-/// The estimate, and how it came about.
+/// Computes the estimate.
 ///
-/// The simulation has the study's controller (its model, if it needs one, is the description) and the log's commanded
-/// motion, and no noise; its motion is taken at the log's instants, and what it gives passes the same parallel filter
-/// as what was measured. Error bars are those of weighted least squares on the last linearised rows, so that coloured
-/// residuals count as everywhere.
+/// The simulation uses the study's controller (a model in it is that of the robot description) and the log's commanded
+/// motion, without noise. Its signals are sampled at the log's instants and pass the same parallel filter as the
+/// measured ones. Error bars are those of weighted least squares on the last linearised rows, so they include
+/// correlated residuals.
 pub(super) fn simulated(
     rows: &TrainingRows<'_>,
     experiment: &SimulatedLoopSettings,
@@ -124,14 +122,14 @@ pub(super) fn simulated(
     let mut estimate = weighted_least_squares(&linearised(rows, &simulated, &found)?, &weighted)?;
     estimate.iterations = best.iterations;
     if found.status == EstimateStatus::IterationLimit {
-        // The step that these rows ask for made the simulation worse: the last values that were simulated are kept.
+        // The last step made the simulation worse, so keep the last simulated values.
         estimate.status = EstimateStatus::IterationLimit;
         estimate.values.clone_from(&found.values);
         let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
         estimate.relative_std_percent = estimate.std.iter().zip(&estimate.values).map(relative).collect();
     }
     let residual_std = std::mem::take(&mut estimate.joint_sigma);
-    // The model's residual of the measured torque, also where positions were compared: the torque's band is made of it.
+    // Residual of the measured torque, also if positions were compared, because the error band of the torque uses it.
     estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
     let fit = SimulatedFit {
         controller: controller.name().to_owned(),
@@ -145,7 +143,7 @@ pub(super) fn simulated(
     Ok((estimate, fit))
 }
 
-/// The loop of the experiment without noise, and with no limits but those of the torque.
+/// The experiment without noise and without limits other than those of the torque.
 fn noiseless(experiment: &SimulatedLoopSettings, compared: ComparedSignal) -> LoopSettings {
     let mut settings = experiment.loop_settings.clone();
     settings.limits = RunLimits { torque: settings.limits.torque, ..RunLimits::default() };
@@ -155,7 +153,7 @@ fn noiseless(experiment: &SimulatedLoopSettings, compared: ComparedSignal) -> Lo
     settings
 }
 
-/// The model of a controller that needs one: the robot's description.
+/// The model inside a controller that needs one: the robot description.
 fn controller_model(
     rows: &TrainingRows<'_>,
     controller: &ControllerSettings,
@@ -177,8 +175,8 @@ fn controller_model(
     described.map(Some).map_err(|error| wrong(format!("[controller]: {error}")))
 }
 
-/// Iterates from the start whose simulation is nearest to the record, and from the others until one of them converges;
-/// the best outcome, with the iterations and simulations of all.
+/// Iterates from the start whose simulation is closest to the record, and from the others until one converges. Returns
+/// the best result, with the total numbers of iterations and simulations.
 fn best_outcome(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
@@ -207,7 +205,7 @@ fn best_outcome(
     Ok(StartOutcome { iterations, simulations, ..best })
 }
 
-/// The starts that can be simulated, the one nearest to the record first.
+/// Starts whose simulation succeeds, the closest to the record first.
 fn simulated_starts(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
@@ -233,7 +231,7 @@ fn simulated_starts(
     Ok(begun)
 }
 
-/// For each joint the standard deviation of its measured filtered torque from the model's, `√(RSS_j / (N_j − p/n))`.
+/// Standard deviation of each joint's residual of the measured filtered torque, `√(RSS_j / (N_j − p/n))`.
 pub(crate) fn torque_sigma(problem: &LinearProblem, values: &[f64]) -> Result<Vec<f64>, EstimationError> {
     let mut squares = vec![0.0; problem.joints().len()];
     for equation in problem.equations() {
@@ -245,14 +243,14 @@ pub(crate) fn torque_sigma(problem: &LinearProblem, values: &[f64]) -> Result<Ve
     Ok(squares.iter().zip(rows).map(|(sum, rows)| (sum / (rows as f64 - share).max(1.0)).sqrt()).collect())
 }
 
-/// A start that can be simulated.
+/// A start whose simulation succeeds.
 struct SimulatedStart {
     values: Vec<f64>,
     name: &'static str,
     sigma: Vec<f64>,
 }
 
-/// The result from one start.
+/// Result from one start.
 struct StartOutcome {
     found: SimulatedEstimate,
     start: &'static str,
@@ -265,7 +263,7 @@ fn log_sum(sigma: &[f64]) -> f64 {
     sigma.iter().map(|sigma| sigma.ln()).sum()
 }
 
-/// Iterates from one start; the joints' noise, which weighs their rows, is judged anew by what is left.
+/// Iterates from one start; the residuals update the noise of the joints, which weights their rows.
 fn settled(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
@@ -310,7 +308,7 @@ fn settled(
     Err(EstimationError::NoSimulation.into())
 }
 
-/// Why there is nothing to begin with.
+/// Reason for a missing start.
 #[derive(Debug, Error)]
 enum NoStartError {
     #[error("there is no physically consistent set to start from: {0}")]
@@ -321,7 +319,7 @@ enum NoStartError {
     Both(Box<Self>, Box<Self>),
 }
 
-/// Where the iteration may begin, and what each is called.
+/// Possible starts with their names.
 fn start_values(
     rows: &TrainingRows<'_>,
     choice: SimulationStart,
@@ -363,7 +361,7 @@ fn no_simulation(why: &str) -> String {
     )
 }
 
-/// Standard deviation of each joint's share of `residual`.
+/// Standard deviation of each joint's part of `residual`.
 fn deviations(
     simulated: &SimulatedLoop<'_>,
     residual: &DVector<f64>,
@@ -387,13 +385,13 @@ fn deviations(
             let rows = count[joint] as f64;
             let least = LEAST_RELATIVE_SIGMA * (signal[joint] / rows.max(1.0)).sqrt();
             let sigma = (squares[joint] / (rows - share).max(1.0)).sqrt().max(least);
-            // Of a joint without torque and without residual.
+            // A joint without torque and without residual.
             if sigma > 0.0 { sigma } else { 1.0 }
         })
         .collect()
 }
 
-/// One number per joint as one per row.
+/// Repeats one value per joint for its rows.
 fn by_row(simulated: &SimulatedLoop<'_>, values: &[f64]) -> DVector<f64> {
     let all = simulated.logs.iter().flat_map(|log| log.rows.iter().zip(values));
     let repeated = all.flat_map(|(&rows, &value)| std::iter::repeat_n(value, rows));

@@ -1,5 +1,5 @@
-//! The closed loop of an experiment behind the estimators' seam: the same controller, reference, instants and filters
-//! as the logs, other parameters.
+//! Simulation of an experiment's closed loop for the estimators: controller, reference, instants and filters as in the
+//! logs, with other parameters.
 
 use super::row_pass::Stop;
 use super::{EstimatorError, TrainingRows};
@@ -13,10 +13,10 @@ use dynident_simulation::{
 };
 use nalgebra::{DMatrix, DVector};
 
-/// What is compared with the record.
+/// Signal that is compared with the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ComparedSignal {
-    /// Torque, with the regressor of the simulated motion beside it: DIDIM.
+    /// Torque, with the regressor of the simulated motion: DIDIM.
     TorqueRows,
     /// Torque: CLIE.
     Torque,
@@ -49,23 +49,23 @@ struct Piece {
     rows: usize,
 }
 
-/// What a log says of how it was made, and when its samples were taken.
+/// Reference, filter and instants of a log.
 pub(super) struct LoopLog {
     pub(super) name: String,
     rate_hz: f64,
     pieces: Vec<Piece>,
     filter: Option<DecimationSettings>,
     reference: Reference,
-    /// When the simulation begins, in seconds after the log's first row: with the commanded motion, or with the log if
-    /// that began later.
+    /// Start of the simulation, s after the log's first row: that of the commanded motion, or of the log if it begins
+    /// later.
     begins_s: f64,
-    /// For each joint its filtered rows.
+    /// Filtered rows of each joint.
     pub(super) rows: Vec<usize>,
-    /// The measured outputs, filtered, joint by joint.
+    /// Measured and filtered outputs of each joint.
     measured: Vec<Vec<f64>>,
 }
 
-/// The experiment over again.
+/// The simulated experiment.
 pub(super) struct SimulatedLoop<'a> {
     pub(super) model: &'a RegressorModel,
     pub(super) controller: &'a ControllerSettings,
@@ -73,14 +73,14 @@ pub(super) struct SimulatedLoop<'a> {
     pub(super) settings: LoopSettings,
     pub(super) compared: ComparedSignal,
     pub(super) logs: Vec<LoopLog>,
-    /// Makes an error from what is wrong.
+    /// Wraps a message in an error.
     pub(super) wrong: &'a dyn Fn(String) -> EstimatorError,
-    /// Why the last simulation that did not get through did not.
+    /// Reason for the last failed simulation.
     pub(super) failure: Option<String>,
 }
 
 impl LoopLog {
-    /// Log number `index`: its instants, its filtered outputs, and the commanded motion at the controller's rate.
+    /// Reads log `index`: its instants, its filtered outputs, and the commanded motion at the controller's rate.
     pub(super) fn read(
         training: &TrainingRows<'_>,
         index: usize,
@@ -151,26 +151,26 @@ impl LoopLog {
 }
 
 impl SimulatedLoop<'_> {
-    /// What was measured, logs one after another and in each joint by joint: the order of all rows.
+    /// Measured outputs, ordered by log, then by joint: the order of all rows.
     pub(super) fn measured(&self) -> DVector<f64> {
         let all = self.logs.iter().flat_map(|log| log.measured.iter().flatten().copied());
         DVector::from_iterator(self.rows(), all)
     }
 
-    /// Rows of all logs and joints.
+    /// Number of rows of all logs and joints.
     pub(super) fn rows(&self) -> usize {
         self.logs.iter().flat_map(|log| &log.rows).sum()
     }
 
-    /// The robot with base parameters θ: its torques, and so its mass matrix, are those of every full set that has
-    /// these base parameters.
+    /// The robot with base parameters θ. Its torques and mass matrix are those of every full set with these base
+    /// parameters.
     fn plant(&self, theta: &[f64]) -> Result<Plant, SimulationError> {
         let model = ControllerModel::from_columns(self.model.model(), self.model.layout().columns(), theta)?;
         let (terms, values): (Vec<TorqueTerm>, Vec<f64>) = model.terms().iter().cloned().unzip();
         Plant::new(model.model(), &terms, &values)
     }
 
-    /// One log's rows of a run.
+    /// Rows of one log in a simulated run.
     fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), EstimatorError> {
         let dof = self.model.model().dof();
         let motion = (self.compared != ComparedSignal::Torque)
@@ -271,14 +271,14 @@ impl SimulatedMotion for SimulatedLoop<'_> {
     }
 }
 
-/// Rows of all logs as they come.
+/// Collected rows of all logs.
 struct Gathered {
     output: Vec<f64>,
     regressor: DMatrix<f64>,
     filled: usize,
 }
 
-/// One number per joint and sample through the parallel filter.
+/// One value per joint and sample through the parallel filter.
 struct Outputs {
     decimators: Option<Vec<Decimator>>,
     segments: Vec<usize>,
@@ -311,7 +311,7 @@ impl Outputs {
     }
 }
 
-/// Keeps every joint's filtered panels.
+/// Collects every joint's filtered panels.
 struct PanelRows {
     joints: Vec<Vec<(usize, Vec<f64>)>>,
 }
@@ -323,8 +323,8 @@ impl RowConsumer for PanelRows {
     }
 }
 
-/// The motion of a run at any time of the log's clock: between the controller's samples the quintic that has both ends'
-/// position, velocity and acceleration.
+/// The motion of a run at any time of the log's clock: quintic interpolation of position, velocity and acceleration
+/// between the controller's samples.
 fn sampled(run: &Run, begins_s: f64) -> Result<dynident_recording::Reference, FilterError> {
     let times: Vec<f64> = (0..run.samples).map(|sample| begins_s + run.time_s(sample)).collect();
     let joints: Vec<[Vec<f64>; 3]> = (0..run.joints.len())
@@ -333,7 +333,7 @@ fn sampled(run: &Run, begins_s: f64) -> Result<dynident_recording::Reference, Fi
     dynident_recording::Reference::sampled(&times, &joints)
 }
 
-/// The torque in force: that of the controller's last sample; rounding must not fetch the one before.
+/// The torque of the controller's last sample; a small offset protects against rounding.
 fn held_torque(run: &Run, joint: usize, time_s: f64) -> f64 {
     let sample = ((time_s * run.rate_hz).max(0.0) + 1e-6).floor() as usize;
     run.tau[run.of(joint)][sample.min(run.samples - 1)]

@@ -12,34 +12,34 @@ use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
 use dynident_rows::LogError;
 use serde::{Deserialize, Serialize};
 
-/// Positions further from the series than this share of their own size are not those of such a motion.
+/// Maximum residual of the positions relative to their size for a motion that is the series.
 const MOST_REMAINDER: f64 = 0.1;
-/// A motion smaller than this counts as none, rad (m).
+/// Minimum size of a motion, rad (m).
 const NO_MOTION: f64 = 1e-4;
-/// Most harmonics that are taken unasked: with more the motion's unknowns, and the time they take, are many.
+/// Maximum number of automatic harmonics; more cost much time.
 const MOST_HARMONICS: usize = 60;
 
-/// What the simultaneous fit found of one log's motion and noise.
+/// Motion and noise of one log in the simultaneous fit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SeriesFit {
     /// Period of the first harmonic, s.
     pub period_s: f64,
-    /// Harmonics of the series.
+    /// Number of harmonics.
     pub harmonics: usize,
     /// Rows of each channel.
     pub rows: usize,
-    /// How many samples a row is the mean of.
+    /// Samples per row.
     pub samples_of_row: usize,
-    /// For each joint the standard deviation of a row's position from the series, rad (m).
+    /// Standard deviation of a row's position from the series by joint, rad (m).
     pub position_std: Vec<f64>,
-    /// For each joint the standard deviation of a row's torque from the model's, N m (N).
+    /// Standard deviation of a row's torque from the model by joint, N m (N).
     pub torque_std: Vec<f64>,
-    /// For each joint the order of the autoregression that its torque noise was found to be; 0 for white noise.
+    /// Order of the autoregression of each joint's torque noise; 0 for white noise.
     pub torque_autoregression: Vec<usize>,
 }
 
-/// One log as it was recorded.
+/// One recorded log.
 struct RawRecord {
     record: PeriodicRecord,
     series: FourierSeries,
@@ -51,7 +51,7 @@ impl RawRecord {
     }
 }
 
-/// The estimate, and what was found of each log's motion.
+/// Computes the estimate and the motion of each log.
 pub(super) fn simultaneous(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
@@ -94,7 +94,7 @@ pub(super) fn simultaneous(
     Ok((estimate, Findings::Series(fits)))
 }
 
-/// The motion's unknowns of all logs as the positions alone give them.
+/// Start values of the motion of all logs, from the positions alone.
 fn fitted_motion(
     rows: &TrainingRows<'_>,
     records: &PeriodicRecords<'_>,
@@ -116,7 +116,7 @@ fn fitted_motion(
     Ok(motion)
 }
 
-/// Motion and noise of each log, as fitted.
+/// Fitted motion and noise of each log.
 fn series_fits(
     recorded: &[RawRecord],
     records: &mut PeriodicRecords<'_>,
@@ -143,7 +143,7 @@ fn series_fits(
     Ok(recorded.iter().enumerate().map(series).collect())
 }
 
-/// The estimate with joints, by their torque, in place of channels, which are each log's positions and torques.
+/// Converts an estimate by channel (positions and torques of each log) to one by joint, using the torque channels.
 fn of_joints(
     mut estimate: Estimate,
     problem: &LinearProblem,
@@ -164,8 +164,7 @@ fn of_joints(
     Ok(estimate)
 }
 
-/// Log number `index` as it was recorded, and the series of its motion: the harmonics that stand out of the noise,
-/// unless their number is given.
+/// Reads log `index` and selects the series of its motion: the stated number of harmonics, or those above the noise.
 fn read(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -181,7 +180,7 @@ fn read(
             "log `{name}`: say after how many seconds the motion repeats: [estimator.periods] period_s = ..., or name the commanded motion of one period as the log's reference"
         )));
     };
-    // Central differences leave positions as they are.
+    // Central differences do not change positions.
     let differentiator = DifferentiatorSettings::CentralDifferences { order: 4 };
     let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
     let Some(mut stream) = recording.open(model.model(), &motion)? else {
@@ -214,7 +213,7 @@ fn read(
             "log `{name}`: {length_s:.2} s are left, less than one period of {period_s} s: record at least one, or give the true period_s"
         )));
     }
-    // The cut-off is twice the highest frequency that stands out of the noise.
+    // The cut-off is twice the highest frequency above the noise.
     let highest = (0.5 * stream.cutoff().cutoff_hz * period_s).ceil() as usize;
     let harmonics = periods.harmonics.unwrap_or_else(|| highest.clamp(1, MOST_HARMONICS));
     if 4.0 * harmonics as f64 > rate_hz * period_s {
@@ -228,13 +227,13 @@ fn read(
     Ok(RawRecord { record, series: FourierSeries { period_s, harmonics } })
 }
 
-/// Whether the positions are those of the fitted series; if not, the joint and what is wrong.
+/// Checks that the positions are those of the fitted series; otherwise returns the joint and a message.
 fn check_motion(record: &PeriodicModel<'_>, fitted: &[f64]) -> Result<(), (usize, String)> {
     let root_mean = |values: &[f64]| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
     let left = record.position_residuals(fitted);
     let unknowns = fitted.len() / left.ncols().max(1);
     for (joint, left) in left.column_iter().enumerate() {
-        // Sine and cosine have the mean square one half.
+        // Sine and cosine have a mean square of one half.
         let size = root_mean(&fitted[joint * unknowns + 1..(joint + 1) * unknowns]) * (0.5 * unknowns as f64).sqrt();
         let remainder = root_mean(left.as_slice());
         if remainder > MOST_REMAINDER * size.max(NO_MOTION) {

@@ -1,4 +1,4 @@
-//! Motion and parameters from one likelihood, for any log: raw positions and torques, noise of both, the motion a
+//! Motion and parameters from one likelihood, for any log: raw positions and torques, noise of both, the motion as a
 //! smoothing spline.
 
 use super::simulated::torque_sigma;
@@ -12,30 +12,30 @@ use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
 use dynident_rows::LogError;
 use serde::{Deserialize, Serialize};
 
-/// Shorter pieces between two gaps are left out, samples.
+/// Minimum length of a piece between two gaps, samples.
 const LEAST_SAMPLES: usize = 64;
 
-/// Where residuals of the filtered rows are so many times those of weighted least squares, what lasts in the torque's
-/// residuals is the model's error, and the whitening filter has taken the model's own motion for noise.
+/// Maximum ratio of filtered residuals to those of weighted least squares. Above it the correlated part of the torque
+/// residuals is model error, and the whitening filter has removed a part of the motion as noise.
 const MOST_OVER_START: f64 = 1.25;
 
-/// What the fit of motion and parameters found.
+/// Results of the fit of motion and parameters.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SplineFit {
     /// Motion and noise of every training log.
     pub logs: Vec<SplineLogFit>,
-    /// The sum of squares with the parameters of weighted least squares, the motion by the positions alone and the
-    /// noise that was found.
+    /// Sum of squares with the parameters of weighted least squares, the motion from the positions alone and the
+    /// estimated noise.
     pub cost_at_start: f64,
-    /// What it came down to.
+    /// Final sum of squares.
     pub cost: f64,
-    /// Residuals of the filtered rows over those of weighted least squares, root mean square over the joints. Somewhat
-    /// above one where noise of the positions biases least squares; far above, the model's error is taken for noise.
+    /// Ratio of filtered residuals to those of weighted least squares, root mean square over the joints. It is slightly
+    /// above one if position noise biases least squares; far above one, model error was treated as noise.
     pub residual_over_start: f64,
 }
 
-/// The estimate, and what was found of each log's motion.
+/// Computes the estimate and the motion of each log.
 pub(super) fn spline_motion(
     rows: &TrainingRows<'_>,
     settings: &SplineMotionSettings,
@@ -97,7 +97,7 @@ pub(super) fn spline_motion(
         }
     }
     let mut estimate = found.estimate;
-    // Channels are torques first; an estimate speaks of joints, by their torque.
+    // Channels are torques first; the estimate is reported by joint.
     for of_channels in [&mut estimate.score_inflation, &mut estimate.effective_lag1, &mut estimate.segment_correlation]
     {
         of_channels.truncate(dof);
@@ -107,7 +107,7 @@ pub(super) fn spline_motion(
     Ok((estimate, Findings::Spline(fit)))
 }
 
-/// The pieces of recording number `index` as it was recorded, with temperatures where they were measured.
+/// Pieces of recording `index`, with measured temperatures if available.
 fn read(
     rows: &TrainingRows<'_>,
     log: usize,
@@ -117,7 +117,7 @@ fn read(
     let TrainingRows { logs, model, .. } = *rows;
     let recording = &logs.recordings[index];
     let name = &recording.name;
-    // Central differences leave positions as they are.
+    // Central differences do not change positions.
     let differentiator = DifferentiatorSettings::CentralDifferences { order: 4 };
     let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
     let raw = "the positions of a motion that is made already are smoothed: give its raw samples, all of them";

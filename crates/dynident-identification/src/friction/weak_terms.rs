@@ -1,34 +1,33 @@
-//! Terms that were chosen between the points of a grid and are not seen once their constants are free.
+//! Friction terms that were selected on the grid but are insignificant with free constants.
 //!
-//! A step whose width lies between two points of the grid looks like a further term there. Once the constants are found
-//! together with all parameters, a further term has to stand on its own: its coefficient with the steps of its own
-//! constants, or for friction by direction the difference of its two coefficients, has to be as far from zero as chance
-//! would not take it, with what is unknown of all other parameters and constants in the covariance: Wald's test,
-//! `xᵀ Σ⁻¹ x` against χ². And the rows have to show it: Stribeck friction that falls off below the slowest velocities
-//! of the rows is seen by its last tail alone, so that its coefficient, the torque at rest, is any number.
+//! A step whose width lies between two points of the grid looks like a further term there. After the constants are
+//! estimated together with all parameters, a further term must be significant: Wald's test, `xᵀ Σ⁻¹ x` against χ²,
+//! where x is its coefficient with the steps of its own constants, or for directional friction the difference of its
+//! two coefficients. Σ includes the uncertainty of all other parameters and constants. The rows must also contain the
+//! term: with Stribeck friction that decays below the slowest velocities of the rows, only its tail is visible, and the
+//! coefficient, the torque at rest, is arbitrary.
 
 use dynident_dynamics::Column;
 use dynident_estimation::Estimate;
 use dynident_model::terms::{CandidateRole, TermAction, TorqueTerm};
 use nalgebra::{DMatrix, DVector};
 
-/// Squares in units of their variance that a further term needs, with 1, 2, 3 numbers of its own: chance goes beyond
-/// them once in twenty times (χ²). Stricter tests drop terms that predict torque better although they are not the
-/// truth.
+/// Critical values of Wald's test for a further term with 1, 2 and 3 degrees of freedom: χ² at 5 %. Stricter tests drop
+/// terms that improve the prediction although they are not the true ones.
 const SEEN: [f64; 3] = [3.84, 5.99, 7.81];
-/// The same for once in a hundred times: what a second look at the same motion needs to add a term that the first did
-/// not show, for then every joint has been asked for every term twice.
+/// The same at 1 %, for terms that only a second selection from the same motion adds, because every term is then tested
+/// twice.
 const SEEN_AT_SECOND_LOOK: [f64; 3] = [6.63, 9.21, 11.34];
 
-/// The sum of squares of a Stribeck term's column, `Σ e^{-2|q̇/v_s|^δ}`, below which no row shows it: less than one row
-/// at rest would.
+/// Minimum sum of squares of a Stribeck term's column, `Σ e^{-2|q̇/v_s|^δ}`, for supporting rows: less than one row at
+/// rest.
 const SHOWN: f64 = 1.0;
 
 /// A further term of a joint.
 struct Further {
-    /// Its square in units of its variance; 0 for what is not friction or what no row shows.
+    /// Wald statistic; 0 for negative friction or without supporting rows.
     square: f64,
-    /// How many numbers are its own.
+    /// Degrees of freedom.
     numbers: usize,
     term: TorqueTerm,
     /// The joint's terms without it.
@@ -36,15 +35,14 @@ struct Further {
 }
 
 impl Further {
-    /// In units of what it needs.
+    /// Ratio to the critical value.
     fn in_units_of(&self, needed: &[f64; 3]) -> f64 {
         self.square / needed[self.numbers - 1]
     }
 }
 
-/// The further ones among the terms of a joint. `estimate` begins with the model's `columns`, whose norms over all rows
-/// are `norms`; `own_constants` tells at which of its columns the constants of a term stand, as steps from where they
-/// are.
+/// Further terms among the terms of a joint. `estimate` begins with the model's `columns`, whose norms over all rows
+/// are `norms`. `own_constants` returns the columns of a term's constants, as steps from their current values.
 fn further_terms(
     terms: &[TorqueTerm],
     columns: &[Column],
@@ -72,7 +70,7 @@ fn further_terms(
         }
         term.candidate().filter(|law| law.role == CandidateRole::Addition)?;
         let left = without(&[term]);
-        // Friction that drives the joint is none, and what no row shows is none that is known.
+        // Reject terms with negative friction or without supporting rows.
         let fades = matches!(term.action(), TermAction::Friction(friction) if friction.fading.is_some());
         let is_shown = !fades || norms[own] * norms[own] >= SHOWN;
         if !is_shown || (term.is_nonnegative() && estimate.values[own] <= 0.0) {
@@ -87,17 +85,17 @@ fn further_terms(
     terms.iter().filter_map(of).collect()
 }
 
-/// Which further terms are weak.
+/// Criterion for weak further terms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Weak {
-    /// Those that are not seen: chance would make as much.
+    /// Insignificant terms.
     Unseen,
-    /// Those alone that drive the joint or that no row shows.
+    /// Only terms with negative friction or without supporting rows.
     Unshown,
 }
 
-/// The terms of a joint without the further one that is seen least; `None` where none is `weak`. The estimate, its
-/// columns and the constants are as in [`further_terms`].
+/// The terms of a joint without the weakest further one; `None` if none is `weak`. Other arguments as in
+/// [`further_terms`].
 pub(super) fn without_weakest(
     (terms, weak): (&[TorqueTerm], Weak),
     columns: (&[Column], &[f64]),
@@ -114,8 +112,8 @@ pub(super) fn without_weakest(
     is_weak.then_some(left)
 }
 
-/// Whether further terms of a joint of which a first look at the same motion had none, whose terms are `before`, may
-/// be chance. The estimate, its columns and the constants are as in [`further_terms`].
+/// Whether a joint has possibly insignificant further terms that were not in its first selection, `before`. Other
+/// arguments as in [`further_terms`].
 pub(super) fn has_doubtful_term(
     (terms, before): (&[TorqueTerm], &[TorqueTerm]),
     columns: (&[Column], &[f64]),
@@ -136,9 +134,8 @@ mod tests {
     };
     use dynident_model::terms::{Coulomb, CoulombShape, Direction, DirectionalCoulomb, Stribeck};
 
-    /// Rows at velocities from 0.05 to 1 rad/s of a joint with 5 Nm of Coulomb and, where that is seen, 2 Nm of
-    /// Stribeck friction, and what an iteration's search made of such rows: a term that has faded to 1e-4 at the
-    /// slowest.
+    /// Result for rows at velocities from 0.05 to 1 rad/s with 5 Nm of Coulomb friction and, if visible, 2 Nm of
+    /// Stribeck friction. With the narrow Stribeck velocity the term has decayed to 1e-4 at the slowest row.
     fn left_without(speed: f64) -> Option<Vec<TorqueTerm>> {
         let shape = CoulombShape::Sign { dead_band: 0.0 };
         let terms = [
@@ -149,8 +146,8 @@ mod tests {
         let count = 200;
         let velocity = |row: usize| 0.05 + 0.95 * row as f64 / count as f64;
         let faded = |row: usize| (-(velocity(row) / speed).powi(2)).exp();
-        // 2 Nm where a Stribeck velocity of 0.3 shows them; of the narrow one 1.5 Nm in the slowest row, as an outlier
-        // would be; a deterministic ripple is the noise.
+        // 2 Nm for a Stribeck velocity of 0.3; for the narrow one 1.5 Nm in the slowest row, like an outlier. A
+        // deterministic ripple is the noise.
         let size = if speed > 0.1 { 2.0 } else { 1.5 / faded(0) };
         let torque = |row: usize| 5.0 + size * faded(row) + 0.02 * (row as f64 * 2.4).sin();
         let values: Vec<f64> =
@@ -160,7 +157,7 @@ mod tests {
         let mut problem = LinearProblem::new(vec!["fc1".to_owned(), "fs1".to_owned()], vec!["joint1".to_owned()]);
         problem.add("log", 0, vec![0, 1], factor).unwrap();
         let estimate = ordinary_least_squares(&problem, &OrdinarySettings::default()).unwrap();
-        // Far beyond its own bar, both times.
+        // Both estimates are far above their error bars.
         assert!(estimate.values[1] > 5.0 * estimate.std[1], "{} +- {}", estimate.values[1], estimate.std[1]);
         let norms = problem.column_norms();
         let without = |weak| without_weakest((&terms, weak), (&columns, &norms), &estimate, |_| Vec::new());
@@ -168,8 +165,8 @@ mod tests {
         without(Weak::Unseen)
     }
 
-    /// Steps of Coulomb friction of 5.0 and 5.085 Nm by direction in rows that know the difference to 0.035: two and a
-    /// half bars from zero, which chance shows once in 65 times: seen at one look, and maybe chance at a second.
+    /// Coulomb friction of 5.0 and 5.085 Nm by direction, with an error bar of 0.035 Nm for the difference. At two and
+    /// a half error bars (p = 1/65) it is significant in the first selection but not in a second one.
     #[test]
     fn what_a_second_look_adds_has_to_be_seen_more_clearly() {
         let shape = CoulombShape::Sign { dead_band: 0.0 };
@@ -178,7 +175,7 @@ mod tests {
         let columns: Vec<Column> = terms.iter().cloned().map(Column::Term).collect();
         let count = 400;
         let is_forward = |row: usize| f64::from(u8::from(row % 40 < 20));
-        // A ripple of no period that the direction has, 0.35 Nm root mean square.
+        // A ripple that is not correlated with the direction, 0.35 Nm root mean square.
         let ripple = |row: usize| 0.5 * (row as f64 * 2.4).sin();
         let torque = |row: usize| 5.085 * is_forward(row) - 5.0 * (1.0 - is_forward(row)) + ripple(row);
         let rows = 0..count;
@@ -203,14 +200,15 @@ mod tests {
         let without =
             |weak, estimate: &_| without_weakest((&terms, weak), (&columns, &norms), estimate, |_| Vec::new());
         assert_eq!(without(Weak::Unseen, &estimate), None);
-        // What is too weak is shown all the same.
+        // A weak term can still have supporting rows.
         let blurred = estimate.with_further_error(&DMatrix::from_diagonal_element(2, 2, 1.0));
         assert_eq!(without(Weak::Unseen, &blurred).as_deref(), Some(&plain[..]));
         assert_eq!(without(Weak::Unshown, &blurred), None);
         assert!(is_doubtful(&plain) && !is_doubtful(&terms));
     }
 
-    /// Its coefficient is thousands of Nm, many bars from zero, and no row has shown a hundredth of it.
+    /// The coefficient is thousands of Nm and far above its error bar, although the term reaches only a hundredth of it
+    /// in the rows.
     #[test]
     fn stribeck_friction_below_the_slowest_rows_is_not_seen() {
         assert_eq!(left_without(0.3), None);

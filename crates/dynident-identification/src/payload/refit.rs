@@ -1,4 +1,3 @@
-
 use serde::{Deserialize, Serialize};
 
 /// Parameters of a known arm that are fitted again together with the payload.
