@@ -78,15 +78,17 @@ impl DriveInertiaChoice {
             (Some(found), _) if self.seen => {
                 let needed = self.needed;
                 format!(
-                    "seen, {found:.0} standard deviations where {needed:.0} are asked for: the torque is the motors'"
+                    "detected ({found:.0} standard deviations, {needed:.0} required): the torque is measured at the motors"
                 )
             }
             (Some(found), _) => {
                 let needed = self.needed;
-                format!("not seen, {found:.1} standard deviations where {needed:.0} are asked for: the model has none")
+                format!(
+                    "not detected ({found:.1} standard deviations, {needed:.0} required): the model has no drive inertia"
+                )
             }
-            (None, Some(reason)) => format!("not tested, the model has none: {reason}"),
-            (None, None) => "not tested, the model has none".to_owned(),
+            (None, Some(reason)) => format!("not tested, the model has no drive inertia: {reason}"),
+            (None, None) => "not tested, the model has no drive inertia".to_owned(),
         }
     }
 }
@@ -120,7 +122,7 @@ pub fn choose_drive_inertia(
         return untested("torque cannot tell it from the inertia of the links");
     }
     if !settings.estimation.held.is_empty() {
-        return untested("base parameters are held, which others would take the place of");
+        return untested("base parameters are held, and additional terms would change their columns");
     }
 
     // Error bars must include the correlation of residuals within a segment, for any setting of the estimate.
@@ -140,13 +142,13 @@ pub fn choose_drive_inertia(
     let fit = match fit() {
         Ok(fit) => fit,
         Err(IdentificationError::Estimation(EstimationError::TooFewRows { .. })) => {
-            return untested("fewer rows than it would take");
+            return untested("there are too few rows");
         }
         Err(error) => return Err(error),
     };
     let excited: Vec<(usize, usize)> = apart.into_iter().filter(|(_, column)| fit.std[*column] > 0.0).collect();
     if excited.is_empty() {
-        return untested("no joint of which torque could tell it is moved");
+        return untested("the logs move no joint whose torque could show it");
     }
     let columns: Vec<usize> = excited.iter().map(|(_, column)| *column).collect();
     let found = together(&fit, &columns);

@@ -68,12 +68,12 @@ impl From<EstimatorError> for IdentificationError {
 pub enum ReduceError {
     /// The cut-off is open.
     #[error(
-        "the cut-off is left to the logs, and each would have its own: state motion.differentiator.cutoff_hz, or reduce like a model that was identified from some of them"
+        "the cut-off is left to the logs and would differ between them: state motion.differentiator.cutoff_hz, or reduce with the settings of a model that was identified from some of them"
     )]
     Cutoff,
     /// Drive inertia is open.
     #[error(
-        "whether the torque of joint {joint} holds its drive's inertia is left to the logs: state it (drive.drive_inertia = true or false), or reduce like a model that was identified from some of them"
+        "the drive inertia of joint {joint} is automatic, which needs all logs: state it (drive.drive_inertia = true or false), or reduce with the settings of a model that was identified from some of them"
     )]
     DriveInertia {
         /// First such joint.
@@ -81,23 +81,23 @@ pub enum ReduceError {
     },
     /// Friction is open.
     #[error(
-        "the friction of joint {joint} is left to the logs: state it (drive.friction = \"stated\" and its terms), or reduce like a model that was identified from some of them"
+        "the friction of joint {joint} is automatic, which needs all logs: state it (drive.friction = \"stated\" and its terms), or reduce with the settings of a model that was identified from some of them"
     )]
     Friction {
         /// First such joint.
         joint: String,
     },
     /// Load-dependent friction needs the samples again.
-    #[error("load-dependent friction needs the samples again, with the load of the fit before: leave it out")]
+    #[error("load-dependent friction needs the samples again, with the load of the previous fit: leave it out")]
     Load,
     /// Payloads, gains or offsets add columns for single logs.
-    #[error("{what} cannot be had from reduced logs: identify them from the logs themselves")]
+    #[error("{what} cannot be estimated from reduced logs: identify them from the complete logs")]
     Columns {
         /// Requested columns.
         what: &'static str,
     },
     /// The estimator reads the samples again.
-    #[error("estimator.method = \"{method}\" goes back to the samples: give \"weighted\" or \"ordinary\"")]
+    #[error("estimator.method = \"{method}\" reads the samples again: give \"weighted\" or \"ordinary\"")]
     Estimator {
         /// Name of the estimator.
         method: &'static str,

@@ -22,7 +22,7 @@ pub(crate) struct Fit<'a> {
 /// inside the instruments' band.
 const CUTOFF_OVER_INSTRUMENTS: f64 = 2.0;
 /// Reason for keeping the stated friction in this case.
-const NOISY: &str = "noise of the positions biases the least squares by which it would be chosen";
+const NOISY: &str = "position noise biases the least squares that would select it";
 /// Ratio of new to old cut-off above which the old one is kept.
 const WORTH_LOWERING: f64 = 0.8;
 

@@ -168,7 +168,7 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
     let settings = task.settings.consistency.as_ref();
     ConsistentParameters {
         fit: None,
-        failure: Some("the arm is known from an earlier result, which has its bodies and its URDF".to_owned()),
+        failure: Some("the arm is known from an earlier result, which contains its bodies and its URDF".to_owned()),
         parameters: nearest_to_nominal(robot, &estimate.values[..training.columns.base()]),
         parameter_std: vec![None; robot.nominal().len()],
         intervals: None,

@@ -1,4 +1,4 @@
-//! Choices made so far, with the evidence for each.
+//! Current choices, with the evidence for each.
 
 use crate::bandwidth::CutoffByError;
 use crate::chosen_friction::{ChosenFriction, GridFriction};
@@ -46,7 +46,7 @@ enum Origin {
     Final,
 }
 
-/// Choices made so far. `None` and [`FrictionChoice::Open`] are open.
+/// Current choices. `None` and [`FrictionChoice::Open`] are open.
 #[derive(Clone)]
 pub(crate) struct Choices {
     /// The compensated lag and the number of its revisions.

@@ -1,6 +1,6 @@
 //! Decisions of the training logs before the last fit: drive inertia, cut-off, friction and lag.
 //!
-//! An open [`Decision`] is made from the rows under the choices so far. A decision that revises a choice reopens the
+//! An open [`Decision`] is made from the rows under the current choices. A decision that revises a choice reopens the
 //! choices that depend on it. The driver then starts again at the top of the list, until no decision revises a choice.
 
 mod choices;

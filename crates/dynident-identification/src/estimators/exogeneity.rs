@@ -89,7 +89,7 @@ pub(super) fn harmless(
     if !is_motion && (move_squared / columns as f64).sqrt() > LEAST_MOVE {
         return Ok(None);
     }
-    let reason = "not made: torque follows the fast motion, or there is too little of it to matter".to_owned();
+    let reason = "not tested: torque follows the fast motion, or the fast motion is too small to matter".to_owned();
     let (verdict, degrees_of_freedom) = (HausmanVerdict::Undecided, [0.0; 2]);
     let test =
         HausmanTest { verdict, f: None, degrees_of_freedom, p_value: None, columns: Vec::new(), reason: Some(reason) };

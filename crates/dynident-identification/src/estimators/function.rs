@@ -24,7 +24,7 @@ impl EstimatorFunction {
     pub(super) fn estimate(&self, rows: &TrainingRows<'_>) -> Result<Estimate, EstimatorError> {
         let Some(rule) = &self.rule else {
             let message = format!(
-                "the estimator is the function `{}`, and no file holds code: give it from the program that has it",
+                "the estimator is the function `{}`, but no file holds code: give it from the program that has it",
                 self.name
             );
             return Err(EstimatorError::Requirement { method: "function", message });

@@ -44,7 +44,7 @@ fn made_rows<'r, 'a>(
     source.begin(index)?;
     if let Samples::Motion(_) = recording.samples {
         let Some(mut stream) = recording.open(rows.model.model(), &logs.motion)? else {
-            let message = "a motion that is made already has no instruments: give its raw samples".to_owned();
+            let message = "a prepared motion has no instruments; give raw samples".to_owned();
             return Err(EstimatorError::Instruments { log: recording.name.clone(), message });
         };
         let mut block = MotionBlock::default();
@@ -165,7 +165,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             if values.len() != numbers {
                 let found = values.len();
                 let message =
-                    format!("{found} numbers for {name} where {numbers} are needed: one for each joint and row");
+                    format!("{found} values for {name}, but {numbers} are needed: give one for each joint and row");
                 return Err(EstimatorError::Instruments { log: self.log.clone(), message });
             }
         }

@@ -53,7 +53,7 @@ impl<'a> SmoothedMotion<'a> {
         EstimatorError::Instruments {
             log: self.log_name(),
             message: "the smoothed motion does not cover the same samples as the regressor: a piece of the log is too short for one of the two filters; \
-                      leave short pieces out with `rows` or `time_range_s`"
+                      exclude short pieces with `rows` or `time_range_s`"
                 .to_owned(),
         }
     }
@@ -66,7 +66,7 @@ impl InstrumentSource for SmoothedMotion<'_> {
         let open = |motion: &MotionSettings| {
             recording.open(model, motion)?.ok_or_else(|| EstimatorError::Instruments {
                 log: recording.name.clone(),
-                message: "a motion that is made already cannot be smoothed anew: give its raw samples".to_owned(),
+                message: "a prepared motion cannot be smoothed again; give raw samples".to_owned(),
             })
         };
         self.stream = Some(open(&self.motion)?);

@@ -48,7 +48,7 @@ pub struct PeriodSettings {
 #[non_exhaustive]
 pub enum PeriodError {
     /// Invalid period.
-    #[error("period_s = {period_s:?}: give the seconds after which the motion repeats, at most {MOST_PERIOD_S:e}")]
+    #[error("period_s = {period_s:?}: give the period of the motion in seconds, at most {MOST_PERIOD_S:e}")]
     Period {
         /// Value.
         period_s: f64,
@@ -62,7 +62,7 @@ pub enum PeriodError {
     /// Invalid number of harmonics.
     #[error("harmonics = {harmonics}: give 1 to 200")]
     Harmonics {
-        /// What was given.
+        /// Value.
         harmonics: usize,
     },
 }
@@ -130,14 +130,14 @@ pub(super) fn periodic(
     let wrong = |message: String| EstimatorError::Requirement { method, message };
     if let Some(term) = model.terms().iter().find(|term| term.has_memory() || term.needs_load()) {
         return Err(wrong(format!(
-            "{} depends on more than the motion of one instant: leave that law out, or take another method",
+            "{} depends on more than the motion of one instant: leave this law out, or use another method",
             term.symbol()
         )));
     }
     rows.begin("periods");
     let Means { period_s, means } = mean_periods(rows, periods, &wrong)?;
     logs.end();
-    let Some(first) = means.first() else { return Err(wrong("there is no log to fit to".to_owned())) };
+    let Some(first) = means.first() else { return Err(wrong("there is no training log".to_owned())) };
     let (dof, most) = (model.model().dof(), first.averaged.periods);
     let sample_covariance = pooled(&means, |mean| mean.covariance.clone());
     // Covariance of the motion before the parallel filter.
@@ -198,7 +198,7 @@ fn mean_periods(
         let name = &recording.name;
         let Some(period_s) = period_s else {
             return Err(wrong(format!(
-                "log `{name}`: say after how many seconds the motion repeats: [estimator.periods] period_s = ..., or name the commanded motion of one period as the log's reference"
+                "log `{name}`: the period of the motion is unknown: set period_s in [estimator.periods], or give the commanded motion of one period as the log's reference"
             )));
         };
         means.push(mean_period(rows, index, period_s, periods.skip_s, &|message| {
@@ -265,7 +265,7 @@ fn mean_period(
     let places = recording.places(model.model())?;
     let failed = |source| LogError::recording(&recording.name, source);
     let Some(mut stream) = recording.open(model.model(), motion)? else {
-        return Err(wrong("a motion that is made already has no periods: give its raw samples".to_owned()));
+        return Err(wrong("a prepared motion has no periods; give raw samples".to_owned()));
     };
     let (rate_hz, dof) = (stream.rate_hz(), model.model().dof());
     let no_filter = PeriodFilter { taps: vec![1.0], stride: 1 };
@@ -278,7 +278,7 @@ fn mean_period(
     while stream.next_block(&mut block).map_err(failed)? {
         if *segment.get_or_insert(block.segment) != block.segment {
             return Err(wrong(
-                "the log has a gap, and periods are counted without one: cut the longest piece out with time_range_s"
+                "the log has a gap, but periods must be complete: select the longest piece with time_range_s"
                     .to_owned(),
             ));
         }
@@ -294,7 +294,7 @@ fn mean_period(
     }
     let samples = (period_s * rate_hz).round() as usize;
     if samples < 2 {
-        return Err(wrong(format!("a period of {period_s} s holds fewer than two samples at {rate_hz:.1} Hz")));
+        return Err(wrong(format!("a period of {period_s} s has fewer than two samples at {rate_hz:.1} Hz")));
     }
     let skipped = (skip_s - begins_s).max(0.0) * rate_hz;
     let channels = at_phases(&channels, skipped, period_s * rate_hz / samples as f64);
@@ -302,7 +302,7 @@ fn mean_period(
     let length = views.first().map_or(0, |channel| channel.len());
     if length / 2 < samples {
         return Err(wrong(format!(
-            "{:.2} s are left, fewer than two periods of {period_s} s: record at least two, better ten; or give the true period_s",
+            "{:.2} s remain, fewer than two periods of {period_s} s: record at least two periods, better ten, or correct period_s",
             length as f64 / rate_hz
         )));
     }

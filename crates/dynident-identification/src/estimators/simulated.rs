@@ -109,7 +109,7 @@ pub(super) fn simulated(
     let entries = simulated.rows() * problem.columns().len();
     if entries > MOST_ENTRIES {
         return Err(wrong(format!(
-            "{} rows of {} columns are too many to hold at once: give parallel_filter.factor, or a shorter part of the log",
+            "{} rows of {} columns do not fit into memory: set parallel_filter.factor, or use a shorter part of the log",
             simulated.rows(),
             problem.columns().len()
         )));
@@ -166,7 +166,7 @@ fn controller_model(
     let unknown = model.model().bodies_without_prior();
     if !unknown.is_empty() {
         return Err(wrong(format!(
-            "the controller \"{}\" needs the model that it had, and the description has no inertial of {}",
+            "the controller \"{}\" needs a model, but the robot description has no inertial of {}",
             controller.name(),
             unknown.join(", ")
         )));
@@ -311,9 +311,9 @@ fn settled(
 /// Reason for a missing start.
 #[derive(Debug, Error)]
 enum NoStartError {
-    #[error("there is no physically consistent set to start from: {0}")]
+    #[error("no physically consistent set is available as start: {0}")]
     Inconsistent(ConsistencyError),
-    #[error("the description, which could be started from, has no inertial of {}", .0.join(", "))]
+    #[error("the robot description cannot be the start, because it has no inertial of {}", .0.join(", "))]
     Undescribed(Vec<String>),
     #[error("{0}; {1}")]
     Both(Box<Self>, Box<Self>),
@@ -352,7 +352,7 @@ fn start_values(
 }
 
 fn failure(simulated: &SimulatedLoop<'_>) -> String {
-    simulated.failure.clone().unwrap_or_else(|| "its motion has grown beyond all numbers".to_owned())
+    simulated.failure.clone().unwrap_or_else(|| "the motion diverges".to_owned())
 }
 
 fn no_simulation(why: &str) -> String {

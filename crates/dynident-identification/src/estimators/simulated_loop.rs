@@ -93,13 +93,11 @@ impl LoopLog {
         let name = recording.name.clone();
         let Some(commanded) = recording.commanded.as_deref() else {
             return Err(wrong(format!(
-                "log `{name}`: say what the controller was commanded to follow: reference = \"trajectory.csv\" under [[log]]"
+                "log `{name}` has no commanded motion: give reference = \"trajectory.csv\" under [[log]]"
             )));
         };
         let Some(mut stream) = recording.open(model.model(), motion)? else {
-            return Err(wrong(format!(
-                "log `{name}`: a motion that is made already has no instants: give its raw samples"
-            )));
+            return Err(wrong(format!("log `{name}`: a prepared motion has no sampling instants; give raw samples")));
         };
         let places = recording.places(model.model())?;
         let filter = logs.filter.decimation(stream.rate_hz(), motion_band_hz(motion));
@@ -131,7 +129,7 @@ impl LoopLog {
         };
         if let Some(time_s) = pieces.iter().filter(|piece| piece.rows > 0).find_map(over) {
             return Err(wrong(format!(
-                "log `{name}`: at {time_s:.3} s of the log its reference has not begun or is over while it still moves; cut the log with time_range_s, or fix the reference's start_s"
+                "log `{name}`: at {time_s:.3} s of the log the reference has not begun or is over while the robot still moves; cut the log with time_range_s, or fix the reference's start_s"
             )));
         }
         let count = ((ends_s - begins_s) * rate_hz).ceil() as usize + 2;

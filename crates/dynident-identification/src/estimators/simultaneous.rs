@@ -61,7 +61,7 @@ pub(super) fn simultaneous(
     let terms = model.terms().iter();
     if let Some(term) = terms.clone().find(|t| t.has_memory() || t.needs_load() || t.needs_temperature()) {
         return Err(wrong(format!(
-            "{} depends on more than the motion of one instant: leave that law out, or take another method",
+            "{} depends on more than the motion of one instant: leave this law out, or use another method",
             term.symbol()
         )));
     }
@@ -105,7 +105,7 @@ fn fitted_motion(
         let name = &rows.logs.recordings[index].name;
         let Some(fitted) = record.fitted_motion() else {
             return Err(wrong(format!(
-                "log `{name}` does not distinguish the harmonics of its motion: give fewer with [estimator.periods] harmonics = ..., or a longer log"
+                "log `{name}` does not determine the harmonics of its motion: reduce [estimator.periods] harmonics, or give a longer log"
             )));
         };
         check_motion(record, &fitted).map_err(|(joint, message)| {
@@ -177,16 +177,14 @@ fn read(
     let commanded = || recording.commanded.as_ref().and_then(|commanded| commanded.period_s());
     let Some(period_s) = periods.period_s.or_else(commanded) else {
         return Err(wrong(format!(
-            "log `{name}`: say after how many seconds the motion repeats: [estimator.periods] period_s = ..., or name the commanded motion of one period as the log's reference"
+            "log `{name}`: the period of the motion is unknown: set period_s in [estimator.periods], or give the commanded motion of one period as the log's reference"
         )));
     };
     // Central differences do not change positions.
     let differentiator = DifferentiatorSettings::CentralDifferences { order: 4 };
     let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
     let Some(mut stream) = recording.open(model.model(), &motion)? else {
-        return Err(wrong(format!(
-            "log `{name}`: the positions of a motion that is made already are smoothed: give its raw samples"
-        )));
+        return Err(wrong(format!("log `{name}`: the positions of a prepared motion are smoothed; give raw samples")));
     };
     let (rate_hz, places) = (stream.rate_hz(), recording.places(model.model())?);
     let mut channels = vec![Vec::new(); 2 * places.len()];
@@ -194,7 +192,7 @@ fn read(
     while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {
         if *segment.get_or_insert(block.segment) != block.segment {
             return Err(wrong(format!(
-                "log `{name}` has a gap, and its noise is followed from sample to sample: cut the longest piece out with time_range_s"
+                "log `{name}` has a gap, but the noise model needs consecutive samples: select the longest piece with time_range_s"
             )));
         }
         let skipped = ((periods.skip_s - block.first_time_s).max(0.0) * rate_hz).ceil() as usize;
@@ -210,7 +208,7 @@ fn read(
     let length_s = channels.first().map_or(0, Vec::len) as f64 / rate_hz;
     if length_s < period_s * (1.0 - 1e-9) {
         return Err(wrong(format!(
-            "log `{name}`: {length_s:.2} s are left, less than one period of {period_s} s: record at least one, or give the true period_s"
+            "log `{name}`: {length_s:.2} s remain, less than one period of {period_s} s: record at least one period, or correct period_s"
         )));
     }
     // The cut-off is twice the highest frequency above the noise.
@@ -218,7 +216,7 @@ fn read(
     let harmonics = periods.harmonics.unwrap_or_else(|| highest.clamp(1, MOST_HARMONICS));
     if 4.0 * harmonics as f64 > rate_hz * period_s {
         return Err(wrong(format!(
-            "log `{name}`: {harmonics} harmonics of {:.3} Hz at {rate_hz:.1} samples a second: give fewer, [estimator.periods] harmonics = ...",
+            "log `{name}`: {harmonics} harmonics of {:.3} Hz are too many for a rate of {rate_hz:.1} Hz: reduce [estimator.periods] harmonics",
             period_s.recip()
         )));
     }
@@ -240,7 +238,7 @@ fn check_motion(record: &PeriodicModel<'_>, fitted: &[f64]) -> Result<(), (usize
             return Err((
                 joint,
                 format!(
-                    "are {remainder:.2e} from the Fourier series of that period and move by {size:.2e} rad (root mean squares): fix period_s, give more harmonics, or skip the start with skip_s"
+                    "differ by {remainder:.2e} rad from the Fourier series of this period and move by {size:.2e} rad (root mean squares): fix period_s, give more harmonics, or skip the start with skip_s"
                 ),
             ));
         }

@@ -45,7 +45,7 @@ pub(super) fn spline_motion(
     let dof = model.dof();
     if problem.columns().len() != model.layout().columns().len() || problem.joints().len() != dof {
         return Err(wrong(
-            "payloads, parameters of single logs and joints without a row are not estimated together with the motion: take another method, or leave these logs out"
+            "payloads, parameters of single logs and joints without rows are not possible with the simultaneous method: use another method, or leave these logs out"
                 .to_owned(),
         ));
     }
@@ -120,7 +120,7 @@ fn read(
     // Central differences do not change positions.
     let differentiator = DifferentiatorSettings::CentralDifferences { order: 4 };
     let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
-    let raw = "the positions of a motion that is made already are smoothed: give its raw samples, all of them";
+    let raw = "the positions of a prepared motion are smoothed; give all raw samples";
     let Some(whole) = recording.with_every_row() else {
         return Err(wrong(format!("log `{name}`: {raw}")));
     };

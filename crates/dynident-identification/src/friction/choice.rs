@@ -87,7 +87,7 @@ pub(crate) fn choose_friction(
     let refused = |joint: usize, reason: &str| JointFriction::as_stated(name(joint), reason);
     let choose: Vec<usize> = candidates.iter().map(|(joint, _)| *joint).collect();
     let Some((validation, folds)) = cross_validation(wide_problem)? else {
-        let reason = "the training logs are too short to be cut into blocks";
+        let reason = "the training logs are too short for cross-validation in blocks";
         return Ok(choose.iter().map(|&joint| refused(joint, reason)).collect());
     };
     let weights = weights(plain, equal_weights);
@@ -120,7 +120,7 @@ pub(crate) fn choose_friction(
         match validation.joint(joint, &common, &variable, &weights) {
             Ok(prepared) => Ok(search(name(joint), scale, folds, inflation, &prepared, columns)),
             Err(EstimationError::TooFewRows { .. }) => {
-                Ok((refused(joint, "fewer rows than columns once a block is left out"), Vec::new()))
+                Ok((refused(joint, "fewer rows than columns without one block"), Vec::new()))
             }
             Err(error) => Err(error),
         }

@@ -84,18 +84,18 @@ impl LagChoice {
             LagKind::None => {
                 let common = self.common?;
                 let bar = ms(common.half_width_95_s);
-                format!("none that matters ({} +- {bar} ms, 95 %, one for all joints)", ms(common.lag_s))
+                format!("not significant ({} +- {bar} ms, 95 %, one for all joints)", ms(common.lag_s))
             }
             LagKind::Common => {
                 let bar = self.common.map_or_else(String::new, |common| format!(" +- {}", ms(common.half_width_95_s)));
                 let lag_s = taken_off();
-                format!("{}{bar} ms {} the motion at all joints, taken off", ms(lag_s.abs()), side(lag_s))
+                format!("{}{bar} ms {} the motion at all joints, compensated", ms(lag_s.abs()), side(lag_s))
             }
-            LagKind::Joints => "another at each joint, taken off".to_owned(),
+            LagKind::Joints => "different at each joint, compensated".to_owned(),
             LagKind::Stated => {
                 let is_one = self.lag_s.iter().all(|lag_s| *lag_s == taken_off());
                 let what = if is_one { format!("{} ms", ms(taken_off())) } else { "joint by joint".to_owned() };
-                format!("{what} as stated, taken off")
+                format!("{what} as stated, compensated")
             }
         })
     }

@@ -54,7 +54,7 @@ pub fn delay_findings(lags: &[Option<TorqueLag>], joints: &[String]) -> Vec<Find
             let side = if lag.lag_s > 0.0 { "after" } else { "before" };
             let taken_off = match lag.taken_off_s {
                 0.0 => String::new(),
-                taken_off_s => format!("; {:.1} ms were taken off", 1e3 * taken_off_s.abs()),
+                taken_off_s => format!("; {:.1} ms were compensated", 1e3 * taken_off_s.abs()),
             };
             let message = format!(
                 "comes {:.1} +- {:.1} ms {side} the motion (95 %), estimated together with the model{taken_off}",

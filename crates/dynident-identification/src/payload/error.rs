@@ -16,7 +16,7 @@ pub enum PayloadError {
         known: Vec<String>,
     },
     /// The link does not exist.
-    #[error("payload at link `{link}`: no moving link has that name; they are {}", known.join(", "))]
+    #[error("payload at link `{link}`: no moving link has this name; the moving links are {}", known.join(", "))]
     UnknownLink {
         link: String,
         /// Links of the robot.
@@ -32,7 +32,7 @@ pub enum PayloadError {
     },
     /// A known arm without anything to estimate.
     #[error(
-        "[arm]: the arm is held and nothing is left to estimate: describe a [[payload]] without mass_kg and let a [[log]] carry it, or say what to `refit`"
+        "[arm]: the arm is held and there is nothing to estimate: describe a [[payload]] without mass_kg and name it in a [[log]], or set `refit`"
     )]
     NothingToEstimate,
     /// A known arm with unknown gains.
@@ -42,21 +42,21 @@ pub enum PayloadError {
     GainsOfKnownArm,
     /// The estimator does not support additional columns.
     #[error(
-        "payloads, offsets per log, a known arm and unknown gains go with estimator.method = \"weighted\" or \"ordinary\", without instruments and without essential: \
-         leave those out"
+        "payloads, offsets per log, a known arm and unknown gains require estimator.method = \"weighted\" or \"ordinary\", without instruments and without essential: \
+         remove the incompatible settings"
     )]
     Estimator,
     /// Selection of friction for a known arm.
     #[error(
-        "[arm] and friction = \"auto\": a known arm has the friction of its result; leave friction out, with refit = \"friction\" to find its parameters again"
+        "[arm] and friction = \"auto\": a known arm has the friction of its result; leave friction out, and set refit = \"friction\" to estimate its parameters again"
     )]
     FrictionOfKnownArm,
     /// Test of drive inertia for a known arm.
-    #[error("[arm]: a known arm has the drive inertia of its result; test none")]
+    #[error("[arm]: a known arm has the drive inertia of its result; do not test it")]
     DrivesOfKnownArm,
     /// Friction that depends on the load of the bare arm.
     #[error(
-        "load-dependent friction does not go with payloads, for its load is the bare arm's: leave out the law `load`"
+        "load-dependent friction is not possible with payloads, because its load is that of the bare arm: leave out the law `load`"
     )]
     LoadFriction,
     /// No recording determines the gains.
@@ -65,7 +65,9 @@ pub enum PayloadError {
     )]
     GainsNeedPayload,
     /// The covariance of the known arm has the wrong size.
-    #[error("{found} covariances of the known arm where {expected} base parameters are: give one for each pair")]
+    #[error(
+        "the covariance of the known arm has {found} rows, but there are {expected} base parameters: give one row for each"
+    )]
     ArmCovariance {
         /// Number of base parameters.
         expected: usize,

@@ -77,9 +77,9 @@ pub(crate) fn drive_gains(
 fn drive_gain(gain: JointGain) -> DriveGain {
     let wide = gain.half_width_95 > WIDEST * gain.gain.abs();
     let reason = if !gain.identified {
-        Some("joint does not feel the payload: any gain fits as well, with other parameters; move it so that the payload's weight or inertia loads it".to_owned())
+        Some("joint does not feel the payload, so any gain fits equally well; move it so that the payload's weight or inertia loads it".to_owned())
     } else if wide {
-        Some("joint hardly feels the payload: its interval is wider than half its value; a heavier payload, farther out, or a motion that loads the joint more would determine".to_owned())
+        Some("joint hardly feels the payload: the half width of its interval exceeds half its value; use a heavier payload, a larger distance, or a motion that loads the joint more".to_owned())
     } else {
         None
     };

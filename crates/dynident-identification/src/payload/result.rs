@@ -173,7 +173,7 @@ fn not_identified(columns: &PayloadColumns, parameters: &[PayloadParameter]) -> 
         if homes.is_empty() {
             format!("{}: no motion of this robot determines it", INERTIAL_NAMES[dropped])
         } else {
-            format!("{}: determined only as a part of {}", INERTIAL_NAMES[dropped], homes.join(", "))
+            format!("{}: determined only as part of {}", INERTIAL_NAMES[dropped], homes.join(", "))
         }
     }));
     not_identified
