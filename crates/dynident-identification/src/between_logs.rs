@@ -11,19 +11,13 @@
 //! `Σ_l A_l T A_lᵀ`: varying friction causes errors of bodies and drives if the motion of the logs differs. The error
 //! relative to a new day grows by T more. The error bars are for a new day: `Σ + Σ_l A_l T A_lᵀ + T`.
 
+use crate::estimators::EstimationSettings;
 use crate::friction_by_log::is_friction_column;
+use crate::thresholds::LogVariationThresholds;
 use crate::training::Training;
 use dynident_estimation::{Estimate, EstimationError, LinearProblem, WeightedSettings, weighted_least_squares};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-
-/// Minimum number of parameter pairs to estimate k of a kind.
-const FEWEST: usize = 5;
-/// Minimum degrees of freedom of a single log's variance.
-const FEWEST_SQUARES: f64 = 4.5;
-/// Upper limit of z² of one pair, relative to the typical value of its kind: one wrong log is not a variation of all
-/// logs.
-const MOST: f64 = 25.0;
 
 /// Differences of parameters between logs, in units of the logs' own error bars; 1 without variation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,7 +33,7 @@ pub struct BetweenLogs {
 /// size of that variation. `None` for a single log.
 pub(crate) fn variation_of_logs(
     training: &Training,
-    settings: &WeightedSettings,
+    settings: &EstimationSettings,
     estimate: &Estimate,
 ) -> Option<(DMatrix<f64>, BetweenLogs)> {
     let problem = &training.problem;
@@ -47,12 +41,13 @@ pub(crate) fn variation_of_logs(
         return None;
     }
     let count = training.columns.base();
+    let weighted = settings.weighted();
     let alone: Vec<Estimate> =
-        (0..problem.logs().len()).filter_map(|log| fit_alone(problem, log, settings, estimate).ok()).collect();
+        (0..problem.logs().len()).filter_map(|log| fit_alone(problem, log, &weighted, estimate).ok()).collect();
     let is_friction: Vec<bool> = training.model.layout().columns()[..count].iter().map(is_friction_column).collect();
     let [bodies, friction] = [false, true].map(|kind| {
         let columns: Vec<usize> = (0..count).filter(|&column| is_friction[column] == kind).collect();
-        variation(&alone, &columns)
+        variation(&alone, &columns, &settings.thresholds.log_variation)
     });
 
     // T with the correlations of the single fits, then its effect on the fit to all logs.
@@ -131,7 +126,7 @@ fn fit_alone(
 }
 
 /// k of some parameters: root mean square of z over pairs of logs, each corrected for Student's distribution.
-fn variation(alone: &[Estimate], columns: &[usize]) -> Option<f64> {
+fn variation(alone: &[Estimate], columns: &[usize], thresholds: &LogVariationThresholds) -> Option<f64> {
     let is_fixed = |one: &Estimate, column: usize| one.rank.fixed.iter().any(|fixed| fixed.column == column);
     let mut squares = Vec::new();
     for (number, a) in alone.iter().enumerate() {
@@ -139,7 +134,8 @@ fn variation(alone: &[Estimate], columns: &[usize]) -> Option<f64> {
             for &column in columns {
                 let freedoms = a.std_degrees_of_freedom[column].min(b.std_degrees_of_freedom[column]);
                 let variance = a.std[column].powi(2) + b.std[column].powi(2);
-                if is_fixed(a, column) || is_fixed(b, column) || freedoms < FEWEST_SQUARES || variance <= 0.0 {
+                let is_unknown = freedoms < thresholds.min_degrees_of_freedom || variance <= 0.0;
+                if is_fixed(a, column) || is_fixed(b, column) || is_unknown {
                     continue;
                 }
                 let z2 = (a.values[column] - b.values[column]).powi(2) / variance;
@@ -147,12 +143,12 @@ fn variation(alone: &[Estimate], columns: &[usize]) -> Option<f64> {
             }
         }
     }
-    if squares.len() < FEWEST {
+    if squares.len() < thresholds.min_pairs {
         return None;
     }
     squares.sort_by(f64::total_cmp);
     // The median of the square of a standard normal variable is 0.455.
     let typical = (squares[squares.len() / 2] / 0.455).max(1.0);
-    let bounded = squares.iter().map(|z2| z2.min(MOST * typical));
+    let bounded = squares.iter().map(|z2| z2.min(thresholds.max_relative_square * typical));
     Some((bounded.sum::<f64>() / squares.len() as f64).sqrt())
 }

@@ -6,9 +6,9 @@ use dynident_estimation::{Estimate, HALF_WIDTH_95};
 use serde::{Deserialize, Serialize};
 
 /// Ratio of nominal effect to error bar above which an estimate is conditional.
-const MATTERS: f64 = 0.1;
+const MIN_EFFECT_RATIO: f64 = 0.1;
 /// Minimum ratio to the largest effect for a fixed parameter to be listed.
-const NAMED: f64 = 0.1;
+const MIN_LISTED_RATIO: f64 = 0.1;
 /// A parameter fixed at nominal on which an estimate depends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -53,7 +53,7 @@ pub fn conditionals(
     let of_free = |column: usize| {
         let answers: Vec<f64> = fixed.iter().map(|fixed| fixed.answers.get(column).copied().unwrap_or(0.0)).collect();
         let own = estimate.half_width_95[column];
-        let matters = MATTERS * noise_half_width_95.get(column).copied().unwrap_or(own);
+        let matters = MIN_EFFECT_RATIO * noise_half_width_95.get(column).copied().unwrap_or(own);
         let part = |place: usize| match &spread {
             Some(spread) => {
                 let variance: f64 = spread[(fixed[place].column, fixed[place].column)];
@@ -73,7 +73,7 @@ pub fn conditionals(
             return Conditional::default();
         }
         let largest = places.iter().map(|&place| part(place)).fold(0.0, f64::max);
-        places.retain(|&place| part(place) >= NAMED * largest);
+        places.retain(|&place| part(place) >= MIN_LISTED_RATIO * largest);
         places.sort_by(|a, b| part(*b).total_cmp(&part(*a)));
         let name = |&place: &usize| Condition { on: fixed[place].name.clone(), per_unit: answers[place] };
         Conditional {

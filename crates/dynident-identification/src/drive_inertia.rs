@@ -23,17 +23,13 @@ use crate::friction_by_log::{is_friction_column, with_friction_by_log};
 use crate::left_to_the_logs::{joints_left_to_the_logs, with_drives};
 use crate::payload::Payload;
 use crate::settings::IdentificationSettings;
+use crate::thresholds::DriveInertiaThresholds;
 use crate::training::{TrainingPasses, plain_estimate};
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::{CovarianceMethod, Estimate, EstimationError};
 use dynident_model::terms::{DriveInertia, TorqueTerm};
 use dynident_rows::{Logs, RegressorModel};
 use serde::{Deserialize, Serialize};
-
-/// Standard deviations from which drive inertia is accepted: by chance once in 740 studies. Accepting a drive that is
-/// absent adds a column and widens the other error bars; missing one loses its torque. A stricter limit would exclude a
-/// single drive whose deviation has three degrees of freedom: thirty of its standard deviations are 3.7 normal ones.
-const SEEN: f64 = 3.0;
 
 /// Result of the test for drive inertia.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,6 +54,7 @@ pub struct DriveInertiaChoice {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DriveInertiaEstimate {
+    /// Name of the joint.
     pub joint: String,
     /// Reflected inertia, kg m² (kg).
     pub inertia: f64,
@@ -69,7 +66,8 @@ impl DriveInertiaChoice {
     /// No drive inertia for these joints, without a test, for this reason.
     pub fn untested(joints: Vec<String>, reason: &str) -> Self {
         let untested = Some(reason.to_owned());
-        Self { joints, seen: false, standard_deviations: None, needed: SEEN, untested, drives: Vec::new() }
+        let needed = DriveInertiaThresholds::default().min_std;
+        Self { joints, seen: false, standard_deviations: None, needed, untested, drives: Vec::new() }
     }
 
     /// The result as a sentence.
@@ -117,7 +115,7 @@ pub fn choose_drive_inertia(
     let names: Vec<String> = tested.iter().map(|&joint| name(joint)).collect();
     let untested = |reason: &str| Ok((robot.clone(), Some(DriveInertiaChoice::untested(names.clone(), reason))));
     let with_drives = with_drives(robot, &tested)?;
-    let apart = standing_apart(&with_drives, &tested);
+    let apart = separate_columns(&with_drives, &tested);
     if apart.is_empty() {
         return untested("torque cannot tell it from the inertia of the links");
     }
@@ -151,8 +149,9 @@ pub fn choose_drive_inertia(
         return untested("the logs move no joint whose torque could show it");
     }
     let columns: Vec<usize> = excited.iter().map(|(_, column)| *column).collect();
-    let found = together(&fit, &columns);
-    let seen = found >= SEEN;
+    let found = combined_statistic(&fit, &columns);
+    let needed = settings.thresholds.drive_inertia.min_std;
+    let seen = found >= needed;
     let drives = excited.iter().map(|&(joint, column)| DriveInertiaEstimate {
         joint: name(joint),
         inertia: fit.values[column],
@@ -162,7 +161,7 @@ pub fn choose_drive_inertia(
         joints: names.clone(),
         seen,
         standard_deviations: Some(found),
-        needed: SEEN,
+        needed,
         untested: None,
         drives: drives.collect(),
     };
@@ -171,7 +170,7 @@ pub fn choose_drive_inertia(
 
 /// The joints whose drive inertia is a separate base parameter, with its column. About the first axes it is combined
 /// with the inertia of the links.
-fn standing_apart(robot: &ParametricModel, joints: &[usize]) -> Vec<(usize, usize)> {
+fn separate_columns(robot: &ParametricModel, joints: &[usize]) -> Vec<(usize, usize)> {
     let expressions = robot.base().expressions();
     let own = |joint: usize| {
         let drive = TorqueTerm::DriveInertia(DriveInertia { joint });
@@ -183,15 +182,15 @@ fn standing_apart(robot: &ParametricModel, joints: &[usize]) -> Vec<(usize, usiz
 }
 
 /// Combined statistic of these columns, standard normal if all are zero.
-fn together(fit: &Estimate, columns: &[usize]) -> f64 {
-    let sum: f64 = columns.iter().map(|&column| as_normal(fit, column)).sum();
+fn combined_statistic(fit: &Estimate, columns: &[usize]) -> f64 {
+    let sum: f64 = columns.iter().map(|&column| normal_deviate(fit, column)).sum();
     let correlation = |a: usize, b: usize| fit.covariance[(a, b)] / (fit.std[a] * fit.std[b]);
     let variance: f64 = columns.iter().flat_map(|&a| columns.iter().map(move |&b| correlation(a, b))).sum();
     sum / variance.max(columns.len() as f64).sqrt()
 }
 
 /// Normal deviate with the same probability as the estimate over its standard deviation under Student's distribution.
-fn as_normal(fit: &Estimate, column: usize) -> f64 {
+fn normal_deviate(fit: &Estimate, column: usize) -> f64 {
     let t = fit.values[column] / fit.std[column];
     let nu = fit.std_degrees_of_freedom[column].clamp(1.0, 1.0e6);
     let scale = (8.0 * nu + 1.0) / (8.0 * nu + 3.0);

@@ -4,6 +4,7 @@ use crate::consistent::ConsistencyError;
 use crate::diagnosis::DiagnosisError;
 use crate::estimators::EstimatorError;
 use crate::payload::PayloadError;
+use crate::thresholds::ThresholdError;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
 use dynident_rows::LogError;
@@ -37,6 +38,9 @@ pub enum IdentificationError {
     /// The logs cannot be reduced to factors.
     #[error(transparent)]
     Reduce(#[from] ReduceError),
+    /// A threshold is invalid.
+    #[error(transparent)]
+    Threshold(#[from] ThresholdError),
     /// The intervals cannot be computed.
     #[error("estimator.intervals: {0}")]
     Intervals(ConsistencyError),

@@ -63,8 +63,7 @@ pub(crate) fn fitted<'a>(
         fit.logs = fit.logs.with_excerpts(Arc::new(excerpts));
     }
     let (bars, between_logs) = if is_model && fit.settings.estimation.estimator.reads_filtered_rows() {
-        let weighted = fit.settings.estimation.weighted();
-        let variation = variation_of_logs(&fit.training, &weighted, &fit.estimation.estimate);
+        let variation = variation_of_logs(&fit.training, &fit.settings.estimation, &fit.estimation.estimate);
         let (covariance, between_logs) = variation.unzip();
         (bars.with(ErrorSource::BetweenLogs, covariance), between_logs)
     } else {

@@ -8,7 +8,7 @@ use dynident_estimation::{EstimationError, LinearProblem, Unexcited};
 
 /// Maximum number of log groups with separate friction. Neighbouring logs share a group, because every group adds
 /// columns.
-const MOST_GROUPS: usize = 8;
+const MAX_GROUPS: usize = 8;
 
 /// Whether a base parameter is torque of a single joint, which can vary from day to day.
 pub(crate) fn is_friction_column(column: &Column) -> bool {
@@ -24,7 +24,7 @@ pub(crate) fn with_friction_by_log(
     problem: &LinearProblem,
     is_friction: &[bool],
 ) -> Result<Option<LinearProblem>, EstimationError> {
-    let groups = problem.logs().len().min(MOST_GROUPS);
+    let groups = problem.logs().len().min(MAX_GROUPS);
     if groups < 2 || problem.prior().is_some() {
         return Ok(None);
     }
@@ -47,12 +47,12 @@ pub(crate) fn with_friction_by_log(
     };
     let Unexcited { columns, silent } = problem.unexcited();
     let unexcited = Unexcited { columns: in_all(columns), silent: in_all(silent) };
-    let mut apart = LinearProblem::new(names.collect(), problem.joints().to_vec())
+    let mut separate = LinearProblem::new(names.collect(), problem.joints().to_vec())
         .with_fallback(values.collect())?
         .with_unexcited(unexcited)?;
     for rows in problem.equations() {
         let columns = rows.columns.iter().map(|&column| own(column, group_of(rows.log))).collect();
-        apart.add(&problem.logs()[rows.log], rows.joint, columns, rows.factor.clone())?;
+        separate.add(&problem.logs()[rows.log], rows.joint, columns, rows.factor.clone())?;
     }
-    Ok(Some(apart))
+    Ok(Some(separate))
 }

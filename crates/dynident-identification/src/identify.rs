@@ -153,6 +153,8 @@ fn identified(
         return Err(IdentificationError::NoTrainingLog);
     }
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
+    settings.thresholds.validate()?;
+    settings.estimation.thresholds.validate()?;
 
     let arm = job.arm();
     let Fitted { fit, choices, lag, between_logs, bars, mut times } = fitted(task, &chosen, execution, job)?;

@@ -18,13 +18,8 @@ pub(crate) struct Fit<'a> {
     pub(crate) settings: IdentificationSettings,
 }
 
-/// Ratio of the regressor's cut-off to that of the instruments if both are automatic: positions are hardly smoothed
-/// inside the instruments' band.
-const CUTOFF_OVER_INSTRUMENTS: f64 = 2.0;
 /// Reason for keeping the stated friction in this case.
-const NOISY: &str = "position noise biases the least squares that would select it";
-/// Ratio of new to old cut-off above which the old one is kept.
-const WORTH_LOWERING: f64 = 0.8;
+const NOISE_REASON: &str = "position noise biases the least squares that would select it";
 
 /// Applies the estimator that `auto` selected; `robot` has the drive inertia of the test. If `auto` selected
 /// instruments and the cut-off is automatic, rows and estimate are computed again with a cut-off that lets less noise
@@ -38,10 +33,11 @@ pub(crate) fn with_less_noise<'a>(
 ) -> Result<Fit<'a>, IdentificationError> {
     let Some((cutoff_hz, noise)) = take_estimator(&mut found) else { return Ok(found) };
     let IdentificationTask { recordings, payloads, .. } = task;
-    let lower_hz = CUTOFF_OVER_INSTRUMENTS * cutoff_hz;
+    let thresholds = found.settings.thresholds.cutoff;
+    let lower_hz = thresholds.instruments_ratio * cutoff_hz;
     let before_hz = found.logs.motion.differentiator.cutoff_hz();
     let is_lower = found.settings.motion.differentiator.wants_cutoff()
-        && before_hz.is_some_and(|before_hz| lower_hz < WORTH_LOWERING * before_hz);
+        && before_hz.is_some_and(|before_hz| lower_hz < thresholds.max_lowered_ratio * before_hz);
     if !is_lower && found.training.friction_choice.is_empty() {
         return Ok(found);
     }
@@ -55,7 +51,7 @@ pub(crate) fn with_less_noise<'a>(
         (found.logs, None)
     };
     // Friction was selected by least squares, which the noise biases.
-    let as_stated = |joint: &JointFriction| JointFriction::as_stated(&joint.joint, NOISY);
+    let as_stated = |joint: &JointFriction| JointFriction::as_stated(&joint.joint, NOISE_REASON);
     let friction_choice = found.training.friction_choice.iter().map(as_stated).collect();
     let training = training_rows(&logs, &found.settings, robot.clone().into(), chosen, payloads, None)?;
     let training = Training { friction_choice, ..training };

@@ -144,6 +144,7 @@ mod settings;
 mod stage_times;
 mod stages;
 mod task;
+mod thresholds;
 mod training;
 
 pub use bandwidth::{CutoffByError, CutoffCandidate, choose_cutoff};
@@ -167,4 +168,9 @@ pub use settings::{DiagnosisChoice, GainChoice, IdentificationSettings, OffsetCh
 pub use stage_times::StageTimes;
 pub use stages::{ConsistentParameters, TrainingExamination, consistent_stage};
 pub use task::IdentificationTask;
+pub use thresholds::{
+    CutoffThresholds, DecisionThresholds, DoubtThresholds, DriveInertiaThresholds, EstimationThresholds,
+    FrictionThresholds, GainThresholds, LagThresholds, LogVariationThresholds, MotionThresholds, NoiseThresholds,
+    ThresholdError,
+};
 pub use training::{LogFactors, Training, log_factors, training_rows};

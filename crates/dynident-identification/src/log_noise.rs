@@ -4,11 +4,11 @@ use crate::estimators::{EstimationSettings, Estimator};
 use dynident_estimation::{EstimationError, LinearProblem, weighted_values};
 
 /// Maximum number of passes.
-const PASSES: usize = 20;
-const SETTLED: f64 = 1e-3;
+const MAX_PASSES: usize = 20;
+const MAX_RELATIVE_CHANGE: f64 = 1e-3;
 
 /// Minimum noise of a log relative to the noisiest log; smaller values are rounding errors.
-const LEAST: f64 = 1e-6;
+const MIN_NOISE_RATIO: f64 = 1e-6;
 
 /// Whether training logs share the noise levels of their joints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,7 +35,7 @@ pub(crate) fn weighted_by_log(
         return Ok(problem);
     }
     let mut weights = vec![vec![1.0_f64; joints]; logs];
-    for _ in 0..PASSES {
+    for _ in 0..MAX_PASSES {
         let weighted = problem.clone().with_log_weights(|log, joint| weights[log][joint])?;
         let theta = weighted_values(&weighted, &settings.weighted())?.values;
         let next = weights_by(&problem, &theta)?;
@@ -44,7 +44,7 @@ pub(crate) fn weighted_by_log(
         };
         let moved = weights.iter().zip(&next).map(change).fold(0.0, f64::max);
         weights = next;
-        if moved <= SETTLED {
+        if moved <= MAX_RELATIVE_CHANGE {
             break;
         }
     }
@@ -63,7 +63,7 @@ fn weights_by(problem: &LinearProblem, theta: &[f64]) -> Result<Vec<Vec<f64>>, E
     let mut weights = vec![vec![1.0; joints]; logs];
     for joint in 0..joints {
         let largest = noise.iter().fold(0.0_f64, |most, of_log| most.max(of_log[joint]));
-        let level = |log: usize| noise[log][joint].max(LEAST * largest);
+        let level = |log: usize| noise[log][joint].max(MIN_NOISE_RATIO * largest);
         let Some(last) = (0..logs).rfind(|&log| noise[log][joint] > 0.0) else { continue };
         for (log, weights) in weights.iter_mut().enumerate() {
             weights[joint] = level(last) / level(log);

@@ -94,6 +94,8 @@ pub fn identify_reduced(
     let model = RegressorModel::from(robot.clone());
     is_reducible(&model, settings)?;
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
+    settings.thresholds.validate()?;
+    settings.estimation.thresholds.validate()?;
     execution.install(|| identified(model, &without_second_look(settings), reduced, execution))
 }
 
@@ -112,7 +114,7 @@ fn identified(
     let passes = TrainingPasses { logs: &logs, settings, training: &training, payloads: &[], known_arm: None };
     let training_rows = passes.of_factors(model, factors)?;
     let Estimation { estimate: noise, .. } = estimate(&training_rows.rows(&logs, settings, &training), None)?;
-    let variation = variation_of_logs(&training_rows, &settings.estimation.weighted(), &noise);
+    let variation = variation_of_logs(&training_rows, &settings.estimation, &noise);
     let (covariance, between_logs) = variation.unzip();
     let bars = ErrorBars::default().with(ErrorSource::BetweenLogs, covariance);
     let estimate = bars.total(&noise);

@@ -4,11 +4,13 @@ use crate::consistent::{ConsistencyError, ConsistencySettings};
 use crate::estimators::EstimationSettings;
 use crate::friction::{FrictionSearch, JointFriction};
 use crate::log_noise::LogNoise;
+use crate::thresholds::DecisionThresholds;
 use dynident_dynamics::ParametricModel;
 use dynident_recording::MotionSettings;
 use dynident_rows::{ParallelFilterSettings, RowSettings};
 use serde::{Deserialize, Serialize};
 
+/// Constant torques of the joints in several training logs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -94,6 +96,8 @@ pub struct IdentificationSettings {
     pub gain_std: f64,
     /// When alternative hypotheses about the training logs are tested; by default if the fit is doubtful.
     pub diagnosis: DiagnosisChoice,
+    /// Thresholds of decisions and of the doubt about a study.
+    pub thresholds: DecisionThresholds,
 }
 
 impl Default for IdentificationSettings {
@@ -113,6 +117,7 @@ impl Default for IdentificationSettings {
             gains: GainChoice::default(),
             gain_std: 0.0,
             diagnosis: DiagnosisChoice::default(),
+            thresholds: DecisionThresholds::default(),
         }
     }
 }

@@ -139,26 +139,25 @@ impl Stage<'_> {
         let training = self.training;
         let theta = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
         let agreements = || training.logs.iter().filter_map(|log| log.nominal_agreement.as_ref());
-        is_doubtful(training, theta)
+        let doubt = &self.settings.thresholds.doubt;
+        is_doubtful(training, theta, doubt)
             || examination.friction_signs.iter().any(FrictionSign::is_reversed)
             || agreements().any(PriorAgreement::is_reversed)
             || agreements().any(PriorAgreement::is_poor)
             || examination.sign.as_ref().is_some_and(TorqueSignCheck::is_reversed)
             || break_limits(training, robot.model())
-            || held_out.iter().any(|log| is_far_worse(&log.validation, &self.estimate.joint_sigma))
+            || held_out
+                .iter()
+                .any(|log| is_far_worse(&log.validation, &self.estimate.joint_sigma, doubt.max_held_out_ratio))
     }
 }
 
-/// Ratio of held-out residual to noise of the fit above which the study is doubtful. Friction that changes with the
-/// motion causes less.
-const FAR_WORSE: f64 = 1.7;
-
-/// Whether the held-out residual is far larger than that of the training logs, relative to each joint's noise.
-fn is_far_worse(log: &LogValidation, sigma: &[f64]) -> bool {
+/// Whether the held-out residual exceeds each joint's noise by more than `max_ratio`, root mean square over the joints.
+fn is_far_worse(log: &LogValidation, sigma: &[f64], max_ratio: f64) -> bool {
     let in_fit_band = log.in_fit_band.as_ref().unwrap_or(&log.model);
     let joints = in_fit_band.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
     let squares: Vec<f64> = joints.map(|(joint, sigma)| (joint.rmse_nm / sigma).powi(2)).collect();
-    squares.iter().sum::<f64>() > FAR_WORSE * FAR_WORSE * squares.len() as f64
+    squares.iter().sum::<f64>() > max_ratio * max_ratio * squares.len() as f64
 }
 
 /// Bodies of a known arm. They belong to the earlier result, so this is the set nearest to the nominal one that has the
@@ -271,7 +270,7 @@ fn examine_all_training(
 
 /// Number of time blocks of the training logs; each is predicted by the fit to the others. With few blocks, they differ
 /// in temperature and motion as a new log does.
-const LEFT_OUT_BLOCKS: usize = 4;
+const VALIDATION_BLOCKS: usize = 4;
 
 /// Calls [`examine_held_out`] for every test recording, in parallel if possible.
 fn examine_all_held_out(
@@ -284,7 +283,7 @@ fn examine_all_held_out(
     let columns = &training.columns;
     let held_out = logs.of_role(Role::Validate);
     let ratios =
-        if held_out.is_empty() { Vec::new() } else { left_out_ratios(&training.problem, estimate, LEFT_OUT_BLOCKS)? };
+        if held_out.is_empty() { Vec::new() } else { left_out_ratios(&training.problem, estimate, VALIDATION_BLOCKS)? };
     let one = |&index: &usize| -> Result<_, IdentificationError> {
         let theta = columns.base_values(index, &estimate.values);
         let uncertainty = Uncertainty::of(estimate, columns.base_covariance(index, &estimate.covariance), &ratios);

@@ -24,11 +24,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Maximum number of passes for the load of load-dependent friction.
-const LOAD_PASSES: usize = 6;
-const LOAD_SETTLED: f64 = 1e-3;
+const MAX_LOAD_PASSES: usize = 6;
+const MAX_RELATIVE_LOAD_CHANGE: f64 = 1e-3;
 
 /// Precision of held values, relative to the largest of them.
-const HELD: f64 = 1e-6;
+const HELD_TOLERANCE: f64 = 1e-6;
 
 /// Data of one recording for the fit.
 #[derive(Clone, Debug)]
@@ -164,14 +164,14 @@ impl<'a> TrainingPasses<'a> {
         if load_is_known || !found.model.needs_load() {
             return Ok(found);
         }
-        for _ in 0..LOAD_PASSES {
+        for _ in 0..MAX_LOAD_PASSES {
             let started = Instant::now();
             let plain = plain_values(&self.settings.estimation, &found.problem)?;
             let estimated_s = started.elapsed().as_secs_f64();
             let with_load = found.model.clone().with_load_of_estimate(&found.model, &plain.values);
-            let has_settled = load_has_settled(&found, &with_load);
+            let has_converged = has_load_converged(&found, &with_load);
             let [read_s, chosen_s] = found.timings_s;
-            if has_settled {
+            if has_converged {
                 found.timings_s[1] += estimated_s;
                 break;
             }
@@ -354,7 +354,7 @@ impl<'a> TrainingPasses<'a> {
 }
 
 /// Whether the load in `next` hardly changes the rows compared with the current load.
-fn load_has_settled(found: &Training, next: &RegressorModel) -> bool {
+fn has_load_converged(found: &Training, next: &RegressorModel) -> bool {
     let (Some(before), Some(after)) = (&found.model.load_parameters, &next.load_parameters) else { return false };
     let (mut change, mut torque) = (0.0, 0.0);
     for log in &found.logs {
@@ -370,7 +370,7 @@ fn load_has_settled(found: &Training, next: &RegressorModel) -> bool {
             torque += total.torque_norm().powi(2);
         }
     }
-    change <= LOAD_SETTLED * LOAD_SETTLED * torque
+    change <= MAX_RELATIVE_LOAD_CHANGE * MAX_RELATIVE_LOAD_CHANGE * torque
 }
 
 /// Joints with rows in some recording; windows can leave a joint without rows.
@@ -390,7 +390,7 @@ fn hold(problem: LinearProblem, held: &[(usize, f64)]) -> Result<LinearProblem, 
     let mut information = DMatrix::zeros(held.len(), count);
     for (row, &(column, value)) in held.iter().enumerate() {
         mean[column] = value;
-        information[(row, column)] = 1.0 / (HELD * largest);
+        information[(row, column)] = 1.0 / (HELD_TOLERANCE * largest);
     }
     problem.with_prior(mean, information)
 }

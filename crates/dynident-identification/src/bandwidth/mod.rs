@@ -2,13 +2,13 @@
 //!
 //! A low cut-off removes motion from the positions that is still in the torque (its highest frequencies, the velocity
 //! near a reversal) and leaves few rows. A high cut-off lets position noise into the regressor, differentiated twice.
-//! The spectrum of the positions alone does not show the optimum. So copies of the recordings are simulated
-//! ([`StandIn`](stand_in::StandIn)): the denoised motion, the torque of a first fit for it, and noise as in the
-//! recordings. The fit with each candidate is compared with the parameters that generated the torque. This is a
-//! parametric bootstrap (Efron and Tibshirani, *An Introduction to the Bootstrap*, 1993, 6.5) of the error, including
-//! filter bias and noise.
+//! The spectrum of the positions alone does not show the optimum. So [copies of the
+//! recordings](simulated_copies::SimulatedCopies) are simulated: the denoised motion, the torque of a first fit for it,
+//! and noise as in the recordings. The fit with each candidate is compared with the parameters that generated the
+//! torque. This is a parametric bootstrap (Efron and Tibshirani, *An Introduction to the Bootstrap*, 1993, 6.5) of the
+//! error, including filter bias and noise.
 
-mod stand_in;
+mod simulated_copies;
 mod thinned;
 
 use crate::error::IdentificationError;
@@ -18,18 +18,18 @@ use dynident_estimation::SegmentSettings;
 use dynident_rows::{Execution, Logs, ParallelFilterSettings, RegressorModel};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use stand_in::StandIn;
+use simulated_copies::SimulatedCopies;
 
 /// Ratio of neighbouring candidates.
-const STEP: f64 = core::f64::consts::SQRT_2;
+const CANDIDATE_RATIO: f64 = core::f64::consts::SQRT_2;
 /// Range of candidates: the lowest relative to the lowest cut-off of a joint's spectrum, the highest relative to the
 /// highest one.
-const SPAN: [f64; 2] = [0.7, 6.0];
+const CANDIDATE_RANGE: [f64; 2] = [0.7, 6.0];
 /// Maximum ratio of candidate to sample rate.
-const HIGHEST: f64 = 0.4;
+const MAX_SAMPLE_RATE_RATIO: f64 = 0.4;
 /// Ratio of predicted errors within which candidates are treated as equal. Copies lack unmodelled friction and
 /// elasticity, so smaller differences are not significant.
-const ALIKE: f64 = 1.1;
+const MAX_EQUAL_ERROR_RATIO: f64 = 1.1;
 
 /// One candidate cut-off.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,7 +62,10 @@ impl CutoffByError {
     pub fn highest_alike_hz(&self) -> f64 {
         let errors = || self.candidates.iter().map(|candidate| candidate.predicted_error_percent);
         let least = errors().fold(f64::INFINITY, f64::min);
-        let alike = self.candidates.iter().filter(|candidate| candidate.predicted_error_percent <= ALIKE * least);
+        let alike = self
+            .candidates
+            .iter()
+            .filter(|candidate| candidate.predicted_error_percent <= MAX_EQUAL_ERROR_RATIO * least);
         alike.map(|candidate| candidate.cutoff_hz).fold(self.cutoff_hz, f64::max)
     }
 }
@@ -86,28 +89,30 @@ pub fn choose_cutoff(
     if settings.gains == GainChoice::Unknown || model.joint_that_needs_temperature().is_some() {
         return Ok(None);
     }
-    let asked = || logs.spectra().iter().flat_map(|log| log.choice.joints_hz.iter().flatten().copied());
-    let lowest = SPAN[0] * asked().fold(f64::INFINITY, f64::min);
-    let highest = SPAN[1] * asked().fold(0.0, f64::max);
+    let suggested = || logs.spectra().iter().flat_map(|log| log.choice.joints_hz.iter().flatten().copied());
+    let lowest = CANDIDATE_RANGE[0] * suggested().fold(f64::INFINITY, f64::min);
+    let highest = CANDIDATE_RANGE[1] * suggested().fold(0.0, f64::max);
     if !(lowest > 0.0 && lowest < highest) {
         return Ok(None);
     }
-    let Some(stand_in) = StandIn::of(logs, settings, model, training, highest)? else { return Ok(None) };
-    let highest = highest.min(HIGHEST * stand_in.log_rate_hz());
+    let Some(simulated_copies) = SimulatedCopies::of(logs, settings, model, training, highest)? else {
+        return Ok(None);
+    };
+    let highest = highest.min(MAX_SAMPLE_RATE_RATIO * simulated_copies.log_rate_hz());
     // The cut-off of the first fit is among the candidates.
-    let below = ((motion_hz / lowest).ln() / STEP.ln()).floor() as i32;
-    let above = ((highest / motion_hz).ln() / STEP.ln()).floor() as i32;
-    let ladder: Vec<f64> = (-below..=above).map(|step| motion_hz * STEP.powi(step)).collect();
+    let below = ((motion_hz / lowest).ln() / CANDIDATE_RATIO.ln()).floor() as i32;
+    let above = ((highest / motion_hz).ln() / CANDIDATE_RATIO.ln()).floor() as i32;
+    let ladder: Vec<f64> = (-below..=above).map(|step| motion_hz * CANDIDATE_RATIO.powi(step)).collect();
     let plain = plain_settings(settings);
     let alone = Execution { threads: 1, ..Execution::default() };
     let tried: Vec<Option<f64>> = ladder
         .par_iter()
         .map(|&cutoff_hz| {
-            let filter = filter_of_copy(&stand_in, cutoff_hz);
+            let filter = filter_of_copy(&simulated_copies, cutoff_hz);
             let (mut sum, mut copies) = (0.0, 0.0);
-            for pieces in stand_in.copies(&settings.motion, cutoff_hz).ok()? {
+            for pieces in simulated_copies.copies(&settings.motion, cutoff_hz).ok()? {
                 let values = plain_fit(model.clone(), pieces?, &filter, &plain, alone).ok()?;
-                sum += stand_in.square_error(model, &values);
+                sum += simulated_copies.square_error(model, &values);
                 copies += 1.0;
             }
             Some(f64::sqrt(sum / copies)).filter(|error| error.is_finite())
@@ -122,7 +127,8 @@ pub fn choose_cutoff(
         .collect();
     let least = candidates.iter().map(|candidate| candidate.predicted_error_percent).fold(f64::INFINITY, f64::min);
     // Among equal candidates prefer the cut-off of the spectra, otherwise the lowest one, which passes the least noise.
-    let mut alike = candidates.iter().filter(|candidate| candidate.predicted_error_percent <= ALIKE * least);
+    let mut alike =
+        candidates.iter().filter(|candidate| candidate.predicted_error_percent <= MAX_EQUAL_ERROR_RATIO * least);
     let lowest = alike.clone().next();
     let Some(best) = alike.find(|candidate| candidate.cutoff_hz == motion_hz).or(lowest) else { return Ok(None) };
     let cutoff_hz = best.cutoff_hz;
@@ -137,14 +143,14 @@ fn plain_settings(settings: &IdentificationSettings) -> IdentificationSettings {
 }
 
 /// Parallel filter for a cut-off at the rate of the copy.
-fn filter_of_copy(stand_in: &StandIn, cutoff_hz: f64) -> ParallelFilterSettings {
+fn filter_of_copy(simulated_copies: &SimulatedCopies, cutoff_hz: f64) -> ParallelFilterSettings {
     let automatic = ParallelFilterSettings::default();
-    match automatic.decimation(stand_in.log_rate_hz(), Some(cutoff_hz)) {
+    match automatic.decimation(simulated_copies.log_rate_hz(), Some(cutoff_hz)) {
         None => ParallelFilterSettings { enabled: false, ..automatic },
         Some(filter) => {
-            let gain_half_hz = 0.4 * stand_in.log_rate_hz() / filter.factor as f64;
+            let gain_half_hz = 0.4 * simulated_copies.log_rate_hz() / filter.factor as f64;
             ParallelFilterSettings {
-                factor: Some((filter.factor / stand_in.thinning()).max(1)),
+                factor: Some((filter.factor / simulated_copies.thinning()).max(1)),
                 cutoff_hz: Some(gain_half_hz),
                 transition_hz: Some(gain_half_hz),
                 ..automatic

@@ -15,15 +15,15 @@ use dynident_model::terms::TorqueTerm;
 use dynident_rows::RegressorModel;
 
 /// Maximum number of passes for the constants, plus one if the last step was too long.
-const MOST_PASSES: usize = 8;
+const MAX_PASSES: usize = 8;
 /// Passes after which insignificant terms are dropped although constants have not converged.
 const DROP_PASSES: usize = 3;
 /// Maximum number of halvings of a step that makes the fit worse.
-const MOST_HALVINGS: usize = 3;
+const MAX_HALVINGS: usize = 3;
 /// Increase of the deviance that is tolerated for a step; far below its statistical variation.
-const NO_WORSE: f64 = 0.1;
+const MAX_DEVIANCE_INCREASE: f64 = 0.1;
 /// Minimum number of passes for load-dependent friction, which uses the load of the previous fit.
-const LOAD_PASSES: usize = 3;
+const MIN_LOAD_PASSES: usize = 3;
 
 /// Constants of a pass, the step from them, and the misfit before the step.
 struct LastPass {
@@ -122,7 +122,7 @@ pub(crate) fn friction_evidence(
     let of_joint = |(one, before): (&JointFriction, &JointFriction)| {
         let place = model.model().joint_index(&one.joint);
         let is_doubtful = |(joint, before): (usize, &Vec<TorqueTerm>)| {
-            constants.has_doubtful_term((joint, before), (model, &norms), &step)
+            constants.has_doubtful_term(joint, before, model, &norms, &step, passes.settings.thresholds.friction)
         };
         FrictionEvidence {
             design_effect: place.map_or(1.0, |joint| constants.design_effect(joint, model, &step)),
@@ -272,6 +272,7 @@ pub(crate) fn with_constants(
 ) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
     let equal_weights = matches!(passes.settings.estimation.estimator, Estimator::Ordinary);
     let mut last: Option<LastPass> = None;
+    let thresholds = passes.settings.thresholds.friction;
     let (mut are_found, mut error) = (false, None);
     for pass in 1.. {
         let constants = FrictionConstants::new(&model, joints);
@@ -284,9 +285,9 @@ pub(crate) fn with_constants(
         // A step that made the fit worse was too long. If no shorter step helps, the constants are final, and one more
         // pass shows which terms have no supporting rows.
         let misfit = misfit(&measured.problem, &fit.joint_sigma, equal_weights);
-        if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit + NO_WORSE) {
+        if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit + MAX_DEVIANCE_INCREASE) {
             before.halvings += 1;
-            are_found = before.halvings > MOST_HALVINGS || pass >= MOST_PASSES;
+            are_found = before.halvings > MAX_HALVINGS || pass >= MAX_PASSES;
             before.steps.iter_mut().for_each(|step| *step *= if are_found { 0.0 } else { 0.5 });
             let terms = before.constants.moved(&before.steps);
             model = with_chosen(robot, joints, &terms, &model, &fit.values)?;
@@ -297,7 +298,7 @@ pub(crate) fn with_constants(
         // Intermediate passes need no error bars.
         if pass < DROP_PASSES && !are_found {
             let step = measured.step_without_bars(passes, &constants, &model, gains)?;
-            if !step.may_have_settled() {
+            if !step.may_have_converged() {
                 let terms = constants.moved(&step.steps);
                 model = with_chosen(robot, joints, &terms, &model, &fit.values)?;
                 last = Some(LastPass { constants, steps: step.steps, misfit, halvings: 0 });
@@ -308,25 +309,25 @@ pub(crate) fn with_constants(
         let step = measured.step(passes, &constants, &model, gains)?;
         take_intervals(joints, &model, &constants, &step);
         error = Some(step.error().clone());
-        let has_settled = are_found || step.has_settled() && (pass >= LOAD_PASSES || !model.needs_load());
+        let has_converged = are_found || step.has_converged() && (pass >= MIN_LOAD_PASSES || !model.needs_load());
 
         // Drop the weakest insignificant term of every joint and repeat. If the passes made no progress, terms may be
         // significant only together, so drop only those without supporting rows.
-        let weak = if are_found { Weak::Unshown } else { Weak::Unseen };
-        let fewer = constants.without_weakest(weak, (&model, &measured.problem.column_norms()), &step);
-        if pass >= MOST_PASSES {
+        let weak = if are_found { Weak::Unsupported } else { Weak::Insignificant };
+        let fewer = constants.without_weakest(weak, &model, &measured.problem.column_norms(), &step, thresholds);
+        if pass >= MAX_PASSES {
             if !fewer.is_empty() {
                 model = with_chosen(robot, joints, &fewer, &model, &fit.values)?;
             }
             break;
         }
-        if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
+        if !fewer.is_empty() && (has_converged || pass >= DROP_PASSES) {
             model = with_chosen(robot, joints, &fewer, &model, &fit.values)?;
             last = None;
             are_found = false;
             continue;
         }
-        if has_settled {
+        if has_converged {
             break;
         }
         let terms = constants.moved(&step.steps);

@@ -96,17 +96,17 @@ impl<'a, 'w> Workspace<'a, 'w> {
     }
 
     /// A trial of other choices for the same task.
-    pub(super) fn look(&self, choices: Choices) -> Workspace<'a, 'w> {
-        let mut look = Workspace::new(self.task, self.training, self.execution, Job::Model(None), Some(choices));
-        if look.settings.motion.torque_lag_s == self.settings.motion.torque_lag_s {
-            look.logs.clone_from(&self.logs);
+    pub(super) fn trial(&self, choices: Choices) -> Workspace<'a, 'w> {
+        let mut trial = Workspace::new(self.task, self.training, self.execution, Job::Model(None), Some(choices));
+        if trial.settings.motion.torque_lag_s == self.settings.motion.torque_lag_s {
+            trial.logs.clone_from(&self.logs);
         }
-        look
+        trial
     }
 
     /// Adopts the choices of a trial: its lag is compensated, and its grid friction is a start.
-    pub(super) fn take_look(&mut self, look: Self) {
-        let Workspace { mut choices, logs, .. } = look;
+    pub(super) fn adopt(&mut self, trial: Self) {
+        let Workspace { mut choices, logs, .. } = trial;
         if let FrictionChoice::Grid(grid) = core::mem::replace(&mut choices.friction, FrictionChoice::Open) {
             choices.grid = Some(grid);
         }

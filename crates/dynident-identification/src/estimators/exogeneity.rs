@@ -10,28 +10,18 @@ use super::band_motion::regressor_cutoff_hz;
 use super::instrumental::{BandEstimate, InstrumentSettings, fast_motion_problem, with_band};
 use super::noise_in_regressor::{EstimateContrast, NoiseInRegressor, NoiseVerdict};
 use super::{EstimatorError, TrainingRows};
+use crate::thresholds::NoiseThresholds;
 use dynident_estimation::{
     Estimate, HausmanTest, HausmanVerdict, InstrumentReport, InstrumentalEstimate, fast_motion, hausman_test,
     weighted_least_squares,
 };
 
 /// Ratios to the regressor's cut-off, tried in turn until the instruments are strong.
-const SHARES: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, 0.84];
+const CUTOFF_RATIOS: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, 0.84];
 /// Ratio of neighbouring bands.
-const STEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
+const BAND_RATIO: f64 = core::f64::consts::FRAC_1_SQRT_2;
 /// Maximum number of bands below the first: six octaves.
-const MOST_BANDS: usize = 12;
-/// Maximum coefficient of the torque on the fast motion for the fast motion to be mostly noise.
-const FOLLOWED: f64 = 0.75;
-/// Maximum difference of two equal estimates, in error bars of the better one: root mean square over the parameters,
-/// and largest. Two independent estimates with the same error bars differ by 1.4.
-const AGREEMENT: [f64; 2] = [1.5, 3.0];
-/// Share of the torque of the fast motion above which lower bands are always tried, because the instruments of the
-/// first band may contain much noise themselves.
-const LARGE_SHARE: f64 = 0.1;
-/// Minimum shift of the parameters in error bars (root mean square) for noise to matter; the shift is at most `√(Σ_j
-/// ‖V_j θ‖² / σ_j² / p)`. The limit is small, because large noise also reduces θ and this bound.
-const LEAST_MOVE: f64 = 0.3;
+const MAX_BANDS: usize = 12;
 
 /// Tests least squares with the logs' own motion in a lower band, and returns the instruments' estimate in the selected
 /// band.
@@ -46,11 +36,13 @@ pub(super) fn examined(
     };
     let estimation = rows.settings;
     let fast = fast_motion(&first.problem, &first.found, estimation.rank, estimation.covariance)?;
-    let agrees = |band: &BandEstimate| contrast(least_squares, &band.found.estimate).as_ref().is_none_or(agree);
-    let noise = fast.filter(|fast| fast.followed + fast.half_width_95 < FOLLOWED);
-    let is_suspect = noise.is_some_and(|noise| noise.share_of_torque > LARGE_SHARE || !agrees(&first));
+    let thresholds = &estimation.thresholds.noise;
+    let agrees = |band: &BandEstimate| agree(least_squares, &band.found.estimate, thresholds);
+    let noise = fast.filter(|fast| fast.followed + fast.half_width_95 < thresholds.max_followed);
+    let is_suspect =
+        noise.is_some_and(|noise| noise.share_of_torque > thresholds.max_fast_torque_share || !agrees(&first));
     let chosen = if is_suspect && settings.cutoff_hz.is_none() && is_strong(&first, least_squares) {
-        settled_band(rows, settings, first, least_squares)
+        highest_stable_band(rows, settings, first, least_squares)
     } else {
         first
     };
@@ -76,7 +68,7 @@ pub(super) fn harmless(
     rows: &TrainingRows<'_>,
     least_squares: &Estimate,
 ) -> Result<Option<NoiseInRegressor>, EstimatorError> {
-    let cutoff_hz = SHARES[0] * regressor_cutoff_hz(rows)?;
+    let cutoff_hz = CUTOFF_RATIOS[0] * regressor_cutoff_hz(rows)?;
     let (problem, squares) = fast_motion_problem(rows, cutoff_hz, &least_squares.values)?;
     let terms = squares.iter().zip(&least_squares.joint_sigma);
     let move_squared: f64 =
@@ -85,8 +77,9 @@ pub(super) fn harmless(
     let settings = rows.settings.weighted();
     let followed = weighted_least_squares(&problem, &settings).ok().filter(|fit| fit.rank.fixed.is_empty());
     let followed = followed.map(|fit| (fit.values[0], fit.half_width_95[0]));
-    let is_motion = followed.is_none_or(|(followed, half_width)| followed + half_width > FOLLOWED);
-    if !is_motion && (move_squared / columns as f64).sqrt() > LEAST_MOVE {
+    let thresholds = &rows.settings.thresholds.noise;
+    let is_motion = followed.is_none_or(|(followed, half_width)| followed + half_width > thresholds.max_followed);
+    if !is_motion && (move_squared / columns as f64).sqrt() > thresholds.min_parameter_shift {
         return Ok(None);
     }
     let reason = "not tested: torque follows the fast motion, or the fast motion is too small to matter".to_owned();
@@ -110,8 +103,8 @@ fn first_band(
     least_squares: &Estimate,
 ) -> Result<BandEstimate, EstimatorError> {
     let cutoff_hz = regressor_cutoff_hz(rows)?;
-    let mut band = with_band(rows, settings, SHARES[0] * cutoff_hz)?;
-    for share in &SHARES[1..] {
+    let mut band = with_band(rows, settings, CUTOFF_RATIOS[0] * cutoff_hz)?;
+    for share in &CUTOFF_RATIOS[1..] {
         if is_strong(&band, least_squares) {
             break;
         }
@@ -121,26 +114,26 @@ fn first_band(
 }
 
 /// The highest band below which the estimate no longer changes.
-fn settled_band(
+fn highest_stable_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
     first: BandEstimate,
     least_squares: &Estimate,
 ) -> BandEstimate {
     let mut bands = vec![first];
-    while let Some(last) = bands.last().filter(|_| bands.len() <= MOST_BANDS) {
+    while let Some(last) = bands.last().filter(|_| bands.len() <= MAX_BANDS) {
         // If a piece is too short for a low filter, the previous bands are used.
-        let Ok(band) = with_band(rows, settings, STEP * last.cutoff_hz) else { break };
+        let Ok(band) = with_band(rows, settings, BAND_RATIO * last.cutoff_hz) else { break };
         if !is_strong(&band, least_squares) {
             break;
         }
         bands.push(band);
     }
-    let settles = |place: &usize| {
+    let is_stable = |place: &usize| {
         let (band, lower) = (&bands[*place].found.estimate, &bands[place + 1..]);
-        lower.iter().all(|lower| contrast(band, &lower.found.estimate).as_ref().is_none_or(agree))
+        lower.iter().all(|lower| agree(band, &lower.found.estimate, &rows.settings.thresholds.noise))
     };
-    let place = (0..bands.len()).find(settles).unwrap_or(bands.len() - 1);
+    let place = (0..bands.len()).find(is_stable).unwrap_or(bands.len() - 1);
     bands.swap_remove(place)
 }
 
@@ -150,8 +143,11 @@ fn is_strong(band: &BandEstimate, least_squares: &Estimate) -> bool {
     !found.instruments.weak && found.estimate.rank.fixed.len() <= least_squares.rank.fixed.len()
 }
 
-fn agree(contrast: &EstimateContrast) -> bool {
-    contrast.rms <= AGREEMENT[0] && contrast.largest <= AGREEMENT[1]
+/// Whether two estimates agree within their error bars.
+fn agree(a: &Estimate, b: &Estimate, thresholds: &NoiseThresholds) -> bool {
+    contrast(a, b).is_none_or(|contrast| {
+        contrast.rms <= thresholds.max_contrast_rms && contrast.largest <= thresholds.max_contrast
+    })
 }
 
 /// `a − b` in standard deviations of b, over the columns that both estimate.

@@ -4,6 +4,7 @@ use super::filtered_period::PeriodFilter;
 use super::row_pass::Stop;
 use super::simulated::torque_sigma;
 use super::{EstimatorError, TrainingRows};
+use crate::thresholds::MotionThresholds;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{
     CovarianceMethod, Estimate, EstimationError, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
@@ -17,18 +18,14 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Maximum period of a motion, s: eleven days.
-const MOST_PERIOD_S: f64 = 1e6;
+const MAX_PERIOD_S: f64 = 1e6;
 
-/// Maximum difference of the periods relative to the size of the motion.
-const MOST_DIFFERENCE: f64 = 0.1;
-/// Minimum size of a motion, rad (m).
-const NO_MOTION: f64 = 1e-4;
 /// Minimum torque noise relative to the root mean square of the torque.
-const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
+const MIN_RELATIVE_SIGMA: f64 = 1e-4;
 /// Minimum steps of central differences of the regressor by position, velocity and acceleration, for an arm of usual
 /// size; the regressor is linear in the last. A larger noise of the mean period gives a larger step, so that the slope
 /// of a friction step is averaged over the noise.
-const LEAST_STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
+const MIN_STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
 
 /// The repeated motion.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -48,7 +45,7 @@ pub struct PeriodSettings {
 #[non_exhaustive]
 pub enum PeriodError {
     /// Invalid period.
-    #[error("period_s = {period_s:?}: give the period of the motion in seconds, at most {MOST_PERIOD_S:e}")]
+    #[error("period_s = {period_s:?}: give the period of the motion in seconds, at most {MAX_PERIOD_S:e}")]
     Period {
         /// Value.
         period_s: f64,
@@ -73,7 +70,7 @@ impl PeriodSettings {
     /// # Errors
     /// The first invalid value.
     pub fn validate(&self) -> Result<(), PeriodError> {
-        if let Some(period_s) = self.period_s.filter(|period| !(*period > 0.0 && *period <= MOST_PERIOD_S)) {
+        if let Some(period_s) = self.period_s.filter(|period| !(*period > 0.0 && *period <= MAX_PERIOD_S)) {
             return Err(PeriodError::Period { period_s });
         }
         if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
@@ -152,7 +149,7 @@ pub(super) fn periodic(
         max_iterations: 50,
     };
     let std = |place: usize| single[(place, place)].max(0.0).sqrt();
-    let steps = |variable: usize| least_step(model, variable).max(std(variable) / (most as f64).sqrt());
+    let steps = |variable: usize| min_step(model, variable).max(std(variable) / (most as f64).sqrt());
     let mut instants = Instants::new(model, (0..3 * dof).map(steps).collect());
     let found = maximum_likelihood::<Stop>(problem.columns(), &settings, |visit| {
         for mean in &means {
@@ -217,18 +214,18 @@ fn torque_covariance(means: &[MeanPeriod], mean_covariance: &DMatrix<f64>, dof: 
             square += mean.averaged.mean[3 * dof + joint].iter().map(|tau| tau * tau).sum::<f64>();
             count += mean.samples;
         }
-        let least = LEAST_RELATIVE_SIGMA * LEAST_RELATIVE_SIGMA * square / count.max(1) as f64;
+        let least = MIN_RELATIVE_SIGMA * MIN_RELATIVE_SIGMA * square / count.max(1) as f64;
         covariance[(joint, joint)] += least.max(f64::MIN_POSITIVE);
     }
     covariance
 }
 
 /// Minimum step of the differences by a variable of the motion: positions of all joints, velocities, accelerations.
-fn least_step(model: &RegressorModel, variable: usize) -> f64 {
+fn min_step(model: &RegressorModel, variable: usize) -> f64 {
     let (model, dof) = (model.model(), model.model().dof());
     let own = model.own_scale();
     let turns = model.joints()[variable % dof].turns();
-    let [position, velocity, acceleration] = LEAST_STEPS;
+    let [position, velocity, acceleration] = MIN_STEPS;
     match variable / dof {
         0 => own.position(turns, position),
         1 => own.velocity(turns, velocity),
@@ -307,20 +304,25 @@ fn mean_period(
         )));
     }
     let averaged = averaged_periods(&views, samples).map_err(|error| wrong(error.to_string()))?;
-    check_repeats(model, &averaged, period_s).map_err(wrong)?;
+    check_repeats(model, &averaged, period_s, &rows.settings.thresholds.motion).map_err(wrong)?;
     let covariance = filter.covariance(&views, &averaged);
     let rows = filter.rows(model, &averaged);
     Ok(MeanPeriod { averaged, samples, covariance, rows })
 }
 
 /// Checks that the positions of all periods agree; returns a message otherwise.
-fn check_repeats(model: &RegressorModel, averaged: &AveragedPeriods, period_s: f64) -> Result<(), String> {
+fn check_repeats(
+    model: &RegressorModel,
+    averaged: &AveragedPeriods,
+    period_s: f64,
+    thresholds: &MotionThresholds,
+) -> Result<(), String> {
     for (joint, described) in model.model().joints().iter().enumerate() {
         let mean = &averaged.mean[joint];
         let middle = mean.iter().sum::<f64>() / mean.len() as f64;
         let size = (mean.iter().map(|q| (q - middle).powi(2)).sum::<f64>() / mean.len() as f64).sqrt();
         let difference = averaged.sample_covariance[joint][joint].max(0.0).sqrt();
-        if difference > MOST_DIFFERENCE * size.max(NO_MOTION) {
+        if difference > thresholds.max_period_difference * size.max(thresholds.min_motion) {
             return Err(format!(
                 "the motion does not repeat every {period_s} s: positions of {} differ by {difference:.2e} rad from period to period, and move by {size:.2e} rad (root mean squares); \
                  fix period_s, or skip the start with skip_s",

@@ -8,10 +8,10 @@ use dynident_rows::RegressorModel;
 use nalgebra::{DMatrix, DVector};
 
 /// Samples per block of the regressor.
-const BLOCK: usize = 256;
+const BLOCK_SAMPLES: usize = 256;
 
 /// Minimum number of rows per period of the highest harmonic, so that the series hardly changes within a row.
-const ROWS_OF_HARMONIC: f64 = 60.0;
+const MIN_ROWS_PER_HARMONIC: f64 = 60.0;
 
 /// Recorded positions and torques on a uniform clock without a gap.
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ pub struct FourierSeries {
 impl FourierSeries {
     /// Maximum number of successive samples per row: at least sixty rows remain in a period of the highest harmonic.
     pub fn samples_of_row(&self, rate_hz: f64) -> usize {
-        (rate_hz * self.period_s / (ROWS_OF_HARMONIC * self.harmonics as f64)).floor().max(1.0) as usize
+        (rate_hz * self.period_s / (MIN_ROWS_PER_HARMONIC * self.harmonics as f64)).floor().max(1.0) as usize
     }
 }
 
@@ -125,8 +125,8 @@ impl<'a> PeriodicModel<'a> {
         let second = self.derivative(&rate);
         let samples = self.basis.nrows();
         let mut panels = Panels::default();
-        for first in (0..samples).step_by(BLOCK) {
-            let count = BLOCK.min(samples - first);
+        for first in (0..samples).step_by(BLOCK_SAMPLES) {
+            let count = BLOCK_SAMPLES.min(samples - first);
             let basis = self.basis.rows(first, count);
             let [q, dq, ddq] = [&coefficients, &rate, &second].map(|c| basis * c);
             let motion = JointMotion { samples: count, q: q.as_slice(), dq: dq.as_slice(), ddq: ddq.as_slice() };

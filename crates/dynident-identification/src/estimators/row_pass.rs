@@ -17,7 +17,7 @@ impl From<EstimationError> for Stop {
 }
 
 /// Maximum number of values of filtered rows that are kept (256 MiB).
-const MOST_KEPT_NUMBERS: usize = 1 << 25;
+const MAX_KEPT_VALUES: usize = 1 << 25;
 
 /// Rows of the training logs for repeated passes; kept if they fit, otherwise computed again in every pass.
 pub(super) struct KeptRows {
@@ -50,7 +50,7 @@ impl KeptRows {
         for (log, &index) in rows.training.iter().enumerate() {
             let mut keep = |block: &RowBlock<'_>| {
                 numbers += block.panel.len();
-                if numbers > MOST_KEPT_NUMBERS {
+                if numbers > MAX_KEPT_VALUES {
                     self.blocks = None;
                 }
                 if let Some(blocks) = &mut self.blocks {

@@ -1,6 +1,7 @@
 //! Settings of the estimation: estimator and error bars.
 
 use super::{Estimator, InstrumentSettings};
+use crate::thresholds::EstimationThresholds;
 use dynident_estimation::{
     CovarianceMethod, EssentialSettings, OrdinarySettings, RankSettings, SegmentSettings, WeightedSettings,
 };
@@ -26,6 +27,8 @@ pub struct EstimationSettings {
     pub essential: Option<EssentialSettings>,
     /// Base columns held at given values (column, value); none by default.
     pub held: Vec<(usize, f64)>,
+    /// Thresholds of tests.
+    pub thresholds: EstimationThresholds,
 }
 
 impl EstimationSettings {

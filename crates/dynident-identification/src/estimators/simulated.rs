@@ -14,12 +14,12 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Minimum noise relative to the root mean square of the compared signal, so that noise-free data have finite weights.
-const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
+const MIN_RELATIVE_SIGMA: f64 = 1e-4;
 /// Maximum number of matrix entries (rows times columns) in memory, 8 bytes each.
-const MOST_ENTRIES: usize = 100_000_000;
+const MAX_ENTRIES: usize = 100_000_000;
 /// Maximum number of updates of the joints' noise.
-const ROUNDS: usize = 3;
-const SETTLED: f64 = 0.1;
+const MAX_ROUNDS: usize = 3;
+const MAX_NOISE_CHANGE: f64 = 0.1;
 
 /// Start of the iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -107,7 +107,7 @@ pub(super) fn simulated(
         failure: None,
     };
     let entries = simulated.rows() * problem.columns().len();
-    if entries > MOST_ENTRIES {
+    if entries > MAX_ENTRIES {
         return Err(wrong(format!(
             "{} rows of {} columns do not fit into memory: set parallel_filter.factor, or use a shorter part of the log",
             simulated.rows(),
@@ -291,14 +291,14 @@ fn settled(
         measured: measured.clone(),
     };
     let (mut iterations, mut simulations) = (0, 0);
-    for round in 1..=ROUNDS {
+    for round in 1..=MAX_ROUNDS {
         let found = simulated_least_squares(&fit, &settings, simulated)?;
         iterations += found.iterations;
         simulations += found.simulations;
         let next = deviations(simulated, &found.residual, measured, found.rank.rank);
-        let changed = next.iter().zip(&sigma).any(|(new, old)| (new / old - 1.0).abs() > SETTLED);
+        let changed = next.iter().zip(&sigma).any(|(new, old)| (new / old - 1.0).abs() > MAX_NOISE_CHANGE);
         sigma = next;
-        if !changed || round == ROUNDS || found.status == EstimateStatus::IterationLimit {
+        if !changed || round == MAX_ROUNDS || found.status == EstimateStatus::IterationLimit {
             return Ok(StartOutcome { found, start: name, sigma, iterations, simulations });
         }
         fit.noise_std = by_row(simulated, &sigma);
@@ -383,7 +383,7 @@ fn deviations(
     (0..joints)
         .map(|joint| {
             let rows = count[joint] as f64;
-            let least = LEAST_RELATIVE_SIGMA * (signal[joint] / rows.max(1.0)).sqrt();
+            let least = MIN_RELATIVE_SIGMA * (signal[joint] / rows.max(1.0)).sqrt();
             let sigma = (squares[joint] / (rows - share).max(1.0)).sqrt().max(least);
             // A joint without torque and without residual.
             if sigma > 0.0 { sigma } else { 1.0 }

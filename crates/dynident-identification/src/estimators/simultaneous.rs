@@ -4,6 +4,7 @@
 use super::periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord, PeriodicRecords};
 use super::simulated::torque_sigma;
 use super::{EstimatorError, Findings, PeriodSettings, TrainingRows};
+use crate::thresholds::MotionThresholds;
 use dynident_estimation::{
     Estimate, LinearProblem, SimultaneousEstimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings,
     simultaneous_least_squares, weighted_least_squares,
@@ -12,12 +13,8 @@ use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
 use dynident_rows::LogError;
 use serde::{Deserialize, Serialize};
 
-/// Maximum residual of the positions relative to their size for a motion that is the series.
-const MOST_REMAINDER: f64 = 0.1;
-/// Minimum size of a motion, rad (m).
-const NO_MOTION: f64 = 1e-4;
 /// Maximum number of automatic harmonics; more cost much time.
-const MOST_HARMONICS: usize = 60;
+const MAX_HARMONICS: usize = 60;
 
 /// Motion and noise of one log in the simultaneous fit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -108,7 +105,7 @@ fn fitted_motion(
                 "log `{name}` does not determine the harmonics of its motion: reduce [estimator.periods] harmonics, or give a longer log"
             )));
         };
-        check_motion(record, &fitted).map_err(|(joint, message)| {
+        check_motion(record, &fitted, &rows.settings.thresholds.motion).map_err(|(joint, message)| {
             wrong(format!("log `{name}`: positions of {} {message}", rows.model.joint_names()[joint]))
         })?;
         motion.extend(fitted);
@@ -213,7 +210,7 @@ fn read(
     }
     // The cut-off is twice the highest frequency above the noise.
     let highest = (0.5 * stream.cutoff().cutoff_hz * period_s).ceil() as usize;
-    let harmonics = periods.harmonics.unwrap_or_else(|| highest.clamp(1, MOST_HARMONICS));
+    let harmonics = periods.harmonics.unwrap_or_else(|| highest.clamp(1, MAX_HARMONICS));
     if 4.0 * harmonics as f64 > rate_hz * period_s {
         return Err(wrong(format!(
             "log `{name}`: {harmonics} harmonics of {:.3} Hz are too many for a rate of {rate_hz:.1} Hz: reduce [estimator.periods] harmonics",
@@ -226,7 +223,11 @@ fn read(
 }
 
 /// Checks that the positions are those of the fitted series; otherwise returns the joint and a message.
-fn check_motion(record: &PeriodicModel<'_>, fitted: &[f64]) -> Result<(), (usize, String)> {
+fn check_motion(
+    record: &PeriodicModel<'_>,
+    fitted: &[f64],
+    thresholds: &MotionThresholds,
+) -> Result<(), (usize, String)> {
     let root_mean = |values: &[f64]| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
     let left = record.position_residuals(fitted);
     let unknowns = fitted.len() / left.ncols().max(1);
@@ -234,7 +235,7 @@ fn check_motion(record: &PeriodicModel<'_>, fitted: &[f64]) -> Result<(), (usize
         // Sine and cosine have a mean square of one half.
         let size = root_mean(&fitted[joint * unknowns + 1..(joint + 1) * unknowns]) * (0.5 * unknowns as f64).sqrt();
         let remainder = root_mean(left.as_slice());
-        if remainder > MOST_REMAINDER * size.max(NO_MOTION) {
+        if remainder > thresholds.max_series_residual * size.max(thresholds.min_motion) {
             return Err((
                 joint,
                 format!(

@@ -13,11 +13,7 @@ use dynident_rows::LogError;
 use serde::{Deserialize, Serialize};
 
 /// Minimum length of a piece between two gaps, samples.
-const LEAST_SAMPLES: usize = 64;
-
-/// Maximum ratio of filtered residuals to those of weighted least squares. Above it the correlated part of the torque
-/// residuals is model error, and the whitening filter has removed a part of the motion as noise.
-const MOST_OVER_START: f64 = 1.25;
+const MIN_PIECE_SAMPLES: usize = 64;
 
 /// Results of the fit of motion and parameters.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -90,7 +86,9 @@ pub(super) fn spline_motion(
         Ok((found, over_start))
     };
     let (mut found, mut over_start) = fitted(&settings)?;
-    if (over_start.is_nan() || over_start > MOST_OVER_START) && settings.most_autoregression > 0 {
+    if (over_start.is_nan() || over_start > estimation.thresholds.motion.max_spline_residual_ratio)
+        && settings.most_autoregression > 0
+    {
         let (white, of_white) = fitted(&SplineMotionSettings { most_autoregression: 0, ..settings })?;
         if over_start.is_nan() || over_start > of_white {
             (found, over_start) = (white, of_white);
@@ -149,10 +147,10 @@ fn read(
         }
         logs.execution.progress.advance(block.rows as u64);
     }
-    pieces.retain(|channels| channels.first().is_some_and(|q| q.len() >= LEAST_SAMPLES));
+    pieces.retain(|channels| channels.first().is_some_and(|q| q.len() >= MIN_PIECE_SAMPLES));
     if pieces.is_empty() {
         return Err(wrong(format!(
-            "log `{name}` has no piece of {LEAST_SAMPLES} samples without a gap: give a longer log"
+            "log `{name}` has no piece of {MIN_PIECE_SAMPLES} samples without a gap: give a longer log"
         )));
     }
     let record = |mut channels: Vec<Vec<f64>>| {

@@ -10,7 +10,7 @@ use dynident_rows::RegressorModel;
 use rayon::prelude::*;
 
 /// Samples per block of one thread.
-const BLOCK: usize = 128;
+const BLOCK_SAMPLES: usize = 128;
 
 /// Torque and its derivatives, for several blocks of samples in parallel.
 ///
@@ -76,14 +76,14 @@ struct Instants<'a>(&'a RegressorModel);
 impl Instants<'_> {
     fn parts(motion: &JointMotion<'_>) -> Vec<Part> {
         let of = |first: usize| {
-            let samples = BLOCK.min(motion.samples - first);
+            let samples = BLOCK_SAMPLES.min(motion.samples - first);
             let cut = |values: &[f64]| -> Vec<f64> {
                 let joints = values.chunks_exact(motion.samples);
                 joints.flat_map(|own| own[first..first + samples].iter().copied()).collect()
             };
             Part { first, samples, motion: [motion.q, motion.dq, motion.ddq].map(cut) }
         };
-        (0..motion.samples).step_by(BLOCK).map(of).collect()
+        (0..motion.samples).step_by(BLOCK_SAMPLES).map(of).collect()
     }
 
     fn panels(self, workspace: &mut BatchWorkspace, part: &Part) -> Panels {

@@ -19,7 +19,7 @@ const FOLDS: [usize; 2] = [10, 5];
 const ROUNDS: usize = 2;
 /// Root mean square velocity below which a joint is at rest, rad/s or m/s of an arm of usual size; typical position
 /// noise of a resting joint.
-const MOVING: f64 = 1.0e-3;
+const MIN_SPEED: f64 = 1.0e-3;
 
 /// The robot with the selected friction; drive inertia and offset of a joint are kept.
 ///
@@ -100,7 +100,7 @@ pub(crate) fn choose_friction(
         let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.term)).collect();
         let speed = norms[variable[0]] / (rows[joint].max(1) as f64).sqrt();
         let scale = JointScale::of(model.model(), joint);
-        if speed < MOVING * scale.velocity {
+        if speed < MIN_SPEED * scale.velocity {
             return Ok((refused(joint, "the joint does not move in the training logs"), Vec::new()));
         }
         // The stated model as far as it is excited, without this joint's friction, and with the selected friction of

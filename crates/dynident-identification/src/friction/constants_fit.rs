@@ -11,7 +11,8 @@
 use super::candidates::JointScale;
 use super::constants::step_of;
 use super::joint_friction::{FrictionConstant, JointFriction};
-use super::weak_terms::{Weak, has_doubtful_term, without_weakest};
+use super::weak_terms::{TermTest, Weak};
+use crate::thresholds::FrictionThresholds;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, HALF_WIDTH_95, JointRows, LinearProblem, SegmentedFactor};
 use dynident_model::terms::{CoulombShape, TorqueTerm};
@@ -20,17 +21,17 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Half distance of the central differences, in units of a constant's logarithm.
-const STEP: f64 = 0.1;
+const HALF_DIFFERENCE: f64 = 0.1;
 /// Maximum step of a constant's logarithm in one pass: one step of the grid.
-const FURTHEST: f64 = 0.7;
+const MAX_STEP: f64 = 0.7;
 /// Prior standard deviation of a constant's logarithm. Its grid spans a factor of 40 to 100; a uniform distribution
 /// over it has 1.1 to 1.3. The prior bounds constants that the rows do not determine.
-const KNOWN_BEFOREHAND: f64 = 1.2;
+const PRIOR_STD: f64 = 1.2;
 /// Convergence: every step is below this ratio of its standard deviation, or below this absolute value.
-const SETTLED: (f64, f64) = (0.1, 2.0e-3);
+const CONVERGENCE: (f64, f64) = (0.1, 2.0e-3);
 /// Maximum ratio of reported standard deviation to that of white noise. A step that is long compared with the product
 /// has certainly not converged.
-const MOST_INFLATION: f64 = 10.0;
+const MAX_STD_INFLATION: f64 = 10.0;
 
 /// Selected friction with its adjustable constants.
 #[derive(Clone, Debug)]
@@ -90,18 +91,18 @@ impl ConstantsStep {
     }
 
     /// Whether the constants have converged.
-    pub(crate) fn has_settled(&self) -> bool {
+    pub(crate) fn has_converged(&self) -> bool {
         self.is_below(1.0)
     }
 
     /// Whether a step with white-noise error bars may have converged by the reported error bars.
-    pub(crate) fn may_have_settled(&self) -> bool {
-        self.is_below(MOST_INFLATION)
+    pub(crate) fn may_have_converged(&self) -> bool {
+        self.is_below(MAX_STD_INFLATION)
     }
 
     /// Whether all steps are small compared with their error bars times `inflation`.
     fn is_below(&self, inflation: f64) -> bool {
-        let small = |(step, std): (&f64, &f64)| step.abs() <= (SETTLED.0 * inflation * std).max(SETTLED.1);
+        let small = |(step, std): (&f64, &f64)| step.abs() <= (CONVERGENCE.0 * inflation * std).max(CONVERGENCE.1);
         self.steps.iter().zip(&self.std).all(small)
     }
 }
@@ -148,14 +149,16 @@ impl FrictionConstants {
     pub(crate) fn without_weakest(
         &self,
         weak: Weak,
-        (model, norms): (&RegressorModel, &[f64]),
+        model: &RegressorModel,
+        norms: &[f64],
         last: &ConstantsStep,
+        thresholds: FrictionThresholds,
     ) -> Vec<(usize, Vec<TorqueTerm>)> {
-        let columns = model.layout().columns();
+        let test = TermTest { columns: model.layout().columns(), norms, estimate: &last.estimate, thresholds };
         let first = last.estimate.values.len() - self.axes.len();
         let of_joint = |(place, (joint, terms)): (usize, &(usize, Vec<TorqueTerm>))| {
             let own_constants = |term: &TorqueTerm| self.own_constants(place, term, first);
-            Some((*joint, without_weakest((terms, weak), (columns, norms), &last.estimate, own_constants)?))
+            Some((*joint, test.without_weakest(terms, weak, own_constants)?))
         };
         self.joints.iter().enumerate().filter_map(of_joint).collect()
     }
@@ -164,15 +167,18 @@ impl FrictionConstants {
     /// arguments as in [`without_weakest`](Self::without_weakest).
     pub(crate) fn has_doubtful_term(
         &self,
-        (joint, before): (usize, &[TorqueTerm]),
-        (model, norms): (&RegressorModel, &[f64]),
+        joint: usize,
+        before: &[TorqueTerm],
+        model: &RegressorModel,
+        norms: &[f64],
         last: &ConstantsStep,
+        thresholds: FrictionThresholds,
     ) -> bool {
         let first = last.estimate.values.len() - self.axes.len();
         let Some(place) = self.joints.iter().position(|(own, _)| *own == joint) else { return false };
         let own_constants = |term: &TorqueTerm| self.own_constants(place, term, first);
-        let columns = (model.layout().columns(), norms);
-        has_doubtful_term((&self.joints[place].1, before), columns, &last.estimate, own_constants)
+        let test = TermTest { columns: model.layout().columns(), norms, estimate: &last.estimate, thresholds };
+        test.has_doubtful_term(&self.joints[place].1, before, own_constants)
     }
 
     /// Columns of the constants that only this term of the joint at `place` has, in a step whose axes begin at `first`.
@@ -215,7 +221,10 @@ impl FrictionConstants {
     /// Terms on both sides of the constants along every axis: additional columns of a pass.
     pub(crate) fn neighbours(&self) -> Vec<TorqueTerm> {
         let of_axis = |axis: &Axis| -> Vec<TorqueTerm> {
-            axis.terms.iter().flat_map(|&number| [-STEP, STEP].map(|step| self.beside(axis, number, step))).collect()
+            axis.terms
+                .iter()
+                .flat_map(|&number| [-HALF_DIFFERENCE, HALF_DIFFERENCE].map(|step| self.beside(axis, number, step)))
+                .collect()
         };
         self.axes.iter().flat_map(of_axis).collect()
     }
@@ -242,7 +251,7 @@ impl FrictionConstants {
             steps.fold(0.0_f64, |most, (axis, _)| most.max(found.values[count + axis].abs()))
         };
         let step = |(place, axis): (usize, &Axis)| {
-            found.values[count + place] * (FURTHEST / furthest(axis.joint).max(FURTHEST))
+            found.values[count + place] * (MAX_STEP / furthest(axis.joint).max(MAX_STEP))
         };
         // Sensitivity with white noise, because least squares uses these weights.
         let white = found.covariance_white.view((count, count), (own, own)).into_owned();
@@ -295,9 +304,9 @@ impl FrictionConstants {
                 for &number in &axis.terms {
                     let centre = place(&self.joints[axis.joint].1[number]);
                     let value = centre.and_then(|centre| fitted.get(centre)).copied().unwrap_or(0.0);
-                    for step in [-STEP, STEP] {
+                    for step in [-HALF_DIFFERENCE, HALF_DIFFERENCE] {
                         if let Some(beside) = place(&self.beside(axis, number, step)) {
-                            of_axis.push((beside, value * step / (2.0 * STEP * STEP)));
+                            of_axis.push((beside, value * step / (2.0 * HALF_DIFFERENCE * HALF_DIFFERENCE)));
                         }
                     }
                 }
@@ -345,7 +354,7 @@ impl FrictionConstants {
         let information =
             DMatrix::from_fn(known + self.axes.len(), count + self.axes.len(), |row, column| match before {
                 Some(prior) if row < known && column < count => prior.sqrt_information()[(row, old(column))],
-                _ if row >= known && column == count + row - known => KNOWN_BEFOREHAND.recip(),
+                _ if row >= known && column == count + row - known => PRIOR_STD.recip(),
                 _ => 0.0,
             });
         problem.with_prior(mean, information)

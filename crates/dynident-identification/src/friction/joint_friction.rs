@@ -47,6 +47,7 @@ impl JointFriction {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FrictionConstant {
+    /// Term: `coulomb`, `directional-coulomb`, `stribeck`, `sigmoid` or `load`.
     pub term: String,
     /// Constant: `width`, `speed`, `exponent`, `steepness` or `offset_speed`.
     pub constant: String,

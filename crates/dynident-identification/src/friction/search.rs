@@ -19,7 +19,7 @@ use dynident_estimation::{FoldErrors, JointFolds};
 use dynident_model::terms::{CandidateRole, TorqueTerm};
 
 /// Maximum number of terms added to viscous friction and a step.
-const MOST_ADDED: usize = 3;
+const MAX_ADDED_TERMS: usize = 3;
 
 /// A candidate with its best constants.
 struct ScoredCandidate {
@@ -171,13 +171,13 @@ fn is_step_by_direction(kind: FrictionKind) -> bool {
 }
 
 /// Adds terms to `start` one at a time, always the one with the largest reduction of the error. All tried models are
-/// appended to `met`.
+/// appended to `tried`.
 fn add_terms(
     folds: &JointFolds,
     columns: &[CandidateColumn],
     start: Vec<FrictionKind>,
-    most_inflation: f64,
-    met: &mut Vec<ScoredCandidate>,
+    max_inflation: f64,
+    tried: &mut Vec<ScoredCandidate>,
 ) {
     let mut additions: Vec<FrictionKind> = columns
         .iter()
@@ -185,32 +185,32 @@ fn add_terms(
         .filter(|kind| matches!(kind.role, CandidateRole::InPlaceOf(_) | CandidateRole::Addition))
         .collect();
     additions.dedup();
-    let mut at = met.len();
-    met.push(tuned(folds, columns, start, None));
+    let mut at = tried.len();
+    tried.push(tuned(folds, columns, start, None));
     let is_distinct =
-        most_inflation == f64::INFINITY || asymmetry_inflation(folds, columns, &met[at]) <= most_inflation;
+        max_inflation == f64::INFINITY || asymmetry_inflation(folds, columns, &tried[at]) <= max_inflation;
     additions.retain(|kind| is_distinct || !is_step_by_direction(kind));
-    for _ in 0..MOST_ADDED {
-        let start = met.len();
+    for _ in 0..MAX_ADDED_TERMS {
+        let start = tried.len();
         for &added in &additions {
             let replaced = added.replaces();
-            let has = |kind: FrictionKind| met[at].kinds.contains(&kind);
+            let has = |kind: FrictionKind| tried[at].kinds.contains(&kind);
             if has(added) || replaced.is_some_and(|replaced| !has(replaced)) {
                 continue;
             }
             let mut kinds: Vec<FrictionKind> =
-                met[at].kinds.iter().copied().filter(|kind| Some(*kind) != replaced).collect();
+                tried[at].kinds.iter().copied().filter(|kind| Some(*kind) != replaced).collect();
             kinds.push(added);
             kinds.sort_by_key(|kind| kind.rank());
-            let with_constants_kept = tuned(folds, columns, kinds, Some(&met[at]));
-            met.push(with_constants_kept);
+            let with_constants_kept = tuned(folds, columns, kinds, Some(&tried[at]));
+            tried.push(with_constants_kept);
         }
         let Some(best) =
-            (start..met.len()).reduce(|a, b| if met[b].errors.rms() < met[a].errors.rms() { b } else { a })
+            (start..tried.len()).reduce(|a, b| if tried[b].errors.rms() < tried[a].errors.rms() { b } else { a })
         else {
             break;
         };
-        if met[best].errors.rms() >= met[at].errors.rms() {
+        if tried[best].errors.rms() >= tried[at].errors.rms() {
             break;
         }
         at = best;
@@ -222,26 +222,26 @@ pub(super) fn search(
     joint: String,
     scale: JointScale,
     count: usize,
-    most_inflation: f64,
+    max_inflation: f64,
     folds: &JointFolds,
     columns: &[CandidateColumn],
 ) -> (JointFriction, Vec<usize>) {
-    let mut met = Vec::new();
+    let mut tried = Vec::new();
     let of_role = |role: CandidateRole| TorqueTerm::candidates().filter(move |kind| kind.role == role);
     for start in of_role(CandidateRole::Start) {
         let kinds = of_role(CandidateRole::Base).chain([start]).collect();
-        add_terms(folds, columns, kinds, most_inflation, &mut met);
+        add_terms(folds, columns, kinds, max_inflation, &mut tried);
     }
     let least =
-        (0..met.len()).reduce(|a, b| if met[b].errors.rms() < met[a].errors.rms() { b } else { a }).unwrap_or(0);
-    let excess: Vec<[f64; 2]> = met.iter().map(|one| one.errors.excess_over(&met[least].errors)).collect();
+        (0..tried.len()).reduce(|a, b| if tried[b].errors.rms() < tried[a].errors.rms() { b } else { a }).unwrap_or(0);
+    let excess: Vec<[f64; 2]> = tried.iter().map(|one| one.errors.excess_over(&tried[least].errors)).collect();
     let within = |index: &usize| *index == least || excess[*index][0] <= excess[*index][1];
     // Among equally simple candidates, prefer the smaller error.
     let order = |a: &usize, b: &usize| {
-        let complexity = |index: usize| met[index].complexity(columns);
-        complexity(*a).cmp(&complexity(*b)).then(met[*a].errors.rms().total_cmp(&met[*b].errors.rms()))
+        let complexity = |index: usize| tried[index].complexity(columns);
+        complexity(*a).cmp(&complexity(*b)).then(tried[*a].errors.rms().total_cmp(&tried[*b].errors.rms()))
     };
-    let chosen = (0..met.len()).filter(within).min_by(order).unwrap_or(least);
+    let chosen = (0..tried.len()).filter(within).min_by(order).unwrap_or(least);
     let candidate = |(index, one): (usize, &ScoredCandidate)| FrictionCandidate {
         term: one.name(),
         parameters: one.parameters(columns),
@@ -254,14 +254,14 @@ pub(super) fn search(
         },
         chosen: index == chosen,
     };
-    let best = &met[chosen];
+    let best = &tried[chosen];
     let friction = JointFriction {
         joint,
         chosen: best.present_name(columns),
         terms: Some(with_one_step(best.terms(columns, scale))),
         constants: Vec::new(),
         folds: count,
-        candidates: met.iter().enumerate().map(candidate).collect(),
+        candidates: tried.iter().enumerate().map(candidate).collect(),
     };
     let present = best.kinds.iter().flat_map(|&kind| best.present(columns, kind)).map(|(place, _)| place).collect();
     (friction, present)

@@ -12,9 +12,9 @@ use dynident_model::terms::{CoulombShape, StepRole, TorqueTerm};
 
 /// Ratio of Coulomb step width to that of the Stribeck term (half the Stribeck velocity) above which both terms have
 /// exchanged their roles.
-const WIDE: f64 = 2.0;
+const MAX_WIDTH_RATIO: f64 = 2.0;
 /// Minimum ratio of Coulomb step width to that of the Stribeck term.
-const NARROW: f64 = 0.5;
+const MIN_WIDTH_RATIO: f64 = 0.5;
 
 /// The same terms with the step near the other minimum; `None` if they already are.
 pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Vec<TorqueTerm>> {
@@ -26,7 +26,7 @@ pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Ve
     let stribeck = terms.iter().find_map(own_width);
     let width = match (step, stribeck) {
         (CoulombShape::Sign { dead_band: 0.0 }, None) => scale.narrowest_width(),
-        (CoulombShape::Smooth { width }, Some(of_stribeck)) if width > WIDE * of_stribeck => of_stribeck,
+        (CoulombShape::Smooth { width }, Some(of_stribeck)) if width > MAX_WIDTH_RATIO * of_stribeck => of_stribeck,
         _ => return None,
     };
     let moved = |term: &TorqueTerm| {
@@ -40,7 +40,7 @@ pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Ve
 pub(crate) fn is_one_friction(terms: &[TorqueTerm]) -> bool {
     let width = |is_wanted: fn(&TorqueTerm) -> bool| terms.iter().filter(|term| is_wanted(term)).find_map(smooth_width);
     match (width(is_coulomb), width(|term| matches!(term.kind().step_role(), StepRole::Own { .. }))) {
-        (Some(coulomb), Some(stribeck)) => coulomb >= NARROW * stribeck,
+        (Some(coulomb), Some(stribeck)) => coulomb >= MIN_WIDTH_RATIO * stribeck,
         _ => true,
     }
 }

@@ -7,123 +7,124 @@
 //! term: with Stribeck friction that decays below the slowest velocities of the rows, only its tail is visible, and the
 //! coefficient, the torque at rest, is arbitrary.
 
+use crate::thresholds::FrictionThresholds;
 use dynident_dynamics::Column;
 use dynident_estimation::Estimate;
 use dynident_model::terms::{CandidateRole, TermAction, TorqueTerm};
 use nalgebra::{DMatrix, DVector};
 
-/// Critical values of Wald's test for a further term with 1, 2 and 3 degrees of freedom: χ² at 5 %. Stricter tests drop
-/// terms that improve the prediction although they are not the true ones.
-const SEEN: [f64; 3] = [3.84, 5.99, 7.81];
-/// The same at 1 %, for terms that only a second selection from the same motion adds, because every term is then tested
-/// twice.
-const SEEN_AT_SECOND_LOOK: [f64; 3] = [6.63, 9.21, 11.34];
-
-/// Minimum sum of squares of a Stribeck term's column, `Σ e^{-2|q̇/v_s|^δ}`, for supporting rows: less than one row at
-/// rest.
-const SHOWN: f64 = 1.0;
-
 /// A further term of a joint.
-struct Further {
+struct FurtherTerm {
     /// Wald statistic; 0 for negative friction or without supporting rows.
-    square: f64,
-    /// Degrees of freedom.
-    numbers: usize,
+    wald: f64,
+    degrees_of_freedom: usize,
     term: TorqueTerm,
     /// The joint's terms without it.
-    left: Vec<TorqueTerm>,
+    others: Vec<TorqueTerm>,
 }
 
-impl Further {
-    /// Ratio to the critical value.
-    fn in_units_of(&self, needed: &[f64; 3]) -> f64 {
-        self.square / needed[self.numbers - 1]
+impl FurtherTerm {
+    /// Ratio of the statistic to its critical value.
+    fn significance(&self, critical: &[f64; 3]) -> f64 {
+        self.wald / critical[self.degrees_of_freedom - 1]
     }
 }
 
-/// Further terms among the terms of a joint. `estimate` begins with the model's `columns`, whose norms over all rows
-/// are `norms`. `own_constants` returns the columns of a term's constants, as steps from their current values.
-fn further_terms(
-    terms: &[TorqueTerm],
-    columns: &[Column],
-    norms: &[f64],
-    estimate: &Estimate,
-    own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
-) -> Vec<Further> {
-    let place =
-        |term: &TorqueTerm| columns.iter().position(|column| matches!(column, Column::Term(own) if own == term));
-    let of = |term: &TorqueTerm| -> Option<Further> {
-        let own = place(term)?;
-        let without = |others: &[&TorqueTerm]| terms.iter().filter(|one| !others.contains(one)).cloned().collect();
-        let further = |square: f64, numbers: usize, left: Vec<TorqueTerm>| {
-            Some(Further { square, numbers, term: term.clone(), left })
-        };
-        if let Some([other, of_both]) = term.kind().both_directions() {
-            let other_place = place(&other)?;
-            let difference = estimate.values[own] - estimate.values[other_place];
-            let covariance = |a: usize, b: usize| estimate.covariance[(a, b)];
-            let variance =
-                covariance(own, own) + covariance(other_place, other_place) - 2.0 * covariance(own, other_place);
-            let mut left: Vec<TorqueTerm> = without(&[term, &other]);
-            left.push(of_both);
-            return further(difference * difference / variance.max(f64::MIN_POSITIVE), 1, left);
-        }
-        term.candidate().filter(|law| law.role == CandidateRole::Addition)?;
-        let left = without(&[term]);
-        // Reject terms with negative friction or without supporting rows.
-        let fades = matches!(term.action(), TermAction::Friction(friction) if friction.fading.is_some());
-        let is_shown = !fades || norms[own] * norms[own] >= SHOWN;
-        if !is_shown || (term.is_nonnegative() && estimate.values[own] <= 0.0) {
-            return further(0.0, 1, left);
-        }
-        let places: Vec<usize> = core::iter::once(own).chain(own_constants(term)).take(SEEN.len()).collect();
-        let x = DVector::from_iterator(places.len(), places.iter().map(|&place| estimate.values[place]));
-        let covariance =
-            DMatrix::from_fn(places.len(), places.len(), |a, b| estimate.covariance[(places[a], places[b])]);
-        further(x.dot(&covariance.cholesky()?.solve(&x)), places.len(), left)
-    };
-    terms.iter().filter_map(of).collect()
+/// Test of further terms in a fit.
+pub(super) struct TermTest<'a> {
+    /// Columns of the model.
+    pub(super) columns: &'a [Column],
+    /// Norms of these columns over all rows.
+    pub(super) norms: &'a [f64],
+    /// Estimate of these columns and then of other unknowns.
+    pub(super) estimate: &'a Estimate,
+    pub(super) thresholds: FrictionThresholds,
 }
 
 /// Criterion for weak further terms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Weak {
     /// Insignificant terms.
-    Unseen,
+    Insignificant,
     /// Only terms with negative friction or without supporting rows.
-    Unshown,
+    Unsupported,
 }
 
-/// The terms of a joint without the weakest further one; `None` if none is `weak`. Other arguments as in
-/// [`further_terms`].
-pub(super) fn without_weakest(
-    (terms, weak): (&[TorqueTerm], Weak),
-    columns: (&[Column], &[f64]),
-    estimate: &Estimate,
-    own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
-) -> Option<Vec<TorqueTerm>> {
-    let of = |further: Further| (further.in_units_of(&SEEN), further.left);
-    let further = further_terms(terms, columns.0, columns.1, estimate, own_constants).into_iter().map(of);
-    let (seen, left) = further.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let is_weak = match weak {
-        Weak::Unseen => seen < 1.0,
-        Weak::Unshown => seen <= 0.0,
-    };
-    is_weak.then_some(left)
-}
+impl TermTest<'_> {
+    /// Further terms among the terms of a joint. `own_constants` returns the columns of a term's constants in the
+    /// estimate, as steps from their current values.
+    fn further_terms(
+        &self,
+        terms: &[TorqueTerm],
+        own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
+    ) -> Vec<FurtherTerm> {
+        let Self { columns, norms, estimate, thresholds } = self;
+        let place =
+            |term: &TorqueTerm| columns.iter().position(|column| matches!(column, Column::Term(own) if own == term));
+        let of = |term: &TorqueTerm| -> Option<FurtherTerm> {
+            let own = place(term)?;
+            let without = |others: &[&TorqueTerm]| terms.iter().filter(|one| !others.contains(one)).cloned().collect();
+            let further = |wald: f64, degrees_of_freedom: usize, others: Vec<TorqueTerm>| {
+                Some(FurtherTerm { wald, degrees_of_freedom, term: term.clone(), others })
+            };
+            if let Some([other, of_both]) = term.kind().both_directions() {
+                let other_place = place(&other)?;
+                let difference = estimate.values[own] - estimate.values[other_place];
+                let covariance = |a: usize, b: usize| estimate.covariance[(a, b)];
+                let variance =
+                    covariance(own, own) + covariance(other_place, other_place) - 2.0 * covariance(own, other_place);
+                let mut left: Vec<TorqueTerm> = without(&[term, &other]);
+                left.push(of_both);
+                return further(difference * difference / variance.max(f64::MIN_POSITIVE), 1, left);
+            }
+            term.candidate().filter(|law| law.role == CandidateRole::Addition)?;
+            let left = without(&[term]);
+            // Reject terms with negative friction or without supporting rows.
+            let fades = matches!(term.action(), TermAction::Friction(friction) if friction.fading.is_some());
+            let is_shown = !fades || norms[own] * norms[own] >= thresholds.min_column_square_sum;
+            if !is_shown || (term.is_nonnegative() && estimate.values[own] <= 0.0) {
+                return further(0.0, 1, left);
+            }
+            let places: Vec<usize> =
+                core::iter::once(own).chain(own_constants(term)).take(thresholds.term_chi_square.len()).collect();
+            let x = DVector::from_iterator(places.len(), places.iter().map(|&place| estimate.values[place]));
+            let covariance =
+                DMatrix::from_fn(places.len(), places.len(), |a, b| estimate.covariance[(places[a], places[b])]);
+            further(x.dot(&covariance.cholesky()?.solve(&x)), places.len(), left)
+        };
+        terms.iter().filter_map(of).collect()
+    }
 
-/// Whether a joint has possibly insignificant further terms that were not in its first selection, `before`. Other
-/// arguments as in [`further_terms`].
-pub(super) fn has_doubtful_term(
-    (terms, before): (&[TorqueTerm], &[TorqueTerm]),
-    columns: (&[Column], &[f64]),
-    estimate: &Estimate,
-    own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
-) -> bool {
-    let kind = core::mem::discriminant;
-    let is_new = |further: &Further| !before.iter().any(|one| kind(one) == kind(&further.term));
-    let further = further_terms(terms, columns.0, columns.1, estimate, own_constants);
-    further.iter().any(|further| is_new(further) && further.in_units_of(&SEEN_AT_SECOND_LOOK) < 1.0)
+    /// The terms of a joint without the weakest further one; `None` if none is `weak`.
+    pub(super) fn without_weakest(
+        &self,
+        terms: &[TorqueTerm],
+        weak: Weak,
+        own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
+    ) -> Option<Vec<TorqueTerm>> {
+        let of = |further: FurtherTerm| (further.significance(&self.thresholds.term_chi_square), further.others);
+        let further = self.further_terms(terms, own_constants).into_iter().map(of);
+        let (significance, others) = further.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let is_weak = match weak {
+            Weak::Insignificant => significance < 1.0,
+            Weak::Unsupported => significance <= 0.0,
+        };
+        is_weak.then_some(others)
+    }
+
+    /// Whether a joint has possibly insignificant further terms that were not in its first selection, `before`.
+    pub(super) fn has_doubtful_term(
+        &self,
+        terms: &[TorqueTerm],
+        before: &[TorqueTerm],
+        own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
+    ) -> bool {
+        let kind = core::mem::discriminant;
+        let is_new = |further: &FurtherTerm| !before.iter().any(|one| kind(one) == kind(&further.term));
+        let critical = &self.thresholds.second_selection_chi_square;
+        let further = self.further_terms(terms, own_constants);
+        further.iter().any(|further| is_new(further) && further.significance(critical) < 1.0)
+    }
 }
 
 #[cfg(test)]
@@ -160,9 +161,11 @@ mod tests {
         // Both estimates are far above their error bars.
         assert!(estimate.values[1] > 5.0 * estimate.std[1], "{} +- {}", estimate.values[1], estimate.std[1]);
         let norms = problem.column_norms();
-        let without = |weak| without_weakest((&terms, weak), (&columns, &norms), &estimate, |_| Vec::new());
-        assert_eq!(without(Weak::Unshown), without(Weak::Unseen));
-        without(Weak::Unseen)
+        let thresholds = FrictionThresholds::default();
+        let test = TermTest { columns: &columns, norms: &norms, estimate: &estimate, thresholds };
+        let without = |weak| test.without_weakest(&terms, weak, |_| Vec::new());
+        assert_eq!(without(Weak::Unsupported), without(Weak::Insignificant));
+        without(Weak::Insignificant)
     }
 
     /// Coulomb friction of 5.0 and 5.085 Nm by direction, with an error bar of 0.035 Nm for the difference. At two and
@@ -190,20 +193,22 @@ mod tests {
         let settings = OrdinarySettings { covariance: CovarianceMethod::White, ..OrdinarySettings::default() };
         let estimate = ordinary_least_squares(&problem, &settings).unwrap();
         let norms = problem.column_norms();
-        let further = further_terms(&terms, &columns, &norms, &estimate, |_| Vec::new());
+        let thresholds = FrictionThresholds::default();
+        let test = TermTest { columns: &columns, norms: &norms, estimate: &estimate, thresholds };
+        let further = test.further_terms(&terms, |_| Vec::new());
         assert_eq!(further.len(), 1);
-        assert!((SEEN[0]..SEEN_AT_SECOND_LOOK[0]).contains(&further[0].square), "{}", further[0].square);
+        let range = thresholds.term_chi_square[0]..thresholds.second_selection_chi_square[0];
+        assert!(range.contains(&further[0].wald), "{}", further[0].wald);
 
         let plain = [TorqueTerm::Coulomb(Coulomb { joint: 0, shape })];
-        let is_doubtful =
-            |before: &[TorqueTerm]| has_doubtful_term((&terms, before), (&columns, &norms), &estimate, |_| Vec::new());
-        let without =
-            |weak, estimate: &_| without_weakest((&terms, weak), (&columns, &norms), estimate, |_| Vec::new());
-        assert_eq!(without(Weak::Unseen, &estimate), None);
+        let is_doubtful = |before: &[TorqueTerm]| test.has_doubtful_term(&terms, before, |_| Vec::new());
+        assert_eq!(test.without_weakest(&terms, Weak::Insignificant, |_| Vec::new()), None);
         // A weak term can still have supporting rows.
         let blurred = estimate.with_further_error(&DMatrix::from_diagonal_element(2, 2, 1.0));
-        assert_eq!(without(Weak::Unseen, &blurred).as_deref(), Some(&plain[..]));
-        assert_eq!(without(Weak::Unshown, &blurred), None);
+        let of_blurred = TermTest { columns: &columns, norms: &norms, estimate: &blurred, thresholds };
+        let without = |weak| of_blurred.without_weakest(&terms, weak, |_| Vec::new());
+        assert_eq!(without(Weak::Insignificant).as_deref(), Some(&plain[..]));
+        assert_eq!(without(Weak::Unsupported), None);
         assert!(is_doubtful(&plain) && !is_doubtful(&terms));
     }
 

@@ -15,13 +15,6 @@ use dynident_recording::log::OneOrMany;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Minimum shift of a parameter, relative to its error bar, for a lag to be compensated.
-const MATTERS: f64 = 0.3;
-/// Standard deviations of χ² above which one common lag is rejected.
-const UNLIKE: f64 = 4.0;
-/// Minimum share of the squared residual that a joint's own lag explains for a separate lag. Unmodelled friction looks
-/// like a lag but explains less.
-const OWN_SHARE: f64 = 0.5;
 /// Halvings of the interval of the spread between joints.
 const BISECTIONS: usize = 20;
 
@@ -45,6 +38,7 @@ pub enum LagKind {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LagChoice {
+    /// Kind of the compensated lag.
     pub kind: LagKind,
     /// Compensated lag of each joint, s; empty if none.
     pub lag_s: Vec<f64>,
@@ -112,11 +106,16 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
     };
     let total = |rest: &dyn Fn(usize) -> f64| (0..dof).map(|joint| before(joint) + rest(joint)).collect::<Vec<f64>>();
     let as_before = LagChoice { lag_s: taken_off.to_vec(), ..LagChoice::default() };
-    let all = telling_joints(fit);
-    let Some(Mean { lag, scatter, .. }) = common(fit, &all) else { return as_before };
+    let all = informative_joints(fit);
+    let Some(CommonLag { lag, scatter, .. }) = common(fit, &all) else { return as_before };
+    let thresholds = &fit.thresholds;
     let matters = |rest: &[f64]| {
         let moved = fit.answers() * DVector::from_column_slice(rest);
-        moved.iter().take(fit.parameters).zip(&estimate.std).any(|(moved, std)| moved.abs() > MATTERS * std)
+        moved
+            .iter()
+            .take(fit.parameters)
+            .zip(&estimate.std)
+            .any(|(moved, std)| moved.abs() > thresholds.min_parameter_shift * std)
     };
     let choice = LagChoice { common: Some(lag.after(taken_off_s)), scatter, ..as_before };
 
@@ -128,9 +127,11 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
 
     // Separate lags of joints, if they explain much of the residual and a common lag does not.
     let freedoms = all.len().saturating_sub(1) as f64;
-    let unlike = scatter.is_some_and(|scatter| (scatter - 1.0) * freedoms > UNLIKE * (2.0 * freedoms).sqrt());
-    let may_own = unlike && candidates == LagCandidates::CommonOrJoints;
-    let own: Vec<usize> = all.iter().copied().filter(|&joint| may_own && fit.share(joint) > OWN_SHARE).collect();
+    let is_scattered = scatter
+        .is_some_and(|scatter| (scatter - 1.0) * freedoms > thresholds.max_scatter_std * (2.0 * freedoms).sqrt());
+    let may_be_separate = is_scattered && candidates == LagCandidates::CommonOrJoints;
+    let is_own = |joint: usize| may_be_separate && fit.share(joint) > thresholds.min_own_share;
+    let own: Vec<usize> = all.iter().copied().filter(|&joint| is_own(joint)).collect();
     if !own.is_empty() {
         let others: Vec<usize> = all.iter().copied().filter(|joint| !own.contains(joint)).collect();
         let of_others =
@@ -166,7 +167,7 @@ fn lag_error(fit: &LagFit, choice: &LagChoice, candidates: LagCandidates) -> Opt
             let std_s = if choice.kind == LagKind::None { usual(shared.std_s) } else { shared.std_s };
             let of_all = answers.column_sum() * std_s;
             let of_all = DMatrix::from_column_slice(of_all.len(), 1, of_all.as_slice());
-            let telling = telling_joints(fit);
+            let telling = informative_joints(fit);
             let spread_s = match candidates {
                 LagCandidates::CommonOrJoints => 0.0,
                 LagCandidates::Common => common(fit, &telling).map_or(0.0, |mean| mean.spread_s),
@@ -207,7 +208,7 @@ pub(crate) fn gain_errors(fit: &LagFit, choice: &LagChoice) -> Vec<f64> {
 
 /// Joints whose lags are more precise than the prior, or all joints with a lag if there are none. A joint at rest only
 /// has a lag of its noise.
-fn telling_joints(fit: &LagFit) -> Vec<usize> {
+fn informative_joints(fit: &LagFit) -> Vec<usize> {
     let lags = fit.joints.iter().enumerate().filter_map(|(joint, lag)| Some((joint, lag.as_ref()?)));
     let telling: Vec<usize> =
         lags.clone().filter(|(_, lag)| lag.std_s < fit.usual_lag_s).map(|(joint, _)| joint).collect();
@@ -219,7 +220,7 @@ fn is_beyond_its_bar(lag: &TorqueLag) -> bool {
 }
 
 /// Common lag of some joints.
-struct Mean {
+struct CommonLag {
     lag: TorqueLag,
     scatter: Option<f64>,
     /// Standard deviation of the joints' lags about it beyond their own errors, s.
@@ -230,7 +231,7 @@ struct Mean {
 /// `χ²(τ) = n − 1` (Paule and Mandel, J. Res. NBS 87 (1982) 377). Unmodelled friction has one sign at all joints and
 /// does not average out, so the interval that decides about a lag includes the whole spread. The standard deviation,
 /// which widens the error bars of the parameters, is that of the mean.
-fn common(fit: &LagFit, joints: &[usize]) -> Option<Mean> {
+fn common(fit: &LagFit, joints: &[usize]) -> Option<CommonLag> {
     let lags: Vec<TorqueLag> = joints.iter().filter_map(|&joint| fit.joints[joint]).collect();
     let covariance = fit.covariance(joints);
     let values = DVector::from_iterator(lags.len(), lags.iter().map(|lag| lag.lag_s));
@@ -257,7 +258,7 @@ fn common(fit: &LagFit, joints: &[usize]) -> Option<Mean> {
     let (lag_s, half_width_95_s) = (shared.mean, quantile * std_s.hypot(spread));
     let matters = lag_s.abs() > half_width_95_s && lags.iter().any(|lag| lag.matters);
     let scatter = (freedoms > 0.0).then(|| alone.chi_square / freedoms);
-    (std_s.is_finite() && lag_s.is_finite()).then_some(Mean {
+    (std_s.is_finite() && lag_s.is_finite()).then_some(CommonLag {
         lag: TorqueLag { lag_s, std_s, half_width_95_s, matters, taken_off_s: 0.0 },
         scatter,
         spread_s: spread,

@@ -12,6 +12,7 @@ use super::samples::DelayCheck;
 use super::unknowns::Unknowns;
 use crate::estimators::EstimationSettings;
 use crate::log_noise::{LogNoise, weighted_by_log};
+use crate::thresholds::LagThresholds;
 use dynident_estimation::{
     Estimate, EstimationError, LinearProblem, SegmentedFactor, weighted_least_squares, weighted_values,
 };
@@ -19,15 +20,12 @@ use dynident_rows::{Logs, RegressorModel};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Prior standard deviation of a lag of a drive or a bus, in seconds for an arm of usual size
-/// ([`OwnScale`](dynident_model::OwnScale)). Drives and buses are as fast as their machine needs.
-const USUAL_LAG_S: f64 = 5.0e-3;
 /// Maximum lag in the search, in seconds for an arm of usual size; drives and buses stay below.
 pub(crate) const LONGEST_DELAY_S: f64 = 0.1;
 /// Maximum number of steps; two to four are usual.
-const MOST_STEPS: usize = 12;
+const MAX_STEPS: usize = 12;
 /// Convergence: no lag moves by more than this ratio of its standard deviation, or by this number of samples.
-const SETTLED: (f64, f64) = (0.02, 1.0e-6);
+const CONVERGENCE: (f64, f64) = (0.02, 1.0e-6);
 
 /// Lags by joint, with the parameters estimated together with them.
 #[derive(Debug)]
@@ -44,6 +42,7 @@ pub struct LagFit {
     pub(crate) rows: Vec<usize>,
     /// Prior standard deviation of a lag, s.
     pub(crate) usual_lag_s: f64,
+    pub(crate) thresholds: LagThresholds,
 }
 
 impl LagFit {
@@ -126,7 +125,7 @@ fn fitted(
     let cutoff_hz = logs.motion.differentiator.cutoff_hz();
     let dof = model.model().dof();
     let own = model.model().own_scale();
-    let longest_s = own.seconds(LONGEST_DELAY_S);
+    let longest_s = own.seconds(settings.thresholds.lag.max_lag_s);
     let start = |joint: usize| {
         let coarse = |check: &DelayCheck<'_>| Some(check.coarse(joint, cutoff_hz, longest_s)? / check.rate_hz());
         checks.iter().find_map(coarse).unwrap_or(0.0).clamp(-longest_s, longest_s)
@@ -139,16 +138,16 @@ fn fitted(
     let mut samples = Samples::new(checks, unknowns, with, (0..dof).into_par_iter().map(start).collect())?;
     let first = unknowns.count();
     let fastest_hz = checks.iter().map(DelayCheck::rate_hz).fold(0.0, f64::max);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let step = weighted_values(&weighted(samples.problem(|rows| &rows.merged)?)?, &settings.weighted())?;
-        let mut has_settled = true;
+        let mut has_converged = true;
         for joint in 0..dof {
             let (rest, std) = (step.values[first + joint], step.white_std[first + joint]);
-            has_settled &= rest.abs() <= (SETTLED.0 * std).max(SETTLED.1 / fastest_hz);
+            has_converged &= rest.abs() <= (CONVERGENCE.0 * std).max(CONVERGENCE.1 / fastest_hz);
             samples.lag_s[joint] = (samples.lag_s[joint] + rest).clamp(-longest_s, longest_s);
         }
         samples.follow()?;
-        if has_settled {
+        if has_converged {
             break;
         }
     }
@@ -156,8 +155,9 @@ fn fitted(
     let joints = (0..dof).map(|joint| samples.joint_lag(&last, first + joint, longest_s, fastest_hz)).collect();
     let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
     let rows = (0..dof).map(of_joint).collect();
-    let usual_lag_s = own.seconds(USUAL_LAG_S);
-    Ok(LagFit { parameters: unknowns.values.len(), first, joints, rows, last, usual_lag_s })
+    let usual_lag_s = own.seconds(settings.thresholds.lag.prior_std_s);
+    let (parameters, thresholds) = (unknowns.values.len(), settings.thresholds.lag);
+    Ok(LagFit { last, parameters, first, joints, rows, usual_lag_s, thresholds })
 }
 
 impl<'a> Samples<'a> {
@@ -194,9 +194,9 @@ impl<'a> Samples<'a> {
         let (rest, std) = (last.values[column], last.std[column]);
         let lag_s = self.lag_s[joint] + rest;
         let excited = last.rank.fixed.iter().all(|fixed| fixed.column != column);
-        let settled = rest.abs() <= (0.5 * std).max(1.0e3 * SETTLED.1 / fastest_hz);
+        let converged = rest.abs() <= (0.5 * std).max(1.0e3 * CONVERGENCE.1 / fastest_hz);
         let half_width = last.half_width_95[column];
-        if !excited || !settled || lag_s.abs() >= 0.999 * longest_s || half_width >= longest_s {
+        if !excited || !converged || lag_s.abs() >= 0.999 * longest_s || half_width >= longest_s {
             return None;
         }
         let of_log = |(check, rows): (&DelayCheck<'_>, &Vec<DelayRows>)| {

@@ -4,7 +4,7 @@ use dynident_recording::{Finding, Level};
 use serde::{Deserialize, Serialize};
 
 /// Lags and error bars below a picosecond are rounding errors.
-const ROUNDING_S: f64 = 1.0e-12;
+const MIN_STD_S: f64 = 1.0e-12;
 
 /// Lag of one joint's torque behind the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,7 +33,7 @@ impl TorqueLag {
 /// Common lag of several logs: the mean weighted by their variances. If logs differ by more than their error bars, the
 /// error bar grows accordingly (Birge, Phys. Rev. 40 (1932) 207).
 pub fn pooled_delay(lags: &[TorqueLag]) -> Option<TorqueLag> {
-    let weight = |lag: &TorqueLag| lag.std_s.max(ROUNDING_S).powi(-2);
+    let weight = |lag: &TorqueLag| lag.std_s.max(MIN_STD_S).powi(-2);
     let total: f64 = lags.iter().map(weight).sum();
     let first = lags.first()?;
     let mean = lags.iter().map(|lag| weight(lag) * lag.lag_s).sum::<f64>() / total;

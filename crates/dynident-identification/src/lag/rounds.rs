@@ -8,7 +8,7 @@ use dynident_recording::log::OneOrMany;
 use nalgebra::DMatrix;
 
 /// Maximum number of rounds; one or two are usual.
-const MOST_ROUNDS: usize = 3;
+const MAX_ROUNDS: usize = 3;
 
 /// Repeats fit and lag estimation until no significant lag is left in the rows. Begin with the default, fit without
 /// [`torque_lag_s`](Self::torque_lag_s), and continue while [`again`](Self::again) returns true.
@@ -42,7 +42,7 @@ impl LagRounds {
     pub fn again(&mut self, fit: Option<&LagFit>, estimate: &Estimate) -> bool {
         let Some(fit) = fit else { return false };
         let next = choose_lag(fit, &self.choice.lag_s, estimate, self.candidates);
-        if next.kind != LagKind::None && self.done < MOST_ROUNDS {
+        if next.kind != LagKind::None && self.done < MAX_ROUNDS {
             self.choice = next;
             self.done += 1;
             return true;

@@ -10,9 +10,9 @@ use dynident_rows::{JointRows, Logs, RawSamples, RegressorModel, motion_band_hz,
 pub(crate) const DELAY_SAMPLES: usize = 20_000;
 /// Samples of the low-passed signal per period of its cut-off for the correlation. A parabola through three of them
 /// finds a peak within a thousandth of the period.
-const COMPARED: f64 = 20.0;
+const SAMPLES_PER_PERIOD: f64 = 20.0;
 /// Maximum number of values that are kept (64 MB).
-const MOST_NUMBERS: usize = 8_000_000;
+const MAX_KEPT_VALUES: usize = 8_000_000;
 
 /// Collects the first samples of a log and determines their lags.
 pub(crate) struct DelayCheck<'a> {
@@ -42,7 +42,7 @@ impl<'a> DelayCheck<'a> {
     }
 
     pub(super) fn take_raw(&mut self, samples: &RawSamples<'_>) {
-        self.full |= self.samples >= DELAY_SAMPLES || self.numbers >= MOST_NUMBERS;
+        self.full |= self.samples >= DELAY_SAMPLES || self.numbers >= MAX_KEPT_VALUES;
         if self.full {
             return;
         }
@@ -82,7 +82,7 @@ impl<'a> DelayCheck<'a> {
     /// Start value, samples: the best match of prediction and torque, if a shift matters.
     pub(crate) fn coarse(&self, joint: usize, cutoff_hz: Option<f64>, longest_s: f64) -> Option<f64> {
         let piece = self.pieces.iter().max_by_key(|piece| piece.measured[joint].len())?;
-        let factor = cutoff_hz.map_or(1, |hz| (self.rate_hz / (COMPARED * hz)).clamp(1.0, 1000.0) as usize);
+        let factor = cutoff_hz.map_or(1, |hz| (self.rate_hz / (SAMPLES_PER_PERIOD * hz)).clamp(1.0, 1000.0) as usize);
         let settings = DecimationSettings { factor, cutoff_hz, ..DecimationSettings::default() };
         let smooth = |signal: &[f64]| -> Option<Vec<f64>> {
             let mut out = Vec::new();

@@ -9,14 +9,14 @@ use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
 /// Radius of gyration about the link's origin, m, of the reference body for undetermined parameters.
-const LENGTH_M: f64 = 0.1;
+const GYRATION_RADIUS_M: f64 = 0.1;
 /// Relative tolerance of a known mass; an interior-point solver needs some room.
-const MASS_WIDTH: f64 = 1.0e-4;
+const MASS_TOLERANCE: f64 = 1.0e-4;
 /// Minimum mass of the reference body, kg.
-const LEAST_MASS_KG: f64 = 0.01;
+const MIN_MASS_KG: f64 = 0.01;
 /// Minimum standard deviation relative to a body of this size. Noise-free logs would make the prior vanish in double
 /// precision.
-const LEAST_RELATIVE_STD: f64 = 1.0e-5;
+const MIN_RELATIVE_STD: f64 = 1.0e-5;
 
 pub(crate) fn at_centre_of_mass(p: &[f64; 10]) -> [f64; 10] {
     let (m, h) = (p[0], [p[1], p[2], p[3]]);
@@ -71,9 +71,9 @@ pub(crate) fn nearest_consistent_body(
     let determined: Vec<usize> = (0..n).filter(|place| !fixed(place)).collect();
     let value = |place: usize| estimate.values[columns.first + place];
     let known_mass = columns.mass.as_ref().map(|(mass, _)| *mass);
-    let estimated = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(LEAST_MASS_KG);
+    let estimated = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(MIN_MASS_KG);
     let mass = known_mass.unwrap_or(estimated);
-    let reference = rough_body(mass, LENGTH_M);
+    let reference = rough_body(mass, GYRATION_RADIUS_M);
     // Sum of both covariances, because one from few segments is singular.
     let entry = |i: usize, j: usize| estimate.covariance[(i, j)] + estimate.covariance_white[(i, j)];
     let mut covariance = DMatrix::from_fn(determined.len(), determined.len(), |i, j| {
@@ -82,10 +82,10 @@ pub(crate) fn nearest_consistent_body(
     for (i, &place) in determined.iter().enumerate() {
         let length = match columns.kept[place] {
             0 => 1.0,
-            1..=3 => LENGTH_M,
-            _ => LENGTH_M * LENGTH_M,
+            1..=3 => GYRATION_RADIUS_M,
+            _ => GYRATION_RADIUS_M * GYRATION_RADIUS_M,
         };
-        covariance[(i, i)] += (LEAST_RELATIVE_STD * mass * length).powi(2);
+        covariance[(i, i)] += (MIN_RELATIVE_STD * mass * length).powi(2);
     }
     // V = L Lᵀ: rows L⁻¹ φ = L⁻¹ φ̂ have unit noise.
     let lower = covariance.cholesky().ok_or(NoBodyError::Covariance)?.l();
@@ -100,7 +100,7 @@ pub(crate) fn nearest_consistent_body(
     panel[n * determined.len()..].copy_from_slice(target.as_slice());
     let factor = TriangularFactor::from_rows(n, &panel, determined.len())?;
     let map = BaseMap::from_regrouping(&columns.kept, &columns.dropped, &columns.regrouping)?;
-    let mass_kg = known_mass.map(|mass| [mass * (1.0 - MASS_WIDTH), mass * (1.0 + MASS_WIDTH)]);
+    let mass_kg = known_mass.map(|mass| [mass * (1.0 - MASS_TOLERANCE), mass * (1.0 + MASS_TOLERANCE)]);
     let body = PhysicalBody { name: name.to_owned(), reference, known: None, mass_kg, com_box_m: None, inside: None };
     let problem = PhysicalProblem::new(map, vec![body], Vec::new(), &factor)?;
     Ok(physical_fit(&problem, &PhysicalSettings::default())?)

@@ -17,9 +17,9 @@ use nalgebra::{DMatrix, DVector};
 
 /// Relative tolerance below which a payload's parameter is a combination of earlier ones; the structure is accurate to
 /// about 1e-9.
-const DEPENDENT: f64 = 1.0e-6;
+const DEPENDENCE_TOLERANCE: f64 = 1.0e-6;
 /// Minimum coefficient of a dropped parameter in a sum.
-const IN_SUM: f64 = 1.0e-9;
+const MIN_COEFFICIENT: f64 = 1.0e-9;
 
 /// A payload at a link of the robot. A [`Recording`] refers to it by name.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,7 +124,7 @@ impl LoadColumns {
             let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
             let unit = |k: usize| if norms[k] > 0.0 { norms[k] } else { 1.0 };
             let scaled = DMatrix::from_fn(matrix.nrows(), 10, |row, k| matrix[(row, k)] / unit(k));
-            let split = independent_columns(&scaled, DEPENDENT);
+            let split = independent_columns(&scaled, DEPENDENCE_TOLERANCE);
             let (kept, dropped) = (split.independent, split.dependent);
             let regrouping = DMatrix::from_fn(kept.len(), dropped.len(), |row, column| {
                 split.regrouping[(row, column)] * unit(dropped[column]) / unit(kept[row])
@@ -325,7 +325,8 @@ impl PayloadColumns {
             let further = self.dropped.iter().enumerate().filter_map(|(column, &dropped)| {
                 let share = self.regrouping[(row, column)];
                 let sign = if share < 0.0 { "-" } else { "+" };
-                (share.abs() > IN_SUM).then(|| format!(" {sign} {:.4} {}", share.abs(), INERTIAL_NAMES[dropped]))
+                (share.abs() > MIN_COEFFICIENT)
+                    .then(|| format!(" {sign} {:.4} {}", share.abs(), INERTIAL_NAMES[dropped]))
             });
             format!("{}{}", INERTIAL_NAMES[kept], further.collect::<String>())
         };
@@ -334,7 +335,7 @@ impl PayloadColumns {
 
     /// Whether kept parameter `row` is a single parameter.
     pub(crate) fn alone(&self, row: usize) -> bool {
-        self.regrouping.row(row).iter().all(|share| share.abs() <= IN_SUM)
+        self.regrouping.row(row).iter().all(|share| share.abs() <= MIN_COEFFICIENT)
     }
 }
 

@@ -18,6 +18,7 @@ pub enum PayloadError {
     /// The link does not exist.
     #[error("payload at link `{link}`: no moving link has this name; the moving links are {}", known.join(", "))]
     UnknownLink {
+        /// Name of the link.
         link: String,
         /// Links of the robot.
         known: Vec<String>,

@@ -7,9 +7,6 @@ use dynident_estimation::{Estimate, EstimationError, GainProblem, JointGain, Lin
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Maximum relative half width of a gain's interval for a determined gain.
-const WIDEST: f64 = 0.5;
-
 /// The drive gain of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -71,15 +68,19 @@ pub(crate) fn drive_gains(
     let scale: Vec<f64> = found.gains.iter().map(|gain| gain.gain).collect();
     let problem = in_newton_metres(rows, known, &scale)?;
     let estimate = without_gains(found.estimate, rows.columns().len(), &scale);
-    Ok(Gains { of_joints: found.gains.into_iter().map(drive_gain).collect(), estimate, problem })
+    let of_joint = |gain| drive_gain(gain, settings.thresholds.gain.max_half_width);
+    Ok(Gains { of_joints: found.gains.into_iter().map(of_joint).collect(), estimate, problem })
 }
 
-fn drive_gain(gain: JointGain) -> DriveGain {
-    let wide = gain.half_width_95 > WIDEST * gain.gain.abs();
+fn drive_gain(gain: JointGain, max_half_width: f64) -> DriveGain {
+    let wide = gain.half_width_95 > max_half_width * gain.gain.abs();
     let reason = if !gain.identified {
         Some("joint does not feel the payload, so any gain fits equally well; move it so that the payload's weight or inertia loads it".to_owned())
     } else if wide {
-        Some("joint hardly feels the payload: the half width of its interval exceeds half its value; use a heavier payload, a larger distance, or a motion that loads the joint more".to_owned())
+        Some(format!(
+            "joint hardly feels the payload: the half width of its interval exceeds {:.0} % of its value; use a heavier payload, a larger distance, or a motion that loads the joint more",
+            100.0 * max_half_width
+        ))
     } else {
         None
     };

@@ -18,20 +18,20 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
 /// Sample rate of the copy, in units of the highest candidate.
-const RATE: f64 = 4.0;
+const RATE_RATIO: f64 = 4.0;
 /// Maximum number of samples of all pieces; enough to compare errors, within milliseconds.
-const MOST_SAMPLES: usize = 4096;
+const MAX_SAMPLES: usize = 4096;
 /// Number of simulated copies.
 const COPIES: usize = 4;
 /// Minimum length of a piece, samples.
-const SHORTEST: usize = 32;
+const MIN_PIECE_SAMPLES: usize = 32;
 /// For each copy the shift of the torque noise, relative to the length of a piece.
-const SHIFTS: [f64; COPIES] = [0.29, 0.53, 0.83, 0.11];
+const NOISE_SHIFTS: [f64; COPIES] = [0.29, 0.53, 0.83, 0.11];
 /// Minimum share of the torque noise's power that is kept if the position noise seems to explain all of it.
-const LEAST_LEFT: f64 = 1.0e-4;
+const MIN_NOISE_SHARE: f64 = 1.0e-4;
 /// Length of the end effects, in periods of the slowest cut-off.
-const INVENTED: f64 = 1.5;
-const GOLDEN: f64 = 1.618_033_988_749_895;
+const END_EFFECT_PERIODS: f64 = 1.5;
+const GOLDEN_RATIO: f64 = 1.618_033_988_749_895;
 const SEED: u64 = 0x005E_ED0F_7157;
 
 /// One uninterrupted piece.
@@ -49,7 +49,7 @@ struct Measured {
 }
 
 /// Motion and noise of the recordings, with known parameters.
-pub(super) struct StandIn {
+pub(super) struct SimulatedCopies {
     pieces: Vec<Piece>,
     /// By copy, then by piece.
     copies: Vec<Vec<Measured>>,
@@ -100,7 +100,7 @@ struct ReadLogs {
     /// Samples read.
     used: u64,
     /// Samples of the complete logs.
-    seen: u64,
+    total: u64,
 }
 
 impl ReadLogs {
@@ -113,7 +113,7 @@ impl ReadLogs {
             noise_squares: vec![0.0; dof],
             reference_hz: vec![0.0; dof],
             used: 0,
-            seen: 0,
+            total: 0,
         }
     }
 
@@ -132,7 +132,7 @@ impl ReadLogs {
         let places = recording.places(model.model())?;
         if self.log_rate_hz == 0.0 {
             self.log_rate_hz = rate_hz;
-            self.thinning = (rate_hz / (RATE * highest_hz)).floor().clamp(1.0, 1000.0) as usize;
+            self.thinning = (rate_hz / (RATE_RATIO * highest_hz)).floor().clamp(1.0, 1000.0) as usize;
         } else if (rate_hz / self.log_rate_hz - 1.0).abs() > 0.01 {
             return Ok(());
         }
@@ -140,10 +140,10 @@ impl ReadLogs {
         let motion = recording.in_log_order(model.model(), motion)?.into_owned();
         let motion = MotionSettings { smooth_torque: false, ..motion };
         let faded = &spectrum.faded_hz;
-        let asked = spectrum.joints_hz.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        let suggested = spectrum.joints_hz.iter().flatten().copied().fold(f64::INFINITY, f64::min);
         let build = || -> Result<Box<dyn Differentiator>, FilterError> {
             let of = |hz: &Option<f64>| {
-                let cutoff_hz = hz.unwrap_or(asked).min(highest_hz).min(0.4 * rate_hz);
+                let cutoff_hz = hz.unwrap_or(suggested).min(highest_hz).min(0.4 * rate_hz);
                 ButterworthZeroPhase::new(4, cutoff_hz)
             };
             Ok(Box::new(JointByJoint(faded.iter().map(of).collect::<Result<_, _>>()?)))
@@ -166,9 +166,9 @@ impl ReadLogs {
             samples += rows;
         }
         self.used += samples as u64;
-        self.seen += recording.rows_of_whole().unwrap_or(samples as u64).max(samples as u64);
+        self.total += recording.rows_of_whole().unwrap_or(samples as u64).max(samples as u64);
         for (joint, &place) in places.iter().enumerate() {
-            let reference_hz = faded[place].unwrap_or(asked).min(highest_hz);
+            let reference_hz = faded[place].unwrap_or(suggested).min(highest_hz);
             self.reference_hz[joint] = self.reference_hz[joint].max(reference_hz);
             let noise = position_noise.get(place).copied().unwrap_or(0.0);
             self.noise_squares[joint] = self.noise_squares[joint].max(noise * noise);
@@ -178,7 +178,7 @@ impl ReadLogs {
     }
 }
 
-impl StandIn {
+impl SimulatedCopies {
     /// Reads the recordings and makes the first fit; `highest_hz` is the highest candidate.
     pub(super) fn of(
         logs: &Logs<'_>,
@@ -190,33 +190,33 @@ impl StandIn {
         let is_bare =
             |log: &&LogSpectrum| training.contains(&log.index) && logs.recordings[log.index].payload.is_none();
         let bare: Vec<&LogSpectrum> = logs.spectra().iter().filter(is_bare).collect();
-        let most = MOST_SAMPLES / bare.len().max(1);
+        let most = MAX_SAMPLES / bare.len().max(1);
         let mut read = ReadLogs::new(model.dof(), highest_hz);
         for log in bare {
             read.take(logs, &settings.motion, model, log, most)?;
         }
-        let ReadLogs { log_rate_hz, thinning, blocks, reference_hz, noise_squares, used, seen, .. } = read;
+        let ReadLogs { log_rate_hz, thinning, blocks, reference_hz, noise_squares, used, total, .. } = read;
         // The filters of the reference extrapolate beyond the ends.
         let slowest_hz = reference_hz.iter().copied().fold(f64::INFINITY, f64::min);
-        let ends = (INVENTED * log_rate_hz / thinning as f64 / slowest_hz).ceil() as usize;
+        let ends = (END_EFFECT_PERIODS * log_rate_hz / thinning as f64 / slowest_hz).ceil() as usize;
         let measured: Vec<MotionBlock> =
-            blocks.iter().map(|block| inside(block, ends)).filter(|block| block.rows >= SHORTEST).collect();
+            blocks.iter().map(|block| inside(block, ends)).filter(|block| block.rows >= MIN_PIECE_SAMPLES).collect();
         if measured.is_empty() || used == 0 {
             return Ok(None);
         }
         let fitted = Self::fitted(logs, settings, model, measured, log_rate_hz, thinning)?;
-        let Some(mut stand_in) = fitted else { return Ok(None) };
+        let Some(mut simulated) = fitted else { return Ok(None) };
         // The log's white noise after the low-pass.
-        stand_in.position_noise = noise_squares.iter().map(|square| (square / thinning as f64).sqrt()).collect();
-        stand_in.scale = (used as f64 / seen as f64).sqrt();
+        simulated.position_noise = noise_squares.iter().map(|square| (square / thinning as f64).sqrt()).collect();
+        simulated.scale = (used as f64 / total as f64).sqrt();
         let rate_hz = log_rate_hz / thinning as f64;
         let reference = |hz: &f64| ButterworthZeroPhase::new(4, hz.min(0.4 * rate_hz));
         let reference = reference_hz.iter().map(reference).collect::<Result<Vec<_>, _>>();
         if let Ok(reference) = reference {
-            stand_in.take_motion_noise(model, &JointByJoint(reference))?;
+            simulated.take_motion_noise(model, &JointByJoint(reference))?;
         }
-        stand_in.copies = (0..COPIES).into_par_iter().map(|copy| stand_in.measured(copy)).collect();
-        Ok(Some(stand_in))
+        simulated.copies = (0..COPIES).into_par_iter().map(|copy| simulated.measured(copy)).collect();
+        Ok(Some(simulated))
     }
 
     /// Removes the effect of position noise from the torque noise: the residual of the first fit contains it, and every
@@ -238,7 +238,7 @@ impl StandIn {
             }
         }
         let left = |(all, of_motion): (&f64, &f64)| {
-            if *all > 0.0 { (1.0 - of_motion / all).max(LEAST_LEFT).sqrt() } else { 1.0 }
+            if *all > 0.0 { (1.0 - of_motion / all).max(MIN_NOISE_SHARE).sqrt() } else { 1.0 }
         };
         let left: Vec<f64> = all.iter().zip(&of_motion).map(left).collect();
         for piece in &mut self.pieces {
@@ -264,7 +264,7 @@ impl StandIn {
         let sign = if copy.is_multiple_of(2) { 1.0 } else { -1.0 };
         let one = |(number, piece): (usize, &Piece)| {
             let (rows, mut tau) = (piece.motion.rows, piece.motion.tau.clone());
-            let shift = (SHIFTS[copy] * rows as f64) as usize;
+            let shift = (NOISE_SHIFTS[copy] * rows as f64) as usize;
             for (tau, noise) in tau.chunks_exact_mut(rows).zip(piece.noise.chunks_exact(rows)) {
                 for (row, tau) in tau.iter_mut().enumerate() {
                     *tau += sign * self.scale * noise[(row + shift) % rows];
@@ -383,7 +383,7 @@ fn shifted(motion: &MotionBlock) -> MotionBlock {
     for joint in 0..motion.joints {
         let own = joint * motion.rows..(joint + 1) * motion.rows;
         // Multiples of the golden ratio's fraction, so that no two joints have the same shift.
-        let shift = ((GOLDEN * (joint + 1) as f64).fract() * motion.rows as f64) as usize;
+        let shift = ((GOLDEN_RATIO * (joint + 1) as f64).fract() * motion.rows as f64) as usize;
         for values in [&mut other.q, &mut other.dq, &mut other.ddq] {
             values[own.clone()].rotate_left(shift);
         }
@@ -399,7 +399,7 @@ fn spread(pieces: &[Piece], joint: usize) -> f64 {
     (values().map(|x| (x - mean) * (x - mean)).sum::<f64>() / count).sqrt()
 }
 
-/// Computes [`StandIn::unseen`].
+/// Computes [`SimulatedCopies::unseen`].
 fn unseen_rows(model: &RegressorModel, pieces: &[Piece]) -> Result<Vec<Option<DMatrix<f64>>>, LogError> {
     struct Squares<'a>(&'a RegressorModel, Vec<DMatrix<f64>>);
     impl RowConsumer for Squares<'_> {
