@@ -27,7 +27,6 @@ pub enum ErrorSource {
     NominalValues,
 }
 
-/// One term of a covariance.
 #[derive(Clone, Debug)]
 struct ErrorTerm {
     source: ErrorSource,

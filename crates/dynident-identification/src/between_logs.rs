@@ -113,7 +113,6 @@ fn rows_of(problem: &LinearProblem, log: usize) -> Result<LinearProblem, Estimat
     Ok(alone)
 }
 
-/// Least squares on one log; unexcited columns are those of the estimate of all logs.
 fn fit_alone(
     problem: &LinearProblem,
     log: usize,

@@ -38,12 +38,10 @@ pub(crate) fn is_doubtful(training: &Training, consistent: Option<&[f64]>, thres
             > thresholds.max_log_residual_ratio * moving.len() as f64
 }
 
-/// Sums of squares of one joint's equations.
 #[derive(Clone, Copy, Default)]
 struct JointSums {
     /// Residual of the consistent robot, N² m².
     of_robot: f64,
-    /// Residual of separate parameters for the joint.
     of_joint: f64,
     torque: f64,
     rows: f64,

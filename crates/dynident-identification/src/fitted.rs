@@ -15,13 +15,11 @@ use dynident_rows::{Execution, Recording, excerpts};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Rows and estimate, with the choices behind them.
 pub(crate) struct Fitted<'a> {
     /// The last fit, with the compensated lag and the estimator that `auto` selected.
     pub(crate) fit: Fit<'a>,
     pub(crate) choices: Choices,
     pub(crate) lag: LagChoice,
-    /// `None` for a single log.
     pub(crate) between_logs: Option<BetweenLogs>,
     /// Terms of the estimate's covariance in addition to the noise.
     pub(crate) bars: ErrorBars,
@@ -74,11 +72,9 @@ pub(crate) fn fitted<'a>(
     Ok(Fitted { fit, choices, lag, between_logs, bars, times })
 }
 
-/// Choices made on an excerpt of long logs.
 struct Excerpt {
     choices: Choices,
     recordings: Vec<Recording>,
-    /// Time to read logs, s.
     logs_s: f64,
 }
 

@@ -17,9 +17,6 @@ pub(crate) fn is_friction_column(column: &Column) -> bool {
 
 /// Adds friction columns for the log groups after the first, whose columns are unchanged. `None` for a single log, and
 /// with a prior, which does not cover the added columns.
-///
-/// # Errors
-/// Columns do not match.
 pub(crate) fn with_friction_by_log(
     problem: &LinearProblem,
     is_friction: &[bool],

@@ -5,9 +5,6 @@ use dynident_dynamics::{ParametricModel, ParametricModelError};
 use dynident_model::terms::{DriveInertia, TorqueTerm, sort_terms};
 
 /// The robot with every drive inertia that `settings.drive_inertia` leaves open, before any test.
-///
-/// # Errors
-/// Terms are impossible for this robot.
 pub(crate) fn with_drives_left_to_the_logs(
     robot: &ParametricModel,
     settings: &IdentificationSettings,
@@ -22,10 +19,6 @@ pub(crate) fn joints_left_to_the_logs(robot: &ParametricModel, settings: &Identi
     named.filter(|joint| !known(joint)).collect()
 }
 
-/// The robot with the drive inertia of these joints.
-///
-/// # Errors
-/// Terms are impossible for this robot.
 pub(crate) fn with_drives(robot: &ParametricModel, joints: &[usize]) -> Result<ParametricModel, ParametricModelError> {
     let drives = joints.iter().map(|&joint| TorqueTerm::DriveInertia(DriveInertia { joint }));
     let mut terms: Vec<TorqueTerm> = robot.terms().iter().cloned().chain(drives).collect();

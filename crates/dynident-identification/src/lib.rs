@@ -136,6 +136,7 @@ mod lag;
 mod left_to_the_logs;
 mod less_noise;
 mod likelihood;
+mod log_factors;
 mod log_noise;
 pub mod payload;
 mod reduced;
@@ -162,6 +163,7 @@ pub use error::{IdentificationError, ReduceError};
 pub use estimators::EstimationSettings;
 pub use identify::{Identification, identify, identify_payload, identify_with_instruments};
 pub use likelihood::schwarz;
+pub use log_factors::{LogFactors, log_factors};
 pub use log_noise::LogNoise;
 pub use reduced::{ReducedLog, identify_reduced, reduce, reduced_errors};
 pub use settings::{DiagnosisChoice, GainChoice, IdentificationSettings, OffsetChoice};
@@ -173,4 +175,4 @@ pub use thresholds::{
     FrictionThresholds, GainThresholds, LagThresholds, LogVariationThresholds, MotionThresholds, NoiseThresholds,
     ThresholdError,
 };
-pub use training::{LogFactors, Training, log_factors, training_rows};
+pub use training::{Training, training_rows};

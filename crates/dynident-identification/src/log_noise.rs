@@ -5,6 +5,7 @@ use dynident_estimation::{EstimationError, LinearProblem, weighted_values};
 
 /// Maximum number of passes.
 const MAX_PASSES: usize = 20;
+/// Relative change of a noise level at which the passes end.
 const MAX_RELATIVE_CHANGE: f64 = 1e-3;
 
 /// Minimum noise of a log relative to the noisiest log; smaller values are rounding errors.
@@ -23,9 +24,6 @@ pub enum LogNoise {
 }
 
 /// Scales the rows of each joint and log to the last log's noise of that joint.
-///
-/// # Errors
-/// The rows do not determine an estimate.
 pub(crate) fn weighted_by_log(
     settings: &EstimationSettings,
     problem: LinearProblem,

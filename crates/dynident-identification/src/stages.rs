@@ -18,7 +18,6 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::consistent::PhysicalFit;
 use dynident_estimation::{Estimate, LinearProblem, left_out_ratios};
 use dynident_rows::{Execution, Logs, Role};
-use rayon::prelude::*;
 use std::time::Instant;
 
 /// Physically consistent parameters of an estimate.
@@ -55,7 +54,6 @@ pub struct TrainingExamination {
     pub friction_signs: Vec<FrictionSign>,
 }
 
-/// An estimate with its inputs.
 pub(crate) struct Stage<'a> {
     pub(crate) task: &'a IdentificationTask,
     pub(crate) execution: Execution<'a>,
@@ -71,7 +69,6 @@ pub(crate) struct Stage<'a> {
     pub(crate) started: Instant,
 }
 
-/// Consistent parameters of an estimate, and its tests.
 pub(crate) struct Examined {
     pub(crate) consistent: ConsistentParameters,
     /// Time from the estimate to the consistent parameters, s.
@@ -257,11 +254,7 @@ fn examine_all_training(
         let theta = training.columns.base_values(log.index, &estimate.values);
         examine_training(logs, &settings.estimation, &training.model, log.index, &theta)
     };
-    let found: Vec<_> = if logs.execution.parallel() {
-        training.logs.par_iter().map(one).collect::<Result<_, _>>()?
-    } else {
-        training.logs.iter().map(one).collect::<Result<_, _>>()?
-    };
+    let found: Vec<_> = logs.execution.try_map(&training.logs, one)?;
     let (delays, traces): (Vec<Vec<Option<TorqueLag>>>, Vec<LogTrace>) = found.into_iter().unzip();
     let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|log| log[joint]).collect() };
     let pooled_delays = (0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect();
@@ -302,11 +295,7 @@ fn examine_all_held_out(
     }
     let names: Vec<&str> = held_out.iter().map(|&index| &logs.recordings[index].name[..]).collect();
     logs.begin(&format!("testing on {}", names.join(", ")), &held_out);
-    let tested = if logs.execution.parallel() {
-        held_out.par_iter().map(one).collect()
-    } else {
-        held_out.iter().map(one).collect()
-    };
+    let tested = logs.execution.try_map(&held_out, one);
     logs.end();
     tested
 }

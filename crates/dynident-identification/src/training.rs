@@ -5,6 +5,7 @@ use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator, TrainingRows};
 use crate::examination::PriorAgreement;
 use crate::friction::JointFriction;
+use crate::log_factors::log_factors;
 use crate::log_noise::{LogNoise, weighted_by_log};
 use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains, known_loads};
 use crate::settings::{GainChoice, IdentificationSettings};
@@ -15,37 +16,23 @@ use dynident_estimation::{
 };
 use dynident_recording::{MotionBlock, MotionSettings};
 use dynident_rows::{
-    Execution, JointRows, LogError, LogPass, LogStatistics, Logs, MotionRecord, ParallelFilterSettings, Recording,
-    RegressorModel, RowBlock, RowConsumer, RowSettings, noise_factors,
+    Execution, LogError, LogStatistics, Logs, MotionRecord, ParallelFilterSettings, Recording, RegressorModel,
+    RowSettings, noise_factors,
 };
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
 
+pub(crate) use crate::log_factors::LogFactors;
+
 /// Maximum number of passes for the load of load-dependent friction.
 const MAX_LOAD_PASSES: usize = 6;
+/// Change of the rows between passes, relative to the torque, at which the load has converged.
 const MAX_RELATIVE_LOAD_CHANGE: f64 = 1e-3;
 
 /// Precision of held values, relative to the largest of them.
 const HELD_TOLERANCE: f64 = 1e-6;
-
-/// Data of one recording for the fit.
-#[derive(Clone, Debug)]
-pub struct LogFactors {
-    /// Index of the recording.
-    pub index: usize,
-    /// One factor of `[W | τ]` for each joint, divided into time segments.
-    pub factors: Vec<SegmentedFactor>,
-    /// Import report and statistics of the pass.
-    pub statistics: LogStatistics,
-    /// Contribution of position noise to the rows, one factor for each joint. `None` until the model is selected, and
-    /// if the noise is unknown.
-    pub noise: Option<Vec<SegmentedFactor>>,
-    /// Fit of the nominal values, if they are known and torque is in newton metres; for the model given to
-    /// [`training_rows`].
-    pub nominal_agreement: Option<PriorAgreement>,
-}
 
 /// Factors of the training recordings, and the model of their columns.
 #[derive(Clone, Debug)]
@@ -111,9 +98,6 @@ pub fn training_rows(
 
 /// Weighted least squares (ordinary if the study requires it) with the stated terms on pieces of a motion; returns the
 /// values only.
-///
-/// # Errors
-/// The rows do not determine an estimate.
 pub(crate) fn plain_fit(
     model: RegressorModel,
     pieces: Vec<MotionBlock>,
@@ -248,11 +232,7 @@ impl<'a> TrainingPasses<'a> {
         self.logs.begin("logs to factors", self.training);
         let alone = self.training.len() == 1;
         let one = |index: &usize| log_factors(self.logs, self.settings, model, *index, alone);
-        let factors = if !alone && self.logs.execution.parallel() {
-            self.training.par_iter().map(one).collect()
-        } else {
-            self.training.iter().map(one).collect()
-        };
+        let factors = self.logs.execution.try_map(self.training, one);
         self.logs.end();
         factors
     }
@@ -417,95 +397,4 @@ pub(crate) fn plain_estimate(
         Estimator::Ordinary => ordinary_least_squares(problem, &settings.ordinary()),
         _ => weighted_least_squares(problem, &settings.weighted()),
     }
-}
-
-impl LogFactors {
-    /// Merges each joint's rows into one segment, sufficient for values and for error bars from white noise.
-    pub(crate) fn as_one_segment(&self) -> Self {
-        let factors = self.factors.par_iter().map(SegmentedFactor::as_one_segment).collect();
-        let (statistics, nominal_agreement) = (self.statistics.clone(), self.nominal_agreement.clone());
-        Self { index: self.index, factors, statistics, noise: self.noise.clone(), nominal_agreement }
-    }
-
-    /// Rows for another model whose columns are a subset of those of `wide`.
-    pub(crate) fn of(mut self, wide: &RegressorModel, model: &RegressorModel) -> Result<Self, EstimationError> {
-        self.factors.par_iter_mut().enumerate().try_for_each(|(joint, factor)| {
-            let seen = wide.layout().joint_columns(joint);
-            // A missing column gets an index out of range, which the selection rejects.
-            let place = |&column: &usize| {
-                let wanted = &model.layout().columns()[column];
-                seen.iter().position(|&global| wide.layout().columns()[global] == *wanted).unwrap_or(usize::MAX)
-            };
-            let places: Vec<usize> = model.layout().joint_columns(joint).iter().map(place).collect();
-            *factor = factor.selected(&places)?;
-            Ok(())
-        })?;
-        Ok(self)
-    }
-}
-
-struct FactorConsumer(Vec<JointFactor>);
-
-struct JointFactor {
-    log: String,
-    factor: SegmentedFactor,
-    block: RowBlock,
-    counted: Vec<f64>,
-}
-
-impl RowConsumer for FactorConsumer {
-    fn reads_samples(&self) -> bool {
-        false
-    }
-
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        self.0[rows.joint].filtered(rows)
-    }
-
-    fn joints(&mut self) -> Option<Vec<&mut (dyn RowConsumer + Send)>> {
-        Some(self.0.iter_mut().map(|joint| joint as &mut (dyn RowConsumer + Send)).collect())
-    }
-}
-
-impl RowConsumer for JointFactor {
-    fn reads_samples(&self) -> bool {
-        false
-    }
-
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        let rows = rows.counted(&mut self.counted);
-        self.block
-            .push(rows.panel, rows.rows, |panel, rows| self.factor.absorb(panel, rows))
-            .map_err(|source| LogError::Rows { log: self.log.clone(), source })
-    }
-}
-
-/// Computes the factors of recording `index`; `alone` allows a reader thread.
-///
-/// # Errors
-/// The recording cannot be read.
-pub fn log_factors(
-    logs: &Logs<'_>,
-    settings: &IdentificationSettings,
-    model: &RegressorModel,
-    index: usize,
-    alone: bool,
-) -> Result<LogFactors, LogError> {
-    let log = logs.recordings[index].label();
-    let in_rows = |source| LogError::Rows { log: log.clone(), source };
-    let joint = |joint: usize| {
-        let columns = model.layout().joint_columns(joint);
-        let factor = SegmentedFactor::new(columns.len(), settings.estimation.segments).map_err(in_rows)?;
-        let block = RowBlock::new(columns.len() + 1);
-        Ok(JointFactor { log: log.clone(), factor, block, counted: Vec::new() })
-    };
-    let mut consumer = FactorConsumer((0..model.dof()).map(joint).collect::<Result<_, LogError>>()?);
-    let pass = LogPass { reader_thread: alone && logs.execution.parallel(), ..logs.pass(model, index) };
-    let statistics = pass.run(&mut consumer)?;
-    let mut factors = Vec::with_capacity(model.dof());
-    for JointFactor { mut factor, block, .. } in consumer.0 {
-        block.finish(|panel, rows| factor.absorb(panel, rows)).map_err(in_rows)?;
-        factors.push(factor);
-    }
-    Ok(LogFactors { index, factors, statistics, noise: None, nominal_agreement: None })
 }

@@ -2,6 +2,7 @@
 
 use crate::progress::Progress;
 use crate::progress::Silent;
+use rayon::prelude::*;
 
 /// Threads and progress of a job; the result does not depend on them.
 #[derive(Clone, Copy)]
@@ -35,6 +36,18 @@ impl Execution<'_> {
             Ok(pool) => pool.install(work),
             Err(_) => work(),
         }
+    }
+
+    /// Maps `items` in parallel if more than one thread is available; results keep the order of the items.
+    ///
+    /// # Errors
+    /// An error of `one`.
+    pub fn try_map<T: Sync, R: Send, E: Send>(
+        &self,
+        items: &[T],
+        one: impl Fn(&T) -> Result<R, E> + Sync + Send,
+    ) -> Result<Vec<R>, E> {
+        if self.parallel() { items.par_iter().map(one).collect() } else { items.iter().map(one).collect() }
     }
 
     /// Whether more than one thread is available.

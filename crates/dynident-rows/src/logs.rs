@@ -268,7 +268,6 @@ impl<'a> Logs<'a> {
     }
 }
 
-/// Empty storage for the motion of every recording.
 fn unread(recordings: &[Recording]) -> Arc<Vec<OnceLock<KeptLog>>> {
     Arc::new(recordings.iter().map(|_| OnceLock::new()).collect())
 }

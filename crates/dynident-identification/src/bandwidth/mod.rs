@@ -8,6 +8,7 @@
 //! torque. This is a parametric bootstrap (Efron and Tibshirani, *An Introduction to the Bootstrap*, 1993, 6.5) of the
 //! error, including filter bias and noise.
 
+mod read_logs;
 mod simulated_copies;
 mod thinned;
 
@@ -135,14 +136,12 @@ pub fn choose_cutoff(
     Ok(Some(CutoffByError { cutoff_hz, motion_hz, candidates }))
 }
 
-/// Settings without error bars for fits of the copies.
 fn plain_settings(settings: &IdentificationSettings) -> IdentificationSettings {
     let mut plain = settings.clone();
     plain.estimation.segments = SegmentSettings { max_segments: 2, first_length_rows: 1024 };
     plain
 }
 
-/// Parallel filter for a cut-off at the rate of the copy.
 fn filter_of_copy(simulated_copies: &SimulatedCopies, cutoff_hz: f64) -> ParallelFilterSettings {
     let automatic = ParallelFilterSettings::default();
     match automatic.decimation(simulated_copies.log_rate_hz(), Some(cutoff_hz)) {

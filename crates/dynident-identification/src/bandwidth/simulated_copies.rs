@@ -1,27 +1,21 @@
 //! Simulated copies of recordings: their denoised motion, the torque of a first fit, and their noise.
 
-use super::thinned::Thinned;
+use super::read_logs::{JointByJoint, ReadLogs};
 use crate::error::IdentificationError;
 use crate::settings::IdentificationSettings;
 use crate::training::plain_fit;
 use dynident_model::sample::Random;
 use dynident_recording::derivative::ButterworthZeroPhase;
-use dynident_recording::{
-    DecimationSettings, Decimator, Derivatives, Differentiator, FilterError, MotionBlock, MotionSettings, MotionStream,
-    Place, SampleRanges,
-};
+use dynident_recording::{Derivatives, Differentiator, FilterError, MotionBlock, MotionSettings, Place};
 use dynident_rows::{
     Execution, JointRows, LogError, LogSpectrum, Logs, ParallelFilterSettings, RegressorModel, RowBuilder, RowConsumer,
-    Samples, predicted_torque,
+    predicted_torque,
 };
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
-/// Sample rate of the copy, in units of the highest candidate.
-const RATE_RATIO: f64 = 4.0;
 /// Maximum number of samples of all pieces; enough to compare errors, within milliseconds.
 const MAX_SAMPLES: usize = 4096;
-/// Number of simulated copies.
 const COPIES: usize = 4;
 /// Minimum length of a piece, samples.
 const MIN_PIECE_SAMPLES: usize = 32;
@@ -34,11 +28,9 @@ const END_EFFECT_PERIODS: f64 = 1.5;
 const GOLDEN_RATIO: f64 = 1.618_033_988_749_895;
 const SEED: u64 = 0x005E_ED0F_7157;
 
-/// One uninterrupted piece.
 struct Piece {
     /// Denoised motion with the torque of the first fit.
     motion: MotionBlock,
-    /// Residual of the first fit.
     noise: Vec<f64>,
 }
 
@@ -51,7 +43,6 @@ struct Measured {
 /// Motion and noise of the recordings, with known parameters.
 pub(super) struct SimulatedCopies {
     pieces: Vec<Piece>,
-    /// By copy, then by piece.
     copies: Vec<Vec<Measured>>,
     /// For each joint `WᵀW` over the same motions with each joint at another time (combinations of postures and
     /// velocities that were not used for the fit), in units of the torque's spread; `None` for a joint without torque.
@@ -62,120 +53,6 @@ pub(super) struct SimulatedCopies {
     scale: f64,
     log_rate_hz: f64,
     thinning: usize,
-}
-
-/// A separate low-pass for each joint, at the frequency where its motion disappears in the noise.
-#[derive(Debug)]
-struct JointByJoint(Vec<ButterworthZeroPhase>);
-
-impl Differentiator for JointByJoint {
-    fn name(&self) -> &'static str {
-        "joint-by-joint"
-    }
-
-    fn minimum_samples(&self) -> usize {
-        self.0.iter().map(Differentiator::minimum_samples).max().unwrap_or(1)
-    }
-
-    fn context_samples(&self, rate_hz: f64) -> Option<usize> {
-        self.0.iter().filter_map(|joint| joint.context_samples(rate_hz)).max()
-    }
-
-    fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError> {
-        self.0[place.joint].differentiate_at(place, q, out)
-    }
-}
-
-/// Denoised motion and torque of the recordings read up to now, decimated.
-struct ReadLogs {
-    highest_hz: f64,
-    /// Rate of the first log, hertz; logs with another rate are skipped.
-    log_rate_hz: f64,
-    thinning: usize,
-    blocks: Vec<MotionBlock>,
-    /// Largest variance of each joint's position noise.
-    noise_squares: Vec<f64>,
-    /// Highest frequency at which each joint's motion disappears in the noise, hertz.
-    reference_hz: Vec<f64>,
-    /// Samples read.
-    used: u64,
-    /// Samples of the complete logs.
-    total: u64,
-}
-
-impl ReadLogs {
-    fn new(dof: usize, highest_hz: f64) -> Self {
-        Self {
-            highest_hz,
-            log_rate_hz: 0.0,
-            thinning: 1,
-            blocks: Vec::new(),
-            noise_squares: vec![0.0; dof],
-            reference_hz: vec![0.0; dof],
-            used: 0,
-            total: 0,
-        }
-    }
-
-    /// Reads about `most` decimated samples of a log.
-    fn take(
-        &mut self,
-        logs: &Logs<'_>,
-        motion: &MotionSettings,
-        model: &RegressorModel,
-        log: &LogSpectrum,
-        most: usize,
-    ) -> Result<(), IdentificationError> {
-        let LogSpectrum { index, rate_hz, choice: spectrum, position_noise } = log;
-        let (recording, rate_hz, highest_hz) = (&logs.recordings[*index], *rate_hz, self.highest_hz);
-        let Samples::Log(log) = &recording.samples else { return Ok(()) };
-        let places = recording.places(model.model())?;
-        if self.log_rate_hz == 0.0 {
-            self.log_rate_hz = rate_hz;
-            self.thinning = (rate_hz / (RATE_RATIO * highest_hz)).floor().clamp(1.0, 1000.0) as usize;
-        } else if (rate_hz / self.log_rate_hz - 1.0).abs() > 0.01 {
-            return Ok(());
-        }
-        let thinning = self.thinning;
-        let motion = recording.in_log_order(model.model(), motion)?.into_owned();
-        let motion = MotionSettings { smooth_torque: false, ..motion };
-        let faded = &spectrum.faded_hz;
-        let suggested = spectrum.joints_hz.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        let build = || -> Result<Box<dyn Differentiator>, FilterError> {
-            let of = |hz: &Option<f64>| {
-                let cutoff_hz = hz.unwrap_or(suggested).min(highest_hz).min(0.4 * rate_hz);
-                ButterworthZeroPhase::new(4, cutoff_hz)
-            };
-            Ok(Box::new(JointByJoint(faded.iter().map(of).collect::<Result<_, _>>()?)))
-        };
-        let named = |source| LogError::recording(&recording.name, source);
-        let mut stream = MotionStream::with_differentiator(log, &motion, |_| build()).map_err(named)?;
-        if logs.execution.parallel() {
-            stream = stream.read_beside();
-        }
-        // Only the torque needs a filter; decimation does not change the denoised motion.
-        let filter = DecimationSettings { factor: thinning, ..DecimationSettings::default() };
-        let in_filter = |source| LogError::Filter { log: recording.name.clone(), source };
-        let decimator = || Decimator::new(&filter, rate_hz, 1).map_err(in_filter);
-        let mut pieces = Thinned::new(thinning, model.dof());
-        let mut block = MotionBlock::default();
-        let mut samples = 0;
-        while samples < most * thinning && stream.next_block(&mut block).map_err(named)? {
-            let rows = block.rows.min(most * thinning - samples);
-            pieces.take(&block, &places, rows, &decimator)?;
-            samples += rows;
-        }
-        self.used += samples as u64;
-        self.total += recording.rows_of_whole().unwrap_or(samples as u64).max(samples as u64);
-        for (joint, &place) in places.iter().enumerate() {
-            let reference_hz = faded[place].unwrap_or(suggested).min(highest_hz);
-            self.reference_hz[joint] = self.reference_hz[joint].max(reference_hz);
-            let noise = position_noise.get(place).copied().unwrap_or(0.0);
-            self.noise_squares[joint] = self.noise_squares[joint].max(noise * noise);
-        }
-        self.blocks.extend(pieces.finished());
-        Ok(())
-    }
 }
 
 impl SimulatedCopies {
@@ -275,7 +152,6 @@ impl SimulatedCopies {
         self.pieces.iter().enumerate().map(one).collect()
     }
 
-    /// The first fit, its torque and its residual.
     fn fitted(
         logs: &Logs<'_>,
         settings: &IdentificationSettings,
@@ -318,12 +194,10 @@ impl SimulatedCopies {
         Ok(Some(Self { pieces, copies, unseen, theta, position_noise, scale: 1.0, log_rate_hz, thinning }))
     }
 
-    /// Sample rate of the recordings, hertz.
     pub(super) fn log_rate_hz(&self) -> f64 {
         self.log_rate_hz
     }
 
-    /// Decimation factor of the copy.
     pub(super) fn thinning(&self) -> usize {
         self.thinning
     }
@@ -391,7 +265,6 @@ fn shifted(motion: &MotionBlock) -> MotionBlock {
     other
 }
 
-/// Standard deviation of a joint's torque over all pieces.
 fn spread(pieces: &[Piece], joint: usize) -> f64 {
     let values = || pieces.iter().flat_map(|piece| piece.motion.joint(&piece.motion.tau, joint));
     let count = values().count() as f64;
@@ -399,7 +272,6 @@ fn spread(pieces: &[Piece], joint: usize) -> f64 {
     (values().map(|x| (x - mean) * (x - mean)).sum::<f64>() / count).sqrt()
 }
 
-/// Computes [`SimulatedCopies::unseen`].
 fn unseen_rows(model: &RegressorModel, pieces: &[Piece]) -> Result<Vec<Option<DMatrix<f64>>>, LogError> {
     struct Squares<'a>(&'a RegressorModel, Vec<DMatrix<f64>>);
     impl RowConsumer for Squares<'_> {

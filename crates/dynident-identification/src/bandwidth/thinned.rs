@@ -25,9 +25,6 @@ impl Thinned {
     }
 
     /// Takes the first `rows` of a block; `decimator` builds the filter of one joint's torque.
-    ///
-    /// # Errors
-    /// The filter is impossible at this rate.
     pub(super) fn take(
         &mut self,
         block: &MotionBlock,

@@ -33,7 +33,6 @@ pub struct ChosenFriction {
 }
 
 impl ChosenFriction {
-    /// A model with stated friction only.
     pub(crate) fn as_stated(model: RegressorModel) -> Self {
         Self { model, joints: Vec::new(), stated: None, constants_error: None }
     }
@@ -65,9 +64,6 @@ pub fn choose_friction(
 }
 
 /// Friction as stated, with the error of constants that other recordings selected.
-///
-/// # Errors
-/// As [`choose_friction`].
 pub(crate) fn stated_friction(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -84,9 +80,6 @@ pub(crate) fn stated_friction(
 
 /// Selects friction: terms from the rows of `passes`, constants from those of `of_constants`. Terms on the grid may be
 /// known [before](friction_by_grid). If `passes` has too few rows, terms are also selected from `of_constants`.
-///
-/// # Errors
-/// As [`choose_friction`].
 pub(crate) fn friction_of_logs(
     passes: &TrainingPasses<'_>,
     of_constants: &Logs<'_>,
@@ -122,7 +115,6 @@ fn friction_by_terms(
     Ok(ChosenFriction { model, joints, stated: Some(stated), constants_error })
 }
 
-/// Terms allowed on the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum GridTerms {
     All,
@@ -138,9 +130,6 @@ impl GridTerms {
 
 /// Selects terms and constants on a grid, at the cut-off of `logs`. This is sufficient to estimate a lag, in a third of
 /// the time. `None` if no joint is open.
-///
-/// # Errors
-/// As [`choose_friction`].
 pub(crate) fn friction_by_grid(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -153,25 +142,20 @@ pub(crate) fn friction_by_grid(
     friction_of_grid(passes, robot, &searches, terms).map(Some)
 }
 
-/// Whether friction of some joint of this robot is open.
 pub(crate) fn is_friction_open(settings: &IdentificationSettings, robot: &ParametricModel) -> bool {
     !searches_of(settings, robot).is_empty()
 }
 
-/// Joints with open friction.
 fn searches_of<'a>(settings: &'a IdentificationSettings, robot: &ParametricModel) -> Vec<(usize, &'a FrictionSearch)> {
     let of = |search: &'a FrictionSearch| Some((robot.model().joint_index(&search.joint)?, search));
     settings.friction.iter().filter_map(of).collect()
 }
 
-/// Friction on a grid of constants.
 #[derive(Clone)]
 pub(crate) struct GridFriction {
     model: RegressorModel,
     joints: Vec<JointFriction>,
-    /// Rows and fit with the stated terms.
     stated: (Training, Estimate),
-    /// Joints with unknown gains.
     gains: Vec<usize>,
 }
 
@@ -235,9 +219,6 @@ fn friction_of_grid(
 /// on the other hand, the error bars underestimate the effective number of rows. So `other` must then be better in both
 /// cases: with all rows and with the effective number of rows. A term that it adds needs stronger evidence than in a
 /// first selection.
-///
-/// # Errors
-/// As [`choose_friction`].
 pub(crate) fn better_friction(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -271,9 +252,6 @@ pub(crate) fn better_friction(
 
 /// Refits the constants of friction that was selected from an excerpt to all rows: one Gauss-Newton step from the
 /// constants of the excerpt, which are close.
-///
-/// # Errors
-/// As [`choose_friction`].
 pub(crate) fn constants_of_all_rows(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -285,7 +263,6 @@ pub(crate) fn constants_of_all_rows(
     Ok(chosen)
 }
 
-/// Width of the smooth step in a joint's friction.
 fn smooth_step_width(joint: &JointFriction) -> Option<f64> {
     joint.terms.iter().flatten().filter(|term| is_coulomb(term)).find_map(smooth_width)
 }

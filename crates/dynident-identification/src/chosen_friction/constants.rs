@@ -25,7 +25,6 @@ const MAX_DEVIANCE_INCREASE: f64 = 0.1;
 /// Minimum number of passes for load-dependent friction, which uses the load of the previous fit.
 const MIN_LOAD_PASSES: usize = 3;
 
-/// Constants of a pass, the step from them, and the misfit before the step.
 struct LastPass {
     constants: FrictionConstants,
     steps: Vec<f64>,
@@ -37,7 +36,6 @@ struct LastPass {
 struct ConstantsPass {
     wide: RegressorModel,
     factors: Vec<LogFactors>,
-    /// The same rows, each log as one segment.
     merged: Vec<LogFactors>,
     /// The same rows without neighbouring columns.
     problem: LinearProblem,
@@ -82,7 +80,6 @@ impl ConstantsPass {
     }
 }
 
-/// Stores the intervals of the constants in the joints.
 fn take_intervals(
     joints: &mut [JointFriction],
     model: &RegressorModel,
@@ -95,7 +92,6 @@ fn take_intervals(
     }
 }
 
-/// Evidence of the rows for a joint's friction.
 pub(crate) struct FrictionEvidence {
     /// Number of rows with the information of one independent row ([`FrictionConstants::design_effect`]).
     pub(crate) design_effect: f64,
@@ -364,7 +360,6 @@ impl TrainingPasses<'_> {
         with_friction_of(robot, joints, before, &fit.values)
     }
 
-    /// Rows of a model and a fit without error bars.
     fn rows_and_fit(&self, model: &RegressorModel) -> Result<(Training, WeightedValues), IdentificationError> {
         let rows = self.rows_once(model.clone())?;
         let fit = plain_values(&self.settings.estimation, &rows.problem)?;

@@ -11,7 +11,6 @@ use dynident_estimation::{CovarianceMethod, LinearProblem};
 use dynident_model::terms::TorqueTerm;
 use dynident_rows::RegressorModel;
 
-/// Settings of a fit without error bars.
 pub(crate) fn without_bars(settings: &IdentificationSettings) -> EstimationSettings {
     EstimationSettings { covariance: CovarianceMethod::White, ..settings.estimation.clone() }
 }

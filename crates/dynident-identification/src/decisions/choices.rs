@@ -7,7 +7,6 @@ use crate::lag::LagRounds;
 use crate::settings::LagCandidates;
 use dynident_dynamics::ParametricModel;
 
-/// Drive inertia: the robot with it or without it.
 #[derive(Clone)]
 pub(crate) struct Drives {
     pub(crate) robot: ParametricModel,
@@ -15,23 +14,19 @@ pub(crate) struct Drives {
     pub(crate) choice: Option<DriveInertiaChoice>,
 }
 
-/// A cut-off of the motion.
 #[derive(Clone)]
 pub(super) struct CutoffChoice {
     /// `None` if the cut-off is stated or the logs are too short.
     pub(super) by_error: Option<CutoffByError>,
 }
 
-/// Friction of the joints.
 #[derive(Clone)]
 pub(super) enum FrictionChoice {
-    /// Not selected yet.
     Open,
     /// With the constants of a grid: enough to estimate a lag.
     Grid(GridFriction),
     /// Selected from an excerpt of the logs; its constants are still to be adjusted to all rows.
     OfExcerpt(ChosenFriction),
-    /// Selected or stated.
     Made(ChosenFriction),
 }
 
@@ -42,7 +37,6 @@ enum Origin {
     TheseLogs,
     /// Only the friction constants, because the rest was selected from an excerpt.
     Excerpt(ChosenFriction),
-    /// Nothing.
     Final,
 }
 
@@ -52,14 +46,11 @@ pub(crate) struct Choices {
     /// The compensated lag and the number of its revisions.
     pub(super) lag: LagRounds,
     pub(super) drives: Option<Drives>,
-    /// Selected with friction as stated.
     pub(super) cutoff: Option<CutoffChoice>,
-    /// Friction on a grid with all terms, from a fit with the same lag.
     pub(super) grid: Option<GridFriction>,
     pub(super) friction: FrictionChoice,
     /// The cut-off at which friction was selected, hertz; `None` if it was stated.
     pub(super) friction_hz: Option<f64>,
-    /// The cut-off that was selected with the selected friction.
     pub(super) cutoff_with_friction: Option<CutoffByError>,
     /// Whether the lag before friction was decided.
     pub(super) has_lag_before_friction: bool,
@@ -85,7 +76,6 @@ impl Choices {
         }
     }
 
-    /// The cut-off in use, with its evidence.
     pub(crate) fn cutoff(&self) -> Option<&CutoffByError> {
         let before = self.cutoff.as_ref().and_then(|cutoff| cutoff.by_error.as_ref());
         self.cutoff_with_friction.as_ref().or(before)
@@ -101,7 +91,6 @@ impl Choices {
         self.drives.as_ref()
     }
 
-    /// The friction in use; `None` while it is open.
     pub(crate) fn friction(&self) -> Option<ChosenFriction> {
         match &self.friction {
             FrictionChoice::Open => None,
@@ -110,7 +99,6 @@ impl Choices {
         }
     }
 
-    /// The lag in use with its evidence.
     pub(crate) fn lag(&self) -> &LagRounds {
         &self.lag
     }
@@ -130,7 +118,6 @@ impl Choices {
         self.origin = Origin::Final;
     }
 
-    /// Reopens the choices that depend on the lag.
     pub(super) fn reopen(&mut self) {
         match &self.origin {
             Origin::TheseLogs => {

@@ -5,16 +5,13 @@ use crate::bars::ErrorSource;
 use crate::error::IdentificationError;
 use nalgebra::DMatrix;
 
-/// Next step of the driver after a decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// Continue with the next decision of the list.
     Proceed,
     /// Start again at the top of the list, because a choice was revised.
     StartAgain,
 }
 
-/// One choice that the training logs determine.
 pub(crate) trait Decision: Sync {
     /// Makes the choice if it is open, or revises it if the current fit requires it.
     ///
@@ -29,9 +26,6 @@ pub(crate) trait Decision: Sync {
 }
 
 /// Makes the decisions of a list until none revises a choice.
-///
-/// # Errors
-/// As [`Decision::decide`].
 pub(crate) fn decide_all(decisions: &[&dyn Decision], work: &mut Workspace<'_, '_>) -> Result<(), IdentificationError> {
     'from_top: loop {
         for decision in decisions {

@@ -56,7 +56,6 @@ impl Decision for Friction {
         Ok(Next::Proceed)
     }
 
-    /// Uncertainty of the selected constants.
     fn error(&self, work: &Workspace<'_, '_>) -> Option<(ErrorSource, DMatrix<f64>)> {
         let FrictionChoice::Made(friction) = &work.choices.friction else { return None };
         let fit = work.fit.as_ref()?;

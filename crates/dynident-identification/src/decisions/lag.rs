@@ -26,7 +26,6 @@ impl Decision for Lag {
         Ok(Next::Proceed)
     }
 
-    /// Remaining uncertainty of the lag.
     fn error(&self, work: &Workspace<'_, '_>) -> Option<(ErrorSource, DMatrix<f64>)> {
         let estimate = &work.fit.as_ref()?.estimation.estimate;
         let covariance = work.choices.lag.error(work.lag_fit.as_ref(), estimate)?;

@@ -21,9 +21,7 @@ use crate::training::TrainingPasses;
 
 pub(super) struct LagBeforeFriction;
 
-/// Grid with all friction terms.
 const ALL_TERMS: [&dyn Decision; 3] = [&DriveInertia, &Cutoff, &GridOfFriction(GridTerms::All)];
-/// Lag with friction without memory.
 const WITHOUT_MEMORY: [&dyn Decision; 4] = [&DriveInertia, &Cutoff, &GridOfFriction(GridTerms::WithoutMemory), &Lag];
 
 impl Decision for LagBeforeFriction {
@@ -80,7 +78,6 @@ fn shows_lag(work: &mut Workspace<'_, '_>) -> Result<bool, IdentificationError> 
     Ok(LagRounds::of(LagCandidates::Common).again(lags.as_ref(), &fit.estimation.estimate))
 }
 
-/// Bayesian information criterion of the fit.
 fn criterion(work: &mut Workspace<'_, '_>) -> Result<f64, IdentificationError> {
     let fit = work.fit()?;
     Ok(schwarz(&fit.training.problem, &fit.estimation.estimate))

@@ -26,6 +26,5 @@ use friction::Friction;
 use lag::Lag;
 use lag_before_friction::LagBeforeFriction;
 
-/// All decisions, in order.
 pub(crate) const DECISIONS: [&dyn Decision; 6] =
     [&DriveInertia, &Cutoff, &LagBeforeFriction, &Friction, &Lag, &CutoffOfFriction];

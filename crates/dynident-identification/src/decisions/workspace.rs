@@ -11,14 +11,12 @@ use crate::task::IdentificationTask;
 use crate::training::training_rows;
 use dynident_rows::{Execution, Logs};
 
-/// Quantity that a fit estimates.
 pub(crate) enum Job<'w> {
     Model(Option<&'w mut (dyn InstrumentSource + 'w)>),
     Payload(&'w KnownArm),
 }
 
 impl<'w> Job<'w> {
-    /// Reborrows for a shorter lifetime.
     pub(crate) fn shorter<'s>(self) -> Job<'s>
     where
         'w: 's,
@@ -43,10 +41,8 @@ impl<'w> Job<'w> {
     }
 }
 
-/// A task with its choices, rows and fit.
 pub(crate) struct Workspace<'a, 'w> {
     pub(super) task: &'a IdentificationTask,
-    /// Indices of the training recordings.
     pub(super) training: &'w [usize],
     /// Settings of the task with the lag in use.
     pub(super) settings: IdentificationSettings,
@@ -55,9 +51,7 @@ pub(crate) struct Workspace<'a, 'w> {
     pub(super) fit: Option<Fit<'a>>,
     /// Lags in the rows of the fit, after the lag was decided.
     pub(super) lag_fit: Option<LagFit>,
-    /// Whether the lag is automatic.
     pub(super) is_lag_free: bool,
-    /// Time to read logs, s.
     pub(crate) logs_s: f64,
     job: Job<'w>,
     execution: Execution<'a>,
@@ -66,7 +60,6 @@ pub(crate) struct Workspace<'a, 'w> {
 }
 
 impl<'a, 'w> Workspace<'a, 'w> {
-    /// Starts with these choices, or with all of them open.
     pub(crate) fn new(
         task: &'a IdentificationTask,
         training: &'w [usize],
@@ -95,7 +88,6 @@ impl<'a, 'w> Workspace<'a, 'w> {
         work
     }
 
-    /// A trial of other choices for the same task.
     pub(super) fn trial(&self, choices: Choices) -> Workspace<'a, 'w> {
         let mut trial = Workspace::new(self.task, self.training, self.execution, Job::Model(None), Some(choices));
         if trial.settings.motion.torque_lag_s == self.settings.motion.torque_lag_s {
@@ -121,7 +113,6 @@ impl<'a, 'w> Workspace<'a, 'w> {
         }
     }
 
-    /// Compensates the lag of the choices and reopens the choices that depend on it.
     pub(super) fn revise_lag(&mut self) {
         self.take_lag();
         self.logs.clear();
@@ -129,7 +120,6 @@ impl<'a, 'w> Workspace<'a, 'w> {
         self.choices.reopen();
     }
 
-    /// The known arm of a payload identification.
     pub(super) fn arm(&self) -> Option<&KnownArm> {
         self.job.arm()
     }
@@ -200,7 +190,6 @@ impl<'a, 'w> Workspace<'a, 'w> {
         &self.choices
     }
 
-    /// Makes the fit if it is missing.
     pub(crate) fn finish(&mut self) -> Result<(), IdentificationError> {
         self.fit().map(|_| ())
     }

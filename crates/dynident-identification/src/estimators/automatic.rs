@@ -28,9 +28,6 @@ pub(super) fn automatic(
 /// Tests the effect of noise on least squares; returns the instruments' estimate if it was needed. `None` if the test
 /// is not possible. It requires columns of the robot only, all of them free, rows for all joints, and pieces of logs
 /// that are long enough for a lower filter.
-///
-/// # Errors
-/// Logs cannot be read.
 pub(super) fn examined_where_possible(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,

@@ -5,7 +5,6 @@ use super::{EstimatorError, TrainingRows};
 use dynident_recording::derivative::ButterworthZeroPhase;
 use dynident_recording::{Derivatives, Differentiator, FilterError, MotionBlock, Place, cutoff};
 use dynident_rows::{LogError, LogPass};
-use rayon::prelude::*;
 
 /// Order of the low-pass, equal to the default of the differentiator.
 const ORDER: usize = 4;
@@ -17,12 +16,9 @@ type Piece = Vec<[Vec<f64>; 3]>;
 pub(super) struct BandMotion<'r, 'a> {
     rows: &'r TrainingRows<'a>,
     cutoff_hz: f64,
-    /// Maximum number of samples of a log; `None` for all.
     most_samples: Option<u64>,
     log: usize,
-    /// Segment indices of the log with their motion.
     pieces: Vec<(usize, Piece)>,
-    /// Next piece and sample.
     next: (usize, usize),
 }
 
@@ -51,11 +47,7 @@ impl InstrumentSource for BandMotion<'_, '_> {
         self.pieces.clear();
         for (segment, q) in pieces {
             let one = |q: &Vec<f64>| self.smoothed(rate_hz, q);
-            let piece = if self.rows.logs.execution.parallel() {
-                q.par_iter().map(one).collect::<Result<Piece, _>>()
-            } else {
-                q.iter().map(one).collect()
-            };
+            let piece = self.rows.logs.execution.try_map(&q, one);
             let piece = piece.map_err(|problem| self.refused(format!("the instruments' filter: {problem}")))?;
             self.pieces.push((segment, piece));
         }

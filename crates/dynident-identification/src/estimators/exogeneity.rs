@@ -143,7 +143,6 @@ fn is_strong(band: &BandEstimate, least_squares: &Estimate) -> bool {
     !found.instruments.weak && found.estimate.rank.fixed.len() <= least_squares.rank.fixed.len()
 }
 
-/// Whether two estimates agree within their error bars.
 fn agree(a: &Estimate, b: &Estimate, thresholds: &NoiseThresholds) -> bool {
     contrast(a, b).is_none_or(|contrast| {
         contrast.rms <= thresholds.max_contrast_rms && contrast.largest <= thresholds.max_contrast

@@ -10,7 +10,6 @@ use dynident_recording::AveragedPeriods;
 use dynident_rows::{PANEL_SAMPLES, RegressorModel};
 use nalgebra::{DMatrix, DVector};
 
-/// Low-pass and decimation.
 #[derive(Clone, Debug)]
 pub(super) struct PeriodFilter {
     /// Symmetric, of odd length; a single 1 without a filter.

@@ -4,7 +4,6 @@ use super::{EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{CrossProblem, Estimate, SegmentedFactor, generalized_least_squares};
 use dynident_rows::{JointRows, LogError, RowConsumer};
 
-/// Combines the joints' rows of the same instants.
 struct SideBySide {
     factor: SegmentedFactor,
     panel: Vec<f64>,
@@ -36,7 +35,6 @@ impl RowConsumer for SideBySide {
     }
 }
 
-/// Computes the estimate with one more pass over the logs.
 pub(super) fn generalized(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), EstimatorError> {
     let TrainingRows { logs, model, problem, .. } = *rows;
     let settings = rows.settings;

@@ -65,7 +65,6 @@ fn made_rows<'r, 'a>(
     refused.map_or(Ok(builder), Err)
 }
 
-/// Rows of both motions.
 struct InstrumentedRows<'r, 'a> {
     rows: &'r TrainingRows<'a>,
     log: String,
@@ -90,10 +89,8 @@ struct InstrumentedRows<'r, 'a> {
     segment: usize,
 }
 
-/// Row maker of one motion.
 struct Side {
     workspace: BatchWorkspace,
-    /// State of friction with memory.
     history: TermHistory,
     panels: Panels,
     motion: [Vec<f64>; 3],

@@ -10,7 +10,6 @@ use dynident_estimation::{
     Unexcited, hausman_test, instrumental_variables,
 };
 use dynident_rows::Samples;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Instruments from the motion of the log itself, with a lower cut-off than in the regressor.
@@ -53,14 +52,12 @@ impl InstrumentSettings {
     }
 }
 
-/// The estimate with instruments of one band.
 pub(super) struct BandEstimate {
     pub(super) cutoff_hz: f64,
     pub(super) problem: InstrumentedProblem,
     pub(super) found: InstrumentalEstimate,
 }
 
-/// The motion of a log below `cutoff_hz`.
 fn band_source<'r>(
     rows: &'r TrainingRows<'_>,
     index: usize,
@@ -74,17 +71,12 @@ fn band_source<'r>(
     }
 }
 
-/// Processes every training log, in parallel if possible.
 fn of_every_log<T: Send>(
     rows: &TrainingRows<'_>,
     one: impl Fn(usize) -> Result<T, EstimatorError> + Sync,
 ) -> Result<Vec<T>, EstimatorError> {
     rows.begin("instruments");
-    let of_logs = if rows.logs.execution.parallel() {
-        rows.training.par_iter().map(|&index| one(index)).collect()
-    } else {
-        rows.training.iter().map(|&index| one(index)).collect()
-    };
+    let of_logs = rows.logs.execution.try_map(rows.training, |&index| one(index));
     rows.logs.end();
     of_logs
 }

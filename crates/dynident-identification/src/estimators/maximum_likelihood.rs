@@ -3,7 +3,7 @@
 use super::filtered_period::PeriodFilter;
 use super::row_pass::Stop;
 use super::simulated::torque_sigma;
-use super::{EstimatorError, TrainingRows};
+use super::{EstimatorError, PeriodSettings, TrainingRows};
 use crate::thresholds::MotionThresholds;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{
@@ -15,10 +15,6 @@ use dynident_recording::{AveragedPeriods, MotionBlock, averaged_periods};
 use dynident_rows::{LogError, RegressorModel, motion_band_hz};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
-
-/// Maximum period of a motion, s: eleven days.
-const MAX_PERIOD_S: f64 = 1e6;
 
 /// Minimum torque noise relative to the root mean square of the torque.
 const MIN_RELATIVE_SIGMA: f64 = 1e-4;
@@ -26,62 +22,6 @@ const MIN_RELATIVE_SIGMA: f64 = 1e-4;
 /// size; the regressor is linear in the last. A larger noise of the mean period gives a larger step, so that the slope
 /// of a friction step is averaged over the noise.
 const MIN_STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
-
-/// The repeated motion.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields, default)]
-pub struct PeriodSettings {
-    /// Period of the motion, s; by default the length of the log's `reference`.
-    pub period_s: Option<f64>,
-    /// Time at the start of every log that is excluded until the motion repeats, s; 0 by default.
-    pub skip_s: f64,
-    /// Harmonics of the motion's Fourier series, for the simultaneous fit only; by default those above the noise.
-    pub harmonics: Option<usize>,
-}
-
-/// Invalid settings of a repeated motion.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum PeriodError {
-    /// Invalid period.
-    #[error("period_s = {period_s:?}: give the period of the motion in seconds, at most {MAX_PERIOD_S:e}")]
-    Period {
-        /// Value.
-        period_s: f64,
-    },
-    /// Invalid start.
-    #[error("skip_s = {skip_s}: give 0 or more seconds")]
-    Skip {
-        /// Value.
-        skip_s: f64,
-    },
-    /// Invalid number of harmonics.
-    #[error("harmonics = {harmonics}: give 1 to 200")]
-    Harmonics {
-        /// Value.
-        harmonics: usize,
-    },
-}
-
-impl PeriodSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// The first invalid value.
-    pub fn validate(&self) -> Result<(), PeriodError> {
-        if let Some(period_s) = self.period_s.filter(|period| !(*period > 0.0 && *period <= MAX_PERIOD_S)) {
-            return Err(PeriodError::Period { period_s });
-        }
-        if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
-            return Err(PeriodError::Skip { skip_s: self.skip_s });
-        }
-        if let Some(harmonics) = self.harmonics.filter(|harmonics| !(1..=200).contains(harmonics)) {
-            return Err(PeriodError::Harmonics { harmonics });
-        }
-        Ok(())
-    }
-}
 
 /// Results for the periods of a repeated motion.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -172,9 +112,7 @@ pub(super) fn periodic(
     Ok((estimate, fit))
 }
 
-/// Mean periods of all logs.
 struct Means {
-    /// Period, s; `None` without logs.
     period_s: Option<f64>,
     means: Vec<MeanPeriod>,
 }
@@ -249,7 +187,6 @@ fn pooled(means: &[MeanPeriod], covariance: impl Fn(&MeanPeriod) -> DMatrix<f64>
     sum / degrees_of_freedom.max(1.0)
 }
 
-/// Mean period of log `index`.
 fn mean_period(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -356,12 +293,10 @@ fn at_phases(channels: &[Vec<f64>], from: f64, step: f64) -> Vec<Vec<f64>> {
     channels.iter().map(|channel| (0..count).map(|k| value(channel, first + k as f64 * step)).collect()).collect()
 }
 
-/// Regressors of single instants and their derivatives by the motion.
 struct Instants<'a> {
     model: &'a RegressorModel,
     workspace: BatchWorkspace,
     panels: Panels,
-    /// Steps of the central differences by variable.
     steps: Vec<f64>,
 }
 

@@ -17,6 +17,7 @@ mod instruments;
 mod maximum_likelihood;
 mod noise_in_regressor;
 mod noise_weighted;
+mod period_settings;
 mod periodic_model;
 mod robust;
 mod row_pass;
@@ -26,14 +27,16 @@ mod simulated_loop;
 mod simultaneous;
 mod spline_motion;
 mod spline_torque;
+mod start_values;
 
 pub use error::EstimatorError;
 pub use function::{EstimatorFunction, EstimatorRule};
 pub use instrumental::InstrumentSettings;
 pub use instruments::{InstrumentSource, SmoothedMotion};
-pub use maximum_likelihood::{PeriodError, PeriodSettings, PeriodicFit};
+pub use maximum_likelihood::PeriodicFit;
 pub use noise_in_regressor::{EstimateContrast, NoiseInRegressor, NoiseVerdict};
 pub use noise_weighted::NoiseLevels;
+pub use period_settings::{PeriodError, PeriodSettings};
 pub use periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord};
 pub use robust::GrossErrors;
 pub use settings::EstimationSettings;
@@ -255,7 +258,6 @@ pub fn estimate(
     Ok(estimation)
 }
 
-/// As [`estimate`] with external instruments.
 fn with_source(rows: &TrainingRows<'_>, source: &mut dyn InstrumentSource) -> Result<Estimation, EstimatorError> {
     let settings = rows.settings;
     let own = match &settings.estimator {
@@ -270,7 +272,6 @@ fn with_source(rows: &TrainingRows<'_>, source: &mut dyn InstrumentSource) -> Re
     Ok(Estimation { estimate, findings, noise_in_regressor: Some(noise) })
 }
 
-/// The estimate without instruments.
 fn without_instruments(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), EstimatorError> {
     let settings = rows.settings;
     let simulated = |loop_settings, compared| {

@@ -39,7 +39,6 @@ impl NoiseLevels {
     }
 }
 
-/// The estimate with one pass over the rows per reweighting.
 pub(super) fn noise_weighted(
     rows: &TrainingRows<'_>,
     levels: &NoiseLevels,

@@ -7,7 +7,6 @@ use dynident_model::terms::JointMotion;
 use dynident_rows::RegressorModel;
 use nalgebra::{DMatrix, DVector};
 
-/// Samples per block of the regressor.
 const BLOCK_SAMPLES: usize = 256;
 
 /// Minimum number of rows per period of the highest harmonic, so that the series hardly changes within a row.
@@ -91,7 +90,6 @@ impl<'a> PeriodicModel<'a> {
         self.row_basis.nrows()
     }
 
-    /// Number of unknowns of one joint's motion.
     fn own(&self) -> usize {
         self.basis.ncols()
     }
@@ -106,7 +104,6 @@ impl<'a> PeriodicModel<'a> {
         Some(normal.solve(&self.row_basis.tr_mul(&self.row_q)).as_slice().to_vec())
     }
 
-    /// Coefficients of the derivative.
     fn derivative(&self, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
         let mut rate = DMatrix::zeros(coefficients.nrows(), coefficients.ncols());
         for joint in 0..coefficients.ncols() {

@@ -15,7 +15,6 @@ pub struct GrossErrors {
     pub mean_weight: Vec<f64>,
 }
 
-/// The estimate with one pass over the rows per reweighting.
 pub(super) fn robust(rows: &TrainingRows<'_>, weight: RowWeight) -> Result<(Estimate, Findings), EstimatorError> {
     let estimation = rows.settings;
     let settings = RobustSettings {

@@ -37,7 +37,6 @@ impl KeptRows {
         Self { blocks: Some(Vec::new()), complete: false }
     }
 
-    /// Passes every row of every training log to `visit`.
     pub(super) fn every_row(&mut self, rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), Stop> {
         if let (Some(blocks), true) = (&self.blocks, self.complete) {
             for KeptBlock { log, joint, rows, panel } in blocks {
@@ -71,7 +70,6 @@ impl KeptRows {
     }
 }
 
-/// Passes the rows of a log to a visitor.
 struct VisitorConsumer<'a, 'b> {
     log: usize,
     visit: &'a mut RowVisitor<'b>,

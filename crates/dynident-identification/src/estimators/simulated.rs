@@ -1,8 +1,8 @@
 //! DIDIM, CLIE and CLOE: estimates from a controller and the commanded motion.
 
 use super::simulated_loop::{ComparedSignal, LoopLog, SimulatedLoop};
+use super::start_values::start_values;
 use super::{EstimatorError, TrainingRows};
-use crate::consistent::{ConsistencyError, ConsistencySettings, consistent_parameters};
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, EstimateStatus, EstimationError, LinearProblem, SegmentedFactor, SimulatedEstimate, SimulatedMotion,
@@ -11,7 +11,6 @@ use dynident_estimation::{
 use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, RunLimits, SensorSettings};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 /// Minimum noise relative to the root mean square of the compared signal, so that noise-free data have finite weights.
 const MIN_RELATIVE_SIGMA: f64 = 1e-4;
@@ -243,14 +242,12 @@ pub(crate) fn torque_sigma(problem: &LinearProblem, values: &[f64]) -> Result<Ve
     Ok(squares.iter().zip(rows).map(|(sum, rows)| (sum / (rows as f64 - share).max(1.0)).sqrt()).collect())
 }
 
-/// A start whose simulation succeeds.
 struct SimulatedStart {
     values: Vec<f64>,
     name: &'static str,
     sigma: Vec<f64>,
 }
 
-/// Result from one start.
 struct StartOutcome {
     found: SimulatedEstimate,
     start: &'static str,
@@ -304,51 +301,7 @@ fn settled(
         fit.noise_std = by_row(simulated, &sigma);
         fit.start.clone_from(&found.values);
     }
-    // The last round returns.
     Err(EstimationError::NoSimulation.into())
-}
-
-/// Reason for a missing start.
-#[derive(Debug, Error)]
-enum NoStartError {
-    #[error("no physically consistent set is available as start: {0}")]
-    Inconsistent(ConsistencyError),
-    #[error("the robot description cannot be the start, because it has no inertial of {}", .0.join(", "))]
-    Undescribed(Vec<String>),
-    #[error("{0}; {1}")]
-    Both(Box<Self>, Box<Self>),
-}
-
-/// Possible starts with their names.
-fn start_values(
-    rows: &TrainingRows<'_>,
-    choice: SimulationStart,
-    plain: &Estimate,
-) -> Result<Vec<(Vec<f64>, &'static str)>, NoStartError> {
-    let (model, problem) = (rows.model, rows.problem);
-    let mut starts = Vec::new();
-    let mut why = Vec::new();
-    if choice != SimulationStart::Description {
-        let default = ConsistencySettings::default();
-        let settings = rows.consistency.unwrap_or(&default);
-        match consistent_parameters(&model.parametric, problem, &plain.joint_sigma, settings) {
-            Ok(fit) => starts.push((fit.base_values, "estimate")),
-            Err(reason) => why.push(NoStartError::Inconsistent(reason)),
-        }
-    }
-    if choice != SimulationStart::Estimate {
-        if let Some(nominal) = model.parametric.nominal_base() {
-            starts.push((nominal.to_vec(), "description"));
-        } else {
-            let unknown = model.model().bodies_without_prior().into_iter().map(str::to_owned);
-            why.push(NoStartError::Undescribed(unknown.collect()));
-        }
-    }
-    let both = |first, second| NoStartError::Both(Box::new(first), Box::new(second));
-    match why.into_iter().reduce(both) {
-        Some(error) if starts.is_empty() => Err(error),
-        _ => Ok(starts),
-    }
 }
 
 fn failure(simulated: &SimulatedLoop<'_>) -> String {

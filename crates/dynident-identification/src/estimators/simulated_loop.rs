@@ -6,21 +6,18 @@ use super::{EstimatorError, TrainingRows};
 use dynident_estimation::{SimulatedCriterion, SimulatedMotion, SimulatedRows};
 use dynident_excitation::Motion;
 use dynident_model::terms::TorqueTerm;
-use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
-use dynident_rows::{JointRows, LogError, RegressorModel, RowBuilder, RowConsumer, motion_band_hz};
+use dynident_recording::{DecimationSettings, FilterError, MotionBlock};
+use dynident_rows::{JointFilters, JointRows, LogError, RegressorModel, RowBuilder, RowConsumer, motion_band_hz};
 use dynident_simulation::{
     ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, SimulationError, closed_loop,
 };
 use nalgebra::{DMatrix, DVector};
 
-/// Signal that is compared with the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ComparedSignal {
     /// Torque, with the regressor of the simulated motion: DIDIM.
     TorqueRows,
-    /// Torque: CLIE.
     Torque,
-    /// Positions: CLOE.
     Position,
 }
 
@@ -41,7 +38,6 @@ impl ComparedSignal {
     }
 }
 
-/// Samples of a log without a gap.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
     segment: usize,
@@ -59,13 +55,11 @@ pub(super) struct LoopLog {
     /// Start of the simulation, s after the log's first row: that of the commanded motion, or of the log if it begins
     /// later.
     begins_s: f64,
-    /// Filtered rows of each joint.
     pub(super) rows: Vec<usize>,
     /// Measured and filtered outputs of each joint.
     measured: Vec<Vec<f64>>,
 }
 
-/// The simulated experiment.
 pub(super) struct SimulatedLoop<'a> {
     pub(super) model: &'a RegressorModel,
     pub(super) controller: &'a ControllerSettings,
@@ -116,7 +110,7 @@ impl LoopLog {
         }
         let log_rate_hz = stream.rate_hz();
         if outputs.rows.iter().any(Vec::is_empty) {
-            let (rows, needed) = (samples as u64, outputs.needed());
+            let (rows, needed) = (samples as u64, outputs.filters.needed());
             return Err(LogError::NothingLeft { log: name, rows, needed }.into());
         }
         let begins_s = commanded.start_s().min(0.0);
@@ -155,7 +149,6 @@ impl SimulatedLoop<'_> {
         DVector::from_iterator(self.rows(), all)
     }
 
-    /// Number of rows of all logs and joints.
     pub(super) fn rows(&self) -> usize {
         self.logs.iter().flat_map(|log| &log.rows).sum()
     }
@@ -168,7 +161,6 @@ impl SimulatedLoop<'_> {
         Plant::new(model.model(), &terms, &values)
     }
 
-    /// Rows of one log in a simulated run.
     fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), EstimatorError> {
         let dof = self.model.model().dof();
         let motion = (self.compared != ComparedSignal::Torque)
@@ -269,7 +261,6 @@ impl SimulatedMotion for SimulatedLoop<'_> {
     }
 }
 
-/// Collected rows of all logs.
 struct Gathered {
     output: Vec<f64>,
     regressor: DMatrix<f64>,
@@ -278,38 +269,26 @@ struct Gathered {
 
 /// One value per joint and sample through the parallel filter.
 struct Outputs {
-    decimators: Option<Vec<Decimator>>,
-    segments: Vec<usize>,
-    out: Vec<f64>,
+    filters: JointFilters,
+    segment: usize,
     rows: Vec<Vec<f64>>,
 }
 
 impl Outputs {
     fn new(dof: usize, filter: Option<&DecimationSettings>, rate_hz: f64) -> Result<Self, FilterError> {
-        let decimators = filter
-            .map(|settings| (0..dof).map(|_| Decimator::new(settings, rate_hz, 1)).collect::<Result<Vec<_>, _>>())
-            .transpose()?;
-        Ok(Self { decimators, segments: vec![0; dof], out: Vec::new(), rows: vec![Vec::new(); dof] })
-    }
-
-    fn needed(&self) -> usize {
-        self.decimators.as_ref().and_then(|all| all.first()).map_or(1, Decimator::length)
+        let filters = JointFilters::new(&vec![1; dof], rate_hz, filter)?;
+        Ok(Self { filters, segment: 0, rows: vec![Vec::new(); dof] })
     }
 
     fn take(&mut self, joint: usize, segment: usize, values: &[f64]) {
-        let Some(decimators) = &mut self.decimators else {
-            self.rows[joint].extend_from_slice(values);
-            return;
-        };
-        if std::mem::replace(&mut self.segments[joint], segment) != segment {
-            decimators[joint].finish();
+        if core::mem::replace(&mut self.segment, segment) != segment {
+            self.filters.restart();
         }
-        let rows = decimators[joint].push(values, values.len(), &mut self.out);
-        self.rows[joint].extend_from_slice(&self.out[..rows]);
+        let rows = self.filters.push(joint, values, values.len(), &[]);
+        self.rows[joint].extend_from_slice(&rows.panel[..rows.rows]);
     }
 }
 
-/// Collects every joint's filtered panels.
 struct PanelRows {
     joints: Vec<Vec<(usize, Vec<f64>)>>,
 }

@@ -36,7 +36,6 @@ pub struct SeriesFit {
     pub torque_autoregression: Vec<usize>,
 }
 
-/// One recorded log.
 struct RawRecord {
     record: PeriodicRecord,
     series: FourierSeries,
@@ -48,7 +47,6 @@ impl RawRecord {
     }
 }
 
-/// Computes the estimate and the motion of each log.
 pub(super) fn simultaneous(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
@@ -113,7 +111,6 @@ fn fitted_motion(
     Ok(motion)
 }
 
-/// Fitted motion and noise of each log.
 fn series_fits(
     recorded: &[RawRecord],
     records: &mut PeriodicRecords<'_>,

@@ -31,7 +31,6 @@ pub struct SplineFit {
     pub residual_over_start: f64,
 }
 
-/// Computes the estimate and the motion of each log.
 pub(super) fn spline_motion(
     rows: &TrainingRows<'_>,
     settings: &SplineMotionSettings,

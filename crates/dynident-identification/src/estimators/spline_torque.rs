@@ -9,7 +9,6 @@ use dynident_model::terms::{JointMotion, TorqueTerm};
 use dynident_rows::RegressorModel;
 use rayon::prelude::*;
 
-/// Samples per block of one thread.
 const BLOCK_SAMPLES: usize = 128;
 
 /// Torque and its derivatives, for several blocks of samples in parallel.
@@ -21,11 +20,9 @@ pub struct SplineTorque<'a> {
     model: &'a RegressorModel,
     /// Temperatures of every record, joint-major; empty if not measured.
     temperatures_c: Vec<Vec<f64>>,
-    /// State for such friction.
     following: Option<(BatchWorkspace, TermHistory)>,
 }
 
-/// Some samples of a motion, joint-major.
 struct Part {
     first: usize,
     samples: usize,
@@ -93,7 +90,6 @@ impl Instants<'_> {
         panels
     }
 
-    /// Torque of joint `joint` from its panel.
     fn torque_of(self, joint: usize, panels: &Panels, samples: usize, parameters: &[f64]) -> Vec<f64> {
         let mut torque = vec![0.0; samples];
         let columns = self.0.layout().joint_columns(joint);

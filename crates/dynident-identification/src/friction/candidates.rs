@@ -26,7 +26,6 @@ pub(super) fn options(kind: FrictionKind, columns: &[CandidateColumn]) -> Vec<Ve
     alone.into_iter().map(|place| vec![place]).chain(pairs).chain(only).collect()
 }
 
-/// One candidate column of a joint.
 #[derive(Clone, Debug)]
 pub(crate) struct CandidateColumn {
     pub(crate) kind: FrictionKind,

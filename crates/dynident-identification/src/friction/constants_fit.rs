@@ -33,10 +33,8 @@ const CONVERGENCE: (f64, f64) = (0.1, 2.0e-3);
 /// has certainly not converged.
 const MAX_STD_INFLATION: f64 = 10.0;
 
-/// Selected friction with its adjustable constants.
 #[derive(Clone, Debug)]
 pub(crate) struct FrictionConstants {
-    /// Joints with their terms.
     joints: Vec<(usize, Vec<TorqueTerm>)>,
     scales: Vec<JointScale>,
     axes: Vec<Axis>,
@@ -45,14 +43,11 @@ pub(crate) struct FrictionConstants {
 /// One constant and the terms of a joint that share it: steps at rest have one width.
 #[derive(Clone, Debug)]
 struct Axis {
-    /// Index among the joints.
     joint: usize,
     terms: Vec<usize>,
-    /// Index of the coordinate.
     place: usize,
 }
 
-/// A step of the constants with its uncertainty.
 #[derive(Clone, Debug)]
 pub(crate) struct ConstantsStep {
     /// Steps of the constants' logarithms, one per axis.
@@ -63,7 +58,6 @@ pub(crate) struct ConstantsStep {
     estimate: Estimate,
 }
 
-/// Effect of the constants' error on the covariance of the parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct ConstantsError {
     symbols: Vec<String>,
@@ -90,7 +84,6 @@ impl ConstantsStep {
         &self.error
     }
 
-    /// Whether the constants have converged.
     pub(crate) fn has_converged(&self) -> bool {
         self.is_below(1.0)
     }
@@ -108,7 +101,6 @@ impl ConstantsStep {
 }
 
 impl FrictionConstants {
-    /// Constants of the selected friction of these joints.
     pub(crate) fn new(model: &RegressorModel, chosen: &[JointFriction]) -> Self {
         let of_joint = |own: &JointFriction| Some((model.model().joint_index(&own.joint)?, own.terms.clone()?));
         let joints: Vec<(usize, Vec<TorqueTerm>)> = chosen.iter().filter_map(of_joint).collect();
@@ -117,7 +109,6 @@ impl FrictionConstants {
         Self { joints, scales, axes }
     }
 
-    /// Number of constants of a joint.
     pub(crate) fn count(&self, joint: usize) -> usize {
         self.axes.iter().filter(|axis| self.joints[axis.joint].0 == joint).count()
     }
@@ -232,9 +223,6 @@ impl FrictionConstants {
     /// The step with its covariance, by `solve`. `fitted` are the values with the current constants, over the columns
     /// of `model` and then those of loads. `wide_problem` also has the columns of `wide`, including all
     /// [`neighbours`](Self::neighbours).
-    ///
-    /// # Errors
-    /// The rows do not determine an estimate.
     pub(crate) fn step(
         &self,
         model: &RegressorModel,
@@ -260,7 +248,6 @@ impl FrictionConstants {
             Some(white) => {
                 let answers = white.solve(&across.transpose()).transpose();
                 let further = &answers * found.covariance.view((count, count), (own, own)) * answers.transpose();
-                // Enforces symmetry.
                 (&further + further.transpose()) * 0.5
             }
             None => DMatrix::zeros(count, count),

@@ -30,7 +30,6 @@ impl JointFriction {
         Self { joint: joint.into(), chosen, terms: None, constants: Vec::new(), folds: 0, candidates: Vec::new() }
     }
 
-    /// Replaces the selected terms by terms with other constants, or fewer.
     pub(crate) fn choose(&mut self, terms: &[TorqueTerm]) {
         let name = name_of(terms);
         if self.terms.as_deref().map(name_of).is_some_and(|before| before != name) {
@@ -86,7 +85,6 @@ pub struct FrictionCandidate {
     pub chosen: bool,
 }
 
-/// Name of a set of terms, as for candidates.
 fn name_of(terms: &[TorqueTerm]) -> String {
     let mut kinds: Vec<FrictionKind> = terms.iter().filter_map(TorqueTerm::candidate).collect();
     kinds.sort_by_key(|kind| kind.rank());

@@ -21,10 +21,8 @@ use dynident_model::terms::{CandidateRole, TorqueTerm};
 /// Maximum number of terms added to viscous friction and a step.
 const MAX_ADDED_TERMS: usize = 3;
 
-/// A candidate with its best constants.
 struct ScoredCandidate {
     kinds: Vec<FrictionKind>,
-    /// Indices of its columns.
     places: Vec<usize>,
     errors: FoldErrors,
 }
@@ -60,7 +58,6 @@ impl ScoredCandidate {
         (0..columns[first].stated.len()).map(|number| mean_term(&weighted(number), scale)).collect()
     }
 
-    /// Distinct symbols of the parameters that are not zero.
     fn parameters(&self, columns: &[CandidateColumn]) -> Vec<String> {
         let mut symbols: Vec<String> = Vec::new();
         for (place, _) in self.kinds.iter().flat_map(|&kind| self.present(columns, kind)) {
@@ -78,7 +75,6 @@ impl ScoredCandidate {
         self.parameters(columns).len() + constants.sum::<usize>()
     }
 
-    /// Name of its terms with nonzero values.
     fn present_name(&self, columns: &[CandidateColumn]) -> String {
         let is_present = |kind: &&FrictionKind| !self.present(columns, kind).is_empty();
         let names: Vec<&str> = self.kinds.iter().filter(is_present).map(|kind| kind.name).collect();
@@ -165,7 +161,6 @@ fn asymmetry_inflation(folds: &JointFolds, columns: &[CandidateColumn], model: &
     folds.variance_inflation(&difference, &others)
 }
 
-/// Whether this is a step with a parameter for each direction.
 fn is_step_by_direction(kind: FrictionKind) -> bool {
     kind.is_step && !kind.is_common_step()
 }
@@ -217,7 +212,6 @@ fn add_terms(
     }
 }
 
-/// Selection for one joint, and the indices of its columns.
 pub(super) fn search(
     joint: String,
     scale: JointScale,

@@ -13,7 +13,6 @@ use dynident_estimation::Estimate;
 use dynident_model::terms::{CandidateRole, TermAction, TorqueTerm};
 use nalgebra::{DMatrix, DVector};
 
-/// A further term of a joint.
 struct FurtherTerm {
     /// Wald statistic; 0 for negative friction or without supporting rows.
     wald: f64,
@@ -24,7 +23,6 @@ struct FurtherTerm {
 }
 
 impl FurtherTerm {
-    /// Ratio of the statistic to its critical value.
     fn significance(&self, critical: &[f64; 3]) -> f64 {
         self.wald / critical[self.degrees_of_freedom - 1]
     }
@@ -32,7 +30,6 @@ impl FurtherTerm {
 
 /// Test of further terms in a fit.
 pub(super) struct TermTest<'a> {
-    /// Columns of the model.
     pub(super) columns: &'a [Column],
     /// Norms of these columns over all rows.
     pub(super) norms: &'a [f64],
@@ -41,10 +38,8 @@ pub(super) struct TermTest<'a> {
     pub(super) thresholds: FrictionThresholds,
 }
 
-/// Criterion for weak further terms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Weak {
-    /// Insignificant terms.
     Insignificant,
     /// Only terms with negative friction or without supporting rows.
     Unsupported,

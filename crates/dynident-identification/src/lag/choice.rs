@@ -219,7 +219,6 @@ fn is_beyond_its_bar(lag: &TorqueLag) -> bool {
     lag.lag_s.abs() > lag.half_width_95_s
 }
 
-/// Common lag of some joints.
 struct CommonLag {
     lag: TorqueLag,
     scatter: Option<f64>,
@@ -265,7 +264,6 @@ fn common(fit: &LagFit, joints: &[usize]) -> Option<CommonLag> {
     })
 }
 
-/// The generalised mean for one spread between the joints.
 #[derive(Clone, Copy)]
 struct SharedLag {
     mean: f64,

@@ -34,19 +34,15 @@ pub struct LagFit {
     pub(crate) last: Estimate,
     /// Number of parameters: base parameters, payloads, offsets of single logs.
     pub(crate) parameters: usize,
-    /// Column of the first lag.
     pub(crate) first: usize,
     /// Lag of torque behind motion by joint; `None` if the samples do not determine it.
     pub(crate) joints: Vec<Option<TorqueLag>>,
-    /// Filtered rows by joint.
     pub(crate) rows: Vec<usize>,
-    /// Prior standard deviation of a lag, s.
     pub(crate) usual_lag_s: f64,
     pub(crate) thresholds: LagThresholds,
 }
 
 impl LagFit {
-    /// Covariance of the lags of some joints, s².
     pub(crate) fn covariance(&self, joints: &[usize]) -> DMatrix<f64> {
         let of = |row: usize, column: usize| (self.first + joints[row], self.first + joints[column]);
         DMatrix::from_fn(joints.len(), joints.len(), |row, column| self.last.covariance[of(row, column)])
@@ -79,14 +75,11 @@ impl LagFit {
     }
 }
 
-/// Samples of some logs with rows about one lag for each joint.
 struct Samples<'a> {
     checks: &'a [DelayCheck<'a>],
     with: (&'a Logs<'a>, &'a EstimationSettings),
     unknowns: Unknowns<'a>,
-    /// By log, then by joint.
     rows: Vec<Vec<DelayRows>>,
-    /// Lag of each joint, s.
     lag_s: Vec<f64>,
 }
 

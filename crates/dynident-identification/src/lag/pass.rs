@@ -10,7 +10,6 @@ use crate::settings::IdentificationSettings;
 use dynident_rows::{
     JointRows, LogError, LogPass, Logs, RawSamples, Recording, RegressorModel, RowConsumer, Samples, Silent,
 };
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 impl RowConsumer for DelayCheck<'_> {
@@ -71,9 +70,6 @@ pub fn lags_of_recordings(
 }
 
 /// Complete lag of each joint in recording `index`, after a pass with `check`.
-///
-/// # Errors
-/// The recording cannot be read again, which is needed if the pass excluded rows of a motion.
 pub(crate) fn lags_after_pass(
     check: DelayCheck<'_>,
     with: (&Logs<'_>, &EstimationSettings),
@@ -105,13 +101,8 @@ fn checks<'a>(
         pass.run(&mut samples)?;
         Ok(samples)
     };
-    let places = 0..chosen.len();
-    let checks = if logs.execution.parallel() {
-        places.into_par_iter().map(of_log).collect::<Result<_, _>>()
-    } else {
-        places.map(of_log).collect()
-    };
-    checks.map(Some)
+    let places: Vec<usize> = (0..chosen.len()).collect();
+    logs.execution.try_map(&places, |&place| of_log(place)).map(Some)
 }
 
 /// The recording with every row, because excluded rows would shift the following ones. `None` if rows inside are

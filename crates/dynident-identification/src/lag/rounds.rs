@@ -7,7 +7,6 @@ use dynident_estimation::Estimate;
 use dynident_recording::log::OneOrMany;
 use nalgebra::DMatrix;
 
-/// Maximum number of rounds; one or two are usual.
 const MAX_ROUNDS: usize = 3;
 
 /// Repeats fit and lag estimation until no significant lag is left in the rows. Begin with the default, fit without

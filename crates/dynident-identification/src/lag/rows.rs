@@ -12,7 +12,6 @@ const FIRST_NODE: isize = -2;
 /// Samples that the slope needs on each side.
 const SLOPE_REACH: isize = 2;
 
-/// One uninterrupted segment of a log.
 pub(crate) struct Piece {
     pub(crate) segment: usize,
     /// Predicted torque of each sample, by joint.
@@ -25,12 +24,10 @@ pub(crate) struct Piece {
     pub(crate) rows: Vec<Vec<FilteredRows>>,
 }
 
-/// A block of one joint's filtered regressor.
 pub(crate) struct FilteredRows {
     pub(crate) rows: usize,
     /// Column-major.
     pub(crate) regressor: Vec<f64>,
-    /// See [`JointRows::coverage`].
     pub(crate) coverage: Vec<f64>,
 }
 
@@ -52,7 +49,6 @@ impl Piece {
 /// One joint's filtered rows `[Y | −∂(Yθ)/∂t | τ at the six nodes]`. The last node has the place of a factor's torque.
 pub(crate) struct DelayRows {
     pub(crate) factor: SegmentedFactor,
-    /// The same rows as one segment.
     pub(crate) merged: SegmentedFactor,
     /// The sample after which the lag lies, within one sample.
     pub(crate) centre: isize,
@@ -91,7 +87,6 @@ impl DelayRows {
                 for column in further.values.chunks_exact(further.rows.max(1)) {
                     let whole = panel.len();
                     panel.extend_from_slice(&column[from..to]);
-                    // As the rows of the regressor.
                     divide(&mut panel[whole..], &shares);
                 }
                 if to > from {

@@ -32,7 +32,6 @@ impl<'a> DelayCheck<'a> {
         Self { model, theta, pieces, samples: 0, numbers: 0, full: false, rate_hz: 0.0, buffer }
     }
 
-    /// Takes filtered rows; their samples came before.
     pub(super) fn take_filtered(&mut self, rows: &JointRows<'_>) {
         let Some(piece) = self.pieces.last_mut().filter(|_| !self.full) else { return };
         let regressor = &rows.panel[..self.model.layout().joint_columns(rows.joint).len() * rows.rows];
@@ -69,12 +68,10 @@ impl<'a> DelayCheck<'a> {
         self.model
     }
 
-    /// Base parameters of the prediction.
     pub(crate) fn theta(&self) -> &'a [f64] {
         self.theta
     }
 
-    /// Sample rate, hertz.
     pub(crate) fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
@@ -97,10 +94,6 @@ impl<'a> DelayCheck<'a> {
         lag.matters().then_some(lag.samples * factor as f64)
     }
 
-    /// Rows of a joint about a lag of `shift` samples.
-    ///
-    /// # Errors
-    /// There are too few rows.
     pub(crate) fn rows(
         &self,
         logs: &Logs<'_>,

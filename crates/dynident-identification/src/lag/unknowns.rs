@@ -3,7 +3,6 @@
 use crate::payload::{LoadColumns, SeenColumns};
 use nalgebra::DVector;
 
-/// Parameters that are estimated together with a lag.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unknowns<'a> {
     /// Values of the fit, in the order of the columns.
@@ -15,7 +14,6 @@ pub(crate) struct Unknowns<'a> {
 }
 
 impl<'a> Unknowns<'a> {
-    /// Base parameters of a single log.
     pub(crate) fn of_log(theta: &'a [f64]) -> Self {
         Self { values: theta, loads: None, gains: &[] }
     }

@@ -34,16 +34,11 @@ pub struct Payload {
     pub known_mass_kg: Option<f64>,
 }
 
-/// Columns of one estimated payload.
 #[derive(Clone, Debug)]
 pub(crate) struct PayloadColumns {
-    /// Index among the study's payloads.
     pub(crate) payload: usize,
-    /// First column.
     pub(crate) first: usize,
-    /// Parameters with columns.
     pub(crate) kept: Vec<usize>,
-    /// Parameters without columns.
     pub(crate) dropped: Vec<usize>,
     /// Coefficients of dropped parameters in the kept ones, shape (kept, dropped).
     pub(crate) regrouping: DMatrix<f64>,
@@ -55,7 +50,6 @@ pub(crate) struct PayloadColumns {
 
 /// Rows of one joint in one log, `W (T x + c)`, in terms of the problem's columns.
 pub(crate) struct SeenColumns {
-    /// Columns of the problem.
     pub(crate) columns: Vec<usize>,
     /// Rows of `T` for the joint's base columns.
     pub(crate) map: DMatrix<f64>,
@@ -64,7 +58,6 @@ pub(crate) struct SeenColumns {
 }
 
 impl SeenColumns {
-    /// A log with the arm alone.
     pub(crate) fn of_base(own: &[usize]) -> Self {
         let count = own.len();
         Self { columns: own.to_vec(), map: DMatrix::identity(count, count), known: DVector::zeros(count) }
@@ -75,7 +68,6 @@ impl SeenColumns {
 #[derive(Clone, Debug)]
 pub struct LoadColumns {
     base: usize,
-    /// Symbols of all additional columns.
     symbols: Vec<String>,
     pub(crate) payloads: Vec<PayloadColumns>,
     /// (log, joint, column) of separate offsets.

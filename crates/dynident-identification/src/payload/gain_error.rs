@@ -11,9 +11,6 @@ use nalgebra::{DMatrix, DVector};
 /// the part of joint j. A relative gain error ε_j scales x_j by `1 + ε_j`. The same error scales a held arm (`held`,
 /// found with the same gains), so its torque is subtracted first. With independent gains of standard deviation `share`
 /// the payload's covariance grows by `share² Σ_j x_j x_jᵀ`.
-///
-/// # Errors
-/// An estimate of other columns.
 pub(crate) fn gain_error(
     problem: &LinearProblem,
     columns: &LoadColumns,

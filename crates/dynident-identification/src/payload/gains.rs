@@ -38,7 +38,6 @@ impl DriveGain {
     }
 }
 
-/// Result of a fit with unknown gains.
 pub(crate) struct Gains {
     pub(crate) of_joints: Vec<DriveGain>,
     /// Over the columns of the problem, in SI units.

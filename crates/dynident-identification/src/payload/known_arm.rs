@@ -46,7 +46,6 @@ impl KnownArm {
         self.cutoff_hz
     }
 
-    /// The columns that are held.
     pub(crate) fn held(&self, model: &RegressorModel, columns: &LoadColumns) -> Vec<usize> {
         let is_held = |column: &usize| match &model.layout().columns()[*column] {
             Column::Term(TorqueTerm::Offset(_)) => self.refit == Refit::Nothing,

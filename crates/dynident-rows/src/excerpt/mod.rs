@@ -113,7 +113,6 @@ fn excerpt(
     Ok(Some((excerpt, Whole { rows, cutoff: stream.cutoff().clone(), position_noise })))
 }
 
-/// Low-pass, decimation and selection of pieces.
 struct Thinning {
     factor: usize,
     pieces: Pieces,
@@ -123,7 +122,6 @@ struct Thinning {
     /// Samples of the segment with invalid torque of some joint, from sample `first_marked` on.
     marked: Vec<bool>,
     first_marked: usize,
-    /// Filtered rows of the segment.
     produced: u64,
     panel: Vec<f64>,
     out: Vec<f64>,

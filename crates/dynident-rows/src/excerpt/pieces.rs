@@ -13,7 +13,6 @@ pub(super) struct Pieces {
     most: usize,
     length: usize,
     stride: usize,
-    /// Number of pieces begun, kept or not.
     begun: usize,
     kept: Vec<Piece>,
     /// Whether the current piece is kept, and its number of rows.
@@ -21,7 +20,6 @@ pub(super) struct Pieces {
     rows: usize,
 }
 
-/// Rows of one piece: index of the piece, times, and values row by row.
 struct Piece {
     number: usize,
     time_s: Vec<f64>,

@@ -18,7 +18,6 @@ pub struct RowBuilder<'a> {
     panels: SamplePanels,
 }
 
-/// Filters panels of samples into rows.
 #[derive(Debug)]
 pub(super) struct PanelFilter<'a> {
     /// For each joint the number of leading columns that are not filtered: bodies that only provide the load.
@@ -131,7 +130,6 @@ impl<'a> RowBuilder<'a> {
 }
 
 impl PanelFilter<'_> {
-    /// Filters the next panels.
     pub(super) fn take(&mut self, samples: &SamplePanels, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
         let raw = samples.as_raw();
         if raw.segment != self.segment {

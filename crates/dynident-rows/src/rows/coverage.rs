@@ -16,7 +16,6 @@ const MIN_COVERAGE: f64 = 0.5;
 pub(super) struct Coverage {
     taps: Vec<f64>,
     factor: usize,
-    /// Samples of the segment up to now.
     samples: usize,
     /// For each joint the masked samples that later rows still contain, and the number of rows up to now.
     joints: Vec<(Vec<usize>, usize)>,
@@ -37,7 +36,6 @@ impl Coverage {
         })
     }
 
-    /// Begins a new segment.
     pub(super) fn restart(&mut self) {
         self.samples = 0;
         self.joints.iter_mut().for_each(|(masked, rows)| {

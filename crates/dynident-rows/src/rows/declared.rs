@@ -7,9 +7,6 @@ use dynident_model::terms::{JointMotion, TorqueTerm};
 use dynident_recording::MotionBlock;
 
 /// Checks that every declared torque of the model is defined at each settled sample of a block.
-///
-/// # Errors
-/// [`LogError::Undeclared`] with the first undefined sample.
 pub(super) fn require_declared(
     model: &RegressorModel,
     log: &str,

@@ -12,7 +12,6 @@ pub struct RowMask<'a> {
     unusable_before: Vec<usize>,
     half: usize,
     factor: usize,
-    /// Rows of each joint up to now.
     done: Vec<usize>,
     places: Vec<usize>,
     kept: Vec<f64>,

@@ -5,10 +5,12 @@
 //! fit.
 
 mod builder;
+mod collector;
 mod coverage;
 mod declared;
 mod filter;
 mod joint_filters;
+mod kept_log;
 mod mask;
 mod motion_noise;
 mod panel_pipeline;
@@ -24,8 +26,9 @@ pub use builder::RowBuilder;
 pub use coverage::{divide_by_coverage, set_aside};
 pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
 pub use joint_filters::JointFilters;
+pub use kept_log::KeptLog;
 pub use motion_noise::noise_factors;
-pub use pass::{KeptLog, LogPass, LogStatistics};
+pub use pass::{LogPass, LogStatistics};
 pub use row_block::RowBlock;
 pub use samples::in_model_order;
 pub use velocities::VelocityHistogram;

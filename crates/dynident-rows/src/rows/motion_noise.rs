@@ -140,7 +140,6 @@ impl Noise {
     }
 }
 
-/// Rows of every joint, panel by panel.
 struct JointPanels(Vec<Vec<Vec<f64>>>);
 
 impl RowConsumer for JointPanels {

@@ -9,7 +9,6 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 /// Maximum number of panels in the queue.
 const MAX_QUEUED_PANELS: usize = 4;
 
-/// Output of the first stage.
 enum MakerOutput<B> {
     Panels(SamplePanels),
     /// A block whose panels were all sent before.
@@ -21,9 +20,6 @@ enum MakerOutput<B> {
 /// A new thread takes blocks from `next`, which can reuse the memory of a returned block, and computes their panels
 /// with `make`, which returns the first sample of the next panel. A bounded queue limits memory. This thread passes
 /// each panel to `filter`, and each block after its last panel to `keep`, which returns blocks that it does not store.
-///
-/// # Errors
-/// The first error of either thread.
 pub(super) fn pipelined_panels<B: Borrow<MotionBlock> + Send>(
     mut next: impl FnMut(Option<B>) -> Result<Option<B>, LogError> + Send,
     mut make: impl FnMut(&MotionBlock, usize, &mut SamplePanels) -> Result<usize, LogError> + Send,

@@ -2,11 +2,13 @@
 
 use super::RowConsumer;
 use super::builder::RowBuilder;
+use super::collector::Keeping;
 use super::declared::require_declared;
 use super::filter::{ParallelFilterSettings, motion_band_hz};
+use super::kept_log::{BlockCache, KeptLog, MAX_KEPT_VALUES};
 use super::mask::RowMask;
 use super::panel_pipeline::pipelined_panels;
-use super::row_store::{Keeping, Passed, RowStore};
+use super::row_store::{Passed, RowStore};
 use super::samples::SamplePanels;
 use super::velocities::VelocityHistogram;
 use crate::progress::Progress;
@@ -16,29 +18,6 @@ use core::borrow::Borrow;
 use dynident_dynamics::Column;
 use dynident_recording::{DecimationSettings, ImportReport, MotionBlock, MotionSettings, MotionStream};
 use std::sync::OnceLock;
-
-/// Maximum number of values that are kept of the motion of one log (256 MiB).
-const MAX_KEPT_VALUES: usize = 1 << 25;
-
-/// The motion of a log that was read once.
-#[derive(Debug)]
-pub struct KeptLog {
-    blocks: Vec<MotionBlock>,
-    rate_hz: f64,
-    report: ImportReport,
-    /// Filtered rows of earlier passes.
-    pub(super) rows: RowStore,
-}
-
-impl KeptLog {
-    fn new(blocks: Vec<MotionBlock>, rate_hz: f64, report: ImportReport) -> Self {
-        Self { blocks, rate_hz, report, rows: RowStore::default() }
-    }
-
-    fn samples(&self) -> usize {
-        self.blocks.iter().map(|block| block.rows).sum()
-    }
-}
 
 /// Properties of a recording after a pass.
 #[derive(Clone, Debug)]
@@ -336,7 +315,6 @@ impl LogPass<'_> {
         Ok(())
     }
 
-    /// Sends the rows of stored blocks to `consumer`.
     fn take_all(
         &self,
         blocks: &[MotionBlock],
@@ -387,7 +365,7 @@ impl LogPass<'_> {
         let rows = self.recording.estimated_rows().unwrap_or(0) as usize;
         let seems_to_fit = rows.saturating_mul(4 * self.model.dof()) <= MAX_KEPT_VALUES;
         let keeps = self.kept.is_some() && self.most_samples.is_none() && seems_to_fit;
-        BlockCache { blocks: keeps.then(Vec::new), numbers: 0 }
+        BlockCache::new(keeps)
     }
 
     /// Reads a log to its end or until `most_samples`; returns its blocks if it was read completely and they fit.
@@ -416,32 +394,6 @@ impl LogPass<'_> {
             }
         }
         Ok(keeper.blocks)
-    }
-}
-
-/// Stores blocks until they exceed the limit.
-struct BlockCache {
-    blocks: Option<Vec<MotionBlock>>,
-    numbers: usize,
-}
-
-impl BlockCache {
-    /// Returns the block if it is not stored.
-    fn keep(&mut self, block: MotionBlock) -> Option<MotionBlock> {
-        let MotionBlock { q, dq, ddq, tau, tau_smooth, temperature_c, .. } = &block;
-        // A mark takes an eighth of the memory of a value.
-        self.numbers += block.set_aside.len() / 8;
-        self.numbers += [q, dq, ddq, tau, tau_smooth, temperature_c].into_iter().map(Vec::len).sum::<usize>();
-        if self.numbers > MAX_KEPT_VALUES {
-            self.blocks = None;
-        }
-        match &mut self.blocks {
-            Some(blocks) => {
-                blocks.push(block);
-                None
-            }
-            None => Some(block),
-        }
     }
 }
 

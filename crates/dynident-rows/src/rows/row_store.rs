@@ -5,6 +5,7 @@
 //! bit-identical to those without storage.
 
 use super::builder::RowBuilder;
+use super::collector::{CollectedJoint, Collector};
 use super::velocities::VelocityHistogram;
 use super::{JointRows, RowConsumer};
 use crate::recording::LogError;
@@ -16,9 +17,8 @@ use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Maximum number of values stored per log (64 MiB).
-const MAX_KEPT_VALUES: usize = 1 << 23;
+pub(super) const MAX_KEPT_VALUES: usize = 1 << 23;
 
-/// One filtered column of a joint.
 type Filtered = Arc<Vec<f64>>;
 
 /// Filters all columns of a model, or some of its terms, into a consumer.
@@ -40,7 +40,6 @@ pub(super) struct FilteredRows {
     velocities: Vec<VelocityHistogram>,
 }
 
-/// All rows of one joint.
 #[derive(Clone, Debug, Default)]
 struct FilteredJoint {
     columns: Vec<(Column, Filtered)>,
@@ -82,7 +81,6 @@ impl RowStore {
         Ok(Arc::new(rows))
     }
 
-    /// Stores all rows of a pass over samples.
     pub(super) fn keep(&self, model: &RegressorModel, filter: &DecimationSettings, made: Collector, passed: Passed) {
         self.put(FilteredRows::new(model, filter, made, passed).without_rarely_used(model));
     }
@@ -103,7 +101,6 @@ impl RowStore {
     }
 }
 
-/// Statistics of a pass.
 #[derive(Clone)]
 pub(super) struct Passed {
     pub(super) samples: u64,
@@ -185,17 +182,14 @@ impl FilteredRows {
         rows * self.joints.iter().map(|joint| joint.columns.len() + 2).sum::<usize>()
     }
 
-    /// Filtered rows of each joint.
     pub(super) fn count(&self) -> u64 {
         self.pieces.iter().sum::<usize>() as u64
     }
 
-    /// Samples of the log.
     pub(super) fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Velocity histograms of the joints.
     pub(super) fn velocities(&self) -> &[VelocityHistogram] {
         &self.velocities
     }
@@ -246,7 +240,6 @@ impl<'k> JointPieces<'k> {
         Self { joint, columns, coverage: &kept.coverage }
     }
 
-    /// Copies some rows into `panel`.
     fn piece<'p>(&'p self, from: usize, rows: usize, panel: &'p mut Vec<f64>) -> JointRows<'p> {
         panel.clear();
         for column in &self.columns {
@@ -261,76 +254,6 @@ impl<'k> JointPieces<'k> {
 impl FilteredJoint {
     fn values(&self, wanted: &Column) -> Option<&Filtered> {
         self.columns.iter().find(|(column, _)| column == wanted).map(|(_, values)| values)
-    }
-}
-
-/// Collects all rows of a pass.
-pub(super) struct Collector {
-    pieces: Vec<usize>,
-    joints: Vec<CollectedJoint>,
-}
-
-#[derive(Clone, Default)]
-struct CollectedJoint {
-    columns: Vec<Vec<f64>>,
-    coverage: Vec<f64>,
-}
-
-impl Collector {
-    fn new(dof: usize) -> Self {
-        Self { pieces: Vec::new(), joints: vec![CollectedJoint::default(); dof] }
-    }
-}
-
-impl RowConsumer for Collector {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        if rows.joint == 0 {
-            self.pieces.push(rows.rows);
-        }
-        let joint = &mut self.joints[rows.joint];
-        joint.columns.resize_with(rows.panel.len() / rows.rows, Vec::new);
-        for (column, values) in joint.columns.iter_mut().zip(rows.panel.chunks_exact(rows.rows)) {
-            column.extend_from_slice(values);
-        }
-        if rows.coverage.is_empty() {
-            joint.coverage.resize(joint.coverage.len() + rows.rows, 1.0);
-        } else {
-            joint.coverage.extend_from_slice(rows.coverage);
-        }
-        Ok(())
-    }
-
-    fn reads_samples(&self) -> bool {
-        false
-    }
-}
-
-/// Forwards rows to a consumer and collects them while they fit.
-pub(super) struct Keeping<'c> {
-    consumer: &'c mut dyn RowConsumer,
-    /// `None` once they exceed the limit.
-    pub(super) rows: Option<Collector>,
-    numbers: usize,
-}
-
-impl<'c> Keeping<'c> {
-    pub(super) fn new(consumer: &'c mut dyn RowConsumer, dof: usize) -> Self {
-        Self { consumer, rows: Some(Collector::new(dof)), numbers: 0 }
-    }
-}
-
-impl RowConsumer for Keeping<'_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        self.numbers += rows.panel.len() + rows.rows;
-        self.rows = self.rows.take().filter(|_| self.numbers <= MAX_KEPT_VALUES);
-        if let Some(kept) = &mut self.rows {
-            kept.filtered(rows)?;
-        }
-        self.consumer.filtered(rows)
-    }
-
-    fn reads_samples(&self) -> bool {
-        false
     }
 }
 
@@ -371,7 +294,6 @@ mod tests {
         }
     }
 
-    /// One consumer per joint.
     struct ByJoint(Vec<Bits>);
 
     impl RowConsumer for ByJoint {

@@ -110,17 +110,14 @@ impl<'a> PanelMaker<'a> {
         &self.layout
     }
 
-    /// Indices of the model's joints in the motion.
     pub(super) fn places(&self) -> &[usize] {
         &self.places
     }
 
-    /// Number of samples up to now.
     pub(super) fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Velocity histograms of the joints.
     pub(super) fn into_velocities(self) -> Vec<VelocityHistogram> {
         self.velocities
     }
