@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn terms_add_up_and_leave_the_estimate_alone() {
+    fn terms_add_up_and_do_not_change_the_estimate() {
         let noise = line();
         let lag = DMatrix::from_row_slice(2, 2, &[4.0e-4, 0.0, 0.0, 0.0]);
         let logs = DMatrix::from_row_slice(1, 1, &[9.0e-4]);

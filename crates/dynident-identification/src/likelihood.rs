@@ -46,7 +46,7 @@ mod tests {
 
     /// Four copies of every row contain the information of one.
     #[test]
-    fn rows_that_say_the_same_count_once() {
+    fn repeated_rows_do_not_add_evidence() {
         let score = |rows: usize| JointScore { rows, sigma: 0.3, own: 5 };
         let (once, repeated) = (score(250).schwarz(1.0), score(1000).schwarz(4.0));
         assert!((once - repeated).abs() < 1e-9 * once.abs(), "{once} {repeated}");

@@ -285,7 +285,7 @@ mod tests {
     use dynident_recording::JointSamples;
 
     #[test]
-    fn instants_of_a_long_log_that_is_not_kept_are_of_its_excerpt() {
+    fn instants_of_a_long_log_come_from_its_excerpt() {
         let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/planar2r.urdf");
         let model = RegressorModel::from(
             ParametricModel::new(dynident_model::load_robot(robot).unwrap().model, Vec::new()).unwrap(),

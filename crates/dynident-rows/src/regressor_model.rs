@@ -137,7 +137,7 @@ mod tests {
 
     /// The drive's part of `Izz1 + Ia1` does not load the gear.
     #[test]
-    fn drive_inertia_that_a_body_holds_is_no_load() {
+    fn drive_inertia_in_a_body_parameter_is_not_load() {
         let model =
             dynident_model::load_robot(concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf")).unwrap().model;
         let drives = terms_per_joint(&model, |_| DriveChoice { drive_inertia: true, ..DriveChoice::default() });

@@ -157,7 +157,7 @@ mod tests {
 
     /// Without rows near rest: one step with the stated width, and no terms that need rows near rest.
     #[test]
-    fn what_rows_near_rest_alone_show_is_no_candidate_without_them() {
+    fn terms_near_rest_are_no_candidates_without_rows_near_rest() {
         let scale = JointScale::usual(0);
         let kinds = |search: &FrictionSearch| -> Vec<FrictionKind> {
             let mut kinds: Vec<_> = candidate_columns(search, scale, None).iter().map(|column| column.kind).collect();

@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_has_one_step_at_rest() {
+    fn friction_terms_of_a_joint_share_one_step() {
         let narrow = CoulombShape::Smooth { width: 0.01 };
         let load = |shape| TorqueTerm::Load(LoadFriction { joint: 0, shape });
         for step in [SMOOTH, SIGN] {

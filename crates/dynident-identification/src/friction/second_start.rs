@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dry_step_begins_as_a_narrow_one() {
+    fn second_start_of_a_dry_step_is_narrow() {
         let viscous = TorqueTerm::Viscous(Viscous { joint: 0 });
         let found = second_start(&[viscous.clone(), coulomb(DRY)], USUAL);
         assert_eq!(found, Some(vec![viscous.clone(), coulomb(smooth(0.002))]));
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_changed_places_with_stribeck_friction_begins_below_it() {
+    fn second_start_of_exchanged_terms_is_below_the_stribeck_velocity() {
         let found = second_start(&[coulomb(smooth(0.14)), stribeck(smooth(0.02)), load(smooth(0.14))], USUAL);
         // Load-dependent friction has the same step, because it is one friction.
         assert_eq!(found, Some(vec![coulomb(smooth(0.02)), stribeck(smooth(0.02)), load(smooth(0.02))]));
@@ -92,7 +92,7 @@ mod tests {
     /// The arm of the paper with dry friction had widths of 0.0025 and 0.0116, and Stribeck friction was 15 % too
     /// large.
     #[test]
-    fn a_dry_joint_has_no_wide_stribeck_friction() {
+    fn wide_stribeck_friction_of_a_dry_joint_is_rejected() {
         assert!(!is_one_friction(&[coulomb(smooth(0.0025)), stribeck(smooth(0.0116))]));
         assert!(is_one_friction(&[coulomb(smooth(0.015)), stribeck(smooth(0.0175))]));
         assert!(is_one_friction(&[coulomb(DRY), stribeck(DRY)]));

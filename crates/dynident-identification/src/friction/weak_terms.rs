@@ -166,7 +166,7 @@ mod tests {
     /// Coulomb friction of 5.0 and 5.085 Nm by direction, with an error bar of 0.035 Nm for the difference. At two and
     /// a half error bars (p = 1/65) it is significant in the first selection but not in a second one.
     #[test]
-    fn what_a_second_look_adds_has_to_be_seen_more_clearly() {
+    fn terms_of_a_second_selection_need_stronger_evidence() {
         let shape = CoulombShape::Sign { dead_band: 0.0 };
         let of = |direction| TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint: 0, direction, shape });
         let terms = [of(Direction::Forward), of(Direction::Backward)];
@@ -210,7 +210,7 @@ mod tests {
     /// The coefficient is thousands of Nm and far above its error bar, although the term reaches only a hundredth of it
     /// in the rows.
     #[test]
-    fn stribeck_friction_below_the_slowest_rows_is_not_seen() {
+    fn stribeck_friction_below_the_slowest_rows_is_dropped() {
         assert_eq!(left_without(0.3), None);
         assert_eq!(left_without(0.0165).map(|terms| terms.len()), Some(1));
     }

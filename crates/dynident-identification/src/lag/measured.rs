@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn logs_that_agree_sharpen_the_lag_and_logs_that_do_not_widen_it() {
+    fn agreeing_logs_narrow_the_lag_interval_and_scattered_logs_widen_it() {
         let lag = |lag_s| TorqueLag { lag_s, std_s: 1e-3, half_width_95_s: 2e-3, matters: true, taken_off_s: 0.0 };
         assert_eq!(pooled_delay(&[]), None);
         assert_eq!(pooled_delay(&[lag(5e-3)]), Some(lag(5e-3)));

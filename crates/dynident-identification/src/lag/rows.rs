@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_at_the_ends_are_left_out() {
+    fn rows_at_the_ends_are_invalid() {
         let signal: Vec<f64> = (0..50).map(f64::from).collect();
         for (centre, valid) in [(0, 2..47), (4, 2..43), (-5, 7..48)] {
             let found = Further::new(&signal, &signal, &[], centre, 100.0, None);

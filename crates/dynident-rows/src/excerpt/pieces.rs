@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_short_stream_is_kept_whole_and_a_long_one_in_even_pieces() {
+    fn short_streams_are_kept_whole_and_long_ones_in_even_pieces() {
         for (rows, stride) in [(1, 1), (800, 1), (801, 2), (1_600, 2), (50_000, 64)] {
             let mut pieces = Pieces::new(800, 0);
             for row in 0..rows {
@@ -107,14 +107,14 @@ mod tests {
     }
 
     #[test]
-    fn pieces_are_as_long_as_they_have_to_be() {
+    fn pieces_have_the_minimum_length() {
         let mut pieces = Pieces::new(800, 500);
         (0..5_000).for_each(|row| pieces.push(f64::from(row), core::iter::empty()));
         assert_eq!(pieces.columns().0, (0..500).chain(4_000..4_500).map(f64::from).collect::<Vec<_>>());
     }
 
     #[test]
-    fn a_piece_ends_where_the_stream_is_interrupted() {
+    fn an_interruption_ends_a_piece() {
         let mut pieces = Pieces::new(80, 0);
         for row in 0..400 {
             if row == 5 {

@@ -142,7 +142,7 @@ mod tests {
 
     /// Rows of `[W | τ]` with `τ = 3 W`, except for the masked samples.
     #[test]
-    fn what_is_left_out_does_not_change_the_equation() {
+    fn masked_samples_do_not_change_the_equation() {
         let settings = DecimationSettings { factor: 5, ..DecimationSettings::default() };
         let n = 1500;
         let masked = |i: usize| i.is_multiple_of(19) || (700..900).contains(&i);

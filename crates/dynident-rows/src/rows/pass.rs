@@ -404,7 +404,7 @@ mod tests {
     use dynident_dynamics::ParametricModel;
 
     #[test]
-    fn a_pass_over_blocks_ends_where_enough_has_passed() {
+    fn a_pass_over_blocks_ends_after_most_samples() {
         let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
         let model = dynident_model::load_robot(robot).unwrap().model;
         let model = RegressorModel::from(ParametricModel::new(model, Vec::new()).unwrap());

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blocks_are_the_same_however_rows_come() {
+    fn blocks_do_not_depend_on_the_arrival_of_rows() {
         let count = 2 * BLOCK_ROWS + 77;
         let value = |column: usize, row: usize| (1000 * column + row) as f64;
         for pieces in [1, 5, BLOCK_ROWS, BLOCK_ROWS + 3, count] {

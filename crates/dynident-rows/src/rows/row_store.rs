@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pass_over_rows_that_are_kept_sees_what_a_pass_over_samples_sees() {
+    fn stored_rows_are_bit_identical_to_filtered_samples() {
         let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
         let model = dynident_model::load_robot(robot).unwrap().model;
         let smooth = CoulombShape::Smooth { width: 0.02 };

@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn rest_and_what_is_no_number_do_not_move() {
+    fn resting_and_non_finite_velocities_are_not_moving() {
         let mut histogram = VelocityHistogram::default();
         histogram.add(&[0.0, f64::NAN, f64::INFINITY, 1.0, -1e-3, 0.5]);
         assert_eq!(histogram.resting, 1);
