@@ -141,10 +141,10 @@ impl DecisionThresholds {
             ("doubt.min_rows_per_parameter", doubt.min_rows_per_parameter, 1.0),
             ("doubt.max_held_out_ratio", doubt.max_held_out_ratio, 0.0),
         ])?;
-        let term = friction.term_chi_square.map(|value| ("friction.term_chi_square", value, f64::MIN_POSITIVE));
+        let term = friction.term_chi_square.map(|value| ("friction.term_chi_square", value, 1e-9));
         let second = friction.second_selection_chi_square;
         check(&term)?;
-        check(&second.map(|value| ("friction.second_selection_chi_square", value, f64::MIN_POSITIVE)))
+        check(&second.map(|value| ("friction.second_selection_chi_square", value, 1e-9)))
     }
 }
 
@@ -291,8 +291,8 @@ impl EstimationThresholds {
             ("lag.min_parameter_shift", lag.min_parameter_shift, 0.0),
             ("lag.max_scatter_std", lag.max_scatter_std, 0.0),
             ("lag.min_own_share", lag.min_own_share, 0.0),
-            ("lag.prior_std_s", lag.prior_std_s, f64::MIN_POSITIVE),
-            ("lag.max_lag_s", lag.max_lag_s, f64::MIN_POSITIVE),
+            ("lag.prior_std_s", lag.prior_std_s, 1e-9),
+            ("lag.max_lag_s", lag.max_lag_s, 1e-9),
             ("noise.max_followed", noise.max_followed, 0.0),
             ("noise.max_contrast_rms", noise.max_contrast_rms, 0.0),
             ("noise.max_contrast", noise.max_contrast, 0.0),

@@ -80,7 +80,7 @@ struct InstrumentedRows<'r, 'a> {
     filters: Option<JointFilters>,
     factors: Vec<SegmentedFactor>,
     /// Row makers of both motions, instruments first.
-    sides: [Side; 2],
+    makers: [RowMaker; 2],
     other: MotionBlock,
     temperature_c: Vec<f64>,
     panel: Vec<f64>,
@@ -89,14 +89,14 @@ struct InstrumentedRows<'r, 'a> {
     segment: usize,
 }
 
-struct Side {
+struct RowMaker {
     workspace: BatchWorkspace,
     history: TermHistory,
     panels: Panels,
     motion: [Vec<f64>; 3],
 }
 
-impl Side {
+impl RowMaker {
     fn new(model: &RegressorModel) -> Self {
         let (workspace, history) =
             (BatchWorkspace::new(model.model()), TermHistory::new(model.load_parameters.clone()));
@@ -136,7 +136,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             widths,
             filters: None,
             factors,
-            sides: [Side::new(rows.model), Side::new(rows.model)],
+            makers: [RowMaker::new(rows.model), RowMaker::new(rows.model)],
             other: MotionBlock::default(),
             temperature_c: Vec::new(),
             panel: Vec::new(),
@@ -173,7 +173,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
         let filters = self.filters.insert(filters);
         if measured.segment != self.segment {
             self.segment = measured.segment;
-            self.sides.iter_mut().for_each(|side| side.history.restart());
+            self.makers.iter_mut().for_each(|maker| maker.history.restart());
             filters.restart();
         }
         let layout = self.rows.model.layout();
@@ -185,10 +185,10 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                     let temperature = measured.joint(&measured.temperature_c, place);
                     self.temperature_c.extend_from_slice(&temperature[from..from + samples]);
                 }
-                self.sides.iter_mut().for_each(|side| side.history.set_temperature(&self.temperature_c));
+                self.makers.iter_mut().for_each(|maker| maker.history.set_temperature(&self.temperature_c));
             }
             let (model, places) = (self.rows.model, &self.places);
-            let [other, own] = &mut self.sides;
+            let [other, own] = &mut self.makers;
             rayon::join(
                 || other.make(model, &self.other, places, from, samples),
                 || own.make(model, measured, places, from, samples),
@@ -197,7 +197,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                 let columns = layout.joint_columns(joint);
                 let gain = self.rows.model.torque_gains.get(joint).copied().unwrap_or(1.0);
                 let torque = &measured.joint(measured.fitted_tau(), place)[from..from + samples];
-                let [other, own] = [&self.sides[0].panels, &self.sides[1].panels];
+                let [other, own] = [&self.makers[0].panels, &self.makers[1].panels];
                 self.panel.clear();
                 if let Some(theta) = self.theta {
                     predicted_torque(other.joint(joint), samples, columns, theta, &mut self.slow);

@@ -1,7 +1,7 @@
 //! Maximum likelihood for a repeated motion: mean periods of logs, their noise, and the estimate.
 
 use super::filtered_period::PeriodFilter;
-use super::row_pass::Stop;
+use super::row_pass::PassError;
 use super::simulated::torque_sigma;
 use super::{EstimatorError, PeriodSettings, TrainingRows};
 use crate::thresholds::MotionThresholds;
@@ -91,7 +91,7 @@ pub(super) fn periodic(
     let std = |place: usize| single[(place, place)].max(0.0).sqrt();
     let steps = |variable: usize| min_step(model, variable).max(std(variable) / (most as f64).sqrt());
     let mut instants = Instants::new(model, (0..3 * dof).map(steps).collect());
-    let found = maximum_likelihood::<Stop>(problem.columns(), &settings, |visit| {
+    let found = maximum_likelihood::<PassError>(problem.columns(), &settings, |visit| {
         for mean in &means {
             let weight = (mean.averaged.periods as f64 / most as f64).sqrt();
             instants.of(mean, weight, visit)?;
@@ -307,7 +307,7 @@ impl<'a> Instants<'a> {
 
     /// Passes the instants of a mean period to `visit`. `weight` is the square root of the relative weight of a mean
     /// over more periods.
-    fn of(&mut self, mean: &MeanPeriod, weight: f64, visit: &mut InstantVisitor<'_>) -> Result<(), Stop> {
+    fn of(&mut self, mean: &MeanPeriod, weight: f64, visit: &mut InstantVisitor<'_>) -> Result<(), PassError> {
         let (model, layout) = (self.model.model(), self.model.layout());
         let (dof, columns) = (model.dof(), layout.columns().len());
         let variables = 3 * dof;

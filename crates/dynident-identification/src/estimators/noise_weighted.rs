@@ -1,6 +1,6 @@
 //! Weights of rows from the local noise level.
 
-use super::row_pass::{KeptRows, Stop};
+use super::row_pass::{KeptRows, PassError};
 use super::{EstimationSettings, EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, NoiseLevelSettings, noise_weighted_least_squares};
 use serde::{Deserialize, Serialize};
@@ -45,6 +45,7 @@ pub(super) fn noise_weighted(
 ) -> Result<(Estimate, Findings), EstimatorError> {
     let settings = levels.settings(rows.settings);
     let mut kept = KeptRows::new();
-    let found = noise_weighted_least_squares::<Stop>(rows.problem, &settings, |visit| kept.every_row(rows, visit))?;
+    let found =
+        noise_weighted_least_squares::<PassError>(rows.problem, &settings, |visit| kept.every_row(rows, visit))?;
     Ok((found.estimate, Findings::NoiseLevels(found.level_range)))
 }

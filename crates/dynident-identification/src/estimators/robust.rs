@@ -1,6 +1,6 @@
 //! Iteratively reweighted least squares: outliers get less weight, or none.
 
-use super::row_pass::{KeptRows, Stop};
+use super::row_pass::{KeptRows, PassError};
 use super::{EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, RobustSettings, RowWeight, robust_least_squares};
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ pub(super) fn robust(rows: &TrainingRows<'_>, weight: RowWeight) -> Result<(Esti
         ..RobustSettings::default()
     };
     let mut kept = KeptRows::new();
-    let found = robust_least_squares::<Stop>(rows.problem, &settings, |visit| kept.every_row(rows, visit))?;
+    let found = robust_least_squares::<PassError>(rows.problem, &settings, |visit| kept.every_row(rows, visit))?;
     let errors = GrossErrors { share: found.outlier_share, mean_weight: found.mean_weight };
     Ok((found.estimate, Findings::GrossErrors(errors)))
 }

@@ -5,12 +5,12 @@ use dynident_estimation::{EstimationError, RowBlock, RowVisitor};
 use dynident_rows::{JointRows, LogError, RowConsumer};
 
 /// Error of the estimator, or of the code that reads or simulates logs for it.
-pub(crate) enum Stop {
+pub(crate) enum PassError {
     Estimator(EstimationError),
     Log(EstimatorError),
 }
 
-impl From<EstimationError> for Stop {
+impl From<EstimationError> for PassError {
     fn from(error: EstimationError) -> Self {
         Self::Estimator(error)
     }
@@ -37,7 +37,7 @@ impl KeptRows {
         Self { blocks: Some(Vec::new()), complete: false }
     }
 
-    pub(super) fn every_row(&mut self, rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), Stop> {
+    pub(super) fn every_row(&mut self, rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), PassError> {
         if let (Some(blocks), true) = (&self.blocks, self.complete) {
             for KeptBlock { log, joint, rows, panel } in blocks {
                 visit(&RowBlock { log: *log, joint: *joint, rows: *rows, panel })?;
@@ -59,7 +59,7 @@ impl KeptRows {
                 visit(block)
             };
             let mut consumer = VisitorConsumer { log, visit: &mut keep, refused: None, counted: Vec::new() };
-            rows.logs.pass(rows.model, index).run(&mut consumer).map_err(|error| Stop::Log(error.into()))?;
+            rows.logs.pass(rows.model, index).run(&mut consumer).map_err(|error| PassError::Log(error.into()))?;
             if let Some(refused) = consumer.refused {
                 return Err(refused.into());
             }
@@ -92,11 +92,11 @@ impl RowConsumer for VisitorConsumer<'_, '_> {
     }
 }
 
-impl From<Stop> for EstimatorError {
-    fn from(stop: Stop) -> Self {
+impl From<PassError> for EstimatorError {
+    fn from(stop: PassError) -> Self {
         match stop {
-            Stop::Estimator(source) => Self::Estimation(source),
-            Stop::Log(error) => error,
+            PassError::Estimator(source) => Self::Estimation(source),
+            PassError::Log(error) => error,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Simulation of an experiment's closed loop for the estimators: controller, reference, instants and filters as in the
 //! logs, with other parameters.
 
-use super::row_pass::Stop;
+use super::row_pass::PassError;
 use super::{EstimatorError, TrainingRows};
 use dynident_estimation::{SimulatedCriterion, SimulatedMotion, SimulatedRows};
 use dynident_excitation::Motion;
@@ -161,7 +161,7 @@ impl SimulatedLoop<'_> {
         Plant::new(model.model(), &terms, &values)
     }
 
-    fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), EstimatorError> {
+    fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut CollectedRows) -> Result<(), EstimatorError> {
         let dof = self.model.model().dof();
         let motion = (self.compared != ComparedSignal::Torque)
             .then(|| sampled(run, log.begins_s))
@@ -228,9 +228,9 @@ impl SimulatedLoop<'_> {
 }
 
 impl SimulatedMotion for SimulatedLoop<'_> {
-    type Error = Stop;
+    type Error = PassError;
 
-    fn simulate(&mut self, parameters: &[f64]) -> Result<Option<SimulatedRows>, Stop> {
+    fn simulate(&mut self, parameters: &[f64]) -> Result<Option<SimulatedRows>, PassError> {
         let mut plant = match self.plant(parameters) {
             Ok(plant) => plant,
             Err(reason) => {
@@ -240,14 +240,17 @@ impl SimulatedMotion for SimulatedLoop<'_> {
         };
         let rows = self.rows();
         let with_regressor = self.compared == ComparedSignal::TorqueRows;
-        let mut out = Gathered {
+        let mut out = CollectedRows {
             output: Vec::with_capacity(rows),
             regressor: DMatrix::zeros(if with_regressor { rows } else { 0 }, parameters.len()),
             filled: 0,
         };
         for log in &self.logs {
             let in_loop = |error: SimulationError| {
-                Stop::Log((self.wrong)(format!("log `{}`: the closed loop cannot be simulated: {error}", log.name)))
+                PassError::Log((self.wrong)(format!(
+                    "log `{}`: the closed loop cannot be simulated: {error}",
+                    log.name
+                )))
             };
             let mut controller = self.controller.build(plant.dof(), self.controller_model.as_ref()).map_err(in_loop)?;
             let run = closed_loop(&mut plant, controller.as_mut(), &log.reference, &self.settings).map_err(in_loop)?;
@@ -255,13 +258,13 @@ impl SimulatedMotion for SimulatedLoop<'_> {
                 self.failure = Some(format!("log `{}`: {}", log.name, run.status));
                 return Ok(None);
             }
-            self.rows_of(log, &run, &mut out).map_err(Stop::Log)?;
+            self.rows_of(log, &run, &mut out).map_err(PassError::Log)?;
         }
         Ok(Some(SimulatedRows { output: DVector::from_vec(out.output), regressor: out.regressor }))
     }
 }
 
-struct Gathered {
+struct CollectedRows {
     output: Vec<f64>,
     regressor: DMatrix<f64>,
     filled: usize,

@@ -73,7 +73,7 @@ impl DelayRows {
         let (mut shares, mut counted) = (Vec::new(), Vec::new());
         for piece in pieces {
             let (measured, left_out) = (&piece.measured[joint], &piece.left_out[joint]);
-            let further = Further::new(&piece.model[joint], measured, left_out, centre, rate_hz, filter);
+            let further = LagColumns::new(&piece.model[joint], measured, left_out, centre, rate_hz, filter);
             let mut first = 0;
             for FilteredRows { rows, regressor, coverage } in &piece.rows[joint] {
                 let from = further.valid.start.max(first).min(first + rows);
@@ -109,13 +109,13 @@ impl DelayRows {
 }
 
 /// Filtered slope and shifted torques, and the range of rows based on existing samples.
-struct Further {
+struct LagColumns {
     rows: usize,
     values: Vec<f64>,
     valid: core::ops::Range<usize>,
 }
 
-impl Further {
+impl LagColumns {
     /// Computed from the predicted torque, the measured torque and the samples masked in the regressor.
     fn new(
         model: &[f64],
@@ -186,7 +186,7 @@ mod tests {
     fn rows_at_the_ends_are_invalid() {
         let signal: Vec<f64> = (0..50).map(f64::from).collect();
         for (centre, valid) in [(0, 2..47), (4, 2..43), (-5, 7..48)] {
-            let found = Further::new(&signal, &signal, &[], centre, 100.0, None);
+            let found = LagColumns::new(&signal, &signal, &[], centre, 100.0, None);
             assert_eq!(found.valid, valid, "{centre}");
             for k in valid {
                 // The slope of a ramp, and the ramp shifted.
@@ -194,6 +194,6 @@ mod tests {
                 assert_eq!(found.values[50 + k], (k as isize + centre - 2) as f64);
             }
         }
-        assert!(Further::new(&signal[..3], &signal[..3], &[], 20, 100.0, None).valid.is_empty());
+        assert!(LagColumns::new(&signal[..3], &signal[..3], &[], 20, 100.0, None).valid.is_empty());
     }
 }

@@ -46,20 +46,20 @@ impl RowConsumer for Collector {
 }
 
 /// Forwards rows to a consumer and collects them while they fit.
-pub(super) struct Keeping<'c> {
+pub(super) struct ForwardingCollector<'c> {
     consumer: &'c mut dyn RowConsumer,
     /// `None` once they exceed the limit.
     pub(super) rows: Option<Collector>,
     values: usize,
 }
 
-impl<'c> Keeping<'c> {
+impl<'c> ForwardingCollector<'c> {
     pub(super) fn new(consumer: &'c mut dyn RowConsumer, dof: usize) -> Self {
         Self { consumer, rows: Some(Collector::new(dof)), values: 0 }
     }
 }
 
-impl RowConsumer for Keeping<'_> {
+impl RowConsumer for ForwardingCollector<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         self.values += rows.panel.len() + rows.rows;
         self.rows = self.rows.take().filter(|_| self.values <= MAX_KEPT_VALUES);

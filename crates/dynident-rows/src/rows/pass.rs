@@ -2,13 +2,13 @@
 
 use super::RowConsumer;
 use super::builder::RowBuilder;
-use super::collector::Keeping;
+use super::collector::ForwardingCollector;
 use super::declared::require_declared;
 use super::filter::{ParallelFilterSettings, motion_band_hz};
 use super::kept_log::{BlockCache, KeptLog, MAX_KEPT_VALUES};
 use super::mask::RowMask;
 use super::panel_pipeline::pipelined_panels;
-use super::row_store::{Passed, RowStore};
+use super::row_store::{PassStatistics, RowStore};
 use super::samples::SamplePanels;
 use super::velocities::VelocityHistogram;
 use crate::progress::Progress;
@@ -133,7 +133,7 @@ impl LogPass<'_> {
             Motion::Stream(stream) => {
                 let keeps = self.kept.is_some() && filter.as_ref().is_some_and(|one| self.may_keep_rows(one, consumer));
                 let blocks = if keeps {
-                    let mut keeping = Keeping::new(consumer, self.model.dof());
+                    let mut keeping = ForwardingCollector::new(consumer, self.model.dof());
                     let blocks = self.stream(stream, &mut builder, &mut keeping)?;
                     made = keeping.rows;
                     blocks
@@ -148,7 +148,7 @@ impl LogPass<'_> {
             }
         }
         let (rows, needed) = (builder.filtered_rows(), builder.needed());
-        let passed = Passed::from(builder);
+        let passed = PassStatistics::from(builder);
         if let (Some(made), Some(kept), Some(filter)) = (made, self.kept.and_then(OnceLock::get), &filter) {
             kept.rows.keep(self.model, filter, made, passed.clone());
         }
@@ -162,7 +162,7 @@ impl LogPass<'_> {
         filter: Option<&DecimationSettings>,
         filtered_rows: u64,
         needed: usize,
-        passed: Passed,
+        passed: PassStatistics,
     ) -> Result<LogStatistics, LogError> {
         if filtered_rows == 0 {
             let log = self.recording.name.clone();
@@ -199,7 +199,7 @@ impl LogPass<'_> {
         let in_filter = |source| LogError::Filter { log: name.clone(), source };
         let mut needed = 0;
         let mut made = 0;
-        let mut pass = |terms: Option<&[Column]>, consumer: &mut dyn RowConsumer| -> Result<Passed, LogError> {
+        let mut pass = |terms: Option<&[Column]>, consumer: &mut dyn RowConsumer| -> Result<PassStatistics, LogError> {
             let mut builder = match terms {
                 None => RowBuilder::new(self.model, places, kept.rate_hz, Some(filter)),
                 Some(terms) => RowBuilder::of_terms(self.model, terms, places, kept.rate_hz, Some(filter)),
@@ -212,7 +212,7 @@ impl LogPass<'_> {
         let rows = kept.rows.rows(self.model, filter, &mut pass)?;
         self.progress.advance(rows.samples() - made);
         rows.give(self.model, consumer, self.reader_thread)?;
-        let passed = Passed { samples: rows.samples(), velocities: rows.velocities().to_vec() };
+        let passed = PassStatistics { samples: rows.samples(), velocities: rows.velocities().to_vec() };
         self.statistics(Some(kept.report.clone()), kept.rate_hz, Some(filter), rows.count(), needed, passed)
     }
 

@@ -22,7 +22,8 @@ pub(super) const MAX_KEPT_VALUES: usize = 1 << 23;
 type Filtered = Arc<Vec<f64>>;
 
 /// Filters all columns of a model, or some of its terms, into a consumer.
-pub(super) type FilterPass<'p> = dyn FnMut(Option<&[Column]>, &mut dyn RowConsumer) -> Result<Passed, LogError> + 'p;
+pub(super) type FilterPass<'p> =
+    dyn FnMut(Option<&[Column]>, &mut dyn RowConsumer) -> Result<PassStatistics, LogError> + 'p;
 
 /// Filtered rows of one log, by filter.
 #[derive(Debug, Default)]
@@ -81,7 +82,13 @@ impl RowStore {
         Ok(Arc::new(rows))
     }
 
-    pub(super) fn keep(&self, model: &RegressorModel, filter: &DecimationSettings, made: Collector, passed: Passed) {
+    pub(super) fn keep(
+        &self,
+        model: &RegressorModel,
+        filter: &DecimationSettings,
+        made: Collector,
+        passed: PassStatistics,
+    ) {
         self.put(FilteredRows::new(model, filter, made, passed).without_rarely_used(model));
     }
 
@@ -102,19 +109,19 @@ impl RowStore {
 }
 
 #[derive(Clone)]
-pub(super) struct Passed {
+pub(super) struct PassStatistics {
     pub(super) samples: u64,
     pub(super) velocities: Vec<VelocityHistogram>,
 }
 
-impl From<RowBuilder<'_>> for Passed {
+impl From<RowBuilder<'_>> for PassStatistics {
     fn from(builder: RowBuilder<'_>) -> Self {
         Self { samples: builder.samples(), velocities: builder.into_velocities() }
     }
 }
 
 impl FilteredRows {
-    fn new(model: &RegressorModel, filter: &DecimationSettings, made: Collector, passed: Passed) -> Self {
+    fn new(model: &RegressorModel, filter: &DecimationSettings, made: Collector, passed: PassStatistics) -> Self {
         let layout = model.layout();
         let of_joint = |(joint, made): (usize, CollectedJoint)| {
             let columns = layout.joint_columns(joint).iter().map(|&column| layout.columns()[column].clone());
