@@ -1,7 +1,9 @@
 //! Thresholds of decisions and tests.
 
-use crate::lag::LONGEST_DELAY_S;
 use thiserror::Error;
+
+/// Default maximum lag, in seconds for an arm of usual size; drives and buses stay below.
+pub(crate) const LONGEST_DELAY_S: f64 = 0.1;
 
 /// A threshold outside of its range.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]

@@ -20,8 +20,6 @@ use dynident_rows::{Logs, RegressorModel};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Maximum lag in the search, in seconds for an arm of usual size; drives and buses stay below.
-pub(crate) const LONGEST_DELAY_S: f64 = 0.1;
 /// Maximum number of steps; two to four are usual.
 const MAX_STEPS: usize = 12;
 /// Convergence: no lag moves by more than this ratio of its standard deviation, or by this number of samples.

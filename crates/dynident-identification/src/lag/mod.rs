@@ -17,7 +17,7 @@ pub use measured::{TorqueLag, delay_findings, pooled_delay};
 pub use pass::{lag_fit, lags_of_recordings};
 pub use rounds::LagRounds;
 
+pub(crate) use crate::thresholds::LONGEST_DELAY_S;
 pub(crate) use choice::gain_errors;
-pub(crate) use fit::LONGEST_DELAY_S;
 pub(crate) use pass::lags_after_pass;
 pub(crate) use samples::{DELAY_SAMPLES, DelayCheck};

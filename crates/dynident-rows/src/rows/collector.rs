@@ -1,8 +1,10 @@
 //! Consumers that collect the filtered rows of a pass.
 
-use super::row_store::MAX_KEPT_VALUES;
 use super::{JointRows, RowConsumer};
 use crate::recording::LogError;
+
+/// Maximum number of values of filtered rows that are stored per log (64 MiB).
+pub(super) const MAX_STORED_VALUES: usize = 1 << 23;
 
 pub(super) struct Collector {
     /// Number of rows per panel of samples.
@@ -62,7 +64,7 @@ impl<'c> ForwardingCollector<'c> {
 impl RowConsumer for ForwardingCollector<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         self.values += rows.panel.len() + rows.rows;
-        self.rows = self.rows.take().filter(|_| self.values <= MAX_KEPT_VALUES);
+        self.rows = self.rows.take().filter(|_| self.values <= MAX_STORED_VALUES);
         if let Some(kept) = &mut self.rows {
             kept.filtered(rows)?;
         }

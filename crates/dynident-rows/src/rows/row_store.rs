@@ -5,7 +5,7 @@
 //! bit-identical to those without storage.
 
 use super::builder::RowBuilder;
-use super::collector::{CollectedJoint, Collector};
+use super::collector::{CollectedJoint, Collector, MAX_STORED_VALUES};
 use super::velocities::VelocityHistogram;
 use super::{JointRows, RowConsumer};
 use crate::recording::LogError;
@@ -15,9 +15,6 @@ use dynident_model::Model;
 use dynident_recording::DecimationSettings;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Maximum number of values stored per log (64 MiB).
-pub(super) const MAX_KEPT_VALUES: usize = 1 << 23;
 
 type Filtered = Arc<Vec<f64>>;
 
@@ -53,7 +50,7 @@ impl RowStore {
     /// Whether the filtered rows of `samples` samples fit.
     pub(super) fn has_room(model: &RegressorModel, filter: &DecimationSettings, samples: usize) -> bool {
         let columns: usize = (0..model.dof()).map(|joint| model.layout().joint_columns(joint).len() + 2).sum();
-        samples / filter.factor * columns <= MAX_KEPT_VALUES
+        samples / filter.factor * columns <= MAX_STORED_VALUES
     }
 
     /// Rows of `model` after `filter`: the stored columns, and the missing ones from `pass`.
@@ -97,7 +94,7 @@ impl RowStore {
         let mut all = self.lock();
         all.retain(|kept| !kept.is_of(&rows.model, &rows.filter));
         all.push(Arc::new(rows));
-        while all.len() > 1 && all.iter().map(|kept| kept.numbers()).sum::<usize>() > MAX_KEPT_VALUES {
+        while all.len() > 1 && all.iter().map(|kept| kept.numbers()).sum::<usize>() > MAX_STORED_VALUES {
             all.remove(0);
         }
     }
@@ -176,7 +173,7 @@ impl FilteredRows {
         for kept in &mut without_rarely_used.joints {
             kept.columns.retain(|(column, _)| !matches!(column, Column::Term(term) if term.needs_load()));
         }
-        if without_rarely_used.numbers() > MAX_KEPT_VALUES {
+        if without_rarely_used.numbers() > MAX_STORED_VALUES {
             for kept in &mut without_rarely_used.joints {
                 kept.columns.retain(|(column, _)| layout.columns().contains(column));
             }
@@ -371,7 +368,7 @@ mod tests {
             }
         }
         assert!(
-            log.kept.get().unwrap().rows.lock().iter().map(|rows| rows.numbers()).sum::<usize>() <= MAX_KEPT_VALUES
+            log.kept.get().unwrap().rows.lock().iter().map(|rows| rows.numbers()).sum::<usize>() <= MAX_STORED_VALUES
         );
     }
 }
