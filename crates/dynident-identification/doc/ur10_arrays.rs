@@ -1,9 +1,9 @@
-// A simulated recording of a UR10 whose bodies are 20 % heavier than its URDF says: what the crate's examples identify.
+// A simulated recording of a UR10 whose bodies are 20 % heavier than in its URDF, for the examples of this crate.
 
 const RATE_HZ: f64 = 200.0;
 const VISCOUS: f64 = 2.0;
 
-/// The arm as it truly is.
+/// The true arm.
 fn true_arm(description: &dynident_model::Model) -> dynident_model::Model {
     let heavier = |body: &dynident_model::InertialParameters| {
         dynident_model::InertialParameters(body.0.map(|parameter| 1.2 * parameter))
@@ -12,7 +12,7 @@ fn true_arm(description: &dynident_model::Model) -> dynident_model::Model {
     description.with_inertials(&inertials).unwrap()
 }
 
-/// Ten seconds of positions and torques, joint by joint, along sums of three sines that differ by `phase`.
+/// Ten seconds of positions and torques by joint, for sums of three sines with a phase shift.
 fn recorded(description: &dynident_model::Model, phase: f64) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     let arm = true_arm(description);
     let mut workspace = dynident_dynamics::Workspace::new(&arm);

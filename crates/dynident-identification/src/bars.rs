@@ -1,9 +1,8 @@
 //! Error bars of an estimate as a sum of named terms.
 //!
-//! An estimator gives the covariance Σ of its values that follows from the residuals. Every other source of error is a
-//! separate term: a covariance `F_k` over the same columns, with the name of its source. The terms are independent of
-//! each other and of the noise, so the covariance of the whole is `Σ + Σ_k F_k`. [`ErrorBars::total`] is the only place
-//! where they are summed.
+//! An estimator returns the covariance Σ of its values that follows from the residuals. Every other source of error is
+//! a separate term: a covariance `F_k` over the same columns, with the name of its source. The terms are independent of
+//! each other and of the noise, so the total covariance is `Σ + Σ_k F_k`. Only [`ErrorBars::total`] adds them.
 
 use dynident_estimation::Estimate;
 use nalgebra::DMatrix;
@@ -28,7 +27,6 @@ pub enum ErrorSource {
     NominalValues,
 }
 
-/// One term of a covariance.
 #[derive(Clone, Debug)]
 struct ErrorTerm {
     source: ErrorSource,
@@ -43,8 +41,8 @@ pub struct ErrorBars {
 }
 
 impl ErrorBars {
-    /// The same terms with a further one. `covariance` has as many rows and columns as the estimate, or belongs to its
-    /// first columns; rows of columns that are held must be zero. `None` adds nothing.
+    /// Adds a term. `covariance` has the size of the estimate or belongs to its first columns; rows of held columns
+    /// must be zero. `None` adds nothing.
     #[must_use]
     pub fn with(mut self, source: ErrorSource, covariance: Option<DMatrix<f64>>) -> Self {
         self.terms.extend(covariance.map(|covariance| ErrorTerm { source, covariance }));
@@ -57,7 +55,7 @@ impl ErrorBars {
     pub fn total(&self, noise: &Estimate) -> Estimate {
         self.terms.iter().fold(noise.clone(), |sum, term| {
             let mut sum = sum.with_further_error(&term.covariance);
-            // The body of a payload is found with both covariances.
+            // The nearest consistent body of a payload uses both covariances.
             if term.source == ErrorSource::Gains {
                 sum.covariance_white += &term.covariance;
             }
@@ -98,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn terms_add_up_and_leave_the_estimate_alone() {
+    fn terms_add_up_and_do_not_change_the_estimate() {
         let noise = line();
         let lag = DMatrix::from_row_slice(2, 2, &[4.0e-4, 0.0, 0.0, 0.0]);
         let logs = DMatrix::from_row_slice(1, 1, &[9.0e-4]);

@@ -1,45 +1,39 @@
-//! What varies between logs, as part of the error bars: friction is another on another day.
+//! Variation of parameters between logs, as a term of the error bars: friction varies from day to day.
 //!
-//! Each training log is fitted alone. Where two logs differ by more than their own bars, the parameters themselves vary
-//! from log to log: with `z² = (θ_a − θ_b)² / (σ_a² + σ_b²)` and its mean k² over the pairs of logs and the parameters
-//! of one kind (bodies and drives; friction), their variance between logs is `τ² = (k² − 1) σ̄²`, σ̄² the mean variance
-//! of a single log's fit. Method of moments as by DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177, with
-//! one k for parameters of one kind.
+//! Each training log is fitted alone. If two logs differ by more than their error bars, the parameters vary from log to
+//! log. With `z² = (θ_a − θ_b)² / (σ_a² + σ_b²)` and its mean k² over the pairs of logs and the parameters of one kind
+//! (bodies and drives; friction), their variance between logs is `τ² = (k² − 1) σ̄²`, where σ̄² is the mean variance of
+//! a single log's fit. This is the method of moments of DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177,
+//! with one k for parameters of one kind.
 //!
-//! The fit to all logs weighs what each of them would say alone, `θ̂ = Σ_l A_l θ_l` with `A_l = N⁻¹ N_l` and the
-//! information N_l of log l. So with T the variation between logs it errs by `Σ_l A_l T A_lᵀ` more about the mean of
-//! all days, friction that varies making errors of bodies and drives wherever the logs hold different motion; and by T
-//! more about what a further day will show. Its bars are for that: `Σ + Σ_l A_l T A_lᵀ + T`.
+//! The fit to all logs is a weighted mean of the single fits, `θ̂ = Σ_l A_l θ_l` with `A_l = N⁻¹ N_l` and the
+//! information N_l of log l. With T the variation between logs, its error relative to the mean of all days grows by
+//! `Σ_l A_l T A_lᵀ`: varying friction causes errors of bodies and drives if the motion of the logs differs. The error
+//! relative to a new day grows by T more. The error bars are for a new day: `Σ + Σ_l A_l T A_lᵀ + T`.
 
+use crate::estimators::EstimationSettings;
 use crate::friction_by_log::is_friction_column;
+use crate::thresholds::LogVariationThresholds;
 use crate::training::Training;
 use dynident_estimation::{Estimate, EstimationError, LinearProblem, WeightedSettings, weighted_least_squares};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Pairs of a parameter's values that a kind needs for its k.
-const FEWEST: usize = 5;
-/// A single log's variance that was found from fewer squares says too little of the parameter.
-const FEWEST_SQUARES: f64 = 4.5;
-/// Times the typical value of its kind that one pair counts at most: one slip of a log is not what all logs vary by.
-const MOST: f64 = 25.0;
-
-/// By how much parameters of two logs differ, in units of what the logs' own error bars allow: 1 where they do not
-/// vary.
+/// Differences of parameters between logs, in units of the logs' own error bars; 1 without variation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BetweenLogs {
-    /// Bodies and drive inertias; none where too few are known from single logs.
+    /// Bodies and drive inertias; `None` if too few are determined by single logs.
     pub bodies: Option<f64>,
-    /// Friction, offsets and other torques of the joints; likewise.
+    /// Friction, offsets and other torques of the joints; `None` if too few are determined by single logs.
     pub friction: Option<f64>,
 }
 
-/// The covariance that the variation between the training logs adds to an estimate, for the prediction of a further
-/// day, and the size of that variation. `None` for a single log.
+/// Covariance that the variation between training logs adds to an estimate, for the prediction of a new day, and the
+/// size of that variation. `None` for a single log.
 pub(crate) fn variation_of_logs(
     training: &Training,
-    settings: &WeightedSettings,
+    settings: &EstimationSettings,
     estimate: &Estimate,
 ) -> Option<(DMatrix<f64>, BetweenLogs)> {
     let problem = &training.problem;
@@ -47,15 +41,16 @@ pub(crate) fn variation_of_logs(
         return None;
     }
     let count = training.columns.base();
+    let weighted = settings.weighted();
     let alone: Vec<Estimate> =
-        (0..problem.logs().len()).filter_map(|log| fit_alone(problem, log, settings, estimate).ok()).collect();
+        (0..problem.logs().len()).filter_map(|log| fit_alone(problem, log, &weighted, estimate).ok()).collect();
     let is_friction: Vec<bool> = training.model.layout().columns()[..count].iter().map(is_friction_column).collect();
     let [bodies, friction] = [false, true].map(|kind| {
         let columns: Vec<usize> = (0..count).filter(|&column| is_friction[column] == kind).collect();
-        variation(&alone, &columns)
+        variation(&alone, &columns, &settings.thresholds.log_variation)
     });
 
-    // T with the correlations of the single fits, then what it makes of the fit to all.
+    // T with the correlations of the single fits, then its effect on the fit to all logs.
     let k = |column: usize| if is_friction[column] { friction } else { bodies }.unwrap_or(1.0).max(1.0);
     let apart = |column: usize| (k(column).powi(2) - 1.0).sqrt();
     let of_one: DMatrix<f64> = alone.iter().fold(DMatrix::zeros(count, count), |sum, one| {
@@ -66,8 +61,8 @@ pub(crate) fn variation_of_logs(
     Some((of_mean + between, BetweenLogs { bodies, friction }))
 }
 
-/// `Σ_l A_l T A_lᵀ` of the columns that T, `between`, is of. `None` where the rows of all logs do not determine the
-/// columns that the estimate leaves free.
+/// `Σ_l A_l T A_lᵀ` over the columns of T, `between`. `None` if the rows of all logs do not determine the free columns
+/// of the estimate.
 fn error_of_all(problem: &LinearProblem, estimate: &Estimate, between: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let count = between.nrows();
     let is_free = |column: &usize| estimate.rank.fixed.iter().all(|fixed| fixed.column != *column);
@@ -78,7 +73,7 @@ fn error_of_all(problem: &LinearProblem, estimate: &Estimate, between: &DMatrix<
         let factor = problem.combined(&weights).and_then(|factor| factor.selected(&free)).ok()?;
         Some(factor.regressor_triangle())
     };
-    // R of all rows with columns of one length, for N is R squared.
+    // R of all rows, scaled to columns of equal length because `N = RᵀR` squares the condition number.
     let mut all = triangle_of(problem)?;
     let lengths: Vec<f64> = all.column_iter().map(|column| column.norm()).collect();
     let shorten = |triangle: &mut DMatrix<f64>| {
@@ -110,7 +105,6 @@ fn error_of_all(problem: &LinearProblem, estimate: &Estimate, between: &DMatrix<
     further.iter().all(|value| value.is_finite()).then_some(further)
 }
 
-/// The rows of one log.
 fn rows_of(problem: &LinearProblem, log: usize) -> Result<LinearProblem, EstimationError> {
     let mut alone = LinearProblem::new(problem.columns().to_vec(), problem.joints().to_vec());
     for rows in problem.equations().iter().filter(|rows| rows.log == log) {
@@ -119,7 +113,6 @@ fn rows_of(problem: &LinearProblem, log: usize) -> Result<LinearProblem, Estimat
     Ok(alone)
 }
 
-/// Least squares on one log, with what it does not excite as in the estimate of all.
 fn fit_alone(
     problem: &LinearProblem,
     log: usize,
@@ -131,9 +124,8 @@ fn fit_alone(
     weighted_least_squares(&alone, settings)
 }
 
-/// k of some parameters: the root of the mean of z² over pairs of logs, each by what Student's distribution makes of
-/// it.
-fn variation(alone: &[Estimate], columns: &[usize]) -> Option<f64> {
+/// k of some parameters: root mean square of z over pairs of logs, each corrected for Student's distribution.
+fn variation(alone: &[Estimate], columns: &[usize], thresholds: &LogVariationThresholds) -> Option<f64> {
     let is_fixed = |one: &Estimate, column: usize| one.rank.fixed.iter().any(|fixed| fixed.column == column);
     let mut squares = Vec::new();
     for (number, a) in alone.iter().enumerate() {
@@ -141,7 +133,8 @@ fn variation(alone: &[Estimate], columns: &[usize]) -> Option<f64> {
             for &column in columns {
                 let freedoms = a.std_degrees_of_freedom[column].min(b.std_degrees_of_freedom[column]);
                 let variance = a.std[column].powi(2) + b.std[column].powi(2);
-                if is_fixed(a, column) || is_fixed(b, column) || freedoms < FEWEST_SQUARES || variance <= 0.0 {
+                let is_unknown = freedoms < thresholds.min_degrees_of_freedom || variance <= 0.0;
+                if is_fixed(a, column) || is_fixed(b, column) || is_unknown {
                     continue;
                 }
                 let z2 = (a.values[column] - b.values[column]).powi(2) / variance;
@@ -149,12 +142,12 @@ fn variation(alone: &[Estimate], columns: &[usize]) -> Option<f64> {
             }
         }
     }
-    if squares.len() < FEWEST {
+    if squares.len() < thresholds.min_pairs {
         return None;
     }
     squares.sort_by(f64::total_cmp);
-    // Of a square of a normal number the median is 0.455.
+    // The median of the square of a standard normal variable is 0.455.
     let typical = (squares[squares.len() / 2] / 0.455).max(1.0);
-    let bounded = squares.iter().map(|z2| z2.min(MOST * typical));
+    let bounded = squares.iter().map(|z2| z2.min(thresholds.max_relative_square * typical));
     Some((bounded.sum::<f64>() / squares.len() as f64).sqrt())
 }

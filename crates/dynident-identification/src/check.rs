@@ -1,4 +1,4 @@
-//! Before any fit is believed: do study, robot and recordings fit together?
+//! Consistency of study, robot and recordings, tested before a fit.
 
 use crate::diagnosis::{Diagnosis, DiagnosisTask, diagnose};
 use crate::doubt::have_jumps;
@@ -9,24 +9,24 @@ use dynident_estimation::{WeightedSettings, weighted_least_squares};
 use dynident_recording::ImportReport;
 use dynident_rows::{Execution, Logs, RegressorModel, Role, of_role};
 
-/// What was found about a task's recordings before any fit is believed.
+/// Results of the tests before a fit.
 #[derive(Clone, Debug)]
 pub struct StudyExamination {
-    /// For each recording its number and what its import found; none for motions that were made already.
+    /// Index and import report of each recording; `None` for prepared motions.
     pub imports: Vec<(usize, Option<ImportReport>)>,
-    /// Mistakes, units of torque, payloads; none where jumps in a log make the comparison meaningless.
+    /// Mistakes, units of torque, payloads; `None` if jumps in a log invalidate the comparison.
     pub diagnosis: Option<Diagnosis>,
-    /// Rows of all joints that a fit would have.
+    /// Number of rows of all joints for a fit.
     pub rows: usize,
-    /// Base parameters that a fit would have.
+    /// Number of base parameters for a fit.
     pub parameters: usize,
 }
 
-/// Reads every recording of a task, and searches mistakes in the training recordings and payloads in the others. No
-/// friction is chosen and no bodies are estimated.
+/// Reads every recording of a task and searches for mistakes in the training recordings and for payloads in the others.
+/// No friction is selected and no bodies are estimated.
 ///
 /// # Errors
-/// Recordings that cannot be read, too few rows.
+/// Recordings cannot be read, or there are too few rows.
 pub fn examine_study(
     task: &IdentificationTask,
     execution: Execution<'_>,
@@ -47,7 +47,7 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     let known = training.columns.is_plain().then_some(theta);
     let mut imports: Vec<(usize, Option<ImportReport>)> =
         training.logs.iter().map(|log| (log.index, log.statistics.report.clone())).collect();
-    // Before the diagnosis, which finds them kept.
+    // Before the diagnosis, so that it finds the motions stored.
     let model: RegressorModel = robot.clone().into();
     for index in of_role(recordings, Role::Validate) {
         imports.push((index, logs.pass(&model, index).each_block(&mut |_| Ok(()))?));

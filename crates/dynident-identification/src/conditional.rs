@@ -1,41 +1,41 @@
-//! What an estimate is conditional on: the parameters that stayed at nominal.
+//! Dependence of estimates on parameters that are fixed at nominal values.
 
 use crate::consistent::{ConsistencySettings, nominal_covariance};
 use crate::training::Training;
 use dynident_estimation::{Estimate, HALF_WIDTH_95};
 use serde::{Deserialize, Serialize};
 
-/// An estimate is conditional where the nominal values may move it by this share of its own error bar.
-const MATTERS: f64 = 0.1;
-/// A held parameter is named where it may move the estimate by this share of what all of them may.
-const NAMED: f64 = 0.1;
-/// A parameter at nominal that an estimate hangs on.
+/// Ratio of nominal effect to error bar above which an estimate is conditional.
+const MIN_EFFECT_RATIO: f64 = 0.1;
+/// Minimum ratio to the largest effect for a fixed parameter to be listed.
+const MIN_LISTED_RATIO: f64 = 0.1;
+/// A parameter fixed at nominal on which an estimate depends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Condition {
-    /// Its symbol.
+    /// Symbol of the fixed parameter.
     pub on: String,
-    /// How much the estimate changes with it: the logs say the sum `estimate - per_unit * (it)`.
+    /// Change of the estimate per unit of the fixed parameter; the logs determine `estimate - per_unit * parameter`.
     pub per_unit: f64,
 }
 
-/// What a base parameter hangs on.
+/// Dependence of a base parameter on fixed parameters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Conditional {
-    /// The parameters at nominal that matter for it, the strongest first; empty for one that stands on its own.
+    /// Fixed parameters with a significant effect, strongest first; empty for an independent estimate.
     pub on: Vec<Condition>,
-    /// Standard deviation by the error of the nominal values, in the parameter's unit; none where nothing is known of
-    /// them, and where they do not matter.
+    /// Standard deviation from the error of the nominal values, in the parameter's unit; `None` if nominal values are
+    /// unknown or have no significant effect.
     pub nominal_std: Option<f64>,
-    /// Half the width of the 95 % interval with what the nominal values may be wrong by; for a parameter at nominal
-    /// that alone. None where nothing is known of the nominal values.
+    /// Half width of the 95 % interval including the error of the nominal values; for a fixed parameter only that
+    /// error. `None` if nominal values are unknown.
     pub half_width_95: Option<f64>,
 }
 
-/// For every base parameter what it hangs on: `θ_F` is estimated with the others at `θ_H = nominal`, and answers to
-/// them by `∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹W_FᵀW_H`. Its variance with theirs is `σ² + ∂ C_H ∂ᵀ`, C_H being how far a
-/// description may be wrong ([`nominal_covariance`]). What matters is judged by the intervals of the noise alone,
-/// `noise_half_width_95`: a lag that is hardly known does not hide it. Empty where all parameters are excited.
+/// Dependence of every base parameter on fixed ones. `θ_F` is estimated with `θ_H = nominal`, with the sensitivity
+/// `∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹W_FᵀW_H` and the variance `σ² + ∂ C_H ∂ᵀ`. C_H is the uncertainty of the robot description
+/// ([`nominal_covariance`]). Significance is judged by the intervals of the noise alone, `noise_half_width_95`, so that
+/// an uncertain lag does not hide the dependence. Empty if all parameters are excited.
 pub fn conditionals(
     training: &Training,
     estimate: &Estimate,
@@ -53,7 +53,7 @@ pub fn conditionals(
     let of_free = |column: usize| {
         let answers: Vec<f64> = fixed.iter().map(|fixed| fixed.answers.get(column).copied().unwrap_or(0.0)).collect();
         let own = estimate.half_width_95[column];
-        let matters = MATTERS * noise_half_width_95.get(column).copied().unwrap_or(own);
+        let matters = MIN_EFFECT_RATIO * noise_half_width_95.get(column).copied().unwrap_or(own);
         let part = |place: usize| match &spread {
             Some(spread) => {
                 let variance: f64 = spread[(fixed[place].column, fixed[place].column)];
@@ -73,7 +73,7 @@ pub fn conditionals(
             return Conditional::default();
         }
         let largest = places.iter().map(|&place| part(place)).fold(0.0, f64::max);
-        places.retain(|&place| part(place) >= NAMED * largest);
+        places.retain(|&place| part(place) >= MIN_LISTED_RATIO * largest);
         places.sort_by(|a, b| part(*b).total_cmp(&part(*a)));
         let name = |&place: &usize| Condition { on: fixed[place].name.clone(), per_unit: answers[place] };
         Conditional {
@@ -91,12 +91,12 @@ pub fn conditionals(
     (0..count).map(|column| if is_fixed(column) { of_fixed(column) } else { of_free(column) }).collect()
 }
 
-/// Joints that no training log moves above the noise of their positions.
+/// Joints whose motion stays below the position noise in all training logs.
 pub fn resting_joints(training: &Training) -> Vec<usize> {
     let rests = |joint: &usize| {
         let mut reports = training.logs.iter().map(|log| log.statistics.report.as_ref());
         reports.all(|report| {
-            // The importer has the joints in the model's order.
+            // The importer uses the joint order of the model.
             report.is_some_and(|report| report.cutoff.joints_hz.get(*joint).is_some_and(Option::is_none))
         })
     };

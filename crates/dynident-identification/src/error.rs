@@ -1,43 +1,47 @@
-//! Everything that can stop an identification, each with the log or the place and the fix in its message.
+//! Errors of an identification; each message names the log or the place, and the fix.
 
 use crate::consistent::ConsistencyError;
 use crate::diagnosis::DiagnosisError;
 use crate::estimators::EstimatorError;
 use crate::payload::PayloadError;
+use crate::thresholds::ThresholdError;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
 use dynident_rows::LogError;
 use thiserror::Error;
 
-/// Why a model could not be identified. A poor fit is not an error.
+/// Reason for a failed identification. A poor fit is not an error.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum IdentificationError {
-    /// Nothing to fit to.
+    /// No training log.
     #[error("no log has the role \"identify\": there is nothing to fit to")]
     NoTrainingLog,
-    /// A recording that gives no rows.
+    /// A recording gives no rows.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// An estimate that cannot be made.
+    /// The estimation fails.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
-    /// An estimator that gives no estimate.
+    /// The estimator fails.
     #[error(transparent)]
     Estimator(EstimatorError),
-    /// A robot whose parts do not fit.
+    /// Terms do not match the robot.
     #[error(transparent)]
     Model(#[from] ParametricModelError),
-    /// Payloads, offsets per log or gains that do not go together.
+    /// Payloads, offsets per log or gains contradict each other.
     #[error(transparent)]
     Payload(#[from] PayloadError),
-    /// Knowledge of bodies that are not there.
+    /// Prior knowledge of unknown bodies.
     #[error("[estimator.physical]: {0}")]
     Consistency(ConsistencyError),
-    /// Logs that cannot be reduced to factors.
+    /// The logs cannot be reduced to factors.
     #[error(transparent)]
     Reduce(#[from] ReduceError),
-    /// Intervals of parameters that cannot be had.
+    /// A threshold is invalid.
+    #[error(transparent)]
+    Threshold(#[from] ThresholdError),
+    /// The intervals cannot be computed.
     #[error("estimator.intervals: {0}")]
     Intervals(ConsistencyError),
 }
@@ -53,7 +57,7 @@ impl From<DiagnosisError> for IdentificationError {
 }
 
 impl From<EstimatorError> for IdentificationError {
-    /// What is wrong with a log or with rows stays what it is.
+    /// Keeps errors of logs and rows as they are.
     fn from(error: EstimatorError) -> Self {
         match error {
             EstimatorError::Log(error) => Self::Log(error),
@@ -63,43 +67,43 @@ impl From<EstimatorError> for IdentificationError {
     }
 }
 
-/// Why logs cannot be reduced to factors: something is to be chosen from the samples of all of them.
+/// Reason why logs cannot be reduced to factors: a choice needs the samples of all logs.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ReduceError {
-    /// The cut-off is left to the logs.
+    /// The cut-off is open.
     #[error(
-        "the cut-off is left to the logs, and each would have its own: state motion.differentiator.cutoff_hz, or reduce like a model that was identified from some of them"
+        "the cut-off is left to the logs and would differ between them: state motion.differentiator.cutoff_hz, or reduce with the settings of a model that was identified from some of them"
     )]
     Cutoff,
-    /// Whether drives have inertia is left to the logs.
+    /// Drive inertia is open.
     #[error(
-        "whether the torque of joint {joint} holds its drive's inertia is left to the logs: state it (drive.drive_inertia = true or false), or reduce like a model that was identified from some of them"
+        "the drive inertia of joint {joint} is automatic, which needs all logs: state it (drive.drive_inertia = true or false), or reduce with the settings of a model that was identified from some of them"
     )]
     DriveInertia {
-        /// The first such joint.
+        /// First such joint.
         joint: String,
     },
-    /// Friction is left to the logs.
+    /// Friction is open.
     #[error(
-        "the friction of joint {joint} is left to the logs: state it (drive.friction = \"stated\" and its terms), or reduce like a model that was identified from some of them"
+        "the friction of joint {joint} is automatic, which needs all logs: state it (drive.friction = \"stated\" and its terms), or reduce with the settings of a model that was identified from some of them"
     )]
     Friction {
-        /// The first such joint.
+        /// First such joint.
         joint: String,
     },
-    /// Friction that grows with the load needs the samples again.
-    #[error("load-dependent friction needs the samples again, with the load of the fit before: leave it out")]
+    /// Load-dependent friction needs the samples again.
+    #[error("load-dependent friction needs the samples again, with the load of the previous fit: leave it out")]
     Load,
-    /// Payloads, gains or offsets make columns of single logs.
-    #[error("{what} cannot be had from reduced logs: identify them from the logs themselves")]
+    /// Payloads, gains or offsets add columns for single logs.
+    #[error("{what} cannot be estimated from reduced logs: identify them from the complete logs")]
     Columns {
-        /// What is asked for.
+        /// Requested columns.
         what: &'static str,
     },
-    /// An estimator that goes back to the samples.
-    #[error("estimator.method = \"{method}\" goes back to the samples: give \"weighted\" or \"ordinary\"")]
+    /// The estimator reads the samples again.
+    #[error("estimator.method = \"{method}\" reads the samples again: give \"weighted\" or \"ordinary\"")]
     Estimator {
-        /// Its name.
+        /// Name of the estimator.
         method: &'static str,
     },
 }

@@ -1,4 +1,4 @@
-//! From recordings to an estimate: decisions, the last fit under them, and the terms of its error bars.
+//! Estimate from recordings: decisions, the last fit, and the terms of its error bars.
 
 use crate::bars::{ErrorBars, ErrorSource};
 use crate::between_logs::{BetweenLogs, variation_of_logs};
@@ -15,21 +15,19 @@ use dynident_rows::{Execution, Recording, excerpts};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Rows and estimate, and the choices under which they were made.
 pub(crate) struct Fitted<'a> {
-    /// The last fit, with the lag that was compensated and the estimator that `auto` selected.
+    /// The last fit, with the compensated lag and the estimator that `auto` selected.
     pub(crate) fit: Fit<'a>,
     pub(crate) choices: Choices,
     pub(crate) lag: LagChoice,
-    /// `None` for a single log.
     pub(crate) between_logs: Option<BetweenLogs>,
-    /// Terms of the estimate's covariance beyond the noise.
+    /// Terms of the estimate's covariance in addition to the noise.
     pub(crate) bars: ErrorBars,
     pub(crate) times: StageTimes,
 }
 
-/// Decides everything that is left to the logs and fits the model. Decisions of long logs are made on an
-/// [excerpt](dynident_rows::excerpts) and then revised on all rows.
+/// Makes all decisions and fits the model. Decisions for long logs are made on an [excerpt](dynident_rows::excerpts)
+/// and then revised on all rows.
 pub(crate) fn fitted<'a>(
     task: &'a IdentificationTask,
     training: &[usize],
@@ -63,8 +61,7 @@ pub(crate) fn fitted<'a>(
         fit.logs = fit.logs.with_excerpts(Arc::new(excerpts));
     }
     let (bars, between_logs) = if is_model && fit.settings.estimation.estimator.reads_filtered_rows() {
-        let weighted = fit.settings.estimation.weighted();
-        let variation = variation_of_logs(&fit.training, &weighted, &fit.estimation.estimate);
+        let variation = variation_of_logs(&fit.training, &fit.settings.estimation, &fit.estimation.estimate);
         let (covariance, between_logs) = variation.unzip();
         (bars.with(ErrorSource::BetweenLogs, covariance), between_logs)
     } else {
@@ -75,17 +72,14 @@ pub(crate) fn fitted<'a>(
     Ok(Fitted { fit, choices, lag, between_logs, bars, times })
 }
 
-/// Choices that an excerpt of long logs made.
 struct Excerpt {
     choices: Choices,
-    /// The recordings with excerpts in place of long logs.
     recordings: Vec<Recording>,
-    /// Time to read logs, s.
     logs_s: f64,
 }
 
-/// The choices of an excerpt. `None` for short logs, and where little is left to choose: with external instruments,
-/// with a known arm, with unknown gains.
+/// Choices of an excerpt. `None` for short logs, and if little is open: with external instruments, a known arm or
+/// unknown gains.
 fn choices_of_excerpt(
     task: &IdentificationTask,
     training: &[usize],
@@ -105,14 +99,13 @@ fn choices_of_excerpt(
     let (robot, payloads, settings) = (robot.clone(), payloads.clone(), settings.clone());
     let task = IdentificationTask { robot, recordings, payloads, settings };
     let mut work = Workspace::new(&task, training, execution, Job::Model(None), None);
-    // A fault of the recordings is reported when all rows are fitted.
+    // The fit of all rows reports errors of the recordings.
     let Ok(()) = decide_all(&DECISIONS, &mut work) else { return Ok(None) };
     let (choices, logs_s) = (work.choices().clone().of_excerpt(task.settings.lags), work.logs_s + read_s);
     drop(work);
     Ok(Some(Excerpt { choices, recordings: task.recordings, logs_s }))
 }
 
-/// The lag that the study states.
 fn stated_lag(fit: &Fit<'_>) -> LagChoice {
     let IdentificationSettings { motion, .. } = &fit.settings;
     let Some(stated) = &motion.torque_lag_s else { return LagChoice::default() };

@@ -1,30 +1,27 @@
-//! The same rows with friction of each log's own: what bodies and drives say when friction is another on another day.
+//! Separate friction parameters for each log, because friction varies from day to day.
 //!
-//! `τ_l = W_b θ_b + W_f θ_{f,l}` for the logs l: bodies and drives are one machine's, friction and offsets are free in
-//! every log ("fixed effects": Mundlak, Econometrica 46 (1978) 69).
+//! `τ_l = W_b θ_b + W_f θ_{f,l}` for the logs l: logs share bodies and drives; friction and offsets are free in every
+//! log ("fixed effects": Mundlak, Econometrica 46 (1978) 69).
 
 use dynident_dynamics::Column;
 use dynident_estimation::{EstimationError, LinearProblem, Unexcited};
 
-/// Friction is told apart between so many groups of logs at most; further logs share it with their neighbours, for
-/// every group adds its columns.
-const MOST_GROUPS: usize = 8;
+/// Maximum number of log groups with separate friction. Neighbouring logs share a group, because every group adds
+/// columns.
+const MAX_GROUPS: usize = 8;
 
-/// Whether a base parameter is torque of a single joint, which can differ from day to day.
+/// Whether a base parameter is torque of a single joint, which can vary from day to day.
 pub(crate) fn is_friction_column(column: &Column) -> bool {
     matches!(column, Column::Term(term) if !term.is_drive_inertia())
 }
 
-/// The problem with further columns for the friction of logs behind the first group, whose columns stay as they are.
-/// `None` where nothing is to be told apart: one log, or a prior, which says nothing of the further columns.
-///
-/// # Errors
-/// Columns that do not go together.
+/// Adds friction columns for the log groups after the first, whose columns are unchanged. `None` for a single log, and
+/// with a prior, which does not cover the added columns.
 pub(crate) fn with_friction_by_log(
     problem: &LinearProblem,
     is_friction: &[bool],
 ) -> Result<Option<LinearProblem>, EstimationError> {
-    let groups = problem.logs().len().min(MOST_GROUPS);
+    let groups = problem.logs().len().min(MAX_GROUPS);
     if groups < 2 || problem.prior().is_some() {
         return Ok(None);
     }
@@ -47,12 +44,12 @@ pub(crate) fn with_friction_by_log(
     };
     let Unexcited { columns, silent } = problem.unexcited();
     let unexcited = Unexcited { columns: in_all(columns), silent: in_all(silent) };
-    let mut apart = LinearProblem::new(names.collect(), problem.joints().to_vec())
+    let mut separate = LinearProblem::new(names.collect(), problem.joints().to_vec())
         .with_fallback(values.collect())?
         .with_unexcited(unexcited)?;
     for rows in problem.equations() {
         let columns = rows.columns.iter().map(|&column| own(column, group_of(rows.log))).collect();
-        apart.add(&problem.logs()[rows.log], rows.joint, columns, rows.factor.clone())?;
+        separate.add(&problem.logs()[rows.log], rows.joint, columns, rows.factor.clone())?;
     }
-    Ok(Some(apart))
+    Ok(Some(separate))
 }

@@ -1,4 +1,4 @@
-//! The whole way from recordings to an identified model, stage by stage.
+//! Identification of a model from recordings, stage by stage.
 
 use crate::bandwidth::CutoffByError;
 use crate::bars::{ErrorBars, ErrorSource};
@@ -26,100 +26,98 @@ use dynident_recording::MotionSettings;
 use dynident_rows::{Execution, RegressorModel, Role, of_role};
 use std::time::Instant;
 
-/// An identified model with everything that was found on the way.
+/// An identified model with all intermediate results.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Identification {
-    /// The motion settings in force, with one cut-off for all recordings.
+    /// Motion settings in use, with one cut-off for all recordings.
     pub motion: MotionSettings,
-    /// How the cut-off was chosen; none where it was given or the recordings are too short to try any.
+    /// Evidence for the cut-off; `None` if it was stated or the recordings are too short to compare cut-offs.
     pub cutoff: Option<CutoffByError>,
-    /// The cut-off whose band held-out figures are for, where the fit has another.
+    /// Cut-off whose band the held-out figures use if the fit has another one, hertz.
     pub motion_hz: Option<f64>,
-    /// Whether drives were seen to have inertia; none where terms state it.
+    /// Test of drive inertia; `None` if terms state it.
     pub drive_inertia: Option<DriveInertiaChoice>,
-    /// The training recordings as factors, the model with the friction that was chosen, payload columns, gains.
+    /// Factors of the training recordings, the model with the selected friction, payload columns, gains.
     pub training: Training,
-    /// The estimator that made the estimate: of `auto` the one that it took.
+    /// Estimator in use; for `auto` the selected one.
     pub estimator: Estimator,
-    /// The result of the estimator: values with error bars by the residuals alone, and its findings.
+    /// Result of the estimator, with error bars from the residuals only.
     pub estimation: Estimation,
-    /// The other terms of the error bars.
+    /// Further terms of the error bars.
     pub bars: ErrorBars,
-    /// The estimate with all terms in its error bars, and with inessential parameters held at zero if the settings
-    /// require it.
+    /// Estimate with all terms in its error bars. Inessential parameters are held at zero if the settings require it.
     pub estimate: Estimate,
-    /// What was held at zero because the data hardly determine it, if that was asked for.
+    /// Parameters held at zero because the data hardly determine them, if requested.
     pub essential: Option<EssentialReport>,
     /// Bodies, friction and drives.
     pub consistent: ConsistentParameters,
-    /// Payloads that were estimated.
+    /// Estimated payloads.
     pub payloads: Vec<PayloadResult>,
-    /// Delays and torque over time of the training recordings.
+    /// Delays and torque traces of the training recordings.
     pub examination: TrainingExamination,
-    /// Tests on recordings that were not fitted to.
+    /// Tests on recordings that were not used for the fit.
     pub held_out: Vec<HeldOutExamination>,
-    /// Other readings of the recordings beside the task's; none where there was no reason to try them, and for
-    /// payloads.
+    /// Alternative hypotheses about the recordings; `None` if the fit gave no reason to test them, and for payloads.
     pub diagnosis: Option<Diagnosis>,
     /// The model with the torque terms of each class of forms; empty for payloads on a known arm and with unknown gains.
     pub forms: Vec<FormFit>,
-    /// The lag of the torque that was taken off the rows, and how well the rest is known.
+    /// The compensated lag of the torque and its remaining uncertainty.
     pub torque_lag: LagChoice,
-    /// By how much training logs differ beyond their own error bars, which the estimate's bars hold; none for a single
-    /// one.
+    /// Variation between training logs beyond their own error bars, which is included in the error bars of the
+    /// estimate; `None` for a single log.
     pub between_logs: Option<BetweenLogs>,
-    /// Where the time went.
+    /// Time of the stages.
     pub times: StageTimes,
 }
 
 impl Identification {
-    /// The model: terms, base parameters, layout.
+    /// Terms, base parameters and layout.
     pub fn model(&self) -> &RegressorModel {
         &self.training.model
     }
 
-    /// The estimate over base parameters, payloads and offsets of single logs.
+    /// Estimate of base parameters, payloads and offsets of single logs.
     pub fn estimate(&self) -> &Estimate {
         &self.estimate
     }
 
-    /// Base parameters as estimated.
+    /// Estimated base parameters.
     pub fn base_values(&self) -> &[f64] {
         &self.estimate.values[..self.training.columns.base()]
     }
 
-    /// Inertial parameters of all bodies: of the consistent set, where there is one.
+    /// Inertial parameters of all bodies, from the consistent set if available.
     pub fn inertials(&self) -> Vec<InertialParameters> {
         inertials(self.model().model(), &self.consistent.parameters)
     }
 
-    /// Base parameters of the consistent set, where there is one.
+    /// Base parameters of the consistent set, if available.
     pub fn consistent_base_values(&self) -> Option<&[f64]> {
         self.consistent.fit.as_ref().map(|fit| &fit.base_values[..])
     }
 }
 
-/// Fits a robot's model to its recordings with the role [`Identify`](Role::Identify) and tests it on the others: rows
-/// and factors, estimate, consistent parameters, examination, held-out examination. Each of these stages can be called
-/// alone: [`Logs::new`](crate::Logs::new), [`training_rows`](crate::training_rows),
+/// Fits a robot's model to its recordings with the role [`Identify`](Role::Identify) and tests it on the others. The
+/// stages are rows and factors, estimate, consistent parameters, examination and held-out examination. Each can be
+/// called separately: [`Logs::new`](crate::Logs::new), [`training_rows`](crate::training_rows),
 /// [`estimate`](crate::estimators::estimate()), [`consistent_stage`](crate::consistent_stage),
 /// [`examine_training`](crate::examination::examine_training),
 /// [`examine_held_out`](crate::examination::examine_held_out).
 ///
 /// # Errors
-/// [`IdentificationError`]: recordings, settings that do not go together. A poor fit is not an error.
+/// [`IdentificationError`]: recordings cannot be read, or settings contradict each other. A poor fit is not an error.
 pub fn identify(task: &IdentificationTask, execution: Execution<'_>) -> Result<Identification, IdentificationError> {
     execution.install(|| identified(task, execution, Job::Model(None)))
 }
 
-/// As [`identify()`] with instruments from `source`: the closed loop simulated with the model so far (IDIM-IV: call
-/// again with a new simulation until the parameters settle), or a repeated run. With
-/// [`Estimator::Instrumental`](crate::estimators::Estimator::Instrumental) they make the estimate, with another
-/// estimator they test it.
+/// As [`identify()`] with instruments from `source`: a simulation of the closed loop with the current model (IDIM-IV:
+/// call again with a new simulation until the parameters converge), or a repeated run.
+/// [`Estimator::Instrumental`](crate::estimators::Estimator::Instrumental) uses them for the estimate; other estimators
+/// are tested with them.
 ///
 /// # Errors
-/// As [`identify()`], and what `source` returns.
+/// As [`identify()`], and errors of `source`.
 pub fn identify_with_instruments(
     task: &IdentificationTask,
     source: &mut dyn InstrumentSource,
@@ -128,8 +126,8 @@ pub fn identify_with_instruments(
     execution.install(|| identified(task, execution, Job::Model(Some(source))))
 }
 
-/// Payloads on an arm that is known already, with the arm's error bars in theirs. The task's robot has the arm's terms;
-/// bodies of the arm are not looked for.
+/// Identifies payloads on a known arm and includes the arm's error bars. The task's robot has the arm's terms; the
+/// bodies of the arm are not estimated.
 ///
 /// # Errors
 /// As [`identify()`].
@@ -158,6 +156,8 @@ fn identified(
         return Err(IdentificationError::NoTrainingLog);
     }
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
+    settings.thresholds.validate()?;
+    settings.estimation.thresholds.validate()?;
 
     let arm = job.arm();
     let Fitted { fit, choices, lag, between_logs, bars, mut times } = fitted(task, &chosen, execution, job)?;
@@ -215,7 +215,7 @@ fn identified(
     })
 }
 
-/// The estimate with parameters held at zero that the data hardly determine, if the settings ask for it.
+/// Holds parameters at zero that the data hardly determine, if requested.
 fn without_inessential(
     estimate: Estimate,
     settings: &IdentificationSettings,

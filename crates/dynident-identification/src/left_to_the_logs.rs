@@ -1,13 +1,10 @@
-//! Drive inertia that a study leaves to the logs: neither stated nor denied.
+//! Drive inertia that a study leaves open.
 
 use crate::settings::IdentificationSettings;
 use dynident_dynamics::{ParametricModel, ParametricModelError};
 use dynident_model::terms::{DriveInertia, TorqueTerm, sort_terms};
 
-/// The robot with every drive inertia that `settings.drive_inertia` leaves to the logs, before these are asked.
-///
-/// # Errors
-/// Terms that this robot cannot have.
+/// The robot with every drive inertia that `settings.drive_inertia` leaves open, before any test.
 pub(crate) fn with_drives_left_to_the_logs(
     robot: &ParametricModel,
     settings: &IdentificationSettings,
@@ -15,17 +12,13 @@ pub(crate) fn with_drives_left_to_the_logs(
     with_drives(robot, &joints_left_to_the_logs(robot, settings))
 }
 
-/// The joints whose drive inertia is left to the logs and none of the robot's terms yet.
+/// Joints with open drive inertia that is not yet among the robot's terms.
 pub(crate) fn joints_left_to_the_logs(robot: &ParametricModel, settings: &IdentificationSettings) -> Vec<usize> {
     let known = |joint: &usize| robot.terms().contains(&TorqueTerm::DriveInertia(DriveInertia { joint: *joint }));
     let named = settings.drive_inertia.iter().filter_map(|name| robot.model().joint_index(name));
     named.filter(|joint| !known(joint)).collect()
 }
 
-/// The robot with the drive inertia of these joints.
-///
-/// # Errors
-/// Terms that this robot cannot have.
 pub(crate) fn with_drives(robot: &ParametricModel, joints: &[usize]) -> Result<ParametricModel, ParametricModelError> {
     let drives = joints.iter().map(|&joint| TorqueTerm::DriveInertia(DriveInertia { joint }));
     let mut terms: Vec<TorqueTerm> = robot.terms().iter().cloned().chain(drives).collect();

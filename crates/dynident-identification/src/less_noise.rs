@@ -1,4 +1,4 @@
-//! Where `auto` took instruments: the cut-off of the motion follows them down.
+//! A lower motion cut-off after `auto` selected instruments.
 
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, Estimator, InstrumentSettings, NoiseInRegressor, estimate};
@@ -10,7 +10,7 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimateStatus;
 use dynident_rows::Logs;
 
-/// Rows, estimate and the settings that made them: with the estimator that `auto` selected and the lag in force.
+/// Rows, estimate and their settings, with the estimator that `auto` selected and the lag in use.
 pub(crate) struct Fit<'a> {
     pub(crate) logs: Logs<'a>,
     pub(crate) training: Training,
@@ -18,18 +18,13 @@ pub(crate) struct Fit<'a> {
     pub(crate) settings: IdentificationSettings,
 }
 
-/// The regressor's cut-off over that of the instruments, where both are free: positions are smoothed little inside of
-/// the instruments' band.
-const CUTOFF_OVER_INSTRUMENTS: f64 = 2.0;
-/// Why friction is not chosen then.
-const NOISY: &str = "noise of the positions biases the least squares by which it would be chosen";
-/// A cut-off that would be lowered by less is kept.
-const WORTH_LOWERING: f64 = 0.8;
+/// Reason for keeping the stated friction in this case.
+const NOISE_REASON: &str = "position noise biases the least squares that would select it";
 
-/// The settings with the estimator that `auto` took; `robot` is the task's with the drive inertia that was seen. Where
-/// it took instruments and the cut-off was left to the data, rows and estimate are made again with a cut-off that lets
-/// less noise into the regressor, and with friction as stated in any case: what least squares, held-out errors and
-/// delays are made from then shows the robot and not the noise.
+/// Applies the estimator that `auto` selected; `robot` has the drive inertia of the test. If `auto` selected
+/// instruments and the cut-off is automatic, rows and estimate are computed again with a cut-off that lets less noise
+/// into the regressor, and with friction as stated. Least squares, held-out errors and delays then describe the robot
+/// and not the noise.
 pub(crate) fn with_less_noise<'a>(
     task: &'a IdentificationTask,
     robot: &ParametricModel,
@@ -38,15 +33,16 @@ pub(crate) fn with_less_noise<'a>(
 ) -> Result<Fit<'a>, IdentificationError> {
     let Some((cutoff_hz, noise)) = take_estimator(&mut found) else { return Ok(found) };
     let IdentificationTask { recordings, payloads, .. } = task;
-    let lower_hz = CUTOFF_OVER_INSTRUMENTS * cutoff_hz;
+    let thresholds = found.settings.thresholds.cutoff;
+    let lower_hz = thresholds.instruments_ratio * cutoff_hz;
     let before_hz = found.logs.motion.differentiator.cutoff_hz();
     let is_lower = found.settings.motion.differentiator.wants_cutoff()
-        && before_hz.is_some_and(|before_hz| lower_hz < WORTH_LOWERING * before_hz);
+        && before_hz.is_some_and(|before_hz| lower_hz < thresholds.max_lowered_ratio * before_hz);
     if !is_lower && found.training.friction_choice.is_empty() {
         return Ok(found);
     }
     let (logs, before) = if is_lower {
-        // What is above the lower cut-off is noise and no motion: held-out figures are for what is below.
+        // Above the lower cut-off there is only noise, so held-out figures use the band below it.
         let execution = found.logs.execution;
         let lower =
             Logs::new(robot.model(), recordings, found.settings.row_settings(), chosen, Some(lower_hz), execution)?;
@@ -54,8 +50,8 @@ pub(crate) fn with_less_noise<'a>(
     } else {
         (found.logs, None)
     };
-    // Friction was chosen by least squares, which the noise biases.
-    let as_stated = |joint: &JointFriction| JointFriction::as_stated(&joint.joint, NOISY);
+    // Friction was selected by least squares, which the noise biases.
+    let as_stated = |joint: &JointFriction| JointFriction::as_stated(&joint.joint, NOISE_REASON);
     let friction_choice = found.training.friction_choice.iter().map(as_stated).collect();
     let training = training_rows(&logs, &found.settings, robot.clone().into(), chosen, payloads, None)?;
     let training = Training { friction_choice, ..training };
@@ -64,7 +60,7 @@ pub(crate) fn with_less_noise<'a>(
         if again.instruments.weak || estimation.estimate.status == EstimateStatus::IterationLimit {
             return Ok(Fit { logs: before.unwrap_or(logs), ..found });
         }
-        // The verdict is about the rows that noise was found in.
+        // The verdict belongs to the rows in which the noise was found.
         (again.verdict, again.fast_motion, again.hausman) = (noise.verdict, noise.fast_motion, noise.hausman);
         (again.least_squares, again.instruments_taken) = (noise.least_squares, true);
         again.cutoff_before_hz = before_hz.filter(|_| is_lower);
@@ -72,8 +68,8 @@ pub(crate) fn with_less_noise<'a>(
     Ok(Fit { logs, training, estimation, settings: found.settings })
 }
 
-/// Puts the estimator that `auto` took into the settings; the cut-off of the instruments, hertz, and what was found of
-/// the noise, where it took them.
+/// Puts the estimator that `auto` selected into the settings. Returns the cut-off of the instruments, hertz, and the
+/// findings on noise if instruments were selected.
 pub(crate) fn take_estimator(found: &mut Fit<'_>) -> Option<(f64, NoiseInRegressor)> {
     let Estimator::Auto(own) = found.settings.estimation.estimator.clone() else { return None };
     let noise = found.estimation.noise_in_regressor.as_ref().filter(|noise| noise.instruments_taken);

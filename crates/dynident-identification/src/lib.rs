@@ -1,10 +1,9 @@
-//! **Which model explains these samples?** From samples in memory or a stream to an identified model. No study files,
-//! no paths, no pages: these are the business of the crate `dynident`.
+//! Identification of a robot model from samples in memory or a stream. Study files and reports are in the crate
+//! `dynident`.
 //!
 //! # A UR10 from arrays
 //!
-//! `q` and `tau` hold one array for each joint (rad, N m), sampled at 200 Hz; a second recording tests what the first
-//! one gives.
+//! `q` and `tau` contain one array for each joint (rad, N m), sampled at 200 Hz; a second recording tests the model.
 //!
 //! ```
 //! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/ur10_arrays.rs"));
@@ -27,12 +26,12 @@
 //! let recordings = vec![Recording::training("train", train), Recording::held_out("test", test)];
 //! let found = identify(&IdentificationTask::new(robot, recordings), Execution::default())?;
 //!
-//! // The description is 20 % off; the identified model predicts motion that it was not fitted to.
+//! // The masses in the URDF are 20 % wrong; the identified model predicts held-out motion.
 //! let test = &found.held_out[0].validation;
 //! assert!(test.prior.as_ref().unwrap().relative_error_percent.unwrap() > 15.0);
 //! assert!(test.model.relative_error_percent.unwrap() < 0.5);
 //!
-//! // Every base parameter has a readable name, a value and an error bar; every body is one that can be real.
+//! // Every base parameter has a readable name, a value and an error bar; every body is physically consistent.
 //! let (names, estimate) = (found.model().base().expressions(), found.estimate());
 //! let viscous = names.iter().position(|name| name == "fv1").unwrap();
 //! assert!((estimate.values[viscous] - 2.0).abs() < 0.05, "{} ± {}", estimate.values[viscous], estimate.std[viscous]);
@@ -43,8 +42,7 @@
 //!
 //! # Stage by stage
 //!
-//! [`identify()`] is five stages, each a public function with a plain struct for its result. Here they are called alone
-//! on the same recordings:
+//! [`identify()`] has five stages, each a public function that returns a plain struct:
 //!
 //! ```
 //! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/ur10_arrays.rs"));
@@ -68,23 +66,23 @@
 //!
 //! // Rows of the regressor, kept as triangular factors; one cut-off frequency for all recordings.
 //! let logs = Logs::new(robot.model(), &recordings, settings.row_settings(), &[0], None, Execution::default())?;
-//! let training = training_rows((&logs, &settings), robot.clone().into(), &[0], &[], None)?;
+//! let training = training_rows(&logs, &settings, robot.clone().into(), &[0], &[], None)?;
 //!
 //! // Base parameters with their covariance, by the estimator of the settings.
-//! let estimate = estimate(&training.rows((&logs, &settings), &[0]), None)?.estimate;
+//! let estimate = estimate(&training.rows(&logs, &settings, &[0]), None)?.estimate;
 //!
-//! // Bodies and friction that can be real and explain the rows best.
-//! let consistent = consistent_stage((&logs, &settings), &training, &estimate)?;
-//! let fit = consistent.fit.expect("a consistent set explains what a real arm did");
+//! // Physically consistent bodies and friction with the best fit.
+//! let consistent = consistent_stage(&logs, &settings, &training, &estimate)?;
+//! let fit = consistent.fit.expect("a consistent set exists");
 //!
-//! // What the recordings say of it: the lag of the torque, and the error on motion that was not used.
-//! let (lags, _) = examine_training((&logs, &settings.estimation), &training.model, 0, &estimate.values)?;
+//! // Lag of the torque, and error on held-out motion.
+//! let (lags, _) = examine_training(&logs, &settings.estimation, &training.model, 0, &estimate.values)?;
 //! assert_eq!(lags.len(), 6);
 //! let tested = ModelUnderTest { theta: &fit.base_values, physical: None, uncertainty: None, traced: false };
-//! let held_out = examine_held_out((&logs, &settings.estimation), &training.model, 1, &tested)?;
+//! let held_out = examine_held_out(&logs, &settings.estimation, &training.model, 1, &tested)?;
 //! assert!(held_out.validation.model.relative_error_percent.unwrap() < 1.0);
 //! # for (value, truth) in estimate.values.iter().zip(robot.base().values(&truth)) {
-//! #     // What the low-pass takes off the motion, and nothing off the torque.
+//! #     // The low-pass changes the motion but not the torque.
 //! #     assert!((value - truth).abs() < 0.05 * truth.abs().max(1.0), "{value} and {truth}");
 //! # }
 //! # Ok(())
@@ -93,26 +91,26 @@
 //!
 //! # By task
 //!
-//! | task | take |
+//! | task | use |
 //! | --- | --- |
 //! | a model from recordings | [`identify()`] of an [`IdentificationTask`] |
-//! | a log file, a stream, arrays | [`Recording`] over a [`Log`](dynident_recording::Log); a motion made elsewhere: [`Recording::of_motion`] |
-//! | another estimator | [`Estimator`](estimators::Estimator) in [`EstimationSettings`]; what it alone finds: [`Findings`](estimators::Findings) |
+//! | a log file, a stream, arrays | [`Recording`] with a [`Log`](dynident_recording::Log); a prepared motion: [`Recording::of_motion`] |
+//! | another estimator | [`Estimator`](estimators::Estimator) in [`EstimationSettings`]; its findings: [`Findings`](estimators::Findings) |
 //! | instruments from a simulated loop or a second run | [`identify_with_instruments`] |
-//! | drive inertia where the training logs show it | [`IdentificationSettings::drive_inertia`] |
-//! | friction chosen by the training logs | [`IdentificationSettings::friction`] |
-//! | what is known of the bodies | [`ConsistencySettings`](consistent::ConsistencySettings) |
-//! | how far a mass could be off | [`IdentificationSettings::intervals`] |
-//! | zeros of torque sensors that drift | [`OffsetChoice::PerLog`] |
-//! | motor constants | [`GainChoice::Unknown`], with a known payload on some of the logs |
+//! | drive inertia, tested with the training logs | [`IdentificationSettings::drive_inertia`] |
+//! | friction selected from the training logs | [`IdentificationSettings::friction`] |
+//! | prior knowledge of the bodies | [`ConsistencySettings`](consistent::ConsistencySettings) |
+//! | possible range of a mass | [`IdentificationSettings::intervals`] |
+//! | drifting zeros of torque sensors | [`OffsetChoice::PerLog`] |
+//! | motor constants | [`GainChoice::Unknown`], with a known payload in some of the logs |
 //! | a payload on a known arm | [`identify_payload`] with a [`KnownArm`](payload::KnownArm) |
 //! | the lag of the torque, its sign, its residuals | [`TrainingExamination`], [`examination`] |
-//! | whether study, robot and logs fit together at all | [`examine_study`], [`diagnosis`] |
-//! | the rows themselves | [`LogPass`](rows::LogPass) with a [`RowConsumer`](rows::RowConsumer) of one's own |
+//! | consistency of study, robot and logs | [`examine_study`], [`diagnosis`] |
+//! | the rows | [`LogPass`](rows::LogPass) with a custom [`RowConsumer`](rows::RowConsumer) |
 //! | a progress bar | [`Progress`] in [`Execution`] |
 //!
-//! A recording that fits into memory is read and differentiated once, however many passes there are over its rows; of a
-//! longer one only factors stay. The result is the same for any number of threads.
+//! A recording that fits into memory is read and differentiated once, for any number of passes; of a longer one only
+//! factors are kept. The result does not depend on the number of threads.
 
 #![forbid(unsafe_code)]
 
@@ -139,6 +137,7 @@ mod lag;
 mod left_to_the_logs;
 mod less_noise;
 mod likelihood;
+mod log_factors;
 mod log_noise;
 pub mod payload;
 mod reduced;
@@ -147,6 +146,7 @@ mod settings;
 mod stage_times;
 mod stages;
 mod task;
+mod thresholds;
 mod training;
 
 pub use bandwidth::{CutoffByError, CutoffCandidate, choose_cutoff};
@@ -164,10 +164,16 @@ pub use error::{IdentificationError, ReduceError};
 pub use estimators::EstimationSettings;
 pub use identify::{Identification, identify, identify_payload, identify_with_instruments};
 pub use likelihood::schwarz;
+pub use log_factors::{LogFactors, log_factors};
 pub use log_noise::LogNoise;
 pub use reduced::{ReducedLog, identify_reduced, reduce, reduced_errors};
 pub use settings::{DiagnosisChoice, GainChoice, IdentificationSettings, OffsetChoice};
 pub use stage_times::StageTimes;
 pub use stages::{ConsistentParameters, TrainingExamination, consistent_stage};
 pub use task::IdentificationTask;
-pub use training::{LogFactors, Training, log_factors, training_rows};
+pub use thresholds::{
+    CutoffThresholds, DecisionThresholds, DoubtThresholds, DriveInertiaThresholds, EstimationThresholds,
+    FrictionThresholds, GainThresholds, LagThresholds, LogVariationThresholds, MotionThresholds, NoiseThresholds,
+    ThresholdError,
+};
+pub use training::{Training, training_rows};

@@ -1,30 +1,29 @@
-//! How well a fit explains its rows: likelihood, and likelihood against parameters.
+//! Likelihood and information criterion of a fit.
 
 use dynident_estimation::{Estimate, LinearProblem};
 
-/// −2 ln of the likelihood with every joint's noise as found, `Σ_j n_j ln σ_j²`, up to a constant of the rows.
+/// −2 ln of the likelihood with the estimated noise of every joint, `Σ_j n_j ln σ_j²`, up to a constant of the rows.
 pub(crate) fn deviance(problem: &LinearProblem, joint_sigma: &[f64]) -> f64 {
     let of_joint = |(rows, sigma): (usize, &f64)| deviance_of_joint(rows, *sigma);
     problem.joint_rows().into_iter().zip(joint_sigma).map(of_joint).sum()
 }
 
-/// That of one joint whose n rows leave noise of `sigma`.
 fn deviance_of_joint(rows: usize, sigma: f64) -> f64 {
     rows as f64 * 2.0 * sigma.max(f64::MIN_POSITIVE).ln()
 }
 
-/// How well one joint's rows are explained, and by how many numbers that are its own.
+/// Fit of one joint's rows, and its number of parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct JointScore {
     pub(crate) rows: usize,
-    /// What they leave, in units of the torque.
+    /// Standard deviation of the residual, in units of the torque.
     pub(crate) sigma: f64,
     pub(crate) own: usize,
 }
 
 impl JointScore {
-    /// Schwarz's criterion of a joint whose rows say as much as `1 / design_effect` of them would that were independent
-    /// (Kish, *Survey Sampling*, 1965, 8.2); the less the better, 0 for a joint without rows.
+    /// Bayesian information criterion of a joint whose rows contain the information of `1 / design_effect` as many
+    /// independent rows (Kish, *Survey Sampling*, 1965, 8.2). Smaller is better; 0 for a joint without rows.
     ///
     /// Source of the correction: Rao and Scott, Annals of Statistics 12 (1984) 46.
     pub(crate) fn schwarz(&self, design_effect: f64) -> f64 {
@@ -33,8 +32,8 @@ impl JointScore {
     }
 }
 
-/// Schwarz's criterion of a fit with k free parameters and n rows: the deviance and `k ln n`; the less the better.
-/// Source: Annals of Statistics 6 (1978) 461.
+/// Bayesian information criterion (BIC) of a fit with k free parameters and n rows, `deviance + k ln n`; smaller is
+/// better. Source: Schwarz, Annals of Statistics 6 (1978) 461.
 pub fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
     let rows = problem.joint_rows().into_iter().sum::<usize>().max(1) as f64;
     let free = (fit.values.len() - fit.rank.fixed.len()) as f64;
@@ -45,13 +44,13 @@ pub fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
 mod tests {
     use super::*;
 
-    /// Every row four times says what it says once.
+    /// Four copies of every row contain the information of one.
     #[test]
-    fn rows_that_say_the_same_count_once() {
+    fn repeated_rows_do_not_add_evidence() {
         let score = |rows: usize| JointScore { rows, sigma: 0.3, own: 5 };
         let (once, repeated) = (score(250).schwarz(1.0), score(1000).schwarz(4.0));
         assert!((once - repeated).abs() < 1e-9 * once.abs(), "{once} {repeated}");
-        // Without it four times as much evidence speaks of the same noise.
+        // Without the correction, the evidence is four times as strong.
         assert!(score(1000).schwarz(1.0) < 3.0 * once);
         assert_eq!(JointScore::default().schwarz(1.0), 0.0);
     }

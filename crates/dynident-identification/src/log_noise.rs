@@ -1,32 +1,29 @@
-//! Noise of every joint log by log: a log that shows the model worse than another counts less.
+//! Noise level of every joint in each log, used to weight logs.
 
 use crate::estimators::{EstimationSettings, Estimator};
 use dynident_estimation::{EstimationError, LinearProblem, weighted_values};
 
-/// Passes at most, and the change of a noise level, as a share of it, at which they have settled.
-const PASSES: usize = 20;
-const SETTLED: f64 = 1e-3;
+/// Maximum number of passes.
+const MAX_PASSES: usize = 20;
+/// Relative change of a noise level at which the passes end.
+const MAX_RELATIVE_CHANGE: f64 = 1e-3;
 
-/// The smallest noise of a log as a share of that of the log with the largest: below it is rounding.
-const LEAST: f64 = 1e-6;
+/// Minimum noise of a log relative to the noisiest log; smaller values are rounding errors.
+const MIN_NOISE_RATIO: f64 = 1e-6;
 
 /// Whether training logs share the noise levels of their joints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LogNoise {
-    /// One for each joint.
+    /// One noise level for each joint.
     #[default]
     Shared,
-    /// Each log has its own: `σ_jℓ = √(‖τ_jℓ - W_jℓ θ‖² / rows)` and θ by weighted least squares in turn, until they
-    /// settle. Residuals are then those of the last log. Not for ordinary least squares, which knows no weights, nor
-    /// for a caller's own rule, which sees the rows as they are; for estimators that go back to the logs it shapes the
-    /// consistent set alone.
+    /// Separate noise levels for each log: `σ_jℓ = √(‖τ_jℓ - W_jℓ θ‖² / rows)` and θ by weighted least squares
+    /// alternate until they converge. Residuals are then in units of the last log. Not available for ordinary least
+    /// squares and for a caller's rule. For estimators that read the logs again it only affects the consistent set.
     Own,
 }
 
-/// The problem with the rows of each joint and log in units of the last log's noise of that joint.
-///
-/// # Errors
-/// Rows that do not carry an estimate.
+/// Scales the rows of each joint and log to the last log's noise of that joint.
 pub(crate) fn weighted_by_log(
     settings: &EstimationSettings,
     problem: LinearProblem,
@@ -36,7 +33,7 @@ pub(crate) fn weighted_by_log(
         return Ok(problem);
     }
     let mut weights = vec![vec![1.0_f64; joints]; logs];
-    for _ in 0..PASSES {
+    for _ in 0..MAX_PASSES {
         let weighted = problem.clone().with_log_weights(|log, joint| weights[log][joint])?;
         let theta = weighted_values(&weighted, &settings.weighted())?.values;
         let next = weights_by(&problem, &theta)?;
@@ -45,14 +42,14 @@ pub(crate) fn weighted_by_log(
         };
         let moved = weights.iter().zip(&next).map(change).fold(0.0, f64::max);
         weights = next;
-        if moved <= SETTLED {
+        if moved <= MAX_RELATIVE_CHANGE {
             break;
         }
     }
     problem.with_log_weights(|log, joint| weights[log][joint])
 }
 
-/// For each log and joint the noise of the last log that has rows of the joint over its own.
+/// For each log and joint the ratio of the last log's noise (with rows of the joint) to its own noise.
 fn weights_by(problem: &LinearProblem, theta: &[f64]) -> Result<Vec<Vec<f64>>, EstimationError> {
     let (logs, joints) = (problem.logs().len(), problem.joints().len());
     let mut noise = vec![vec![0.0_f64; joints]; logs];
@@ -64,7 +61,7 @@ fn weights_by(problem: &LinearProblem, theta: &[f64]) -> Result<Vec<Vec<f64>>, E
     let mut weights = vec![vec![1.0; joints]; logs];
     for joint in 0..joints {
         let largest = noise.iter().fold(0.0_f64, |most, of_log| most.max(of_log[joint]));
-        let level = |log: usize| noise[log][joint].max(LEAST * largest);
+        let level = |log: usize| noise[log][joint].max(MIN_NOISE_RATIO * largest);
         let Some(last) = (0..logs).rfind(|&log| noise[log][joint] > 0.0) else { continue };
         for (log, weights) in weights.iter_mut().enumerate() {
             weights[joint] = level(last) / level(log);

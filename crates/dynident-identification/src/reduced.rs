@@ -1,8 +1,8 @@
-//! Logs reduced to their factors: a fit of many logs that need not lie in one place.
+//! Logs reduced to their factors: a fit of many logs that can be stored at different places.
 //!
-//! [`reduce`] turns each log into its triangles, wherever it lies; [`identify_reduced`] makes the model of the
-//! triangles alone, as [`identify`](crate::identify()) would of the logs. For that, nothing may be left that is chosen
-//! by looking at the samples again: cut-off, drives and friction are stated, the estimator is least squares.
+//! [`reduce`] converts each log to its triangular factors; [`identify_reduced`] fits the model to the factors only, as
+//! [`identify`](crate::identify()) would to the logs. The samples are not read again, so cut-off, drives and friction
+//! must be stated, and the estimator is least squares.
 
 use crate::bars::{ErrorBars, ErrorSource};
 use crate::between_logs::variation_of_logs;
@@ -23,27 +23,26 @@ use dynident_estimation::{EstimationError, SegmentedFactor};
 use dynident_rows::{Execution, LogStatistics, Logs, Recording, RegressorModel, Role, of_role};
 use std::time::Instant;
 
-/// A log of which its factors are left.
+/// A log reduced to its factors.
 #[derive(Clone, Debug)]
 pub struct ReducedLog {
-    /// What it is called.
+    /// Name of the log.
     pub name: String,
-    /// One factor of `[W | τ]` for each joint, cut into time segments; columns as
+    /// One factor of `[W | τ]` for each joint, divided into time segments; columns as
     /// [`joint_columns`](dynident_dynamics::PanelLayout::joint_columns) of the model's layout.
     pub factors: Vec<SegmentedFactor>,
-    /// What noise of the positions adds to the rows, likewise; none where the log does not show its noise.
+    /// Contribution of position noise to the rows, in the same layout; `None` if the noise is unknown.
     pub noise: Option<Vec<SegmentedFactor>>,
-    /// How it was read, without the report on its clock and its samples.
+    /// Statistics of the pass, without the import report.
     pub statistics: LogStatistics,
 }
 
-/// Reduces every recording of the task with the role [`Identify`](Role::Identify) to factors of at most `segments`
-/// segments for each joint. Memory does not grow with the length of a log. More segments make better error bars where
-/// logs are few; where there are many logs, each is a segment, and one will do. A lag of the torque is taken off where
-/// the settings state it.
+/// Reduces every recording with the role [`Identify`](Role::Identify) to factors with at most `segments` segments for
+/// each joint. Memory does not grow with the length of a log. More segments improve the error bars of few logs; with
+/// many logs, one segment per log is sufficient. A stated lag is compensated.
 ///
 /// # Errors
-/// [`ReduceError`] where something is left to be chosen; recordings that cannot be read.
+/// [`ReduceError`] if a choice is open; recordings cannot be read.
 pub fn reduce(
     task: &IdentificationTask,
     segments: usize,
@@ -67,7 +66,7 @@ pub fn reduce(
             Ok(ReducedLog {
                 name: recordings[log.index].name.clone(),
                 factors: few(log.factors, segments)?,
-                // Nobody asks when the noise was.
+                // The time of the noise is irrelevant.
                 noise: log.noise.map(|noise| few(noise, 1)).transpose()?,
                 statistics: LogStatistics { report: None, ..log.statistics },
             })
@@ -76,10 +75,10 @@ pub fn reduce(
     })
 }
 
-/// The model that explains reduced logs: the estimate with what varies between logs in its bars, consistent parameters,
-/// signs of torque and friction. As [`identify`](crate::identify()), but for what only samples show: delays, torque
-/// over time, other readings of a doubtful log, tests on held-out motion. The result does not depend on where the logs
-/// were reduced; of their order it depends by rounding.
+/// Fits a model to reduced logs: the estimate with the variation between logs in its error bars, consistent parameters,
+/// signs of torque and friction. Compared with [`identify`](crate::identify()), results that need samples are missing:
+/// delays, torque traces, alternative hypotheses, held-out tests. The result does not depend on where the logs were
+/// reduced; their order only changes rounding.
 ///
 /// # Errors
 /// [`ReduceError`] as [`reduce`]; factors of other columns; as [`identify`](crate::identify()).
@@ -95,6 +94,8 @@ pub fn identify_reduced(
     let model = RegressorModel::from(robot.clone());
     is_reducible(&model, settings)?;
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
+    settings.thresholds.validate()?;
+    settings.estimation.thresholds.validate()?;
     execution.install(|| identified(model, &without_second_look(settings), reduced, execution))
 }
 
@@ -113,7 +114,7 @@ fn identified(
     let passes = TrainingPasses { logs: &logs, settings, training: &training, payloads: &[], known_arm: None };
     let training_rows = passes.of_factors(model, factors)?;
     let Estimation { estimate: noise, .. } = estimate(&training_rows.rows(&logs, settings, &training), None)?;
-    let variation = variation_of_logs(&training_rows, &settings.estimation.weighted(), &noise);
+    let variation = variation_of_logs(&training_rows, &settings.estimation, &noise);
     let (covariance, between_logs) = variation.unzip();
     let bars = ErrorBars::default().with(ErrorSource::BetweenLogs, covariance);
     let estimate = bars.total(&noise);
@@ -149,7 +150,7 @@ fn identified(
     })
 }
 
-/// The settings without what would look at samples again.
+/// Disables everything that reads samples again.
 fn without_second_look(settings: &IdentificationSettings) -> IdentificationSettings {
     let mut own = settings.clone();
     if let Estimator::Auto(_) = own.estimation.estimator {
@@ -161,7 +162,7 @@ fn without_second_look(settings: &IdentificationSettings) -> IdentificationSetti
     own
 }
 
-/// The factors of a reduced log, if they are this model's.
+/// The factors of a reduced log, checked against the columns of the model.
 fn log_factors(model: &RegressorModel, index: usize, log: &ReducedLog) -> Result<LogFactors, EstimationError> {
     let fits = |what: &str, factors: &[SegmentedFactor]| {
         let mismatch = |what: String, expected, found| Err(EstimationError::Mismatch { what, expected, found });
@@ -188,8 +189,8 @@ fn log_factors(model: &RegressorModel, index: usize, log: &ReducedLog) -> Result
     })
 }
 
-/// The part of the torque of reduced logs that base parameters `theta` leave unexplained: `‖τ − Wθ‖ / ‖τ‖` of every
-/// log, percent; none for a log without torque. From factors, so without a look at the samples, and exact.
+/// Unexplained torque of base parameters `theta`: `‖τ − Wθ‖ / ‖τ‖` of every reduced log, percent; `None` for a log
+/// without torque. Exact, and computed from the factors.
 ///
 /// # Errors
 /// Factors of other columns.

@@ -1,11 +1,10 @@
-//! Whether logs can be reduced to factors: nothing may be left that is chosen by looking at the samples of all of them.
+//! Whether logs can be reduced to factors: no choice may need the samples of all logs.
 
 use crate::error::ReduceError;
 use crate::estimators::Estimator;
 use crate::settings::{GainChoice, IdentificationSettings, OffsetChoice};
 use dynident_rows::RegressorModel;
 
-/// Whether all that makes rows is stated.
 pub(crate) fn is_reducible(model: &RegressorModel, settings: &IdentificationSettings) -> Result<(), ReduceError> {
     if let Some(search) = settings.friction.first() {
         return Err(ReduceError::Friction { joint: search.joint.clone() });

@@ -1,15 +1,16 @@
-//! How a model is identified: filters, estimator, what is known of the bodies, whose friction is chosen.
+//! Settings of an identification: filters, estimator, prior knowledge of bodies, selection of friction.
 
 use crate::consistent::{ConsistencyError, ConsistencySettings};
 use crate::estimators::EstimationSettings;
 use crate::friction::{FrictionSearch, JointFriction};
 use crate::log_noise::LogNoise;
+use crate::thresholds::DecisionThresholds;
 use dynident_dynamics::ParametricModel;
 use dynident_recording::MotionSettings;
 use dynident_rows::{ParallelFilterSettings, RowSettings};
 use serde::{Deserialize, Serialize};
 
-/// Whether logs share the constant torques of their joints.
+/// Constant torques of the joints in several training logs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -17,87 +18,86 @@ pub enum OffsetChoice {
     /// One offset for each joint.
     #[default]
     Shared,
-    /// Each training log has its own; base parameters and joints hold their mean. Zeros of torque sensors drift from
-    /// day to day.
+    /// Separate offsets for each training log; base parameters and joints use their mean. Zeros of torque sensors drift
+    /// from day to day.
     PerLog,
 }
 
-/// Who says what a unit of logged torque is worth.
+/// Source of the torque gains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum GainChoice {
-    /// The format: torque columns are newton metres once their units and scales are in force.
+    /// The format: torque columns are in newton metres after units and scales are applied.
     #[default]
     Stated,
-    /// The logs: joint by joint one gain, from logs without and with a payload that is known.
+    /// The logs: one gain per joint, estimated from logs without and with a known payload.
     Unknown,
 }
 
-/// Which lags may be taken off.
+/// Lags that may be compensated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LagCandidates {
-    /// One for all joints, or joints with one of their own where the rows say so.
+    /// One lag for all joints, or separate lags of joints that clearly differ.
     #[default]
     CommonOrJoints,
-    /// One for all joints: of runs under one controller friction leaves a lag of its own at each joint, and not the
-    /// same in every run.
+    /// One lag for all joints. For runs under one controller: friction looks like a different lag at each joint, which
+    /// varies between runs.
     Common,
 }
 
-/// Whether other readings of the logs are tried: see [`diagnosis`](crate::diagnosis).
+/// When alternative hypotheses about the logs are tested: see [`diagnosis`](crate::diagnosis).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DiagnosisChoice {
-    /// Not at all.
+    /// Never.
     Never,
-    /// Where the fit gives reason to: a consistent robot leaves clearly more than parameters of each joint's own, or
-    /// friction drives a joint, or a joint is beyond its limits.
+    /// If the fit is doubtful: the residual of a consistent robot is clearly larger than that of separate parameters
+    /// for each joint, friction drives a joint, or a joint is beyond its limits.
     #[default]
     WhenDoubtful,
-    /// In any case.
+    /// Always.
     Always,
 }
 
-/// Everything that [`identify`](crate::identify()) can be given beside robot and recordings; the default is weighted
-/// least squares with consistent parameters.
+/// Settings of [`identify`](crate::identify()). The default is weighted least squares with consistent parameters.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct IdentificationSettings {
-    /// From positions to velocities and accelerations.
+    /// Differentiation of positions.
     pub motion: MotionSettings,
-    /// The low-pass and decimation that torque and regressor go through alike.
+    /// Low-pass and decimation of torque and regressor.
     pub parallel_filter: ParallelFilterSettings,
-    /// The estimator.
+    /// Estimator and error bars.
     pub estimation: EstimationSettings,
-    /// What is known of the bodies; `None` leaves parameters as they are estimated, consistent or not.
+    /// Prior knowledge of the bodies; `None` skips the physically consistent fit.
     pub consistency: Option<ConsistencySettings>,
-    /// Intervals for every parameter over all consistent sets that the data do not reject; some thousand fits, so not
-    /// by default.
+    /// Whether to compute intervals of every parameter over all consistent sets that the data do not reject. It takes
+    /// some thousand fits; off by default.
     pub intervals: bool,
-    /// Joints whose drives the training logs show to have inertia or not: it is tested for all of them together, and
-    /// they have it where it is seen. None by default; joints that have a drive inertia by their terms are passed over.
+    /// Joints whose drive inertia is tested, all together; it is added to the model if the test is positive. Empty by
+    /// default. Joints with a stated drive inertia are skipped.
     pub drive_inertia: Vec<String>,
-    /// Joints whose friction the training logs choose; none by default.
+    /// Joints whose friction is selected from the training logs; empty by default.
     pub friction: Vec<FrictionSearch>,
-    /// Friction that other recordings chose and the robot's terms hold already: what is unknown of its constants stands
-    /// in the error bars by what these recordings tell of them. None by default, and without effect where friction is
-    /// chosen.
+    /// Friction that other recordings selected and that is already among the robot's terms. The uncertainty of its
+    /// constants, as found by these recordings, enters the error bars. Empty by default; ignored if friction is
+    /// selected.
     pub friction_before: Vec<JointFriction>,
-    /// Whether training logs share their offsets; by default they do.
+    /// Whether training logs share their offsets; they do by default.
     pub offsets: OffsetChoice,
-    /// Whether training logs share the noise of their joints; by default they do.
+    /// Whether training logs share the noise of their joints; they do by default.
     pub log_noise: LogNoise,
-    /// Which lags of the torque may be taken off the rows where none is stated; by default one for all joints, or
-    /// joints with one of their own.
+    /// Lags of the torque that may be compensated if no lag is stated.
     pub lags: LagCandidates,
-    /// Whether torque is in newton metres; by default it is.
+    /// Whether torque is in newton metres; it is by default.
     pub gains: GainChoice,
-    /// Standard deviation of stated gains as a share of each, independent from joint to joint: it goes into the error
-    /// bars of payloads. Zero by default.
+    /// Relative standard deviation of stated gains, independent between joints; it enters the error bars of payloads.
+    /// Zero by default.
     pub gain_std: f64,
-    /// Whether other readings of the training logs are compared with the study's; where the fit gives reason to, by
-    /// default.
+    /// When alternative hypotheses about the training logs are tested; by default if the fit is doubtful.
     pub diagnosis: DiagnosisChoice,
+    /// Thresholds of decisions and of the doubt about a study.
+    pub thresholds: DecisionThresholds,
 }
 
 impl Default for IdentificationSettings {
@@ -117,25 +117,26 @@ impl Default for IdentificationSettings {
             gains: GainChoice::default(),
             gain_std: 0.0,
             diagnosis: DiagnosisChoice::default(),
+            thresholds: DecisionThresholds::default(),
         }
     }
 }
 
 impl IdentificationSettings {
-    /// The settings that make rows.
+    /// Settings that define the rows.
     pub fn row_settings(&self) -> RowSettings<'_> {
         RowSettings { motion: &self.motion, parallel_filter: &self.parallel_filter }
     }
 
-    /// Checks that the bodies and terms of which something is known are there.
+    /// Checks that the named bodies and terms exist.
     ///
     /// # Errors
-    /// A name that the robot does not have.
+    /// A name is unknown.
     pub fn check_names(&self, robot: &ParametricModel) -> Result<(), ConsistencyError> {
         let Some(knowledge) = &self.consistency else { return Ok(()) };
         let mut named = knowledge.clone();
         if !self.friction.is_empty() {
-            // Terms that the logs are to choose are not there yet.
+            // Terms that will be selected do not exist yet.
             named.terms.clear();
         }
         named.check_names(robot.model(), robot.terms())

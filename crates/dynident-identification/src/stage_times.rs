@@ -1,6 +1,4 @@
-//! Time of the stages of an identification.
-
-/// Where the time went, seconds.
+/// Time of the stages of an identification, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageTimes {
     /// From logs to factors.

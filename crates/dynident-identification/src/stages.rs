@@ -1,4 +1,4 @@
-//! The stages after the estimate: consistent parameters, examination, tests on held-out recordings, diagnosis.
+//! Stages after the estimate: consistent parameters, examination, held-out tests, diagnosis.
 
 use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
@@ -18,44 +18,42 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::consistent::PhysicalFit;
 use dynident_estimation::{Estimate, LinearProblem, left_out_ratios};
 use dynident_rows::{Execution, Logs, Role};
-use rayon::prelude::*;
 use std::time::Instant;
 
-/// Physically consistent parameters of an estimate, or why they do not exist.
+/// Physically consistent parameters of an estimate.
 #[derive(Clone, Debug)]
 pub struct ConsistentParameters {
-    /// The consistent set that explains the data best; none if it was not asked for or does not exist.
+    /// The consistent set with the best fit; `None` if not requested or not found.
     pub fit: Option<PhysicalFit>,
-    /// Why no consistent set was found; none where one was found or not requested.
+    /// Reason for a missing consistent set.
     pub failure: Option<String>,
-    /// All parameters, ten for each body and one for each term: the consistent set's, or else the set nearest to the
-    /// nominal one that has the estimated base parameters.
+    /// All parameters, ten for each body and one for each term. They belong to the consistent set, or otherwise to the
+    /// set nearest to the nominal one that has the estimated base parameters.
     pub parameters: Vec<f64>,
-    /// Standard deviation of each of `parameters` ([`parameter_std`]); none where there is no consistent set, and for
-    /// bodies that are not described.
+    /// Standard deviation of each of `parameters` ([`parameter_std`]); `None` without a consistent set, and for bodies
+    /// without nominal inertia.
     pub parameter_std: Vec<Option<f64>>,
-    /// Intervals of all parameters over all consistent sets that the data do not reject, if asked for.
+    /// Intervals of all parameters over all consistent sets that the data do not reject, if requested.
     pub intervals: Option<Vec<ParameterInterval>>,
-    /// Bodies whose nominal inertia is not physically consistent, with the least eigenvalue of their pseudo-inertia.
+    /// Bodies whose nominal inertia is not physically consistent, with the smallest eigenvalue of their pseudo-inertia.
     pub inconsistent_nominal: Vec<(String, f64)>,
 }
 
 /// Tests of the estimate on the training recordings.
 #[derive(Clone, Debug)]
 pub struct TrainingExamination {
-    /// For each training recording the delays of its torque, joint by joint; none where it does not determine one.
+    /// Delays of the torque of each training recording, by joint; `None` if not determined.
     pub delays: Vec<Vec<Option<TorqueLag>>>,
     /// Measured and predicted torque over time.
     pub traces: Vec<LogTrace>,
-    /// The delays of all recordings together, joint by joint.
+    /// Delays of all recordings together, by joint.
     pub pooled_delays: Vec<Option<TorqueLag>>,
-    /// How well consistent sets explain the torque with either sign; none where a fit fails, and for payloads.
+    /// Fit of consistent sets to the torque with either sign; `None` if a fit fails, and for payloads.
     pub sign: Option<TorqueSignCheck>,
-    /// The mean friction of every joint that has friction terms; empty for payloads on a known arm.
+    /// Mean friction of every joint with friction terms; empty for payloads on a known arm.
     pub friction_signs: Vec<FrictionSign>,
 }
 
-/// An estimate and what it was made from.
 pub(crate) struct Stage<'a> {
     pub(crate) task: &'a IdentificationTask,
     pub(crate) execution: Execution<'a>,
@@ -63,25 +61,24 @@ pub(crate) struct Stage<'a> {
     pub(crate) settings: &'a IdentificationSettings,
     pub(crate) training: &'a Training,
     pub(crate) estimate: &'a Estimate,
-    /// Rows and fit with friction as stated, where it was chosen.
+    /// Rows and fit with friction as stated, if friction was selected.
     pub(crate) stated_friction: Option<&'a (Training, Estimate)>,
-    /// Whether the arm's parameters are those of an earlier result.
+    /// Whether the arm's parameters come from an earlier result.
     pub(crate) arm_is_known: bool,
-    /// When the estimate was finished.
+    /// Time at which the estimate was finished.
     pub(crate) started: Instant,
 }
 
-/// The consistent parameters of an estimate, and its tests.
 pub(crate) struct Examined {
     pub(crate) consistent: ConsistentParameters,
-    /// Seconds from the estimate to the consistent parameters.
+    /// Time from the estimate to the consistent parameters, s.
     pub(crate) estimation_s: f64,
     pub(crate) held_out: Vec<HeldOutExamination>,
     pub(crate) examination: TrainingExamination,
 }
 
 impl Stage<'_> {
-    /// Consistent parameters and all tests, side by side where the execution is parallel.
+    /// Computes consistent parameters and all tests, in parallel if the execution allows it.
     pub(crate) fn examined(&self) -> Result<Examined, IdentificationError> {
         let Self { task, logs, settings, training, estimate, .. } = *self;
         let bodies = || -> Result<_, IdentificationError> {
@@ -95,7 +92,7 @@ impl Stage<'_> {
             let held_out = examine_all_held_out(logs, settings, training, estimate, physical);
             Ok((consistent, estimation_s, held_out))
         };
-        // The stated terms determine the sign: chosen friction has no wrong one, for such terms are left out.
+        // Stated terms determine the sign, because selection drops friction terms with a wrong sign.
         let signs = || match self.stated_friction {
             _ if self.arm_is_known => Ok((None, Vec::new())),
             Some((stated, plain)) => torque_signs(stated, plain),
@@ -113,7 +110,7 @@ impl Stage<'_> {
         Ok(Examined { consistent, estimation_s, held_out: held_out?, examination })
     }
 
-    /// Tests for mistakes in the study, if the settings require them or an examination gives reason to doubt it.
+    /// Tests for mistakes in the study, if the settings require it or an examination gives reason for doubt.
     pub(crate) fn diagnosis(
         &self,
         examined: &Examined,
@@ -134,42 +131,40 @@ impl Stage<'_> {
         }
     }
 
-    /// Whether an examination gives reason to doubt the study.
     fn is_doubted(&self, examined: &Examined, robot: &ParametricModel) -> bool {
         let Examined { consistent, held_out, examination, .. } = examined;
         let training = self.training;
         let theta = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
         let agreements = || training.logs.iter().filter_map(|log| log.nominal_agreement.as_ref());
-        is_doubtful(training, theta)
+        let doubt = &self.settings.thresholds.doubt;
+        is_doubtful(training, theta, doubt)
             || examination.friction_signs.iter().any(FrictionSign::is_reversed)
             || agreements().any(PriorAgreement::is_reversed)
             || agreements().any(PriorAgreement::is_poor)
             || examination.sign.as_ref().is_some_and(TorqueSignCheck::is_reversed)
             || break_limits(training, robot.model())
-            || held_out.iter().any(|log| is_far_worse(&log.validation, &self.estimate.joint_sigma))
+            || held_out
+                .iter()
+                .any(|log| is_far_worse(&log.validation, &self.estimate.joint_sigma, doubt.max_held_out_ratio))
     }
 }
 
-/// Times the noise of the fit that a held-out log may be worse before it gives reason to doubt: friction that changes
-/// with the motion costs less.
-const FAR_WORSE: f64 = 1.7;
-
-/// Whether the residual of a held-out log is far larger than that of the training logs, relative to each joint's noise.
-fn is_far_worse(log: &LogValidation, sigma: &[f64]) -> bool {
+/// Whether the held-out residual exceeds each joint's noise by more than `max_ratio`, root mean square over the joints.
+fn is_far_worse(log: &LogValidation, sigma: &[f64], max_ratio: f64) -> bool {
     let in_fit_band = log.in_fit_band.as_ref().unwrap_or(&log.model);
     let joints = in_fit_band.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
     let squares: Vec<f64> = joints.map(|(joint, sigma)| (joint.rmse_nm / sigma).powi(2)).collect();
-    squares.iter().sum::<f64>() > FAR_WORSE * FAR_WORSE * squares.len() as f64
+    squares.iter().sum::<f64>() > max_ratio * max_ratio * squares.len() as f64
 }
 
-/// The bodies of a known arm, which are those of the earlier result. Their parameters here are the set nearest to the
-/// nominal one that has the estimated base parameters.
+/// Bodies of a known arm. They belong to the earlier result, so this is the set nearest to the nominal one that has the
+/// estimated base parameters.
 fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate) -> ConsistentParameters {
     let robot = &training.model.parametric;
     let settings = task.settings.consistency.as_ref();
     ConsistentParameters {
         fit: None,
-        failure: Some("the arm is known from an earlier result, which has its bodies and its URDF".to_owned()),
+        failure: Some("the arm is known from an earlier result, which contains its bodies and its URDF".to_owned()),
         parameters: nearest_to_nominal(robot, &estimate.values[..training.columns.base()]),
         parameter_std: vec![None; robot.nominal().len()],
         intervals: None,
@@ -177,11 +172,11 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
     }
 }
 
-/// Consistent parameters for an estimate over the columns of `training`: the best set, and its intervals if asked for.
+/// Finds consistent parameters for an estimate over the columns of `training`: the best set, and its intervals if
+/// requested. A missing consistent set is part of the result.
 ///
 /// # Errors
-/// Factors that do not belong to the estimate, intervals that cannot be had. That there is no consistent set is part of
-/// the result.
+/// The factors do not belong to the estimate, or the intervals cannot be computed.
 pub fn consistent_stage(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -199,7 +194,7 @@ pub fn consistent_stage(
         Err(reason) => (None, Some(reason.to_string())),
     };
     let intervals = match &settings.consistency {
-        // Where there is no consistent set, `failure` says why.
+        // A missing consistent set is explained by `failure`.
         Some(knowledge) if settings.intervals && fit.is_some() => {
             let progress = logs.execution.progress;
             let found = consistent_intervals(robot, problem, &arm, plain, knowledge, progress);
@@ -225,8 +220,8 @@ pub fn consistent_stage(
     })
 }
 
-/// The problem and the estimate without the columns of payloads and offsets of single logs; `None` where the problem
-/// has none.
+/// The problem and the estimate without the columns of payloads and offsets of single logs; `None` if the problem has
+/// no such columns.
 fn arm_alone(
     training: &Training,
     estimate: &Estimate,
@@ -236,7 +231,7 @@ fn arm_alone(
     Ok((alone, columns.arm_estimate(estimate)))
 }
 
-/// How well consistent sets explain the torque with either sign, none where a fit fails; and the sign of each joint's
+/// Fit of consistent sets to the torque with either sign (`None` if a fit fails), and the sign of each joint's
 /// friction.
 fn torque_signs(
     training: &Training,
@@ -248,7 +243,7 @@ fn torque_signs(
     Ok((sign_evidence(&training.model.parametric, problem, &arm), frictions))
 }
 
-/// [`examine_training`] of every training recording, side by side.
+/// Calls [`examine_training`] for every training recording, in parallel if possible.
 fn examine_all_training(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -259,22 +254,18 @@ fn examine_all_training(
         let theta = training.columns.base_values(log.index, &estimate.values);
         examine_training(logs, &settings.estimation, &training.model, log.index, &theta)
     };
-    let found: Vec<_> = if logs.execution.parallel() {
-        training.logs.par_iter().map(one).collect::<Result<_, _>>()?
-    } else {
-        training.logs.iter().map(one).collect::<Result<_, _>>()?
-    };
+    let found: Vec<_> = logs.execution.try_map(&training.logs, one)?;
     let (delays, traces): (Vec<Vec<Option<TorqueLag>>>, Vec<LogTrace>) = found.into_iter().unzip();
     let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|log| log[joint]).collect() };
     let pooled_delays = (0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect();
     Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new() })
 }
 
-/// Number of time blocks of the training logs; each is predicted by the fit to the others. Few blocks, so that they
-/// differ in temperature and motion as a new log does.
-const LEFT_OUT_BLOCKS: usize = 4;
+/// Number of time blocks of the training logs; each is predicted by the fit to the others. With few blocks, they differ
+/// in temperature and motion as a new log does.
+const VALIDATION_BLOCKS: usize = 4;
 
-/// [`examine_held_out`] of every recording to test on, side by side.
+/// Calls [`examine_held_out`] for every test recording, in parallel if possible.
 fn examine_all_held_out(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -285,7 +276,7 @@ fn examine_all_held_out(
     let columns = &training.columns;
     let held_out = logs.of_role(Role::Validate);
     let ratios =
-        if held_out.is_empty() { Vec::new() } else { left_out_ratios(&training.problem, estimate, LEFT_OUT_BLOCKS)? };
+        if held_out.is_empty() { Vec::new() } else { left_out_ratios(&training.problem, estimate, VALIDATION_BLOCKS)? };
     let one = |&index: &usize| -> Result<_, IdentificationError> {
         let theta = columns.base_values(index, &estimate.values);
         let uncertainty = Uncertainty::of(estimate, columns.base_covariance(index, &estimate.covariance), &ratios);
@@ -304,11 +295,7 @@ fn examine_all_held_out(
     }
     let names: Vec<&str> = held_out.iter().map(|&index| &logs.recordings[index].name[..]).collect();
     logs.begin(&format!("testing on {}", names.join(", ")), &held_out);
-    let tested = if logs.execution.parallel() {
-        held_out.par_iter().map(one).collect()
-    } else {
-        held_out.iter().map(one).collect()
-    };
+    let tested = logs.execution.try_map(&held_out, one);
     logs.end();
     tested
 }

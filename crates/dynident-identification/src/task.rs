@@ -1,26 +1,26 @@
-//! What is to be identified, from which recordings, and how.
+//! Identification task: robot, recordings, settings.
 
 use crate::payload::Payload;
 use crate::settings::IdentificationSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_rows::Recording;
 
-/// A robot, its recordings, and how to go about it.
+/// A robot, its recordings, and the settings.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct IdentificationTask {
-    /// The robot with the torque terms that are looked for.
+    /// The robot with the torque terms to estimate.
     pub robot: ParametricModel,
-    /// Recordings to fit to and to test on.
+    /// Recordings for the fit and for the tests.
     pub recordings: Vec<Recording>,
-    /// What recordings were made with.
+    /// Payloads of the recordings.
     pub payloads: Vec<Payload>,
-    /// Filters, estimator, what is known of the bodies.
+    /// Filters, estimator, prior knowledge of the bodies.
     pub settings: IdentificationSettings,
 }
 
 impl IdentificationTask {
-    /// The task with default settings and no payload.
+    /// A task with default settings and without payload.
     pub fn new(robot: ParametricModel, recordings: Vec<Recording>) -> Self {
         Self { robot, recordings, payloads: Vec::new(), settings: IdentificationSettings::default() }
     }

@@ -1,10 +1,11 @@
-//! From training recordings to triangular factors, and the model whose terms they were made with.
+//! Triangular factors of the training recordings, and the model whose terms they contain.
 
 use crate::consistent::nominal_covariance;
 use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator, TrainingRows};
 use crate::examination::PriorAgreement;
 use crate::friction::JointFriction;
+use crate::log_factors::log_factors;
 use crate::log_noise::{LogNoise, weighted_by_log};
 use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains, known_loads};
 use crate::settings::{GainChoice, IdentificationSettings};
@@ -15,62 +16,47 @@ use dynident_estimation::{
 };
 use dynident_recording::{MotionBlock, MotionSettings};
 use dynident_rows::{
-    Execution, JointRows, LogError, LogPass, LogStatistics, Logs, MotionRecord, ParallelFilterSettings, Recording,
-    RegressorModel, RowBlock, RowConsumer, RowSettings, noise_factors,
+    Execution, LogError, LogStatistics, Logs, MotionRecord, ParallelFilterSettings, Recording, RegressorModel,
+    RowSettings, noise_factors,
 };
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Passes that the load behind load-dependent friction takes at most, and the change from one to the next, in units of
-/// the torque, at which it has settled.
-const LOAD_PASSES: usize = 6;
-const LOAD_SETTLED: f64 = 1e-3;
+pub(crate) use crate::log_factors::LogFactors;
 
-/// How closely given values are held, as a share of the largest of them.
-const HELD: f64 = 1e-6;
+/// Maximum number of passes for the load of load-dependent friction.
+const MAX_LOAD_PASSES: usize = 6;
+/// Change of the rows between passes, relative to the torque, at which the load has converged.
+const MAX_RELATIVE_LOAD_CHANGE: f64 = 1e-3;
 
-/// What is left of one recording for fitting.
-#[derive(Clone, Debug)]
-pub struct LogFactors {
-    /// Number of the recording.
-    pub index: usize,
-    /// One factor of `[W | τ]` for each joint, cut into time segments.
-    pub factors: Vec<SegmentedFactor>,
-    /// How the recording was read.
-    pub statistics: LogStatistics,
-    /// What noise of the positions adds to the rows, one factor for each joint: known once the model is chosen, and
-    /// where the recording shows its noise.
-    pub noise: Option<Vec<SegmentedFactor>>,
-    /// How well the nominal values explain it, where they are known and torque is in newton metres: what
-    /// [`training_rows`] says of the model that it is given.
-    pub nominal_agreement: Option<PriorAgreement>,
-}
+/// Precision of held values, relative to the largest of them.
+const HELD_TOLERANCE: f64 = 1e-6;
 
-/// The training recordings as factors, and the model that they were made with.
+/// Factors of the training recordings, and the model of their columns.
 #[derive(Clone, Debug)]
 pub struct Training {
-    /// The model, with the friction that was chosen.
+    /// The model with the selected friction.
     pub model: RegressorModel,
-    /// The recordings, in the order of the problem's logs.
+    /// Recordings, in the order of the problem's logs.
     pub logs: Vec<LogFactors>,
-    /// The joints that the problem's joints are: all of them, unless windows leave some without a row.
+    /// Joints of the problem: all of them, unless windows leave a joint without rows.
     pub joints: Vec<usize>,
-    /// All of them over one set of columns.
+    /// All rows over one set of columns.
     pub problem: LinearProblem,
-    /// Columns beside the base parameters: payloads and offsets of single logs.
+    /// Columns in addition to the base parameters: payloads and offsets of single logs.
     pub columns: LoadColumns,
-    /// How friction was chosen, joint by joint; empty where it was stated.
+    /// Selection of friction by joint; empty if friction was stated.
     pub friction_choice: Vec<JointFriction>,
-    /// Where gains were asked for: what was found, and the estimate with them.
+    /// Estimate with unknown gains and the gains, if requested.
     pub gains: Option<(Estimate, Vec<DriveGain>)>,
-    /// Seconds spent on reading logs, and on estimates that choose.
+    /// Time for reading logs and for intermediate estimates, s.
     pub timings_s: [f64; 2],
 }
 
 impl Training {
-    /// What estimators are given: the recordings `training`, as factors and to come back to.
+    /// Input of the estimators: the recordings `training` as factors and as logs.
     pub fn rows<'a>(
         &'a self,
         logs: &'a Logs<'a>,
@@ -82,12 +68,12 @@ impl Training {
     }
 }
 
-/// Makes the factors of the recordings `training`; where friction depends on the load, again with what the fit before
-/// says of it. `known_arm` where the arm is held, with what of it is fitted again. Friction is the model's own:
-/// [`choose_friction`](crate::choose_friction) comes before.
+/// Computes the factors of the recordings `training`. Load-dependent friction needs several passes with the load of the
+/// previous fit. `known_arm` holds the arm and states which of its parameters are fitted again. Friction is that of the
+/// model; [`choose_friction`](crate::choose_friction) selects it before.
 ///
 /// # Errors
-/// Recordings that cannot be read, payloads and gains that do not go together, rows that do not carry an estimate.
+/// Recordings cannot be read, payloads and gains contradict each other, or rows do not determine an estimate.
 pub fn training_rows(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -101,7 +87,7 @@ pub fn training_rows(
     if settings.log_noise == LogNoise::Own && fitted.gains.is_none() {
         fitted.problem = weighted_by_log(&settings.estimation, fitted.problem)?;
     }
-    // Torque in a unit that nobody knows says nothing about the description.
+    // The nominal model cannot be compared with torque in an unknown unit.
     if let Some(nominal) = fitted.model.parametric.nominal_base().filter(|_| settings.gains == GainChoice::Stated) {
         for log in &mut fitted.logs {
             log.nominal_agreement = Some(PriorAgreement::of_factors(&fitted.model, &log.factors, nominal));
@@ -110,11 +96,8 @@ pub fn training_rows(
     Ok(fitted)
 }
 
-/// The values of weighted least squares (ordinary where the study asks for it) with the stated terms on pieces of a
-/// motion.
-///
-/// # Errors
-/// Rows that do not carry an estimate.
+/// Weighted least squares (ordinary if the study requires it) with the stated terms on pieces of a motion; returns the
+/// values only.
 pub(crate) fn plain_fit(
     model: RegressorModel,
     pieces: Vec<MotionBlock>,
@@ -131,7 +114,6 @@ pub(crate) fn plain_fit(
     Ok(plain_values(&settings.estimation, &rows.problem)?.values)
 }
 
-/// A piece of a motion as a recording.
 fn of_piece(motion: MotionBlock) -> Recording {
     let label = "a piece of a motion".to_owned();
     let record =
@@ -139,7 +121,6 @@ fn of_piece(motion: MotionBlock) -> Recording {
     Recording::of_motion(label, record)
 }
 
-/// Passes over the training recordings.
 pub(crate) struct TrainingPasses<'a> {
     pub(crate) logs: &'a Logs<'a>,
     pub(crate) settings: &'a IdentificationSettings,
@@ -159,22 +140,22 @@ impl<'a> TrainingPasses<'a> {
         Self { logs, settings, training, payloads, known_arm: None }
     }
 
-    /// The rows of this model; where friction depends on a load that is not known yet, again and again with the load
-    /// of the fit before, until it settles.
+    /// Rows of this model. If friction depends on an unknown load, passes repeat with the load of the previous fit
+    /// until it converges.
     pub(crate) fn fit(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
         let load_is_known = model.load_parameters.is_some();
         let mut found = self.rows_once(model)?;
         if load_is_known || !found.model.needs_load() {
             return Ok(found);
         }
-        for _ in 0..LOAD_PASSES {
+        for _ in 0..MAX_LOAD_PASSES {
             let started = Instant::now();
             let plain = plain_values(&self.settings.estimation, &found.problem)?;
             let estimated_s = started.elapsed().as_secs_f64();
             let with_load = found.model.clone().with_load_of_estimate(&found.model, &plain.values);
-            let has_settled = load_has_settled(&found, &with_load);
+            let has_converged = has_load_converged(&found, &with_load);
             let [read_s, chosen_s] = found.timings_s;
-            if has_settled {
+            if has_converged {
                 found.timings_s[1] += estimated_s;
                 break;
             }
@@ -185,7 +166,7 @@ impl<'a> TrainingPasses<'a> {
         Ok(found)
     }
 
-    /// The rows with their torque in newton metres, where gains are to be found.
+    /// Converts the torque to newton metres if gains are unknown.
     pub(crate) fn with_gains(&self, mut rows: Training) -> Result<Training, IdentificationError> {
         if self.settings.gains == GainChoice::Unknown {
             let known = known_loads(&rows.columns, self.training)?;
@@ -197,7 +178,7 @@ impl<'a> TrainingPasses<'a> {
         Ok(rows)
     }
 
-    /// The rows with this model's columns.
+    /// Rows with the columns of this model.
     pub(crate) fn rows_once(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
         let columns = self.columns(&model)?;
         let started = Instant::now();
@@ -208,14 +189,14 @@ impl<'a> TrainingPasses<'a> {
         Ok(rows)
     }
 
-    /// The recordings as factors, with what noise adds to them.
+    /// Factors of the recordings, with the contribution of noise.
     pub(crate) fn factors(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, LogError> {
         let mut logs = self.read(model)?;
         self.add_noise(model, &mut logs)?;
         Ok(logs)
     }
 
-    /// The rows that factors made elsewhere hold.
+    /// Rows of factors that were computed elsewhere.
     pub(crate) fn of_factors(
         &self,
         model: RegressorModel,
@@ -229,7 +210,6 @@ impl<'a> TrainingPasses<'a> {
         Ok(rows)
     }
 
-    /// Factors of all logs over one set of columns.
     fn assembled(
         &self,
         model: RegressorModel,
@@ -247,21 +227,17 @@ impl<'a> TrainingPasses<'a> {
         Ok(LoadColumns::new(self.settings, self.logs.recordings, self.payloads, model, self.known_arm)?)
     }
 
-    /// Recordings side by side, or one with its reader on a second thread; results stand in their order either way.
+    /// Reads recordings in parallel, or a single one with a reader thread; results keep their order.
     pub(crate) fn read(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, LogError> {
         self.logs.begin("logs to factors", self.training);
         let alone = self.training.len() == 1;
         let one = |index: &usize| log_factors(self.logs, self.settings, model, *index, alone);
-        let factors = if !alone && self.logs.execution.parallel() {
-            self.training.par_iter().map(one).collect()
-        } else {
-            self.training.iter().map(one).collect()
-        };
+        let factors = self.logs.execution.try_map(self.training, one);
         self.logs.end();
         factors
     }
 
-    /// What noise adds to the rows, once it is clear which columns they have.
+    /// Adds the contribution of noise for these columns.
     fn add_noise(&self, model: &RegressorModel, logs: &mut [LogFactors]) -> Result<(), LogError> {
         let one = |log: &mut LogFactors| {
             let LogStatistics { report, filtered_rows, .. } = &log.statistics;
@@ -282,7 +258,7 @@ impl<'a> TrainingPasses<'a> {
         logs: &[LogFactors],
     ) -> Result<LinearProblem, EstimationError> {
         let problem = self.stated_problem(model, columns, logs)?;
-        // Of an arm that is known nothing is estimated that the payload could be taken for.
+        // With a known arm, no fallback parameter may absorb the payload.
         if self.known_arm.is_some() || logs.iter().all(|log| log.noise.is_none()) {
             return Ok(problem);
         }
@@ -291,7 +267,7 @@ impl<'a> TrainingPasses<'a> {
         problem.with_unexcited(unexcited)
     }
 
-    /// All rows, with what is known of the parameters beforehand.
+    /// All rows, with prior knowledge of the parameters.
     pub(crate) fn stated_problem(
         &self,
         model: &RegressorModel,
@@ -307,7 +283,6 @@ impl<'a> TrainingPasses<'a> {
         hold(problem, &self.settings.estimation.held)
     }
 
-    /// The factors of all logs over one set of columns.
     fn rows_of<'l>(
         &self,
         model: &RegressorModel,
@@ -321,7 +296,7 @@ impl<'a> TrainingPasses<'a> {
         let mut problem = LinearProblem::new(columns.symbols(model), names);
         let keep_known = self.settings.gains == GainChoice::Unknown && model.torque_gains.is_empty();
         for log in logs {
-            // Two recordings may share a name; their numbers keep them apart.
+            // Two recordings can share a name, so the index is part of the name.
             let name = format!("{} ({})", self.logs.recordings[log.index].name, log.index + 1);
             let Some(factors) = factors(log) else { continue };
             for (place, &joint) in joints.iter().enumerate() {
@@ -334,7 +309,7 @@ impl<'a> TrainingPasses<'a> {
         Ok(problem)
     }
 
-    /// The columns that are nothing but noise and other columns, by the noise that a first fit leaves in each joint.
+    /// Columns that contain only noise and other columns, judged with the noise of a first fit in each joint.
     fn unexcited(
         &self,
         model: &RegressorModel,
@@ -343,7 +318,7 @@ impl<'a> TrainingPasses<'a> {
     ) -> Result<Unexcited, EstimationError> {
         let weights = match weighted_values(problem, &self.settings.estimation.weighted()) {
             Ok(first) => first.joint_sigma.iter().map(|sigma| sigma.recip()).collect(),
-            // What is wrong is said where the estimate itself is made.
+            // The estimate itself reports the error.
             Err(_) => vec![1.0; problem.joints().len()],
         };
         let robot = &model.parametric;
@@ -358,8 +333,8 @@ impl<'a> TrainingPasses<'a> {
     }
 }
 
-/// Whether the load that `next` has hardly differs, on the rows, from the one that they were made with.
-fn load_has_settled(found: &Training, next: &RegressorModel) -> bool {
+/// Whether the load in `next` hardly changes the rows compared with the current load.
+fn has_load_converged(found: &Training, next: &RegressorModel) -> bool {
     let (Some(before), Some(after)) = (&found.model.load_parameters, &next.load_parameters) else { return false };
     let (mut change, mut torque) = (0.0, 0.0);
     for log in &found.logs {
@@ -375,15 +350,15 @@ fn load_has_settled(found: &Training, next: &RegressorModel) -> bool {
             torque += total.torque_norm().powi(2);
         }
     }
-    change <= LOAD_SETTLED * LOAD_SETTLED * torque
+    change <= MAX_RELATIVE_LOAD_CHANGE * MAX_RELATIVE_LOAD_CHANGE * torque
 }
 
-/// Joints of which some recording has rows: where windows leave a joint none, it is not in the problem.
+/// Joints with rows in some recording; windows can leave a joint without rows.
 fn joints_with_rows(logs: &[LogFactors], dof: usize) -> Vec<usize> {
     (0..dof).filter(|&joint| logs.iter().any(|log| log.factors[joint].rows() > 0)).collect()
 }
 
-/// The problem with columns held at given values, by a prior that is far narrower than any data.
+/// Holds columns at given values by a prior that is far narrower than any data.
 fn hold(problem: LinearProblem, held: &[(usize, f64)]) -> Result<LinearProblem, EstimationError> {
     if held.is_empty() {
         return Ok(problem);
@@ -395,12 +370,12 @@ fn hold(problem: LinearProblem, held: &[(usize, f64)]) -> Result<LinearProblem, 
     let mut information = DMatrix::zeros(held.len(), count);
     for (row, &(column, value)) in held.iter().enumerate() {
         mean[column] = value;
-        information[(row, column)] = 1.0 / (HELD * largest);
+        information[(row, column)] = 1.0 / (HELD_TOLERANCE * largest);
     }
     problem.with_prior(mean, information)
 }
 
-/// The values that friction is chosen and loads are taken by, and the noise of the joints there.
+/// Values and joint noise used to select friction and to compute loads.
 pub(crate) fn plain_values(
     settings: &EstimationSettings,
     problem: &LinearProblem,
@@ -422,97 +397,4 @@ pub(crate) fn plain_estimate(
         Estimator::Ordinary => ordinary_least_squares(problem, &settings.ordinary()),
         _ => weighted_least_squares(problem, &settings.weighted()),
     }
-}
-
-impl LogFactors {
-    /// The same rows, each joint's as one segment: all that values and bars by white noise need.
-    pub(crate) fn as_one_segment(&self) -> Self {
-        let factors = self.factors.par_iter().map(SegmentedFactor::as_one_segment).collect();
-        let (statistics, nominal_agreement) = (self.statistics.clone(), self.nominal_agreement.clone());
-        Self { index: self.index, factors, statistics, noise: self.noise.clone(), nominal_agreement }
-    }
-
-    /// The same rows as another model sees them, whose columns are among those of `wide`.
-    pub(crate) fn of(mut self, wide: &RegressorModel, model: &RegressorModel) -> Result<Self, EstimationError> {
-        self.factors.par_iter_mut().enumerate().try_for_each(|(joint, factor)| {
-            let seen = wide.layout().joint_columns(joint);
-            // A column that is not there gets a number out of range, which the selection refuses.
-            let place = |&column: &usize| {
-                let wanted = &model.layout().columns()[column];
-                seen.iter().position(|&global| wide.layout().columns()[global] == *wanted).unwrap_or(usize::MAX)
-            };
-            let places: Vec<usize> = model.layout().joint_columns(joint).iter().map(place).collect();
-            *factor = factor.selected(&places)?;
-            Ok(())
-        })?;
-        Ok(self)
-    }
-}
-
-/// Makes a factor for each joint.
-struct FactorConsumer(Vec<JointFactor>);
-
-/// The factor of one joint in the making.
-struct JointFactor {
-    log: String,
-    factor: SegmentedFactor,
-    block: RowBlock,
-    counted: Vec<f64>,
-}
-
-impl RowConsumer for FactorConsumer {
-    fn reads_samples(&self) -> bool {
-        false
-    }
-
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        self.0[rows.joint].filtered(rows)
-    }
-
-    fn joints(&mut self) -> Option<Vec<&mut (dyn RowConsumer + Send)>> {
-        Some(self.0.iter_mut().map(|joint| joint as &mut (dyn RowConsumer + Send)).collect())
-    }
-}
-
-impl RowConsumer for JointFactor {
-    fn reads_samples(&self) -> bool {
-        false
-    }
-
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        let rows = rows.counted(&mut self.counted);
-        self.block
-            .push(rows.panel, rows.rows, |panel, rows| self.factor.absorb(panel, rows))
-            .map_err(|source| LogError::Rows { log: self.log.clone(), source })
-    }
-}
-
-/// The factors of recording number `index`; `alone` lets a second thread read.
-///
-/// # Errors
-/// What reading it can give.
-pub fn log_factors(
-    logs: &Logs<'_>,
-    settings: &IdentificationSettings,
-    model: &RegressorModel,
-    index: usize,
-    alone: bool,
-) -> Result<LogFactors, LogError> {
-    let log = logs.recordings[index].label();
-    let in_rows = |source| LogError::Rows { log: log.clone(), source };
-    let joint = |joint: usize| {
-        let columns = model.layout().joint_columns(joint);
-        let factor = SegmentedFactor::new(columns.len(), settings.estimation.segments).map_err(in_rows)?;
-        let block = RowBlock::new(columns.len() + 1);
-        Ok(JointFactor { log: log.clone(), factor, block, counted: Vec::new() })
-    };
-    let mut consumer = FactorConsumer((0..model.dof()).map(joint).collect::<Result<_, LogError>>()?);
-    let pass = LogPass { reader_thread: alone && logs.execution.parallel(), ..logs.pass(model, index) };
-    let statistics = pass.run(&mut consumer)?;
-    let mut factors = Vec::with_capacity(model.dof());
-    for JointFactor { mut factor, block, .. } in consumer.0 {
-        block.finish(|panel, rows| factor.absorb(panel, rows)).map_err(in_rows)?;
-        factors.push(factor);
-    }
-    Ok(LogFactors { index, factors, statistics, noise: None, nominal_agreement: None })
 }

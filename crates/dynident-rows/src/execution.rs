@@ -1,19 +1,20 @@
-//! How a job runs; not what it computes.
+//! Execution of a job: threads and progress.
 
 use crate::progress::Progress;
 use crate::progress::Silent;
+use rayon::prelude::*;
 
-/// How a job runs; the result is the same for any choice.
+/// Threads and progress of a job; the result does not depend on them.
 #[derive(Clone, Copy)]
 pub struct Execution<'a> {
-    /// Threads that compute, 1 or more.
+    /// Number of worker threads, 1 or more.
     pub threads: usize,
-    /// Hears how far the job has come.
+    /// Receives the progress of the job.
     pub progress: &'a dyn Progress,
 }
 
 impl Default for Execution<'_> {
-    /// As many threads as the caller's rayon pool has, in silence.
+    /// The number of threads of the caller's rayon pool, without progress reports.
     fn default() -> Self {
         Self { threads: rayon::current_num_threads(), progress: &Silent }
     }
@@ -26,8 +27,7 @@ impl core::fmt::Debug for Execution<'_> {
 }
 
 impl Execution<'_> {
-    /// Runs `work` where parallel iterators have just [`threads`](Self::threads) threads. Where no pool can be made,
-    /// the caller's serves.
+    /// Runs `work` in a pool of [`threads`](Self::threads) threads, or in the caller's pool if no pool can be created.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         if rayon::current_num_threads() == self.threads {
             return work();
@@ -38,7 +38,19 @@ impl Execution<'_> {
         }
     }
 
-    /// Whether there is a second thread.
+    /// Maps `items` in parallel if more than one thread is available; results keep the order of the items.
+    ///
+    /// # Errors
+    /// An error of `one`.
+    pub fn try_map<T: Sync, R: Send, E: Send>(
+        &self,
+        items: &[T],
+        one: impl Fn(&T) -> Result<R, E> + Sync + Send,
+    ) -> Result<Vec<R>, E> {
+        if self.parallel() { items.par_iter().map(one).collect() } else { items.iter().map(one).collect() }
+    }
+
+    /// Whether more than one thread is available.
     pub fn parallel(&self) -> bool {
         self.threads > 1
     }

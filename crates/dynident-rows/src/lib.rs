@@ -1,7 +1,7 @@
-//! **Which rows does a log give?** From recordings to filtered rows of regressor and torque.
+//! Filtered rows of regressor and torque from recordings.
 //!
-//! A [`Recording`] is a log or a motion in memory. [`Logs`] holds all recordings of a task with one cut-off. A
-//! [`LogPass`] reads one of them and gives its rows to a [`RowConsumer`]. A recording that fits into memory is read and
+//! A [`Recording`] is a log or a motion in memory. [`Logs`] contains all recordings of a task with one cut-off. A
+//! [`LogPass`] reads one of them and sends its rows to a [`RowConsumer`]. A recording that fits into memory is read and
 //! differentiated once, for any number of passes. Estimators and examinations are in `dynident-identification`.
 
 #![forbid(unsafe_code)]

@@ -1,4 +1,4 @@
-//! The recordings of a task with the filters in force: what every pass over them needs.
+//! Recordings of a task with the filters in use: the input of every pass.
 
 use crate::execution::Execution;
 use crate::recording::{LogError, Recording, Role};
@@ -9,69 +9,68 @@ use dynident_recording::filter::CutoffChoice;
 use dynident_recording::{FilterError, MotionSettings};
 use std::sync::{Arc, OnceLock};
 
-/// Longest lag that can be stated, seconds of a usual arm: two recorders that were started by hand, and no milliseconds
-/// that are taken for seconds.
-const LONGEST_STATED_LAG_S: f64 = 2.5;
+/// Maximum lag that a study can state, in seconds for an arm of usual size. Large enough for two recorders that were
+/// started by hand; small enough to reject milliseconds given as seconds.
+const MAX_STATED_LAG_S: f64 = 2.5;
 
-/// Rows of a log that is not counted before it is needed.
-const LONG_LOG_ROWS: u64 = 200_000;
-/// Rows of a joint that are kept above the motion's band, at most, all recordings together; ...
-const MOST_BEYOND_MOTION: f64 = 20_000.0;
-/// ... and where the rate of the recordings was not asked for so many times those within it.
-const BEYOND_MOTION: f64 = 8.0;
+/// Rows above which the row count of a log is estimated, not counted.
+const MAX_COUNTED_ROWS: u64 = 200_000;
+/// Maximum number of rows of a joint above the motion's band, over all recordings.
+const MAX_ROWS_ABOVE_MOTION_BAND: f64 = 20_000.0;
+/// Ratio of torque cut-off to motion cut-off if the rate of the recordings is unknown.
+const DEFAULT_TORQUE_BAND_RATIO: f64 = 8.0;
 
-/// What the positions of one log say about its noise.
+/// Cut-off and noise that the position spectra of one log show.
 #[derive(Clone, Debug)]
 pub struct LogSpectrum {
-    /// Number of the recording.
+    /// Index of the recording.
     pub index: usize,
-    /// Samples a second.
+    /// Sample rate, hertz.
     pub rate_hz: f64,
-    /// The cut-off that they suggest.
+    /// Suggested cut-off.
     pub choice: CutoffChoice,
-    /// Standard deviation of the noise of one sample, in the log's order of joints.
+    /// Standard deviation of the noise of one sample, joints in the order of the log.
     pub position_noise: Vec<f64>,
 }
 
-/// The settings that make rows of positions and torques.
+/// Settings that define the rows.
 #[derive(Clone, Copy, Debug)]
 pub struct RowSettings<'a> {
-    /// From positions to velocities and accelerations.
+    /// Differentiation of positions.
     pub motion: &'a MotionSettings,
-    /// The filter of torque and regressor.
+    /// Filter of torque and regressor.
     pub parallel_filter: &'a ParallelFilterSettings,
 }
 
-/// The recordings of a task and the filters in force. A log that fits into memory is read and
-/// differentiated once, however many passes there are.
+/// Recordings of a task and the filters in use. Each log that fits into memory is read and differentiated only once.
 #[derive(Clone, Debug)]
 pub struct Logs<'a> {
-    /// All recordings, whatever their role.
+    /// All recordings of any role.
     pub recordings: &'a [Recording],
-    /// The motion settings with one cut-off for all logs.
+    /// Motion settings with one cut-off for all logs.
     pub motion: MotionSettings,
-    /// The low-pass and decimation that torque and regressor go through alike.
+    /// Low-pass and decimation of torque and regressor.
     pub filter: ParallelFilterSettings,
-    /// How the job runs.
+    /// Threads and progress of the job.
     pub execution: Execution<'a>,
-    /// Empty where nothing is kept between passes.
+    /// Empty if passes store nothing.
     kept: Arc<Vec<OnceLock<KeptLog>>>,
-    /// The same recordings with excerpts of long ones; empty where there are none.
+    /// The same recordings with excerpts of the long ones; empty without excerpts.
     excerpts: Arc<Vec<Recording>>,
-    /// What the spectra of the deciding logs say, where the cut-off was left to them.
+    /// Spectra of the deciding logs if the cut-off is automatic.
     spectra: Vec<LogSpectrum>,
-    /// The cut-off of the torque's motion band, where the fit has another.
+    /// Cut-off of the torque's motion band if the fit uses another one, hertz.
     motion_hz: Option<f64>,
-    /// The cut-off that the parallel filter follows, where it is not the motion's.
+    /// Cut-off that the parallel filter follows if it is not that of the motion, hertz.
     torque_hz: Option<f64>,
 }
 
 impl<'a> Logs<'a> {
-    /// Decides on one cut-off for all logs: that of `settings`; or the one that a finished model was made with; or the
-    /// highest that any of the logs `deciding` asks for. A model and its test must not differ in their filters.
+    /// Selects one cut-off for all logs: the stated one, that of a finished model, or the highest that the spectra of
+    /// the logs `deciding` suggest. A model and its test must use the same filters.
     ///
     /// # Errors
-    /// Logs that cannot be read; a stated lag that no drive of such a robot has.
+    /// A log cannot be read, or a stated lag is too long for a robot of this size.
     pub fn new(
         model: &Model,
         recordings: &'a [Recording],
@@ -81,11 +80,11 @@ impl<'a> Logs<'a> {
         execution: Execution<'a>,
     ) -> Result<Self, LogError> {
         let RowSettings { motion: settings, parallel_filter } = settings;
-        let longest_s = model.own_scale().seconds(LONGEST_STATED_LAG_S);
+        let longest_s = model.own_scale().seconds(MAX_STATED_LAG_S);
         let stated = settings.torque_lag_s.as_ref();
         let mut stated = (0..model.dof()).filter_map(|joint| stated.and_then(|lags| lags.at(joint)));
         if let Some(value) = stated.find(|lag_s| lag_s.abs() > longest_s) {
-            let fix = "give seconds, at most two and a half own seconds of the robot (2.5 s of an arm of 1.2 m)";
+            let fix = "give seconds; the maximum is 2.5 s for an arm of 1.2 m and scales with the robot's characteristic time";
             let source = FilterError::Setting { name: "torque_lag_s", value, fix };
             let log = recordings.first().map_or("", |recording| &recording.name);
             return Err(LogError::recording(log, source.into()));
@@ -117,8 +116,7 @@ impl<'a> Logs<'a> {
         Ok(Self { recordings, motion, filter, execution, kept, excerpts, spectra, motion_hz: None, torque_hz: None })
     }
 
-    /// The same with the cut-off `cutoff_hz` where it was left to the data; held-out figures stay those of the motion's
-    /// own band, which the cut-off so far stands for.
+    /// Replaces the cut-off if it is automatic. Held-out figures keep the band of the previous cut-off.
     #[must_use]
     pub fn with_cutoff(mut self, settings: &MotionSettings, cutoff_hz: f64) -> Self {
         let motion_hz = self.motion_hz.or_else(|| motion_band_hz(&self.motion));
@@ -131,7 +129,7 @@ impl<'a> Logs<'a> {
         self
     }
 
-    /// The same with a cut-off that was chosen, or as it is.
+    /// Applies a selected cut-off, if there is one.
     #[must_use]
     pub fn with_chosen_cutoff(self, settings: &MotionSettings, cutoff_hz: Option<f64>) -> Self {
         match cutoff_hz {
@@ -140,7 +138,7 @@ impl<'a> Logs<'a> {
         }
     }
 
-    /// The same with what `other` has kept of the same recordings, where both have the same motion.
+    /// Shares the motions that `other` has stored, if recordings and motion settings are the same.
     #[must_use]
     pub fn with_motion_of(mut self, other: &Self) -> Self {
         if self.motion == other.motion && core::ptr::eq(self.recordings, other.recordings) {
@@ -149,39 +147,38 @@ impl<'a> Logs<'a> {
         self
     }
 
-    /// The same with [excerpts](crate::excerpt) for [looks at some instants](Self::pass_for_instants).
+    /// Adds [excerpts](crate::excerpt) for [passes over selected instants](Self::pass_for_instants).
     #[must_use]
     pub fn with_excerpts(mut self, excerpts: Arc<Vec<Recording>>) -> Self {
         self.excerpts = excerpts;
         self
     }
 
-    /// What was given to [`with_excerpts`](Self::with_excerpts); empty where nothing was.
+    /// Excerpts of [`with_excerpts`](Self::with_excerpts); empty by default.
     pub fn excerpts(&self) -> Arc<Vec<Recording>> {
         Arc::clone(&self.excerpts)
     }
 
-    /// The same with every pass reading anew: slower, in memory that does not grow with the length of a log.
+    /// Makes every pass read again: slower, but memory does not grow with the length of a log.
     #[must_use]
     pub fn without_keeping(mut self) -> Self {
         self.kept = Arc::default();
         self
     }
 
-    /// The same with held-out figures for the band that a motion cut-off of `motion_hz` makes; `None` for that of the
-    /// fit.
+    /// Sets the motion cut-off whose band the held-out figures use, hertz; `None` for that of the fit.
     #[must_use]
     pub fn with_motion_band(mut self, motion_hz: Option<f64>) -> Self {
         self.motion_hz = motion_hz;
         self
     }
 
-    /// The same motion with rows of the torque above its band: as many as a pass takes in fractions of a second. The
-    /// parallel filter follows the motion's cut-off, and a step that friction passes within milliseconds has most of
-    /// what it says about its width above that.
+    /// Adds torque above the motion's band, with as many rows as a pass handles within a second. The parallel filter
+    /// normally follows the motion's cut-off, but most of the information on the width of a friction step
+    /// (milliseconds) lies above it.
     ///
     /// # Errors
-    /// A recording that cannot be read.
+    /// A recording cannot be read.
     pub fn with_torque_beyond_motion(&self, model: &RegressorModel) -> Result<Self, LogError> {
         let Some(motion_hz) = motion_band_hz(&self.motion) else { return Ok(self.clone()) };
         let mut rows = 0.0;
@@ -189,16 +186,16 @@ impl<'a> Logs<'a> {
             let share = (ParallelFilterSettings::rows_per_s(motion_hz) / log.rate_hz).min(1.0);
             rows += self.rows_of(model, log.index)? * share;
         }
-        let times = if rows > 0.0 { (MOST_BEYOND_MOTION / rows).max(1.0) } else { BEYOND_MOTION };
-        // By factors of two: the rows of a long text file are only estimated.
+        let times = if rows > 0.0 { (MAX_ROWS_ABOVE_MOTION_BAND / rows).max(1.0) } else { DEFAULT_TORQUE_BAND_RATIO };
+        // Powers of two, because the rows of a long text file are only estimated.
         let times = times.log2().floor().exp2();
         Ok(Self { torque_hz: Some(times * motion_hz), ..self.clone() })
     }
 
-    /// Rows of a recording: counted, which keeps its motion for the next pass, or of a long one estimated.
+    /// Counts the rows of a recording, which stores its motion for the next pass; estimates those of a long log.
     fn rows_of(&self, model: &RegressorModel, index: usize) -> Result<f64, LogError> {
         let estimated = self.recordings[index].estimated_rows();
-        if let Some(estimated) = estimated.filter(|rows| *rows > LONG_LOG_ROWS) {
+        if let Some(estimated) = estimated.filter(|rows| *rows > MAX_COUNTED_ROWS) {
             return Ok(estimated as f64);
         }
         let mut rows = 0;
@@ -210,12 +207,12 @@ impl<'a> Logs<'a> {
         Ok(rows as f64)
     }
 
-    /// What the spectra alone ask for; none where the fit has that cut-off too.
+    /// Cut-off that the spectra suggest, hertz; `None` if the fit uses it.
     pub fn motion_hz(&self) -> Option<f64> {
         self.motion_hz
     }
 
-    /// The cut-off that the spectra suggest, if both the cut-off and the parallel filter are left to the data; hertz.
+    /// Cut-off that the spectra suggest, hertz, if cut-off and parallel filter are both automatic.
     pub fn automatic_cutoff_hz(&self) -> Option<f64> {
         let filter = &self.filter;
         let is_automatic = filter.enabled && filter.factor.is_none() && filter.cutoff_hz.is_none();
@@ -223,17 +220,17 @@ impl<'a> Logs<'a> {
         motion_hz.filter(|_| is_automatic && !self.spectra().is_empty())
     }
 
-    /// What the spectra of the deciding logs say; empty where the cut-off was given.
+    /// Spectra of the deciding logs; empty if the cut-off was stated.
     pub fn spectra(&self) -> &[LogSpectrum] {
         &self.spectra
     }
 
-    /// Places of the recordings with this role.
+    /// Indices of the recordings with this role.
     pub fn of_role(&self, role: Role) -> Vec<usize> {
         of_role(self.recordings, role)
     }
 
-    /// A pass over recording number `index`.
+    /// A pass over recording `index`.
     pub fn pass<'p>(&'p self, model: &'p RegressorModel, index: usize) -> LogPass<'p> {
         LogPass {
             recording: &self.recordings[index],
@@ -248,8 +245,8 @@ impl<'a> Logs<'a> {
         }
     }
 
-    /// A pass that is asked for some instants of recording number `index`: of one whose motion is not kept over its
-    /// excerpt, where it has one, so that a long log is not read again.
+    /// A pass that needs only some instants of recording `index`. It reads the excerpt, if there is one and the motion
+    /// is not stored, so that a long log is not read again.
     pub fn pass_for_instants<'p>(&'p self, model: &'p RegressorModel, index: usize) -> LogPass<'p> {
         let pass = self.pass(model, index);
         let is_kept = pass.kept.is_some_and(|kept| kept.get().is_some());
@@ -265,18 +262,17 @@ impl<'a> Logs<'a> {
         self.execution.progress.begin(stage, rows);
     }
 
-    /// Ends a stage.
+    /// Ends the stage.
     pub fn end(&self) {
         self.execution.progress.end();
     }
 }
 
-/// A place for the motion of every recording.
 fn unread(recordings: &[Recording]) -> Arc<Vec<OnceLock<KeptLog>>> {
     Arc::new(recordings.iter().map(|_| OnceLock::new()).collect())
 }
 
-/// Places of the recordings with this role.
+/// Indices of the recordings with this role.
 pub fn of_role(recordings: &[Recording], role: Role) -> Vec<usize> {
     (0..recordings.len()).filter(|&index| recordings[index].role == role).collect()
 }
@@ -289,7 +285,7 @@ mod tests {
     use dynident_recording::JointSamples;
 
     #[test]
-    fn instants_of_a_long_log_that_is_not_kept_are_of_its_excerpt() {
+    fn instants_of_a_long_log_come_from_its_excerpt() {
         let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/planar2r.urdf");
         let model = RegressorModel::from(
             ParametricModel::new(dynident_model::load_robot(robot).unwrap().model, Vec::new()).unwrap(),
@@ -318,7 +314,7 @@ mod tests {
         };
         let of_excerpt = rows_of(logs.pass_for_instants(&model, 0));
         assert!((50_000..=200_000).contains(&of_excerpt), "{of_excerpt}");
-        // Once the motion of all rows is at hand these are as good, and more.
+        // Once the whole motion is stored, the pass uses all of its rows.
         let all = rows_of(logs.pass(&model, 0));
         assert!(all > 440_000 && rows_of(logs.pass_for_instants(&model, 0)) == all, "{all}");
         assert_eq!(rows_of(logs.without_keeping().pass_for_instants(&model, 0)), of_excerpt);

@@ -1,16 +1,16 @@
-//! How a long job says where it is.
+//! Progress of long jobs.
 
-/// Hears how far a job has come. Calls may come from several threads.
+/// Receives the progress of a job. Several threads may call it.
 pub trait Progress: Sync {
-    /// A stage begins; `total` is its size in rows where known.
+    /// A stage begins; `total` is its number of rows, if known.
     fn begin(&self, stage: &str, total: Option<u64>);
-    /// `rows` more rows are done.
+    /// `rows` more rows are finished.
     fn advance(&self, rows: u64);
-    /// The stage is over.
+    /// The stage is finished.
     fn end(&self);
 }
 
-/// Reports to nobody.
+/// Ignores progress.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

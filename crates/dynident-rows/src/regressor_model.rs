@@ -1,22 +1,21 @@
-//! A parametric model with what its regressor needs beside the motion.
+//! A parametric model with the data that its regressor needs in addition to the motion.
 
 use dynident_dynamics::{BaseParameters, Column, PanelLayout, ParametricModel};
 use dynident_model::Model;
 use dynident_model::terms::TorqueTerm;
 
-/// A parameter holds another from this factor of it on: less is rounding.
-const HELD: f64 = 1e-9;
+/// Regrouping factors below this value are rounding errors.
+const MIN_REGROUPING_FACTOR: f64 = 1e-9;
 
-/// A parametric model, and what estimates have added to it: the load behind load-dependent friction, the gains of
-/// logged torque.
+/// A parametric model with results of earlier estimates: the load for load-dependent friction, and torque gains.
 #[derive(Clone, Debug)]
 pub struct RegressorModel {
-    /// Model, torque terms, base parameters, layout.
+    /// Model, torque terms, base parameters and layout.
     pub parametric: ParametricModel,
-    /// For load-dependent friction: the bodies by an earlier estimate, one value per column of the layout. Without it
-    /// such friction has a column of zeros.
+    /// Bodies of an earlier estimate for load-dependent friction, one value per column of the layout. Without them such
+    /// friction has a column of zeros.
     pub load_parameters: Option<Vec<f64>>,
-    /// What logged torque is multiplied by, joint by joint, where gains were found and not stated; empty otherwise.
+    /// Estimated factor on the logged torque of each joint; empty if no gain was estimated.
     pub torque_gains: Vec<f64>,
 }
 
@@ -32,7 +31,7 @@ impl RegressorModel {
         self.parametric.model()
     }
 
-    /// Torque terms beside the rigid bodies.
+    /// Torque terms in addition to the rigid bodies.
     pub fn terms(&self) -> &[TorqueTerm] {
         self.parametric.terms()
     }
@@ -42,7 +41,7 @@ impl RegressorModel {
         self.parametric.base()
     }
 
-    /// Regressor blocks of the joints.
+    /// Regressor columns of each joint.
     pub fn layout(&self) -> &PanelLayout {
         self.parametric.layout()
     }
@@ -57,7 +56,7 @@ impl RegressorModel {
         self.parametric.joint_names()
     }
 
-    /// The same with further terms behind its base columns, dependent or not: for choosing among them from one set of
+    /// Appends further terms to the base columns, dependent or not, so that terms can be selected from one set of
     /// factors.
     #[must_use]
     pub fn with_further_columns(&self, further: impl IntoIterator<Item = TorqueTerm>) -> Self {
@@ -70,17 +69,17 @@ impl RegressorModel {
         wide
     }
 
-    /// The same with the load of an estimate of `other`, where load-dependent friction needs it.
+    /// Sets the load from an estimate of `other`, without drive inertia, if load-dependent friction needs it.
     #[must_use]
     pub fn with_load_of_estimate(self, other: &Self, values: &[f64]) -> Self {
         if self.needs_load() { self.with_load_of(other, &other.without_drives(values)) } else { self }
     }
 
-    /// Estimated values of the layout's columns without the drive inertia that base parameters of bodies hold.
+    /// Removes drive inertia from the base parameters of bodies.
     ///
-    /// Drive inertia of the first joints cannot be told from their bodies' (`Izz1 + Ia1`), and it does not load the
-    /// gear. Of such a parameter, what lies beyond the description's bodies is taken for the drives', never more than
-    /// all of it; all counts as the bodies' where these are not described.
+    /// Drive inertia of the first joints is not distinguishable from that of their bodies (`Izz1 + Ia1`), but does not
+    /// load the gear. The part above the robot description's value, at most the whole, is attributed to the drive.
+    /// Without a robot description all is attributed to the bodies.
     fn without_drives(&self, values: &[f64]) -> Vec<f64> {
         let mut bodies = values.to_vec();
         let (base, terms) = (self.base(), self.terms().len());
@@ -88,14 +87,14 @@ impl RegressorModel {
         if self.parametric.nominal_base().is_none() {
             return bodies;
         }
-        // A description's friction is no body either.
+        // Friction in the robot description is not part of a body.
         let first_term = nominal.len() - terms;
         nominal[first_term..].fill(0.0);
         let of_bodies = base.values(&nominal);
         let is_drive = |column: usize| matches!(base.all_columns()[column], Column::Term(TorqueTerm::DriveInertia(_)));
         let regrouped = base.dependent().iter().zip(base.regrouping().column_iter());
         for (_, factors) in regrouped.filter(|(column, _)| is_drive(**column)) {
-            for (place, _) in factors.iter().enumerate().filter(|(_, factor)| **factor > HELD) {
+            for (place, _) in factors.iter().enumerate().filter(|(_, factor)| **factor > MIN_REGROUPING_FACTOR) {
                 if matches!(base.all_columns()[base.independent()[place]], Column::Body { .. }) {
                     let beyond = (values[place] - of_bodies[place]).max(0.0);
                     bodies[place] = values[place] - beyond.min(values[place].max(0.0));
@@ -105,7 +104,7 @@ impl RegressorModel {
         bodies
     }
 
-    /// The same with the bodies of an estimate of `other`, where load-dependent friction needs them.
+    /// Sets the load from the bodies of an estimate of `other`, if load-dependent friction needs it.
     #[must_use]
     pub fn with_load_of(mut self, other: &Self, values: &[f64]) -> Self {
         if self.needs_load() {
@@ -116,12 +115,12 @@ impl RegressorModel {
         self
     }
 
-    /// Whether some friction depends on the joint's load.
+    /// Whether some friction depends on the joint load.
     pub fn needs_load(&self) -> bool {
         self.layout().columns().iter().any(|column| matches!(column, Column::Term(term) if term.needs_load()))
     }
 
-    /// The first joint whose friction depends on its temperature.
+    /// First joint with temperature-dependent friction.
     pub fn joint_that_needs_temperature(&self) -> Option<usize> {
         let needing = self.layout().columns().iter().filter_map(|column| match column {
             Column::Term(term) if term.needs_temperature() => term.joints().first().copied(),
@@ -136,9 +135,9 @@ mod tests {
     use super::*;
     use dynident_model::terms::{DriveChoice, terms_per_joint};
 
-    /// Of the first joint's `Izz1 + Ia1` the drive's part loads no gear: it was taken for load.
+    /// The drive's part of `Izz1 + Ia1` does not load the gear.
     #[test]
-    fn drive_inertia_that_a_body_holds_is_no_load() {
+    fn drive_inertia_in_a_body_parameter_is_not_load() {
         let model =
             dynident_model::load_robot(concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf")).unwrap().model;
         let drives = terms_per_joint(&model, |_| DriveChoice { drive_inertia: true, ..DriveChoice::default() });
@@ -151,7 +150,7 @@ mod tests {
         let is_held = |place: &usize| with_drives[*place] != bodies[*place] && found[*place] != with_drives[*place];
         assert!((0..bodies.len()).any(|place| is_held(&place)));
         for place in (0..bodies.len()).filter(is_held) {
-            // Three significant digits of rounding beside values of ten.
+            // Rounding of three digits, for values around ten.
             assert!((found[place] - bodies[place]).abs() < 1e-12 * 10.0, "{place}");
         }
     }

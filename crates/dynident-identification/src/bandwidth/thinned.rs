@@ -1,9 +1,9 @@
-//! A log at a lower rate: its torque through a low-pass, its smooth motion as it is.
+//! Decimation of a log: low-pass of the torque, subsampling of the smooth motion.
 
 use dynident_recording::{Decimator, MotionBlock};
 use dynident_rows::{LogError, set_aside};
 
-/// A log's blocks at a lower rate, piece by piece, joints in the model's order.
+/// Decimated blocks of a log by piece, joints in the order of the model.
 #[derive(Default)]
 pub(super) struct Thinned {
     thinning: usize,
@@ -12,22 +12,19 @@ pub(super) struct Thinned {
     segment: Option<usize>,
     decimators: Vec<Decimator>,
     columns: [Vec<Vec<f64>>; 4],
-    /// Joint by joint whether a sample's torque does not count; empty where all of the piece do.
+    /// Marks of invalid torque by joint; empty if all torques of the piece are valid.
     left_out: Vec<Vec<bool>>,
     out: Vec<f64>,
     rate_hz: f64,
 }
 
 impl Thinned {
-    /// Nothing yet of a log of `dof` joints, every `thinning`-th sample of which is kept.
+    /// For a log of `dof` joints with decimation factor `thinning`.
     pub(super) fn new(thinning: usize, dof: usize) -> Self {
         Self { thinning, dof, ..Self::default() }
     }
 
-    /// Takes the first `rows` of a block; `decimator` makes the filter of one joint's torque.
-    ///
-    /// # Errors
-    /// A filter that does not exist at this rate.
+    /// Takes the first `rows` of a block; `decimator` builds the filter of one joint's torque.
     pub(super) fn take(
         &mut self,
         block: &MotionBlock,
@@ -60,14 +57,13 @@ impl Thinned {
         Ok(())
     }
 
-    /// Ends a piece.
     fn close(&mut self) {
         let Some(decimator) = self.decimators.first() else { return };
         let (rows, first) = (self.columns[3].first().map_or(0, Vec::len), decimator.half_length());
         let thinned = |columns: &[Vec<f64>]| -> Vec<f64> {
             columns.iter().flat_map(|x| (0..rows).map(|row| x[first + row * self.thinning])).collect()
         };
-        // A sample stands for those nearest to it, and counts where at least half of them do.
+        // A sample represents those nearest to it and is valid if at least half of them are.
         let (half, all) = (self.thinning / 2, self.columns[0].first().map_or(0, Vec::len));
         let counts_not = |left_out: &[bool], row: usize| {
             let centre = first + row * self.thinning;
@@ -94,7 +90,6 @@ impl Thinned {
         self.decimators.clear();
     }
 
-    /// All pieces.
     pub(super) fn finished(mut self) -> Vec<MotionBlock> {
         self.close();
         self.pieces

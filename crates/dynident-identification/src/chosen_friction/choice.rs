@@ -1,4 +1,4 @@
-//! The friction of the joints as their recordings choose it: which terms, then their constants.
+//! Selection of friction from the recordings: first the terms, then their constants.
 
 use super::constants::{
     best_constants, better_of_joints, error_of_constants, friction_evidence, one_step, take, with_constants,
@@ -19,21 +19,20 @@ use dynident_model::terms::TorqueTerm;
 use dynident_rows::{Logs, RegressorModel};
 use nalgebra::DMatrix;
 
-/// A model with the friction that its recordings chose.
+/// A model with selected friction.
 #[derive(Clone, Debug)]
 pub struct ChosenFriction {
-    /// The model, with the load where friction depends on it.
+    /// Model, including the load if friction depends on it.
     pub model: RegressorModel,
-    /// How each joint's was chosen; empty where none was to be.
+    /// Selection of each joint; empty if nothing was selected.
     pub joints: Vec<JointFriction>,
-    /// The rows and the fit with the terms as stated, of which the choice began; none where none was to be.
+    /// Rows and fit with the stated terms, the start of the selection; `None` if nothing was selected.
     pub stated: Option<(Training, Estimate)>,
-    /// What the error of the chosen constants adds to the bars of all parameters; none where none was chosen.
+    /// Effect of the constants' error on all parameters; `None` if nothing was selected.
     pub(crate) constants_error: Option<ConstantsError>,
 }
 
 impl ChosenFriction {
-    /// A model whose friction is all stated.
     pub(crate) fn as_stated(model: RegressorModel) -> Self {
         Self { model, joints: Vec::new(), stated: None, constants_error: None }
     }
@@ -44,12 +43,12 @@ impl ChosenFriction {
     }
 }
 
-/// Chooses the friction of the joints that `settings.friction` names, by cross-validation inside the recordings
-/// `training`: first among terms whose columns are in one set of factors, for a grid of constants; then in further
-/// passes the constants between the grid's points, together with all parameters. Filters are those of `logs`.
+/// Selects the friction of the joints in `settings.friction` by cross-validation within the recordings `training`.
+/// First it selects terms from one set of factors that contains all terms on a grid of constants. Then further passes
+/// refine the constants together with all parameters. Filters are those of `logs`.
 ///
 /// # Errors
-/// Recordings that cannot be read, rows that do not determine an estimate.
+/// Recordings cannot be read, or rows do not determine an estimate.
 pub fn choose_friction(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -64,10 +63,7 @@ pub fn choose_friction(
     friction_by_terms(&passes, logs, robot, None)
 }
 
-/// Friction as stated, with the error of the constants that other recordings chose before.
-///
-/// # Errors
-/// As [`choose_friction`].
+/// Friction as stated, with the error of constants that other recordings selected.
 pub(crate) fn stated_friction(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -82,12 +78,8 @@ pub(crate) fn stated_friction(
     Ok(ChosenFriction { constants_error, ..ChosenFriction::as_stated(stated) })
 }
 
-/// Friction that the recordings choose: terms from the rows of `passes`, constants from those of `of_constants`. Terms
-/// of all candidates may have been found [before](friction_by_grid). If the rows of `passes` are too few to choose
-/// from, terms are chosen from `of_constants` as well.
-///
-/// # Errors
-/// As [`choose_friction`].
+/// Selects friction: terms from the rows of `passes`, constants from those of `of_constants`. Terms on the grid may be
+/// known [before](friction_by_grid). If `passes` has too few rows, terms are also selected from `of_constants`.
 pub(crate) fn friction_of_logs(
     passes: &TrainingPasses<'_>,
     of_constants: &Logs<'_>,
@@ -118,18 +110,15 @@ fn friction_by_terms(
         searches.iter().filter(|(_, one)| one.rows_near_rest).map(|(_, one)| &one.joint[..]).collect();
     let of_constants = TrainingPasses { logs: of_constants, ..*passes };
     let (mut model, constants_error) = best_constants(&of_constants, robot, &mut joints, &near_rest, model, &gains)?;
-    // The next fit estimates the gains with the friction that was chosen.
+    // The next fit estimates the gains with the selected friction.
     model.torque_gains.clear();
     Ok(ChosenFriction { model, joints, stated: Some(stated), constants_error })
 }
 
-/// Which terms friction of a grid may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum GridTerms {
-    /// All that the search has.
     All,
-    /// None that remembers where the joint came from (Maxwell-slip): such a term is late by itself, and would take a
-    /// lag for its own.
+    /// Only terms without memory. Maxwell-slip friction itself acts late and would absorb a lag.
     WithoutMemory,
 }
 
@@ -139,11 +128,8 @@ impl GridTerms {
     }
 }
 
-/// The friction that the recordings choose among the terms and constants of a grid, at the cut-off of `logs`: enough to
-/// tell a lag beside it, in a third of the time. None where no joint's is to be chosen.
-///
-/// # Errors
-/// As [`choose_friction`].
+/// Selects terms and constants on a grid, at the cut-off of `logs`. This is sufficient to estimate a lag, in a third of
+/// the time. `None` if no joint is open.
 pub(crate) fn friction_by_grid(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -156,30 +142,25 @@ pub(crate) fn friction_by_grid(
     friction_of_grid(passes, robot, &searches, terms).map(Some)
 }
 
-/// Whether friction of a joint of this robot is to be chosen.
 pub(crate) fn is_friction_open(settings: &IdentificationSettings, robot: &ParametricModel) -> bool {
     !searches_of(settings, robot).is_empty()
 }
 
-/// The joints whose friction is to be chosen.
 fn searches_of<'a>(settings: &'a IdentificationSettings, robot: &ParametricModel) -> Vec<(usize, &'a FrictionSearch)> {
     let of = |search: &'a FrictionSearch| Some((robot.model().joint_index(&search.joint)?, search));
     settings.friction.iter().filter_map(of).collect()
 }
 
-/// Friction with the constants of a grid.
 #[derive(Clone)]
 pub(crate) struct GridFriction {
     model: RegressorModel,
     joints: Vec<JointFriction>,
-    /// Rows and fit with the terms as stated.
     stated: (Training, Estimate),
-    /// Joints whose gains are unknowns.
     gains: Vec<usize>,
 }
 
 impl GridFriction {
-    /// As it is, for a fit that tells a lag.
+    /// Unchanged, for the estimation of a lag.
     pub(crate) fn as_chosen(&self) -> ChosenFriction {
         let Self { mut model, joints, stated, .. } = self.clone();
         model.torque_gains.clear();
@@ -196,8 +177,8 @@ fn friction_of_grid(
     let TrainingPasses { logs, settings, .. } = passes;
     let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
 
-    // The stated terms first: the load, the noise of every joint, what is excited; with gains that nobody knows the
-    // torque in newton metres.
+    // Fit of the stated terms: load, noise of every joint, excited columns, and torque in newton metres if gains are
+    // unknown.
     let first = passes.with_gains(passes.rows_once(RegressorModel::from(robot.clone()))?)?;
     let plain = match &first.gains {
         Some((with_gains, _)) => with_gains.clone(),
@@ -205,7 +186,7 @@ fn friction_of_grid(
     };
     let gains = first.gains.as_ref().map_or_else(Vec::new, |(_, gains)| free_gains(gains));
 
-    // All candidates as columns of one set of factors, from which each candidate model is a selection.
+    // All candidates are columns of one set of factors; each candidate model is a selection of them.
     let most_inflation: Vec<f64> =
         searches.iter().map(|(_, search)| search.most_inflation.unwrap_or(f64::INFINITY)).collect();
     let chosen_among = |candidates: &[(usize, Vec<CandidateColumn>)]| -> Result<_, IdentificationError> {
@@ -214,7 +195,7 @@ fn friction_of_grid(
         let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, &first.model, &plain.values, &gains)?;
         Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, &most_inflation, &plain, equal_weights)?)
     };
-    // How wide the step is; then all that friction may be. With payloads the load would be the bare arm's.
+    // First the width of the step, then all terms. With payloads the load of the bare arm would be wrong.
     let scale = |joint: usize| JointScale::of(robot.model(), joint);
     let steps: Vec<_> = searches.iter().map(|(joint, search)| (*joint, step_columns(search, scale(*joint)))).collect();
     let widths: Vec<Option<f64>> = chosen_among(&steps)?.iter().map(smooth_step_width).collect();
@@ -230,17 +211,14 @@ fn friction_of_grid(
     Ok(GridFriction { model, joints, stated: (first, plain), gains })
 }
 
-/// Friction that other rows of the same motion chose, with the constants that suit these; at joints where `other`,
-/// which these chose, says more of them with fewer numbers, that of `other`.
+/// Compares friction that was selected at another cut-off, with constants refitted to these rows, with `other`, which
+/// was selected from these rows. Each joint takes `other` if it has the lower information criterion.
 ///
-/// A second look shows what the first could not where its cut-off is higher. Where it is lower, `shows_less`: where
-/// noise of the motion is what rows have left, they hang together for as long as the cut-off has it, and say far less
-/// than as many independent ones would; where it is friction that no term has, bars count too few of them. So the other
-/// friction then has to be the better one both ways, by all rows and by as many as the bars have. And a term that it
-/// adds has to be seen more clearly than at a first look.
-///
-/// # Errors
-/// As [`choose_friction`].
+/// A selection at a higher cut-off can show more than the first one. At a lower cut-off (`shows_less`) residuals are
+/// correlated, and the rows contain far less information than independent rows. If the residual is unmodelled friction,
+/// on the other hand, the error bars underestimate the effective number of rows. So `other` must then be better in both
+/// cases: with all rows and with the effective number of rows. A term that it adds needs stronger evidence than in a
+/// first selection.
 pub(crate) fn better_friction(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -265,18 +243,15 @@ pub(crate) fn better_friction(
         return Ok(ChosenFriction { model, joints, stated, constants_error });
     }
 
-    // A mixture, each joint with the constants that it has beside its own others.
+    // A mixture; each joint keeps the constants found with its own selection.
     take(&mut joints, other.joints, &taken);
     let model = passes.with_friction(robot, &joints, &model)?;
     let constants_error = error_of_constants(passes, &joints, &model)?;
     Ok(ChosenFriction { model, joints, stated, constants_error })
 }
 
-/// Friction that was chosen from an excerpt, with constants estimated from all rows: one step of Gauss and Newton from
-/// the constants of the excerpt, which are close.
-///
-/// # Errors
-/// As [`choose_friction`].
+/// Refits the constants of friction that was selected from an excerpt to all rows: one Gauss-Newton step from the
+/// constants of the excerpt, which are close.
 pub(crate) fn constants_of_all_rows(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -288,7 +263,6 @@ pub(crate) fn constants_of_all_rows(
     Ok(chosen)
 }
 
-/// The width of the smooth step that a joint's friction has.
 fn smooth_step_width(joint: &JointFriction) -> Option<f64> {
     joint.terms.iter().flatten().filter(|term| is_coulomb(term)).find_map(smooth_width)
 }

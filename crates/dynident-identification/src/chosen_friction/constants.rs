@@ -1,5 +1,5 @@
-//! The constants of the friction that joints chose, together with all parameters: passes over the recordings from where
-//! the terms were found, and from a second start where such steps are known to end beside the best.
+//! Constants of selected friction, estimated together with all parameters: passes over the recordings from the grid
+//! values, and from a second start if the first one is known to end in a local minimum.
 
 use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
@@ -14,18 +14,17 @@ use dynident_estimation::{LinearProblem, WeightedValues};
 use dynident_model::terms::TorqueTerm;
 use dynident_rows::RegressorModel;
 
-/// Passes over the recordings for the constants of chosen friction, at most, and one more where the last went too far.
-const MOST_PASSES: usize = 8;
-/// Passes after which terms that are not seen are dropped although constants still move.
+/// Maximum number of passes for the constants, plus one if the last step was too long.
+const MAX_PASSES: usize = 8;
+/// Passes after which insignificant terms are dropped although constants have not converged.
 const DROP_PASSES: usize = 3;
-/// Times that a step which makes the fit worse is halved: the constants are as good as they get.
-const MOST_HALVINGS: usize = 3;
-/// Deviance that a step may cost without being too long: far less than chance makes of it.
-const NO_WORSE: f64 = 0.1;
-/// Passes at least where friction depends on the load, which is the fit's before.
-const LOAD_PASSES: usize = 3;
+/// Maximum number of halvings of a step that makes the fit worse.
+const MAX_HALVINGS: usize = 3;
+/// Increase of the deviance that is tolerated for a step; far below its statistical variation.
+const MAX_DEVIANCE_INCREASE: f64 = 0.1;
+/// Minimum number of passes for load-dependent friction, which uses the load of the previous fit.
+const MIN_LOAD_PASSES: usize = 3;
 
-/// The constants of a pass, the step from there, and what the fit left before it.
 struct LastPass {
     constants: FrictionConstants,
     steps: Vec<f64>,
@@ -33,19 +32,18 @@ struct LastPass {
     halvings: usize,
 }
 
-/// One pass over the recordings for the constants of chosen friction: rows with the columns beside them, and the fit.
+/// One pass for the constants of selected friction: rows with neighbouring columns, and the fit.
 struct ConstantsPass {
     wide: RegressorModel,
     factors: Vec<LogFactors>,
-    /// The same rows, each log's as one segment.
     merged: Vec<LogFactors>,
-    /// Those without the columns beside them.
+    /// The same rows without neighbouring columns.
     problem: LinearProblem,
     fit: WeightedValues,
 }
 
 impl ConstantsPass {
-    /// The step from here, and how well the constants are known, by the covariance that bars are made of.
+    /// The step of the constants with the covariance of the reported error bars.
     fn step(
         &self,
         passes: &TrainingPasses<'_>,
@@ -56,7 +54,7 @@ impl ConstantsPass {
         self.step_by(passes, constants, model, gains, &self.factors, &passes.settings.estimation)
     }
 
-    /// The same step with bars that count every row for independent: no time segments are looked at.
+    /// The same step with error bars that assume independent rows, without time segments.
     fn step_without_bars(
         &self,
         passes: &TrainingPasses<'_>,
@@ -82,7 +80,6 @@ impl ConstantsPass {
     }
 }
 
-/// What a step says of the constants' intervals, to the joints that have them.
 fn take_intervals(
     joints: &mut [JointFriction],
     model: &RegressorModel,
@@ -95,16 +92,15 @@ fn take_intervals(
     }
 }
 
-/// What the rows say of a joint's friction.
 pub(crate) struct FrictionEvidence {
-    /// How many rows say what one independent row would ([`FrictionConstants::design_effect`]).
+    /// Number of rows with the information of one independent row ([`FrictionConstants::design_effect`]).
     pub(crate) design_effect: f64,
-    /// Whether it has terms that may be chance, of which a first look at the same motion had none.
+    /// Whether it has possibly insignificant terms that the first selection did not have.
     pub(crate) is_doubtful: bool,
 }
 
-/// What the rows of `passes` say of the friction of every joint, with the constants that suit them; a first look at the
-/// same motion had the friction `before`. Where no friction has constants every row is taken for independent.
+/// Evidence of the rows of `passes` for the friction of every joint, with refitted constants. The first selection from
+/// the same motion had the friction `before`. Without constants all rows are treated as independent.
 pub(crate) fn friction_evidence(
     passes: &TrainingPasses<'_>,
     joints: &[JointFriction],
@@ -122,7 +118,7 @@ pub(crate) fn friction_evidence(
     let of_joint = |(one, before): (&JointFriction, &JointFriction)| {
         let place = model.model().joint_index(&one.joint);
         let is_doubtful = |(joint, before): (usize, &Vec<TorqueTerm>)| {
-            constants.has_doubtful_term((joint, before), (model, &norms), &step)
+            constants.has_doubtful_term(joint, before, model, &norms, &step, passes.settings.thresholds.friction)
         };
         FrictionEvidence {
             design_effect: place.map_or(1.0, |joint| constants.design_effect(joint, model, &step)),
@@ -132,9 +128,9 @@ pub(crate) fn friction_evidence(
     Ok(joints.iter().zip(before).map(of_joint).collect())
 }
 
-/// The best constants from where the terms were found and, for joints of which rows near rest count, from a
-/// [second start](second_start); joint by joint the friction that says most of the rows with the fewest numbers
-/// (Schwarz). Gains of some joints are unknowns, too.
+/// Finds the best constants from the grid values and, for joints with rows near rest, from a [second
+/// start](second_start). Each joint takes the friction with the lower Bayesian information criterion. `gains` are
+/// joints with unknown gains.
 pub(crate) fn best_constants(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -160,7 +156,7 @@ pub(crate) fn best_constants(
         return Ok(first);
     }
 
-    // From the other start; then of both what is better.
+    // From the second start; then the better of both.
     let start = passes.with_friction(robot, &others, &first.0)?;
     let second = with_constants(passes, robot, &mut others, start, gains)?;
     let as_counted = vec![1.0; joints.len()];
@@ -177,9 +173,9 @@ pub(crate) fn best_constants(
     with_constants(passes, robot, joints, start, gains)
 }
 
-/// Of two frictions with the constants that suit the rows of `passes` whether, joint by joint, the second says more of
-/// them with fewer numbers (Schwarz, Annals of Statistics 6 (1978) 461), both if all rows count and if they count as
-/// their `design_effects` have it. Only joints count whose friction `is_other`.
+/// Whether the second of two frictions has the lower Bayesian information criterion (Schwarz, Annals of Statistics 6
+/// (1978) 461) at each joint, both with all rows and with the number of rows reduced by `design_effects`. Only joints
+/// in `is_other` can differ.
 pub(crate) fn better_of_joints(
     passes: &TrainingPasses<'_>,
     joints: &[JointFriction],
@@ -204,15 +200,14 @@ pub(crate) fn better_of_joints(
     Ok((0..joints.len()).map(is_better).collect())
 }
 
-/// The friction of `others` to the joints that have `taken` it.
+/// Copies the friction of `others` to the joints marked in `taken`.
 pub(crate) fn take(joints: &mut [JointFriction], others: Vec<JointFriction>, taken: &[bool]) {
     for ((one, other), _) in joints.iter_mut().zip(others).zip(taken).filter(|(_, taken)| **taken) {
         *one = other;
     }
 }
 
-/// What is unknown of the constants of friction that `model` has and other rows chose, by these rows; none where there
-/// is no constant.
+/// Error of the constants of friction that other rows selected, from these rows; `None` without constants.
 pub(crate) fn error_of_constants(
     passes: &TrainingPasses<'_>,
     joints: &[JointFriction],
@@ -226,8 +221,7 @@ pub(crate) fn error_of_constants(
     Ok(Some(step.error().clone()))
 }
 
-/// One step of the constants from where they are, for joints that chose their friction by other rows; none where there
-/// is nothing to move.
+/// One step of the constants for friction that was selected from other rows; `None` if nothing can change.
 pub(crate) fn one_step(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -246,8 +240,7 @@ pub(crate) fn one_step(
     Ok(Some((with_chosen(robot, joints, &terms, model, &measured.fit.values)?, error)))
 }
 
-/// How well every joint's rows are explained by a model, with the terms and the constants of its friction as its own
-/// numbers.
+/// Fit of every joint's rows by a model; the parameters of a joint are the terms and constants of its friction.
 fn friction_scores(
     passes: &TrainingPasses<'_>,
     model: &RegressorModel,
@@ -264,8 +257,8 @@ fn friction_scores(
     Ok(scores)
 }
 
-/// The model with the constants of the terms that its joints chose, and without terms that are not seen with the
-/// constants free; and what the error of the constants adds to the bars. Gains of some joints are unknowns, too.
+/// Refines the constants of the selected terms and drops insignificant terms; returns the model and the error of the
+/// constants. `gains` are joints with unknown gains.
 pub(crate) fn with_constants(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -275,6 +268,7 @@ pub(crate) fn with_constants(
 ) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
     let equal_weights = matches!(passes.settings.estimation.estimator, Estimator::Ordinary);
     let mut last: Option<LastPass> = None;
+    let thresholds = passes.settings.thresholds.friction;
     let (mut are_found, mut error) = (false, None);
     for pass in 1.. {
         let constants = FrictionConstants::new(&model, joints);
@@ -284,12 +278,12 @@ pub(crate) fn with_constants(
         let measured = passes.constants_pass(&constants, &model)?;
         let fit = &measured.fit;
 
-        // A step that made the fit worse was too long; where no length makes it better the constants are found, and one
-        // more pass there says which terms no row shows.
+        // A step that made the fit worse was too long. If no shorter step helps, the constants are final, and one more
+        // pass shows which terms have no supporting rows.
         let misfit = misfit(&measured.problem, &fit.joint_sigma, equal_weights);
-        if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit + NO_WORSE) {
+        if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit + MAX_DEVIANCE_INCREASE) {
             before.halvings += 1;
-            are_found = before.halvings > MOST_HALVINGS || pass >= MOST_PASSES;
+            are_found = before.halvings > MAX_HALVINGS || pass >= MAX_PASSES;
             before.steps.iter_mut().for_each(|step| *step *= if are_found { 0.0 } else { 0.5 });
             let terms = before.constants.moved(&before.steps);
             model = with_chosen(robot, joints, &terms, &model, &fit.values)?;
@@ -297,10 +291,10 @@ pub(crate) fn with_constants(
             continue;
         }
 
-        // On the way bars are for nobody.
+        // Intermediate passes need no error bars.
         if pass < DROP_PASSES && !are_found {
             let step = measured.step_without_bars(passes, &constants, &model, gains)?;
-            if !step.may_have_settled() {
+            if !step.may_have_converged() {
                 let terms = constants.moved(&step.steps);
                 model = with_chosen(robot, joints, &terms, &model, &fit.values)?;
                 last = Some(LastPass { constants, steps: step.steps, misfit, halvings: 0 });
@@ -311,25 +305,25 @@ pub(crate) fn with_constants(
         let step = measured.step(passes, &constants, &model, gains)?;
         take_intervals(joints, &model, &constants, &step);
         error = Some(step.error().clone());
-        let has_settled = are_found || step.has_settled() && (pass >= LOAD_PASSES || !model.needs_load());
+        let has_converged = are_found || step.has_converged() && (pass >= MIN_LOAD_PASSES || !model.needs_load());
 
-        // Terms that are not seen once constants are free: the weakest of every joint, then again. Where the passes got
-        // no further terms may say something together that none of them says alone; what no row shows says nothing.
-        let weak = if are_found { Weak::Unshown } else { Weak::Unseen };
-        let fewer = constants.without_weakest(weak, (&model, &measured.problem.column_norms()), &step);
-        if pass >= MOST_PASSES {
+        // Drop the weakest insignificant term of every joint and repeat. If the passes made no progress, terms may be
+        // significant only together, so drop only those without supporting rows.
+        let weak = if are_found { Weak::Unsupported } else { Weak::Insignificant };
+        let fewer = constants.without_weakest(weak, &model, &measured.problem.column_norms(), &step, thresholds);
+        if pass >= MAX_PASSES {
             if !fewer.is_empty() {
                 model = with_chosen(robot, joints, &fewer, &model, &fit.values)?;
             }
             break;
         }
-        if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
+        if !fewer.is_empty() && (has_converged || pass >= DROP_PASSES) {
             model = with_chosen(robot, joints, &fewer, &model, &fit.values)?;
             last = None;
             are_found = false;
             continue;
         }
-        if has_settled {
+        if has_converged {
             break;
         }
         let terms = constants.moved(&step.steps);
@@ -339,7 +333,7 @@ pub(crate) fn with_constants(
     Ok((model, error))
 }
 
-/// The robot with these terms at the joints that chose theirs, and the load of a fit of the model before.
+/// The robot with these terms, and the load of a fit of the previous model.
 fn with_chosen(
     robot: &ParametricModel,
     joints: &mut [JointFriction],
@@ -366,14 +360,13 @@ impl TrainingPasses<'_> {
         with_friction_of(robot, joints, before, &fit.values)
     }
 
-    /// The rows of a model and a fit without bars.
     fn rows_and_fit(&self, model: &RegressorModel) -> Result<(Training, WeightedValues), IdentificationError> {
         let rows = self.rows_once(model.clone())?;
         let fit = plain_values(&self.settings.estimation, &rows.problem)?;
         Ok((rows, fit))
     }
 
-    /// The rows of a model with the columns that its constants ask for beside it.
+    /// Rows of a model with the neighbouring columns of its constants.
     fn constants_pass(
         &self,
         constants: &FrictionConstants,
@@ -389,7 +382,7 @@ impl TrainingPasses<'_> {
     }
 }
 
-/// What a fit leaves: its deviance; where joints count alike that of all rows together, `N ln(Σ N_j σ_j²)`.
+/// Deviance of a fit; with equal weights of the joints that of all rows together, `N ln(Σ N_j σ_j²)`.
 fn misfit(problem: &LinearProblem, joint_sigma: &[f64], equal_weights: bool) -> f64 {
     if !equal_weights {
         return deviance(problem, joint_sigma);

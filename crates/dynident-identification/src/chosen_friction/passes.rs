@@ -1,4 +1,4 @@
-//! What every pass over the recordings for friction needs: a model with further columns, and the rows of it.
+//! Common parts of the passes for friction: models with additional columns, and their rows.
 
 use crate::error::IdentificationError;
 use crate::estimators::EstimationSettings;
@@ -11,12 +11,11 @@ use dynident_estimation::{CovarianceMethod, LinearProblem};
 use dynident_model::terms::TorqueTerm;
 use dynident_rows::RegressorModel;
 
-/// Settings of a fit whose error bars nobody wants.
 pub(crate) fn without_bars(settings: &IdentificationSettings) -> EstimationSettings {
     EstimationSettings { covariance: CovarianceMethod::White, ..settings.estimation.clone() }
 }
 
-/// The model with those of these terms as columns that it does not have.
+/// Adds those terms as columns that the model does not have.
 pub(crate) fn with_terms(model: &RegressorModel, terms: impl Iterator<Item = TorqueTerm>) -> RegressorModel {
     let known = model.layout().columns();
     let mut further: Vec<TorqueTerm> = Vec::new();
@@ -28,7 +27,7 @@ pub(crate) fn with_terms(model: &RegressorModel, terms: impl Iterator<Item = Tor
     model.with_further_columns(further)
 }
 
-/// The robot with the friction that its joints chose, and the gains and the load of a fit of the model before.
+/// The robot with the selected friction, and the gains and the load of a fit of the previous model.
 pub(crate) fn with_friction_of(
     robot: &ParametricModel,
     joints: &[JointFriction],
@@ -41,8 +40,8 @@ pub(crate) fn with_friction_of(
 }
 
 impl TrainingPasses<'_> {
-    /// The rows of `wide`, with the `free` gains of some joints as unknowns about the values `fitted` to the columns
-    /// of `model` and to those that logs add to them.
+    /// Rows of `wide`, with the gains of the joints `free` as unknowns about the values `fitted`. These belong to the
+    /// columns of `model` and then to the additional columns of the logs.
     pub(crate) fn free_problem(
         &self,
         wide: &RegressorModel,

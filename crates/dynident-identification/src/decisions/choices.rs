@@ -1,4 +1,4 @@
-//! The choices so far, with the evidence for each.
+//! Current choices, with the evidence for each.
 
 use crate::bandwidth::CutoffByError;
 use crate::chosen_friction::{ChosenFriction, GridFriction};
@@ -7,64 +7,54 @@ use crate::lag::LagRounds;
 use crate::settings::LagCandidates;
 use dynident_dynamics::ParametricModel;
 
-/// Drive inertia: the robot with it or without it.
 #[derive(Clone)]
 pub(crate) struct Drives {
-    /// The task's robot, with the drive inertia that the logs show.
     pub(crate) robot: ParametricModel,
     /// The evidence; `None` if the terms state the drive inertia.
     pub(crate) choice: Option<DriveInertiaChoice>,
 }
 
-/// A cut-off of the motion.
 #[derive(Clone)]
 pub(super) struct CutoffChoice {
-    /// The evidence; `None` if the cut-off is stated, or if the logs are too short.
+    /// `None` if the cut-off is stated or the logs are too short.
     pub(super) by_error: Option<CutoffByError>,
 }
 
-/// Friction of the joints.
 #[derive(Clone)]
 pub(super) enum FrictionChoice {
-    /// Not selected yet.
     Open,
     /// With the constants of a grid: enough to estimate a lag.
     Grid(GridFriction),
     /// Selected from an excerpt of the logs; its constants are still to be adjusted to all rows.
     OfExcerpt(ChosenFriction),
-    /// Selected or stated.
     Made(ChosenFriction),
 }
 
-/// What a change of the lag reopens.
+/// Scope of a revision of the lag.
 #[derive(Clone)]
 enum Origin {
-    /// All other choices: they were made from rows with the lag.
+    /// All other choices, because they were made from rows with the lag.
     TheseLogs,
-    /// Only the friction constants: the rest was chosen from an excerpt.
+    /// Only the friction constants, because the rest was selected from an excerpt.
     Excerpt(ChosenFriction),
-    /// Nothing.
     Final,
 }
 
-/// The choices so far. `None` and [`FrictionChoice::Open`] are open.
+/// Current choices. `None` and [`FrictionChoice::Open`] are open.
 #[derive(Clone)]
 pub(crate) struct Choices {
-    /// The lag that is compensated, and how often it was revised.
+    /// The compensated lag and the number of its revisions.
     pub(super) lag: LagRounds,
     pub(super) drives: Option<Drives>,
-    /// Selected with friction as stated.
     pub(super) cutoff: Option<CutoffChoice>,
-    /// Friction of a grid with all terms, from a fit with the same lag.
     pub(super) grid: Option<GridFriction>,
     pub(super) friction: FrictionChoice,
     /// The cut-off at which friction was selected, hertz; `None` if it was stated.
     pub(super) friction_hz: Option<f64>,
-    /// The cut-off that was selected with the selected friction.
     pub(super) cutoff_with_friction: Option<CutoffByError>,
-    /// Whether a lag was looked for before friction was selected.
+    /// Whether the lag before friction was decided.
     pub(super) has_lag_before_friction: bool,
-    /// Whether friction was tried at another cut-off.
+    /// Whether friction was selected again at another cut-off.
     pub(super) has_cutoff_of_friction: bool,
     origin: Origin,
 }
@@ -86,24 +76,21 @@ impl Choices {
         }
     }
 
-    /// The cut-off in force, with its evidence.
     pub(crate) fn cutoff(&self) -> Option<&CutoffByError> {
         let before = self.cutoff.as_ref().and_then(|cutoff| cutoff.by_error.as_ref());
         self.cutoff_with_friction.as_ref().or(before)
     }
 
-    /// The cut-off at which friction is selected, hertz: the highest that serves the parameters nearly as well as the
-    /// best, because details of friction lie above the band of the motion.
+    /// The cut-off at which friction is selected, hertz: the highest with nearly the smallest parameter error, because
+    /// details of friction lie above the band of the motion.
     pub(super) fn friction_cutoff_hz(&self) -> Option<f64> {
         self.cutoff().map(CutoffByError::highest_alike_hz)
     }
 
-    /// Drive inertia, once it is decided.
     pub(crate) fn drives(&self) -> Option<&Drives> {
         self.drives.as_ref()
     }
 
-    /// The friction in force; `None` while it is open.
     pub(crate) fn friction(&self) -> Option<ChosenFriction> {
         match &self.friction {
             FrictionChoice::Open => None,
@@ -112,29 +99,25 @@ impl Choices {
         }
     }
 
-    /// The lag in force and what is known of it.
     pub(crate) fn lag(&self) -> &LagRounds {
         &self.lag
     }
 
-    /// The same choices with friction open.
     #[must_use]
     pub(super) fn with_open_friction(&self) -> Self {
         Self { friction: FrictionChoice::Open, ..self.clone() }
     }
 
-    /// The same choices with this lag.
     #[must_use]
     pub(super) fn with_lag(self, lag: LagRounds) -> Self {
         Self { lag, ..self }
     }
 
-    /// Keeps all other choices if the lag changes.
+    /// Keeps all other choices if the lag is revised.
     pub(super) fn finish(&mut self) {
         self.origin = Origin::Final;
     }
 
-    /// Reopens the choices that depend on the lag.
     pub(super) fn reopen(&mut self) {
         match &self.origin {
             Origin::TheseLogs => {
@@ -146,8 +129,8 @@ impl Choices {
         }
     }
 
-    /// The choices of an excerpt as a start for all rows: the lag and the friction constants are revised, the rest is
-    /// kept. `candidates` are the lags that all rows may have.
+    /// Choices of an excerpt as a start for all rows. The lag and the friction constants are revised, the rest is kept.
+    /// `candidates` are the lags allowed for all rows.
     #[must_use]
     pub(crate) fn of_excerpt(self, candidates: LagCandidates) -> Self {
         let cutoff = CutoffChoice { by_error: self.cutoff().cloned() };

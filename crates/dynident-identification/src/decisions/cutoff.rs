@@ -1,4 +1,4 @@
-//! The cut-off with the smallest predicted error of the parameters, with friction as stated.
+//! Decision: the cut-off with the smallest predicted parameter error, with friction as stated.
 
 use super::choices::CutoffChoice;
 use super::decision::{Decision, Next};

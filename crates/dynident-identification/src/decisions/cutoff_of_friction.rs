@@ -1,12 +1,12 @@
-//! Friction at another cut-off.
+//! Decision: friction at another cut-off.
 //!
-//! Friction has details above the band of the motion, so it is selected at the highest cut-off that serves the
-//! parameters. That cut-off is predicted with the stated friction, whose wide step is not sensitive to noise of the
-//! velocity. With the selected friction the prediction can differ: noise smears a narrow step, and other terms
-//! compensate for it. Friction is therefore selected again, once, in two cases: at the new cut-off if it is lower and
-//! the noise is more than a small part of the width of a step, or if the new cut-off is clearly higher. On the rows of
-//! that cut-off, each joint takes the friction with the lower Bayesian information criterion (Schwarz, Annals of
-//! Statistics 6 (1978) 461). A lower cut-off shows less, so terms that it adds need stronger evidence.
+//! Friction has details above the band of the motion, so it is selected at the highest cut-off with nearly the smallest
+//! parameter error. That cut-off is predicted with the stated friction, whose wide step is not sensitive to velocity
+//! noise. With the selected friction the prediction can change: noise smears a narrow step, and other terms compensate
+//! for it. Friction is therefore selected again, once, in two cases: at a lower cut-off if the velocity noise exceeds a
+//! small ratio of the step width, or at a clearly higher cut-off. On the rows of that cut-off, each joint takes the
+//! friction with the lower Bayesian information criterion (Schwarz, Annals of Statistics 6 (1978) 461). A lower cut-off
+//! shows less, so terms that it adds need stronger evidence.
 
 use super::choices::{Choices, FrictionChoice};
 use super::decision::{Decision, Next};
@@ -16,14 +16,9 @@ use crate::chosen_friction::{ChosenFriction, better_friction, friction_of_logs};
 use crate::error::IdentificationError;
 use crate::friction::smooth_width;
 use crate::less_noise::Fit;
+use crate::thresholds::CutoffThresholds;
 use crate::training::TrainingPasses;
 use dynident_rows::{LogSpectrum, Logs};
-
-/// Cut-offs with a smaller ratio are treated as equal; candidates are √2 apart.
-const MIN_CUTOFF_RATIO: f64 = 1.2;
-/// Standard deviation of the velocity over the width of a step above which noise smears the step. Noise widens a
-/// smooth step by half the square of this ratio.
-const MAX_NOISE_RATIO: f64 = 0.05;
 
 pub(super) struct CutoffOfFriction;
 
@@ -38,7 +33,7 @@ impl Decision for CutoffOfFriction {
         else {
             return Ok(Next::Proceed);
         };
-        let Some(other_hz) = other_cutoff_hz(&fit.logs, &work.choices, friction, before_hz) else {
+        let Some(other_hz) = other_cutoff_hz(fit, &work.choices, friction, before_hz) else {
             return Ok(Next::Proceed);
         };
         let robot = work.drives().robot;
@@ -60,28 +55,30 @@ impl Decision for CutoffOfFriction {
     }
 }
 
-/// The cut-off at which friction is selected again, hertz, if it was selected at `before_hz`.
-fn other_cutoff_hz(logs: &Logs<'_>, choices: &Choices, friction: &ChosenFriction, before_hz: f64) -> Option<f64> {
+/// The cut-off at which friction is selected again, hertz. Friction was selected at `before_hz`.
+fn other_cutoff_hz(fit: &Fit<'_>, choices: &Choices, friction: &ChosenFriction, before_hz: f64) -> Option<f64> {
     let cutoff = choices.cutoff()?;
     if friction.joints.is_empty() {
         return None;
     }
+    let CutoffThresholds { min_friction_ratio, max_step_noise_ratio, .. } = fit.settings.thresholds.cutoff;
+    let is_smeared = |cutoff_hz: f64| is_step_smeared(&fit.logs, friction, cutoff_hz, max_step_noise_ratio);
     let high_hz = cutoff.highest_alike_hz();
-    if high_hz > MIN_CUTOFF_RATIO * before_hz && !is_smeared(logs, friction, high_hz) {
+    if high_hz > min_friction_ratio * before_hz && !is_smeared(high_hz) {
         return Some(high_hz);
     }
-    let is_lower = MIN_CUTOFF_RATIO * cutoff.cutoff_hz <= before_hz;
-    (is_lower && is_smeared(logs, friction, before_hz)).then_some(cutoff.cutoff_hz)
+    let is_lower = min_friction_ratio * cutoff.cutoff_hz <= before_hz;
+    (is_lower && is_smeared(before_hz)).then_some(cutoff.cutoff_hz)
 }
 
-/// Whether noise of the positions behind a low-pass at `cutoff_hz` smears the narrowest smooth step: white noise of
-/// standard deviation σ gives the velocity `σ 2π √(2 f³ / 3 rate)`. A smeared step does not look dry.
-fn is_smeared(logs: &Logs<'_>, friction: &ChosenFriction, cutoff_hz: f64) -> bool {
+/// Whether position noise after a low-pass at `cutoff_hz` smears the narrowest smooth step. White noise of standard
+/// deviation σ gives the velocity noise `σ 2π √(2 f³ / 3 rate)`.
+fn is_step_smeared(logs: &Logs<'_>, friction: &ChosenFriction, cutoff_hz: f64, max_noise_ratio: f64) -> bool {
     let widths = friction.joints.iter().flat_map(|joint| joint.terms.iter().flatten()).filter_map(smooth_width);
     let narrowest = widths.fold(f64::INFINITY, f64::min);
     let noise = |log: &LogSpectrum| {
         let of_position = log.position_noise.iter().copied().fold(0.0, f64::max);
         of_position * core::f64::consts::TAU * (2.0 * cutoff_hz.powi(3) / (3.0 * log.rate_hz)).sqrt()
     };
-    logs.spectra().iter().map(noise).fold(0.0, f64::max) > MAX_NOISE_RATIO * narrowest
+    logs.spectra().iter().map(noise).fold(0.0, f64::max) > max_noise_ratio * narrowest
 }

@@ -5,21 +5,18 @@ use crate::bars::ErrorSource;
 use crate::error::IdentificationError;
 use nalgebra::DMatrix;
 
-/// What the driver does after a decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// Goes on with the next decision of the list.
     Proceed,
-    /// Starts again at the top of the list, because a choice was revised.
+    /// Start again at the top of the list, because a choice was revised.
     StartAgain,
 }
 
-/// One thing that the training logs decide.
 pub(crate) trait Decision: Sync {
-    /// Makes the choice if it is open, or revises it if the fit under the choices so far requires it.
+    /// Makes the choice if it is open, or revises it if the current fit requires it.
     ///
     /// # Errors
-    /// Recordings that cannot be read, rows that do not determine an estimate.
+    /// Recordings cannot be read, or rows do not determine an estimate.
     fn decide(&self, work: &mut Workspace<'_, '_>) -> Result<Next, IdentificationError>;
 
     /// Covariance that the remaining uncertainty of the choice adds to the estimate of the last fit.
@@ -29,9 +26,6 @@ pub(crate) trait Decision: Sync {
 }
 
 /// Makes the decisions of a list until none revises a choice.
-///
-/// # Errors
-/// As [`Decision::decide`].
 pub(crate) fn decide_all(decisions: &[&dyn Decision], work: &mut Workspace<'_, '_>) -> Result<(), IdentificationError> {
     'from_top: loop {
         for decision in decisions {

@@ -1,4 +1,4 @@
-//! Whether the torque contains the inertia of the drives.
+//! Decision: does the torque contain the inertia of the drives?
 
 use super::choices::Drives;
 use super::decision::{Decision, Next};

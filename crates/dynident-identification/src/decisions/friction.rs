@@ -1,4 +1,4 @@
-//! Friction of the joints: terms, then their constants, and the cut-off for a fit with them.
+//! Decision: friction terms, their constants, and the cut-off for a fit with them.
 
 use super::choices::FrictionChoice;
 use super::decision::{Decision, Next};
@@ -34,7 +34,7 @@ impl Decision for Friction {
         let friction = match of_excerpt {
             None if !is_open => stated_friction(&passes, &robot)?,
             None => {
-                // The width of a step at rest shows mostly above the band of the motion.
+                // The width of a friction step is visible mostly above the band of the motion.
                 let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
                 let friction = friction_of_logs(&passes, &of_constants, &robot, grid)?;
                 cutoff = choose_cutoff(&logs, settings, &friction.model, training)?;
@@ -56,7 +56,6 @@ impl Decision for Friction {
         Ok(Next::Proceed)
     }
 
-    /// Uncertainty of the selected constants.
     fn error(&self, work: &Workspace<'_, '_>) -> Option<(ErrorSource, DMatrix<f64>)> {
         let FrictionChoice::Made(friction) = &work.choices.friction else { return None };
         let fit = work.fit.as_ref()?;

@@ -1,4 +1,4 @@
-//! Friction with the constants of a grid: enough to estimate a lag, in a third of the time.
+//! Decision: friction on a grid of constants. It is sufficient to estimate a lag, in a third of the time.
 
 use super::choices::FrictionChoice;
 use super::decision::{Decision, Next};

@@ -1,4 +1,4 @@
-//! The lag of the torque that the rows of the fit show.
+//! Decision: the lag of the torque in the rows of the fit.
 
 use super::decision::{Decision, Next};
 use super::workspace::Workspace;
@@ -26,7 +26,6 @@ impl Decision for Lag {
         Ok(Next::Proceed)
     }
 
-    /// Remaining uncertainty of the lag.
     fn error(&self, work: &Workspace<'_, '_>) -> Option<(ErrorSource, DMatrix<f64>)> {
         let estimate = &work.fit.as_ref()?.estimation.estimate;
         let covariance = work.choices.lag.error(work.lag_fit.as_ref(), estimate)?;
@@ -34,8 +33,8 @@ impl Decision for Lag {
     }
 }
 
-/// The lags of the joints, estimated together with the parameters. `None` if they cannot be compensated: rows of some
-/// joints are missing, or noise of the positions biases the estimator, and with it the lag.
+/// Estimates the lags of the joints together with the parameters. `None` if they cannot be compensated: rows of some
+/// joints are missing, or position noise biases the estimator and the lag.
 pub(super) fn free_lag(fit: &Fit<'_>, training: &[usize]) -> Result<Option<LagFit>, IdentificationError> {
     let Fit { logs, training: rows, estimation, settings } = fit;
     if rows.joints.len() != rows.model.dof() || !settings.estimation.estimator.reads_filtered_rows() {

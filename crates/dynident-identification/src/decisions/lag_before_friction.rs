@@ -1,10 +1,10 @@
-//! The lag that is compensated before friction is selected.
+//! Decision: the lag that is compensated before friction is selected.
 //!
-//! Selecting friction takes most of the time, so the lag is first looked for with friction of a grid. Friction that is
-//! selected from rows with a lag can compensate it, above all Maxwell-slip friction, which acts late itself. Conversely,
-//! friction that no stated term describes looks like a lag. Two rules follow. A lag that shows with friction of all
-//! terms is estimated with friction without memory. A lag that shows only with the stated terms is accepted if the
-//! Bayesian information criterion of the fit with all terms is lower with it than without it.
+//! Selecting friction takes most of the time, so the lag is first estimated with friction on a grid. Friction that is
+//! selected from rows with a lag can compensate it, above all Maxwell-slip friction, which itself acts late.
+//! Conversely, friction outside of the stated terms looks like a lag. So a lag that is significant with all friction
+//! terms is estimated with friction without memory. A lag that is significant only with the stated terms is accepted if
+//! it lowers the Bayesian information criterion of the fit with all terms.
 
 use super::choices::FrictionChoice;
 use super::cutoff::Cutoff;
@@ -21,9 +21,7 @@ use crate::training::TrainingPasses;
 
 pub(super) struct LagBeforeFriction;
 
-/// A grid of all friction terms.
 const ALL_TERMS: [&dyn Decision; 3] = [&DriveInertia, &Cutoff, &GridOfFriction(GridTerms::All)];
-/// The lag with friction that has no memory.
 const WITHOUT_MEMORY: [&dyn Decision; 4] = [&DriveInertia, &Cutoff, &GridOfFriction(GridTerms::WithoutMemory), &Lag];
 
 impl Decision for LagBeforeFriction {
@@ -31,11 +29,11 @@ impl Decision for LagBeforeFriction {
         if work.choices.has_lag_before_friction || !is_friction_open(&work.settings, &work.task.robot) {
             return Ok(Next::Proceed);
         }
-        let mut without = work.look(work.choices.clone());
-        decide_all(&ALL_TERMS, &mut without)?;
-        let is_seen = shows_lag(&mut without)?;
+        let mut without_lag = work.trial(work.choices.clone());
+        decide_all(&ALL_TERMS, &mut without_lag)?;
+        let is_seen = shows_lag(&mut without_lag)?;
         let has_lag = is_seen || {
-            let mut stated = without.look(without.choices.with_open_friction());
+            let mut stated = without_lag.trial(without_lag.choices.with_open_friction());
             let logs = stated.logs_at(stated.choices.cutoff().map(|choice| choice.cutoff_hz))?;
             let passes = TrainingPasses::of_logs(&logs, &stated.settings, stated.training, &stated.task.payloads);
             let friction = stated_friction(&passes, &stated.drives().robot)?;
@@ -44,35 +42,35 @@ impl Decision for LagBeforeFriction {
             work.logs_s += stated.logs_s;
             shows
         };
-        work.logs_s += without.logs_s;
+        work.logs_s += without_lag.logs_s;
         if !has_lag {
-            work.take_look(without);
+            work.adopt(without_lag);
             return Ok(Next::Proceed);
         }
 
-        // The common lag with friction without memory, until none shows. Lags of single joints can be estimated only
-        // with fully selected friction.
+        // Revise the common lag with memoryless friction until it is no longer significant. Lags of single joints need
+        // fully selected friction.
         let candidates = work.settings.lags;
-        let common = without.choices.with_open_friction().with_lag(LagRounds::of(LagCandidates::Common));
-        let mut late = without.look(common);
-        decide_all(&WITHOUT_MEMORY, &mut late)?;
-        late.choices.lag = LagRounds::of(candidates).after(late.choices.lag.clone().choice());
-        work.logs_s += late.logs_s;
+        let common = without_lag.choices.with_open_friction().with_lag(LagRounds::of(LagCandidates::Common));
+        let mut with_lag = without_lag.trial(common);
+        decide_all(&WITHOUT_MEMORY, &mut with_lag)?;
+        with_lag.choices.lag = LagRounds::of(candidates).after(with_lag.choices.lag.clone().choice());
+        work.logs_s += with_lag.logs_s;
         if is_seen {
-            late.choices.friction = FrictionChoice::Open;
-            work.take_look(late);
+            with_lag.choices.friction = FrictionChoice::Open;
+            work.adopt(with_lag);
             return Ok(Next::Proceed);
         }
-        let mut late = late.look(late.choices.with_open_friction());
-        decide_all(&ALL_TERMS, &mut late)?;
-        let is_better = criterion(&mut late)? < criterion(&mut without)?;
-        work.logs_s += late.logs_s;
-        work.take_look(if is_better { late } else { without });
+        let mut with_lag = with_lag.trial(with_lag.choices.with_open_friction());
+        decide_all(&ALL_TERMS, &mut with_lag)?;
+        let is_better = criterion(&mut with_lag)? < criterion(&mut without_lag)?;
+        work.logs_s += with_lag.logs_s;
+        work.adopt(if is_better { with_lag } else { without_lag });
         Ok(Next::Proceed)
     }
 }
 
-/// Whether the rows of the fit show a common lag that should be compensated.
+/// Whether the rows of the fit show a significant common lag.
 fn shows_lag(work: &mut Workspace<'_, '_>) -> Result<bool, IdentificationError> {
     let training = work.training;
     let fit = work.fit()?;
@@ -80,7 +78,6 @@ fn shows_lag(work: &mut Workspace<'_, '_>) -> Result<bool, IdentificationError> 
     Ok(LagRounds::of(LagCandidates::Common).again(lags.as_ref(), &fit.estimation.estimate))
 }
 
-/// Bayesian information criterion of the fit.
 fn criterion(work: &mut Workspace<'_, '_>) -> Result<f64, IdentificationError> {
     let fit = work.fit()?;
     Ok(schwarz(&fit.training.problem, &fit.estimation.estimate))

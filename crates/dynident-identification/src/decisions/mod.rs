@@ -1,8 +1,7 @@
-//! Everything that the training logs decide before the last fit: drive inertia, cut-off, friction and lag.
+//! Decisions of the training logs before the last fit: drive inertia, cut-off, friction and lag.
 //!
-//! Each is one [`Decision`]. An open decision is made from the rows under the choices so far. A decision that revises a
-//! choice reopens the choices that depend on it. The driver then starts again at the top of the list, until every
-//! decision is made and none revises a choice.
+//! An open [`Decision`] is made from the rows under the current choices. A decision that revises a choice reopens the
+//! choices that depend on it. The driver then starts again at the top of the list, until no decision revises a choice.
 
 mod choices;
 mod cutoff;
@@ -27,6 +26,5 @@ use friction::Friction;
 use lag::Lag;
 use lag_before_friction::LagBeforeFriction;
 
-/// All decisions, in the order in which open ones are made.
 pub(crate) const DECISIONS: [&dyn Decision; 6] =
     [&DriveInertia, &Cutoff, &LagBeforeFriction, &Friction, &Lag, &CutoffOfFriction];

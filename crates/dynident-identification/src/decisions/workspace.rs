@@ -1,4 +1,4 @@
-//! Rows and fits under the choices so far.
+//! Rows and fits under the current choices.
 
 use super::choices::{Choices, Drives, FrictionChoice};
 use crate::error::IdentificationError;
@@ -11,14 +11,12 @@ use crate::task::IdentificationTask;
 use crate::training::training_rows;
 use dynident_rows::{Execution, Logs};
 
-/// What a fit estimates.
 pub(crate) enum Job<'w> {
     Model(Option<&'w mut (dyn InstrumentSource + 'w)>),
     Payload(&'w KnownArm),
 }
 
 impl<'w> Job<'w> {
-    /// The same for a shorter time.
     pub(crate) fn shorter<'s>(self) -> Job<'s>
     where
         'w: 's,
@@ -37,36 +35,31 @@ impl<'w> Job<'w> {
         }
     }
 
-    /// Whether it is a model without external instruments, which can be fitted repeatedly.
+    /// Whether this is a model without external instruments, which can be fitted repeatedly.
     pub(crate) fn is_plain(&self) -> bool {
         matches!(self, Self::Model(None))
     }
 }
 
-/// A task with the choices so far, and the rows and the fit under them.
 pub(crate) struct Workspace<'a, 'w> {
     pub(super) task: &'a IdentificationTask,
-    /// Numbers of the training recordings.
     pub(super) training: &'w [usize],
-    /// The task's settings with the lag in force.
+    /// Settings of the task with the lag in use.
     pub(super) settings: IdentificationSettings,
     pub(super) choices: Choices,
-    /// The fit under the choices; `None` until it is needed.
+    /// The fit under the choices; `None` until needed.
     pub(super) fit: Option<Fit<'a>>,
-    /// The lags that the rows of the fit show, after the lag was decided.
+    /// Lags in the rows of the fit, after the lag was decided.
     pub(super) lag_fit: Option<LagFit>,
-    /// Whether the lag is left to the logs.
     pub(super) is_lag_free: bool,
-    /// Time to read logs, s.
     pub(crate) logs_s: f64,
     job: Job<'w>,
     execution: Execution<'a>,
-    /// Logs with the lag in force, one for each cut-off; the first has the cut-off that the spectra suggest.
+    /// Logs with the lag in use, one entry per cut-off; the first has the cut-off that the spectra suggest.
     logs: Vec<Logs<'a>>,
 }
 
 impl<'a, 'w> Workspace<'a, 'w> {
-    /// Begins with these choices; with all of them open if there are none.
     pub(crate) fn new(
         task: &'a IdentificationTask,
         training: &'w [usize],
@@ -95,18 +88,17 @@ impl<'a, 'w> Workspace<'a, 'w> {
         work
     }
 
-    /// The same task with other choices, to look at a fit that is not the last.
-    pub(super) fn look(&self, choices: Choices) -> Workspace<'a, 'w> {
-        let mut look = Workspace::new(self.task, self.training, self.execution, Job::Model(None), Some(choices));
-        if look.settings.motion.torque_lag_s == self.settings.motion.torque_lag_s {
-            look.logs.clone_from(&self.logs);
+    pub(super) fn trial(&self, choices: Choices) -> Workspace<'a, 'w> {
+        let mut trial = Workspace::new(self.task, self.training, self.execution, Job::Model(None), Some(choices));
+        if trial.settings.motion.torque_lag_s == self.settings.motion.torque_lag_s {
+            trial.logs.clone_from(&self.logs);
         }
-        look
+        trial
     }
 
-    /// Goes on with the choices of a look: its lag is compensated, its friction of a grid is a start.
-    pub(super) fn take_look(&mut self, look: Self) {
-        let Workspace { mut choices, logs, .. } = look;
+    /// Adopts the choices of a trial: its lag is compensated, and its grid friction is a start.
+    pub(super) fn adopt(&mut self, trial: Self) {
+        let Workspace { mut choices, logs, .. } = trial;
         if let FrictionChoice::Grid(grid) = core::mem::replace(&mut choices.friction, FrictionChoice::Open) {
             choices.grid = Some(grid);
         }
@@ -115,14 +107,12 @@ impl<'a, 'w> Workspace<'a, 'w> {
         self.take_lag();
     }
 
-    /// Puts the lag of the choices into the settings.
     fn take_lag(&mut self) {
         if self.is_lag_free {
             self.settings.motion.torque_lag_s = self.choices.lag.torque_lag_s();
         }
     }
 
-    /// Compensates the lag of the choices from now on and reopens the choices that depend on it.
     pub(super) fn revise_lag(&mut self) {
         self.take_lag();
         self.logs.clear();
@@ -130,18 +120,17 @@ impl<'a, 'w> Workspace<'a, 'w> {
         self.choices.reopen();
     }
 
-    /// The known arm that payloads are identified on.
     pub(super) fn arm(&self) -> Option<&KnownArm> {
         self.job.arm()
     }
 
-    /// Drive inertia and the robot that has it; with all drives as stated while the decision is open.
+    /// Drive inertia and the robot with it; as stated while the decision is open.
     pub(super) fn drives(&self) -> Drives {
         let stated = || Drives { robot: self.task.robot.clone(), choice: None };
         self.choices.drives.clone().unwrap_or_else(stated)
     }
 
-    /// The logs with this cut-off, or with that of the spectra; a motion that was read before is not read again.
+    /// The logs with this cut-off, or with that of the spectra. A stored motion is not read again.
     pub(super) fn logs_at(&mut self, cutoff_hz: Option<f64>) -> Result<Logs<'a>, IdentificationError> {
         if self.logs.is_empty() {
             let of_arm_hz = self.job.arm().and_then(KnownArm::cutoff_hz);
@@ -158,7 +147,6 @@ impl<'a, 'w> Workspace<'a, 'w> {
         }
     }
 
-    /// The fit under the choices.
     pub(super) fn fit(&mut self) -> Result<&Fit<'a>, IdentificationError> {
         let fit = match self.fit.take() {
             Some(fit) => fit,
@@ -191,24 +179,22 @@ impl<'a, 'w> Workspace<'a, 'w> {
         };
         let mut fit = Fit { logs, training: rows, estimation, settings: settings.clone() };
         if matches!(self.choices.friction, FrictionChoice::Grid(_)) {
-            // A later fit replaces this one, so noise of the positions is left in it.
+            // A later fit replaces this one, so its position noise is acceptable.
             take_estimator(&mut fit);
             return Ok(fit);
         }
         with_less_noise(self.task, &robot, training, fit)
     }
 
-    /// The choices so far.
     pub(crate) fn choices(&self) -> &Choices {
         &self.choices
     }
 
-    /// Makes the fit under the choices, if it is not made yet.
     pub(crate) fn finish(&mut self) -> Result<(), IdentificationError> {
         self.fit().map(|_| ())
     }
 
-    /// The choices, the last fit, the lags that its rows show, and whether the lag was left to the logs.
+    /// The choices, the last fit, the lags in its rows, and whether the lag is automatic.
     pub(crate) fn into_parts(mut self) -> Result<(Choices, Fit<'a>, Option<LagFit>, bool), IdentificationError> {
         let fit = match self.fit.take() {
             Some(fit) => fit,

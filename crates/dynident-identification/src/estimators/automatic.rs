@@ -1,4 +1,4 @@
-//! Weighted least squares where nothing speaks against it, instruments where noise in the regressor biases it.
+//! Automatic selection: weighted least squares, or instruments if noise in the regressor biases it.
 
 use super::exogeneity::{examined, harmless};
 use super::instrumental::InstrumentSettings;
@@ -6,7 +6,7 @@ use super::noise_in_regressor::{NoiseInRegressor, NoiseVerdict};
 use super::{Estimation, EstimatorError, TrainingRows};
 use dynident_estimation::{Estimate, EstimateStatus, InstrumentalEstimate};
 
-/// The weighted estimate, or that of instruments where least squares is biased and they are strong.
+/// The weighted estimate, or that of instruments if least squares is biased and the instruments are strong.
 pub(super) fn automatic(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -25,12 +25,9 @@ pub(super) fn automatic(
     Ok(Estimation { noise_in_regressor: Some(noise), ..Estimation::plain(estimate) })
 }
 
-/// What noise does to least squares, with the instruments' estimate where these had to be asked; none where it cannot
-/// be examined: it can where all columns are the robot's own and free, all joints have rows, and no piece of a log is
-/// too short for a lower filter.
-///
-/// # Errors
-/// Logs that cannot be read.
+/// Tests the effect of noise on least squares; returns the instruments' estimate if it was needed. `None` if the test
+/// is not possible. It requires columns of the robot only, all of them free, rows for all joints, and pieces of logs
+/// that are long enough for a lower filter.
 pub(super) fn examined_where_possible(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -50,7 +47,7 @@ pub(super) fn examined_where_possible(
     });
     match found {
         Ok(found) => Ok(Some(found)),
-        // The estimate stands without it.
+        // Without the test the estimate is still valid.
         Err(EstimatorError::Estimation(_) | EstimatorError::Instruments { .. }) => Ok(None),
         Err(error) => Err(error),
     }

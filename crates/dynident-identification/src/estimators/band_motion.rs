@@ -1,29 +1,24 @@
-//! The motion of a log through a low-pass of its own, whole: instruments that no second reading of the file is needed
-//! for.
+//! Instruments from the motion of a log behind an additional low-pass, without reading the file again.
 
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
 use dynident_recording::derivative::ButterworthZeroPhase;
 use dynident_recording::{Derivatives, Differentiator, FilterError, MotionBlock, Place, cutoff};
 use dynident_rows::{LogError, LogPass};
-use rayon::prelude::*;
 
-/// Order of the low-pass, as of the differentiator's default.
+/// Order of the low-pass, equal to the default of the differentiator.
 const ORDER: usize = 4;
 
-/// One uninterrupted piece: q, dq, ddq of every joint of the log.
+/// One uninterrupted segment: q, dq, ddq of every joint of the log.
 type Piece = Vec<[Vec<f64>; 3]>;
 
-/// The positions of a log behind the differentiator, through a zero-phase Butterworth filter.
+/// The positions of a log after the differentiator and a zero-phase Butterworth filter.
 pub(super) struct BandMotion<'r, 'a> {
     rows: &'r TrainingRows<'a>,
     cutoff_hz: f64,
-    /// Samples of a log, at most; `None` for all.
     most_samples: Option<u64>,
     log: usize,
-    /// Numbers of the pieces of the log begun, and their motion.
     pieces: Vec<(usize, Piece)>,
-    /// Piece and sample that come next.
     next: (usize, usize),
 }
 
@@ -52,11 +47,7 @@ impl InstrumentSource for BandMotion<'_, '_> {
         self.pieces.clear();
         for (segment, q) in pieces {
             let one = |q: &Vec<f64>| self.smoothed(rate_hz, q);
-            let piece = if self.rows.logs.execution.parallel() {
-                q.par_iter().map(one).collect::<Result<Piece, _>>()
-            } else {
-                q.iter().map(one).collect()
-            };
+            let piece = self.rows.logs.execution.try_map(&q, one);
             let piece = piece.map_err(|problem| self.refused(format!("the instruments' filter: {problem}")))?;
             self.pieces.push((segment, piece));
         }
@@ -87,7 +78,7 @@ impl InstrumentSource for BandMotion<'_, '_> {
     }
 }
 
-/// Positions of a log by uninterrupted piece and joint, and their rate.
+/// Positions of a log by segment and joint, and their rate.
 type Positions = (f64, Vec<(usize, Vec<Vec<f64>>)>);
 
 fn positions(rows: &TrainingRows<'_>, log: usize, most_samples: Option<u64>) -> Result<Positions, LogError> {
@@ -108,8 +99,8 @@ fn positions(rows: &TrainingRows<'_>, log: usize, most_samples: Option<u64>) -> 
     Ok((rate_hz, pieces))
 }
 
-/// The cut-off of the motion behind the regressor: that in force, or what the longest piece of a log asks for, the
-/// highest of all training logs'.
+/// Cut-off of the motion in the regressor: the one in use, or the highest suggested by the longest piece of each
+/// training log.
 pub(super) fn regressor_cutoff_hz(rows: &TrainingRows<'_>) -> Result<f64, LogError> {
     if let Some(cutoff_hz) = rows.logs.motion.differentiator.cutoff_hz() {
         return Ok(cutoff_hz);

@@ -1,33 +1,33 @@
-//! What an estimator needs and does not find.
+//! Errors of estimators.
 
 use dynident_estimation::EstimationError;
 use dynident_rows::LogError;
 use thiserror::Error;
 
-/// Why an estimator gives no estimate.
+/// Reason for a missing estimate.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EstimatorError {
-    /// A recording that gives no rows.
+    /// A recording gives no rows.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// Rows that do not carry an estimate.
+    /// The rows do not determine an estimate.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
-    /// A log or robot that lacks what the estimator chosen needs.
+    /// A log or robot does not meet a requirement of the estimator.
     #[error("estimator.method = \"{method}\": {message}")]
     Requirement {
-        /// The estimator.
+        /// Name of the estimator.
         method: &'static str,
-        /// What is wrong, and the fix.
+        /// Problem and fix.
         message: String,
     },
-    /// Instruments that do not belong to the log.
+    /// The instruments do not match the log.
     #[error("log `{log}`, instruments: {message}")]
     Instruments {
-        /// The log.
+        /// Name of the log.
         log: String,
-        /// What is wrong, and the fix.
+        /// Problem and fix.
         message: String,
     },
 }

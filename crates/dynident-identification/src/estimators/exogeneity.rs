@@ -1,40 +1,30 @@
-//! Does noise in the regressor bias least squares, and with which instruments is the estimate free of it?
+//! Test for bias of least squares by noise in the regressor, and selection of instruments.
 //!
-//! Instruments of half the regressor's cut-off hold the motion and hardly any of the noise of its accelerations (with
-//! white noise of the positions three hundredths of its power). Least squares is found biased where torque does not
-//! follow what these instruments leave over ([`fast_motion`]) *and* the estimates differ by more than their error bars.
-//! Then the instruments' cut-off goes down, and the highest one is taken below which the estimate no longer moves
-//! (Lepski, Theory Probab. Appl. 35 (1990) 454): as little noise as shows, as much of the motion as there is.
+//! Instruments with half the regressor's cut-off contain the motion and hardly any noise of the accelerations (for
+//! white position noise 3 % of its power). Least squares is biased if the torque does not follow the fast motion, which
+//! these instruments remove ([`fast_motion`]), *and* the estimates differ by more than their error bars. Then the
+//! cut-off of the instruments is lowered. The highest cut-off is selected below which the estimate no longer changes
+//! (Lepski, Theory Probab. Appl. 35 (1990) 454): a compromise between noise and motion content.
 
 use super::band_motion::regressor_cutoff_hz;
 use super::instrumental::{BandEstimate, InstrumentSettings, fast_motion_problem, with_band};
 use super::noise_in_regressor::{EstimateContrast, NoiseInRegressor, NoiseVerdict};
 use super::{EstimatorError, TrainingRows};
+use crate::thresholds::NoiseThresholds;
 use dynident_estimation::{
     Estimate, HausmanTest, HausmanVerdict, InstrumentReport, InstrumentalEstimate, fast_motion, hausman_test,
     weighted_least_squares,
 };
 
-/// Parts of the regressor's cut-off that are tried in turn until the instruments are strong.
-const SHARES: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, 0.84];
-/// From band to band.
-const STEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
-/// Bands below the first, at most: six octaves.
-const MOST_BANDS: usize = 12;
-/// Torque that follows less than this of the fast motion says that noise is a good part of it.
-const FOLLOWED: f64 = 0.75;
-/// Two estimates agree where they differ by less than this, in error bars of the one that is nearer to the truth: root
-/// mean square over the parameters, and largest. Two independent ones with the same bars differ by 1.4.
-const AGREEMENT: [f64; 2] = [1.5, 3.0];
-/// Where the fast motion would need less than this share of the torque, instruments of the first band show what its
-/// noise does; where more, they may hold so much of it themselves that lower ones are asked in any case.
-const LARGE_SHARE: f64 = 0.1;
-/// Noise cannot move the parameters by more error bars (root mean square) than `√(Σ_j ‖V_j θ‖² / σ_j² / p)`: below this
-/// it is no matter. Small, for where noise is large, θ and with it this bound are too.
-const LEAST_MOVE: f64 = 0.3;
+/// Ratios to the regressor's cut-off, tried in turn until the instruments are strong.
+const CUTOFF_RATIOS: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, 0.84];
+/// Ratio of neighbouring bands.
+const BAND_RATIO: f64 = core::f64::consts::FRAC_1_SQRT_2;
+/// Maximum number of bands below the first: six octaves.
+const MAX_BANDS: usize = 12;
 
-/// Least squares examined with the logs' own motion of a lower band, and the instruments' estimate in the band that
-/// suits best.
+/// Tests least squares with the logs' own motion in a lower band, and returns the instruments' estimate in the selected
+/// band.
 pub(super) fn examined(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -46,18 +36,20 @@ pub(super) fn examined(
     };
     let estimation = rows.settings;
     let fast = fast_motion(&first.problem, &first.found, estimation.rank, estimation.covariance)?;
-    let agrees = |band: &BandEstimate| contrast(least_squares, &band.found.estimate).as_ref().is_none_or(agree);
-    let noise = fast.filter(|fast| fast.followed + fast.half_width_95 < FOLLOWED);
-    let is_suspect = noise.is_some_and(|noise| noise.share_of_torque > LARGE_SHARE || !agrees(&first));
+    let thresholds = &estimation.thresholds.noise;
+    let agrees = |band: &BandEstimate| agree(least_squares, &band.found.estimate, thresholds);
+    let noise = fast.filter(|fast| fast.followed + fast.half_width_95 < thresholds.max_followed);
+    let is_suspect =
+        noise.is_some_and(|noise| noise.share_of_torque > thresholds.max_fast_torque_share || !agrees(&first));
     let chosen = if is_suspect && settings.cutoff_hz.is_none() && is_strong(&first, least_squares) {
-        settled_band(rows, settings, first, least_squares)
+        highest_stable_band(rows, settings, first, least_squares)
     } else {
         first
     };
     let verdict = if is_suspect && !agrees(&chosen) {
         NoiseVerdict::BiasesLeastSquares
     } else if fast.is_none() || chosen.found.instruments.weak {
-        // Weak instruments agree with least squares whatever is true.
+        // Weak instruments agree with least squares in any case.
         NoiseVerdict::Undecided
     } else {
         NoiseVerdict::Harmless
@@ -70,13 +62,13 @@ pub(super) fn examined(
     Ok((chosen.found, noise))
 }
 
-/// Whether noise can matter at all, from the torques alone that least squares' parameters need for the motion and for
-/// its part below half the cut-off: some milliseconds, where instruments take tens. None where they have to be asked.
+/// A fast test whether noise can matter, from the torques of the complete motion and of its part below half the cut-off
+/// (some milliseconds, compared with tens for instruments). `None` if instruments are needed.
 pub(super) fn harmless(
     rows: &TrainingRows<'_>,
     least_squares: &Estimate,
 ) -> Result<Option<NoiseInRegressor>, EstimatorError> {
-    let cutoff_hz = SHARES[0] * regressor_cutoff_hz(rows)?;
+    let cutoff_hz = CUTOFF_RATIOS[0] * regressor_cutoff_hz(rows)?;
     let (problem, squares) = fast_motion_problem(rows, cutoff_hz, &least_squares.values)?;
     let terms = squares.iter().zip(&least_squares.joint_sigma);
     let move_squared: f64 =
@@ -85,11 +77,12 @@ pub(super) fn harmless(
     let settings = rows.settings.weighted();
     let followed = weighted_least_squares(&problem, &settings).ok().filter(|fit| fit.rank.fixed.is_empty());
     let followed = followed.map(|fit| (fit.values[0], fit.half_width_95[0]));
-    let is_motion = followed.is_none_or(|(followed, half_width)| followed + half_width > FOLLOWED);
-    if !is_motion && (move_squared / columns as f64).sqrt() > LEAST_MOVE {
+    let thresholds = &rows.settings.thresholds.noise;
+    let is_motion = followed.is_none_or(|(followed, half_width)| followed + half_width > thresholds.max_followed);
+    if !is_motion && (move_squared / columns as f64).sqrt() > thresholds.min_parameter_shift {
         return Ok(None);
     }
-    let reason = "not made: torque follows the fast motion, or there is too little of it to matter".to_owned();
+    let reason = "not tested: torque follows the fast motion, or the fast motion is too small to matter".to_owned();
     let (verdict, degrees_of_freedom) = (HausmanVerdict::Undecided, [0.0; 2]);
     let test =
         HausmanTest { verdict, f: None, degrees_of_freedom, p_value: None, columns: Vec::new(), reason: Some(reason) };
@@ -103,15 +96,15 @@ pub(super) fn harmless(
     Ok(Some(NoiseInRegressor { verdict: NoiseVerdict::Harmless, ..NoiseInRegressor::of_test(instruments, test) }))
 }
 
-/// The lowest of the shares whose instruments are strong, or the highest of them.
+/// The lowest cut-off ratio with strong instruments, or the highest ratio.
 fn first_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
     least_squares: &Estimate,
 ) -> Result<BandEstimate, EstimatorError> {
     let cutoff_hz = regressor_cutoff_hz(rows)?;
-    let mut band = with_band(rows, settings, SHARES[0] * cutoff_hz)?;
-    for share in &SHARES[1..] {
+    let mut band = with_band(rows, settings, CUTOFF_RATIOS[0] * cutoff_hz)?;
+    for share in &CUTOFF_RATIOS[1..] {
         if is_strong(&band, least_squares) {
             break;
         }
@@ -120,38 +113,40 @@ fn first_band(
     Ok(band)
 }
 
-/// The highest band below which the estimate does not move any more.
-fn settled_band(
+/// The highest band below which the estimate no longer changes.
+fn highest_stable_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
     first: BandEstimate,
     least_squares: &Estimate,
 ) -> BandEstimate {
     let mut bands = vec![first];
-    while let Some(last) = bands.last().filter(|_| bands.len() <= MOST_BANDS) {
-        // A piece may be too short for a low filter: the bands so far remain.
-        let Ok(band) = with_band(rows, settings, STEP * last.cutoff_hz) else { break };
+    while let Some(last) = bands.last().filter(|_| bands.len() <= MAX_BANDS) {
+        // If a piece is too short for a low filter, the previous bands are used.
+        let Ok(band) = with_band(rows, settings, BAND_RATIO * last.cutoff_hz) else { break };
         if !is_strong(&band, least_squares) {
             break;
         }
         bands.push(band);
     }
-    let settles = |place: &usize| {
+    let is_stable = |place: &usize| {
         let (band, lower) = (&bands[*place].found.estimate, &bands[place + 1..]);
-        lower.iter().all(|lower| contrast(band, &lower.found.estimate).as_ref().is_none_or(agree))
+        lower.iter().all(|lower| agree(band, &lower.found.estimate, &rows.settings.thresholds.noise))
     };
-    let place = (0..bands.len()).find(settles).unwrap_or(bands.len() - 1);
+    let place = (0..bands.len()).find(is_stable).unwrap_or(bands.len() - 1);
     bands.swap_remove(place)
 }
 
-/// Whether the instruments tell all columns that least squares tells, and tell them well.
+/// Whether the instruments determine all columns that least squares determines, and are strong.
 fn is_strong(band: &BandEstimate, least_squares: &Estimate) -> bool {
     let found = &band.found;
     !found.instruments.weak && found.estimate.rank.fixed.len() <= least_squares.rank.fixed.len()
 }
 
-fn agree(contrast: &EstimateContrast) -> bool {
-    contrast.rms <= AGREEMENT[0] && contrast.largest <= AGREEMENT[1]
+fn agree(a: &Estimate, b: &Estimate, thresholds: &NoiseThresholds) -> bool {
+    contrast(a, b).is_none_or(|contrast| {
+        contrast.rms <= thresholds.max_contrast_rms && contrast.largest <= thresholds.max_contrast
+    })
 }
 
 /// `a − b` in standard deviations of b, over the columns that both estimate.

@@ -1,8 +1,8 @@
-//! The mean period of a repeated motion behind the parallel filter: torque and every column of the regressor alike.
+//! Mean period of a repeated motion after the parallel filter, for torque and all columns of the regressor.
 //!
-//! Columns that are not linear in the motion (friction, above all) must pass the same filter as the torque: a step of
-//! friction whose torque was smoothed and whose column was not is another friction law. A mean period has no ends, so
-//! that the filter runs around it and invents nothing.
+//! Columns that are not linear in the motion (above all friction) must pass the same filter as the torque: a smoothed
+//! torque with an unsmoothed friction step would correspond to another friction law. A mean period is cyclic, so the
+//! filter has no end effects.
 
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_model::terms::JointMotion;
@@ -10,10 +10,9 @@ use dynident_recording::AveragedPeriods;
 use dynident_rows::{PANEL_SAMPLES, RegressorModel};
 use nalgebra::{DMatrix, DVector};
 
-/// The low-pass and how many samples lie between rows.
 #[derive(Clone, Debug)]
 pub(super) struct PeriodFilter {
-    /// Symmetric, of odd length; a single 1 where there is no filter.
+    /// Symmetric, of odd length; a single 1 without a filter.
     pub(super) taps: Vec<f64>,
     pub(super) stride: usize,
 }
@@ -23,16 +22,16 @@ impl PeriodFilter {
         self.taps.len() / 2
     }
 
-    /// The filtered value at sample `at` of a signal that repeats.
+    /// The filtered value at sample `at` of a cyclic signal.
     fn around(&self, signal: &[f64], at: usize) -> f64 {
         let length = signal.len();
-        // The first sample of the filter's support, counted so that it is not negative.
+        // First sample of the filter's support, shifted by whole periods to be nonnegative.
         let first = at + length * (self.half() / length + 1) - self.half();
         self.taps.iter().enumerate().map(|(k, tap)| tap * signal[(first + k) % length]).sum()
     }
 
-    /// Covariance of all channels' deviations from the mean period behind the filter, `Σ_p Σ_k d d ᵀ / (N (P − 1))`
-    /// over the samples that rows are made of.
+    /// Covariance of all channels' deviations from the mean period after the filter, `Σ_p Σ_k d d ᵀ / (N (P − 1))`,
+    /// over the samples of the rows.
     pub(super) fn covariance(&self, channels: &[&[f64]], averaged: &AveragedPeriods) -> DMatrix<f64> {
         let samples = averaged.mean.first().map_or(0, Vec::len);
         let all = samples * averaged.periods;
@@ -42,7 +41,7 @@ impl PeriodFilter {
             .zip(&averaged.mean)
             .map(|(channel, mean)| {
                 let raw: Vec<f64> = (0..all).map(|at| channel[at] - mean[at % samples]).collect();
-                // Beyond the ends nothing is known of the noise; it is zero in the mean.
+                // Beyond the ends the noise is unknown, with mean zero.
                 let filtered = |at: usize| -> f64 {
                     let from = at.saturating_sub(half);
                     let to = (at + half + 1).min(all);
@@ -58,8 +57,8 @@ impl PeriodFilter {
         })
     }
 
-    /// Regressor and torque of the mean period at every row: `(instant, W, τ)`. Channels are those of a mean period,
-    /// positions of all joints first, then velocities, accelerations and torques.
+    /// Regressor and torque of the mean period at every row: `(instant, W, τ)`. Channels are positions of all joints,
+    /// then velocities, accelerations and torques.
     pub(super) fn rows(
         &self,
         model: &RegressorModel,

@@ -1,14 +1,13 @@
-//! Generalised least squares: the joints' rows of the same instants side by side, in one factor.
+//! Generalised least squares: the rows of all joints at an instant in one factor.
 
 use super::{EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{CrossProblem, Estimate, SegmentedFactor, generalized_least_squares};
 use dynident_rows::{JointRows, LogError, RowConsumer};
 
-/// Puts the joints' rows of the same instants side by side.
 struct SideBySide {
     factor: SegmentedFactor,
     panel: Vec<f64>,
-    /// Row by row the least coverage of all joints; empty where all is covered.
+    /// Smallest coverage over the joints, by row; empty if all samples are valid.
     coverage: Vec<f64>,
     counted: Vec<f64>,
     joints: usize,
@@ -16,7 +15,7 @@ struct SideBySide {
 
 impl RowConsumer for SideBySide {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        // Joints of a block come in their order, with as many rows each.
+        // Joints of a block arrive in order, with the same number of rows.
         if rows.joint == 0 {
             self.panel.clear();
             self.coverage.clear();
@@ -27,7 +26,7 @@ impl RowConsumer for SideBySide {
             self.coverage.iter_mut().zip(rows.coverage).for_each(|(least, own)| *least = least.min(*own));
         }
         if rows.joint + 1 == self.joints {
-            // An instant counts where it does for every joint.
+            // An instant is valid if it is valid for every joint.
             let all = JointRows { panel: &self.panel, coverage: &self.coverage, ..*rows };
             let counted = all.counted(&mut self.counted);
             self.factor.absorb(counted.panel, counted.rows)?;
@@ -36,7 +35,6 @@ impl RowConsumer for SideBySide {
     }
 }
 
-/// The estimate, from one more pass over the logs.
 pub(super) fn generalized(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), EstimatorError> {
     let TrainingRows { logs, model, problem, .. } = *rows;
     let settings = rows.settings;

@@ -1,5 +1,4 @@
-//! A log's rows with their instruments, `[Z | W | τ]`: two motions through the same regressor and the same parallel
-//! filter.
+//! Rows of a log with their instruments, `[Z | W | τ]`: both motions pass the same regressor and parallel filter.
 
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
@@ -12,7 +11,7 @@ use dynident_rows::{
     predicted_torque, set_aside,
 };
 
-/// The factors of one log's `[Z | W | τ]`, one for each joint.
+/// Factors of `[Z | W | τ]` of one log, one for each joint.
 pub(super) fn instrumented_factors(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -21,8 +20,8 @@ pub(super) fn instrumented_factors(
     made_rows(rows, index, None, None, source).map(|made| made.factors)
 }
 
-/// The factors of `[(W − Z) θ | τ − Z θ]` of one log or of its first samples, one for each joint, and each joint's
-/// `‖(W − Z) θ‖²`.
+/// Factors of `[(W − Z) θ | τ − Z θ]` of one log or of its first samples, one for each joint, and each joint's `‖(W −
+/// Z) θ‖²`.
 pub(super) fn fast_motion_factors(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -45,7 +44,7 @@ fn made_rows<'r, 'a>(
     source.begin(index)?;
     if let Samples::Motion(_) = recording.samples {
         let Some(mut stream) = recording.open(rows.model.model(), &logs.motion)? else {
-            let message = "a motion that is made already has no instruments: give its raw samples".to_owned();
+            let message = "a prepared motion has no instruments; give raw samples".to_owned();
             return Err(EstimatorError::Instruments { log: recording.name.clone(), message });
         };
         let mut block = MotionBlock::default();
@@ -66,23 +65,22 @@ fn made_rows<'r, 'a>(
     refused.map_or(Ok(builder), Err)
 }
 
-/// Rows of both motions as they come.
 struct InstrumentedRows<'r, 'a> {
     rows: &'r TrainingRows<'a>,
     log: String,
     label: String,
     places: Vec<usize>,
-    /// Parameters, where only the torques of both motions are asked for.
+    /// Parameters, if only the torques of both motions are needed.
     theta: Option<&'r [f64]>,
-    /// Columns of each joint's rows beside the last.
+    /// Columns of each joint's rows except the last.
     widths: Vec<usize>,
-    /// Each joint's sum of squares of its first column behind the filter.
+    /// Sum of squares of each joint's first filtered column.
     squares: Vec<f64>,
-    /// Made with the first block, which knows the rate.
+    /// Built with the first block, because it defines the rate.
     filters: Option<JointFilters>,
     factors: Vec<SegmentedFactor>,
-    /// What makes the rows of either motion, instruments first.
-    sides: [Side; 2],
+    /// Row makers of both motions, instruments first.
+    makers: [RowMaker; 2],
     other: MotionBlock,
     temperature_c: Vec<f64>,
     panel: Vec<f64>,
@@ -91,23 +89,21 @@ struct InstrumentedRows<'r, 'a> {
     segment: usize,
 }
 
-/// What makes the rows of one motion.
-struct Side {
+struct RowMaker {
     workspace: BatchWorkspace,
-    /// What friction remembers.
     history: TermHistory,
     panels: Panels,
     motion: [Vec<f64>; 3],
 }
 
-impl Side {
+impl RowMaker {
     fn new(model: &RegressorModel) -> Self {
         let (workspace, history) =
             (BatchWorkspace::new(model.model()), TermHistory::new(model.load_parameters.clone()));
         Self { workspace, history, panels: Panels::default(), motion: Default::default() }
     }
 
-    /// The panels of some samples of `block`, whose joints stand at `places`.
+    /// Computes the panels of some samples of `block`, whose joints have the indices `places`.
     fn make(&mut self, model: &RegressorModel, block: &MotionBlock, places: &[usize], from: usize, samples: usize) {
         in_model_order(block, places, from, samples, &mut self.motion);
         let [q, dq, ddq] = &self.motion;
@@ -140,7 +136,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             widths,
             filters: None,
             factors,
-            sides: [Side::new(rows.model), Side::new(rows.model)],
+            makers: [RowMaker::new(rows.model), RowMaker::new(rows.model)],
             other: MotionBlock::default(),
             temperature_c: Vec::new(),
             panel: Vec::new(),
@@ -166,7 +162,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             if values.len() != numbers {
                 let found = values.len();
                 let message =
-                    format!("{found} numbers for {name} where {numbers} are needed: one for each joint and row");
+                    format!("{found} values for {name}, but {numbers} are needed: give one for each joint and row");
                 return Err(EstimatorError::Instruments { log: self.log.clone(), message });
             }
         }
@@ -177,7 +173,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
         let filters = self.filters.insert(filters);
         if measured.segment != self.segment {
             self.segment = measured.segment;
-            self.sides.iter_mut().for_each(|side| side.history.restart());
+            self.makers.iter_mut().for_each(|maker| maker.history.restart());
             filters.restart();
         }
         let layout = self.rows.model.layout();
@@ -189,10 +185,10 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                     let temperature = measured.joint(&measured.temperature_c, place);
                     self.temperature_c.extend_from_slice(&temperature[from..from + samples]);
                 }
-                self.sides.iter_mut().for_each(|side| side.history.set_temperature(&self.temperature_c));
+                self.makers.iter_mut().for_each(|maker| maker.history.set_temperature(&self.temperature_c));
             }
             let (model, places) = (self.rows.model, &self.places);
-            let [other, own] = &mut self.sides;
+            let [other, own] = &mut self.makers;
             rayon::join(
                 || other.make(model, &self.other, places, from, samples),
                 || own.make(model, measured, places, from, samples),
@@ -201,7 +197,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                 let columns = layout.joint_columns(joint);
                 let gain = self.rows.model.torque_gains.get(joint).copied().unwrap_or(1.0);
                 let torque = &measured.joint(measured.fitted_tau(), place)[from..from + samples];
-                let [other, own] = [&self.sides[0].panels, &self.sides[1].panels];
+                let [other, own] = [&self.makers[0].panels, &self.makers[1].panels];
                 self.panel.clear();
                 if let Some(theta) = self.theta {
                     predicted_torque(other.joint(joint), samples, columns, theta, &mut self.slow);
@@ -214,7 +210,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                     self.panel.extend_from_slice(&own.joint(joint)[..width]);
                     self.panel.extend(torque.iter().map(|torque| gain * torque));
                 }
-                // What does not count is left out of both motions and the torque alike, as in the rows of a fit.
+                // Mask invalid samples in both motions and the torque, as in the rows of a fit.
                 let left_out = set_aside(measured, place, from, samples);
                 let rows = filters.push(joint, &self.panel, samples, left_out).counted(&mut self.counted);
                 if rows.rows > 0 {

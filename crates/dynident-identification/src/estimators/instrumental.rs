@@ -10,28 +10,27 @@ use dynident_estimation::{
     Unexcited, hausman_test, instrumental_variables,
 };
 use dynident_rows::Samples;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Instruments from the motion of the log itself, smoothed more strongly than for the regressor.
+/// Instruments from the motion of the log itself, with a lower cut-off than in the regressor.
 ///
-/// Noise above their cut-off is not in the instruments; what lies below it is, and is small where the motion is slow
-/// against the noise.
+/// They do not contain noise above their cut-off. Noise below it remains, but is small if the motion is slow compared
+/// with the noise.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct InstrumentSettings {
-    /// Cut-off of the zero-phase Butterworth filter of fourth order; by default found from the logs: half of the
-    /// regressor's, which holds the motion, and where noise shows, as much lower as the estimate still changes.
+    /// Cut-off of the zero-phase Butterworth filter of fourth order, hertz. By default half of the regressor's cut-off,
+    /// which contains the motion; if noise is significant, lower while the estimate still changes.
     pub cutoff_hz: Option<f64>,
-    /// First-stage F below which instruments are called weak; 10 by default.
+    /// First-stage F below which instruments are weak; 10 by default.
     pub weak_below: Option<f64>,
-    /// Probability of rejecting least squares where it is right; 0.01 by default.
+    /// Probability of rejecting least squares if it is correct; 0.01 by default.
     pub test_level: Option<f64>,
 }
 
 impl InstrumentSettings {
-    /// The estimator's settings.
+    /// Settings of the estimator.
     pub fn instrumental(&self, estimation: &EstimationSettings) -> InstrumentalSettings {
         let default = InstrumentalSettings::default();
         InstrumentalSettings {
@@ -42,7 +41,7 @@ impl InstrumentSettings {
         }
     }
 
-    /// The test's settings.
+    /// Settings of the Hausman test.
     pub fn hausman(&self, estimation: &EstimationSettings) -> HausmanSettings {
         let default = HausmanSettings::default();
         HausmanSettings {
@@ -53,14 +52,12 @@ impl InstrumentSettings {
     }
 }
 
-/// The estimate with instruments of one band.
 pub(super) struct BandEstimate {
     pub(super) cutoff_hz: f64,
     pub(super) problem: InstrumentedProblem,
     pub(super) found: InstrumentalEstimate,
 }
 
-/// A log's own motion below `cutoff_hz`.
 fn band_source<'r>(
     rows: &'r TrainingRows<'_>,
     index: usize,
@@ -69,32 +66,27 @@ fn band_source<'r>(
 ) -> Box<dyn InstrumentSource + 'r> {
     match rows.logs.recordings[index].samples {
         Samples::Log(_) => Box::new(BandMotion::new(rows, cutoff_hz, most_samples)),
-        // Its raw samples, where they are at hand.
+        // From raw samples, if available.
         Samples::Motion(_) => Box::new(SmoothedMotion::new(rows.logs, rows.model.model(), cutoff_hz)),
     }
 }
 
-/// Every training log's, side by side.
 fn of_every_log<T: Send>(
     rows: &TrainingRows<'_>,
     one: impl Fn(usize) -> Result<T, EstimatorError> + Sync,
 ) -> Result<Vec<T>, EstimatorError> {
     rows.begin("instruments");
-    let of_logs = if rows.logs.execution.parallel() {
-        rows.training.par_iter().map(|&index| one(index)).collect()
-    } else {
-        rows.training.iter().map(|&index| one(index)).collect()
-    };
+    let of_logs = rows.logs.execution.try_map(rows.training, |&index| one(index));
     rows.logs.end();
     of_logs
 }
 
-/// Samples of all logs together that say whether torque follows the fast motion, and of each at least: it is one
-/// number, and its bar is narrow long before an hour of recording has passed. Memory then does not grow with a log.
+/// Maximum number of samples of all logs for the test of the fast motion, and minimum per log. The test estimates one
+/// coefficient, so minutes of recording are sufficient, and memory does not grow with a log.
 const FAST_MOTION_SAMPLES: [u64; 2] = [200_000, 20_000];
 
-/// `τ − Z θ = κ (W − Z) θ` with one κ, Z of the logs' own motion below `cutoff_hz`; and each joint's `‖(W − Z) θ‖²`. Of
-/// long logs their beginnings count, and the squares are those of as many rows as the problem has.
+/// Problem `τ − Z θ = κ (W − Z) θ` with a single κ and Z from the logs' motion below `cutoff_hz`, and each joint's `‖(W
+/// − Z) θ‖²`. Long logs contribute their beginnings, and the squares are scaled to the number of rows of the problem.
 pub(super) fn fast_motion_problem(
     rows: &TrainingRows<'_>,
     cutoff_hz: f64,
@@ -120,7 +112,7 @@ pub(super) fn fast_motion_problem(
     Ok((problem, squares))
 }
 
-/// With the logs' own motion below `cutoff_hz` as instruments.
+/// Uses the logs' motion below `cutoff_hz` as instruments.
 pub(super) fn with_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -141,7 +133,7 @@ pub(super) fn with_instruments(
 ) -> Result<(InstrumentalEstimate, NoiseInRegressor), EstimatorError> {
     rows.begin("instruments");
     let factors = rows.training.iter().map(|&index| instrumented_factors(rows, index, source));
-    // Instruments from outside have no noise of these positions: they alone say what the logs excite.
+    // External instruments do not contain this position noise, so they alone determine which columns are excited.
     let problem =
         instrumented_problem(rows, factors.collect::<Result<Vec<_>, _>>()?)?.with_unexcited(Unexcited::default())?;
     rows.logs.end();
@@ -151,7 +143,7 @@ pub(super) fn with_instruments(
     Ok((found, noise))
 }
 
-/// All logs' rows over one set of columns; one list of factors for each training log.
+/// Rows of all logs over one set of columns; `factors` has one list for each training log.
 fn instrumented_problem(
     rows: &TrainingRows<'_>,
     factors: Vec<Vec<SegmentedFactor>>,

@@ -1,25 +1,25 @@
-//! Instruments for a log: a second account of the same motion, sample by sample, that is free of the noise in the
-//! first.
+//! Instruments for a log: a second description of the same motion whose noise is independent of the first.
 
 use super::EstimatorError;
 use dynident_model::Model;
 use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings, MotionStream};
 use dynident_rows::{LogError, Logs};
 
-/// Where the motion behind the instruments comes from: [`SmoothedMotion`] of the same log, or a simulation of the
-/// closed loop with the current model, which a crate above this one can plug in.
+/// Source of the instruments' motion: [`SmoothedMotion`] of the same log, or a simulation of the closed loop with the
+/// current model, provided by another crate.
 pub trait InstrumentSource: Send {
-    /// A new pass over recording number `log` of the task begins.
+    /// Begins a new pass over recording `log` of the task.
     ///
     /// # Errors
-    /// If there is no motion for this log.
+    /// There is no motion for this log.
     fn begin(&mut self, log: usize) -> Result<(), EstimatorError>;
 
-    /// Writes `q`, `dq` and `ddq` (joint-major, `joint * rows + row`, the log's order of joints, SI units) for the
-    /// samples of `measured`, which come in the order of time: same rows, same piece of the log. Nothing else of
-    /// `instruments` is read.
+    /// Writes `q`, `dq` and `ddq` (joint-major, `joint * rows + row`, joints in the order of the log, SI units) for the
+    /// samples of `measured`, which arrive in order of time. Rows and segment are those of `measured`. Other fields of
+    /// `instruments` are ignored.
     ///
     /// # Errors
+    /// The motion does not cover these samples.
     /// If the motion does not cover these samples.
     fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), EstimatorError>;
 }
@@ -37,7 +37,7 @@ pub struct SmoothedMotion<'a> {
 }
 
 impl<'a> SmoothedMotion<'a> {
-    /// The motion of the task's logs below `cutoff_hz`; trimmed as the regressor's.
+    /// The motion of the task's logs below `cutoff_hz`, trimmed as in the regressor.
     pub fn new(logs: &'a Logs<'a>, model: &'a Model, cutoff_hz: f64) -> Self {
         let differentiator = DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(cutoff_hz) };
         let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
@@ -53,7 +53,7 @@ impl<'a> SmoothedMotion<'a> {
         EstimatorError::Instruments {
             log: self.log_name(),
             message: "the smoothed motion does not cover the same samples as the regressor: a piece of the log is too short for one of the two filters; \
-                      leave short pieces out with `rows` or `time_range_s`"
+                      exclude short pieces with `rows` or `time_range_s`"
                 .to_owned(),
         }
     }
@@ -66,7 +66,7 @@ impl InstrumentSource for SmoothedMotion<'_> {
         let open = |motion: &MotionSettings| {
             recording.open(model, motion)?.ok_or_else(|| EstimatorError::Instruments {
                 log: recording.name.clone(),
-                message: "a motion that is made already cannot be smoothed anew: give its raw samples".to_owned(),
+                message: "a prepared motion cannot be smoothed again; give raw samples".to_owned(),
             })
         };
         self.stream = Some(open(&self.motion)?);

@@ -1,9 +1,10 @@
-//! Maximum likelihood for a motion that repeats: from logs to mean periods, their noise, and an estimate.
+//! Maximum likelihood for a repeated motion: mean periods of logs, their noise, and the estimate.
 
 use super::filtered_period::PeriodFilter;
-use super::row_pass::Stop;
+use super::row_pass::PassError;
 use super::simulated::torque_sigma;
-use super::{EstimatorError, TrainingRows};
+use super::{EstimatorError, PeriodSettings, TrainingRows};
+use crate::thresholds::MotionThresholds;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{
     CovarianceMethod, Estimate, EstimationError, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
@@ -14,117 +15,49 @@ use dynident_recording::{AveragedPeriods, MotionBlock, averaged_periods};
 use dynident_rows::{LogError, RegressorModel, motion_band_hz};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-/// No motion repeats after more than eleven days, s.
-const MOST_PERIOD_S: f64 = 1e6;
+/// Minimum torque noise relative to the root mean square of the torque.
+const MIN_RELATIVE_SIGMA: f64 = 1e-4;
+/// Minimum steps of central differences of the regressor by position, velocity and acceleration, for an arm of usual
+/// size; the regressor is linear in the last. A larger noise of the mean period gives a larger step, so that the slope
+/// of a friction step is averaged over the noise.
+const MIN_STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
 
-/// A motion whose periods differ by more than this share of its own size does not repeat.
-const MOST_DIFFERENCE: f64 = 0.1;
-/// A motion smaller than this counts as none, rad (m).
-const NO_MOTION: f64 = 1e-4;
-/// Noise of a torque counts as at least this share of its root mean square.
-const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
-/// Least steps of central differences of the regressor by position, velocity and acceleration of a usual arm; it is
-/// linear in the last. Where the noise of the mean period is larger, so is the step: the slope of a step of friction is
-/// that over the noise.
-const LEAST_STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
-
-/// The repeated motion.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields, default)]
-pub struct PeriodSettings {
-    /// After how many seconds the motion repeats; by default the length of the log's `reference`.
-    pub period_s: Option<f64>,
-    /// Seconds at the start of every log that are left out, until the motion repeats; 0 by default.
-    pub skip_s: f64,
-    /// Harmonics of the motion's Fourier series, for the simultaneous fit alone; by default those that stand out of the
-    /// noise.
-    pub harmonics: Option<usize>,
-}
-
-/// Settings of a repeated motion that are impossible.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum PeriodError {
-    /// A period that is no time.
-    #[error("period_s = {period_s:?}: give the seconds after which the motion repeats, at most {MOST_PERIOD_S:e}")]
-    Period {
-        /// What was given.
-        period_s: f64,
-    },
-    /// A start that is no time.
-    #[error("skip_s = {skip_s}: give 0 or more seconds")]
-    Skip {
-        /// What was given.
-        skip_s: f64,
-    },
-    /// Too few or too many harmonics.
-    #[error("harmonics = {harmonics}: give 1 to 200")]
-    Harmonics {
-        /// What was given.
-        harmonics: usize,
-    },
-}
-
-impl PeriodSettings {
-    /// Checks the numbers.
-    ///
-    /// # Errors
-    /// The first number that is impossible.
-    pub fn validate(&self) -> Result<(), PeriodError> {
-        if let Some(period_s) = self.period_s.filter(|period| !(*period > 0.0 && *period <= MOST_PERIOD_S)) {
-            return Err(PeriodError::Period { period_s });
-        }
-        if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
-            return Err(PeriodError::Skip { skip_s: self.skip_s });
-        }
-        if let Some(harmonics) = self.harmonics.filter(|harmonics| !(1..=200).contains(harmonics)) {
-            return Err(PeriodError::Harmonics { harmonics });
-        }
-        Ok(())
-    }
-}
-
-/// What the periods of a repeated motion give.
+/// Results for the periods of a repeated motion.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PeriodicFit {
-    /// Their length, s.
+    /// Period, s.
     pub period_s: f64,
-    /// For each log how many whole periods were averaged.
+    /// Number of averaged periods of each log.
     pub periods: Vec<usize>,
-    /// Instants of all mean periods that were fitted to.
+    /// Instants of all mean periods in the fit.
     pub instants: usize,
-    /// For each joint the standard deviation of a single sample's smoothed position, velocity and acceleration, rad,
-    /// rad/s, rad/s² (m).
+    /// Standard deviation of a single sample's smoothed position, velocity and acceleration of each joint, rad, rad/s,
+    /// rad/s² (m).
     pub motion_std: Vec<[f64; 3]>,
-    /// For each joint the standard deviation of a single sample's torque behind the parallel filter, Nm (N).
+    /// Standard deviation of a single sample's filtered torque of each joint, Nm (N).
     pub torque_std: Vec<f64>,
-    /// The likelihood's cost.
+    /// Cost of the likelihood.
     pub cost: f64,
-    /// What it would be if model and noise were right. Where the cost is larger, the model leaves something out, and
-    /// the error bars were widened by the root of the ratio.
+    /// Expected cost for correct model and noise. A larger cost shows model errors, and the error bars grow by the root
+    /// of the ratio.
     pub degrees_of_freedom: usize,
 }
 
-/// The mean period of one log, joints in the model's order: for each joint position, velocity, acceleration, then the
-/// torques of all.
+/// Mean period of one log, joints in the order of the model: positions, velocities, accelerations and torques.
 struct MeanPeriod {
     averaged: AveragedPeriods,
     samples: usize,
-    /// Noise of a single sample between all channels behind the parallel filter.
+    /// Covariance of a single sample between all channels after the parallel filter.
     covariance: DMatrix<f64>,
-    /// Instants that are fitted to, with regressor and torque behind the parallel filter: between them it has left
-    /// nothing new.
+    /// Instants of the fit, with filtered regressor and torque, at the decimated rate.
     rows: Vec<(usize, DMatrix<f64>, DVector<f64>)>,
 }
 
-/// The estimate, and what the periods give.
+/// Computes the estimate and the results for the periods.
 ///
-/// Torque and regressor of the mean period pass the same parallel filter, and of the mean period as many instants count
-/// as it distinguishes.
+/// Torque and regressor of the mean period pass the same parallel filter, and the instants are decimated accordingly.
 pub(super) fn periodic(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
@@ -134,19 +67,19 @@ pub(super) fn periodic(
     let wrong = |message: String| EstimatorError::Requirement { method, message };
     if let Some(term) = model.terms().iter().find(|term| term.has_memory() || term.needs_load()) {
         return Err(wrong(format!(
-            "{} depends on more than the motion of one instant: leave that law out, or take another method",
+            "{} depends on more than the motion of one instant: leave this law out, or use another method",
             term.symbol()
         )));
     }
     rows.begin("periods");
     let Means { period_s, means } = mean_periods(rows, periods, &wrong)?;
     logs.end();
-    let Some(first) = means.first() else { return Err(wrong("there is no log to fit to".to_owned())) };
+    let Some(first) = means.first() else { return Err(wrong("there is no training log".to_owned())) };
     let (dof, most) = (model.model().dof(), first.averaged.periods);
     let sample_covariance = pooled(&means, |mean| mean.covariance.clone());
-    // Of the motion's variables before the parallel filter.
+    // Covariance of the motion before the parallel filter.
     let single = pooled(&means, |mean| matrix(&mean.averaged.sample_covariance));
-    // Covariance of the mean of as many periods as the first log has; the other logs' rows are scaled to it.
+    // Covariance of the mean over the number of periods of the first log; rows of the other logs are scaled to it.
     let mean_covariance = &sample_covariance / most as f64;
     let settings = MaximumLikelihoodSettings {
         motion_covariance: mean_covariance.view((0, 0), (3 * dof, 3 * dof)).into_owned(),
@@ -156,9 +89,9 @@ pub(super) fn periodic(
         max_iterations: 50,
     };
     let std = |place: usize| single[(place, place)].max(0.0).sqrt();
-    let steps = |variable: usize| least_step(model, variable).max(std(variable) / (most as f64).sqrt());
+    let steps = |variable: usize| min_step(model, variable).max(std(variable) / (most as f64).sqrt());
     let mut instants = Instants::new(model, (0..3 * dof).map(steps).collect());
-    let found = maximum_likelihood::<Stop>(problem.columns(), &settings, |visit| {
+    let found = maximum_likelihood::<PassError>(problem.columns(), &settings, |visit| {
         for mean in &means {
             let weight = (mean.averaged.periods as f64 / most as f64).sqrt();
             instants.of(mean, weight, visit)?;
@@ -179,14 +112,12 @@ pub(super) fn periodic(
     Ok((estimate, fit))
 }
 
-/// The mean periods of all logs.
 struct Means {
-    /// The period; none without logs.
     period_s: Option<f64>,
     means: Vec<MeanPeriod>,
 }
 
-/// Averages the periods of all logs. The period is that of the settings, else of the first commanded motion.
+/// Averages the periods of all logs. The period is stated, or otherwise that of the first commanded motion.
 fn mean_periods(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
@@ -202,7 +133,7 @@ fn mean_periods(
         let name = &recording.name;
         let Some(period_s) = period_s else {
             return Err(wrong(format!(
-                "log `{name}`: say after how many seconds the motion repeats: [estimator.periods] period_s = ..., or name the commanded motion of one period as the log's reference"
+                "log `{name}`: the period of the motion is unknown: set period_s in [estimator.periods], or give the commanded motion of one period as the log's reference"
             )));
         };
         means.push(mean_period(rows, index, period_s, periods.skip_s, &|message| {
@@ -212,7 +143,7 @@ fn mean_periods(
     Ok(Means { period_s, means })
 }
 
-/// Covariance of the torques of a mean period, whose deviations are at least a small share of the torques.
+/// Covariance of the torques of a mean period, with a lower limit relative to the torques.
 fn torque_covariance(means: &[MeanPeriod], mean_covariance: &DMatrix<f64>, dof: usize) -> DMatrix<f64> {
     let mut covariance = mean_covariance.view((3 * dof, 3 * dof), (dof, dof)).into_owned();
     for joint in 0..dof {
@@ -221,18 +152,18 @@ fn torque_covariance(means: &[MeanPeriod], mean_covariance: &DMatrix<f64>, dof: 
             square += mean.averaged.mean[3 * dof + joint].iter().map(|tau| tau * tau).sum::<f64>();
             count += mean.samples;
         }
-        let least = LEAST_RELATIVE_SIGMA * LEAST_RELATIVE_SIGMA * square / count.max(1) as f64;
+        let least = MIN_RELATIVE_SIGMA * MIN_RELATIVE_SIGMA * square / count.max(1) as f64;
         covariance[(joint, joint)] += least.max(f64::MIN_POSITIVE);
     }
     covariance
 }
 
-/// Least step of the differences by a variable of the motion: positions of all joints, velocities, accelerations.
-fn least_step(model: &RegressorModel, variable: usize) -> f64 {
+/// Minimum step of the differences by a variable of the motion: positions of all joints, velocities, accelerations.
+fn min_step(model: &RegressorModel, variable: usize) -> f64 {
     let (model, dof) = (model.model(), model.model().dof());
     let own = model.own_scale();
     let turns = model.joints()[variable % dof].turns();
-    let [position, velocity, acceleration] = LEAST_STEPS;
+    let [position, velocity, acceleration] = MIN_STEPS;
     match variable / dof {
         0 => own.position(turns, position),
         1 => own.velocity(turns, velocity),
@@ -244,7 +175,7 @@ fn matrix(rows: &[Vec<f64>]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), rows.len(), |a, b| rows[a][b])
 }
 
-/// A covariance of a single sample between all channels, over all logs.
+/// Covariance of a single sample between all channels, over all logs.
 fn pooled(means: &[MeanPeriod], covariance: impl Fn(&MeanPeriod) -> DMatrix<f64>) -> DMatrix<f64> {
     let channels = means.first().map_or(0, |mean| mean.averaged.mean.len());
     let (mut sum, mut degrees_of_freedom) = (DMatrix::zeros(channels, channels), 0.0);
@@ -256,7 +187,6 @@ fn pooled(means: &[MeanPeriod], covariance: impl Fn(&MeanPeriod) -> DMatrix<f64>
     sum / degrees_of_freedom.max(1.0)
 }
 
-/// The mean period of log number `index`.
 fn mean_period(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -269,7 +199,7 @@ fn mean_period(
     let places = recording.places(model.model())?;
     let failed = |source| LogError::recording(&recording.name, source);
     let Some(mut stream) = recording.open(model.model(), motion)? else {
-        return Err(wrong("a motion that is made already has no periods: give its raw samples".to_owned()));
+        return Err(wrong("a prepared motion has no periods; give raw samples".to_owned()));
     };
     let (rate_hz, dof) = (stream.rate_hz(), model.model().dof());
     let no_filter = PeriodFilter { taps: vec![1.0], stride: 1 };
@@ -282,7 +212,7 @@ fn mean_period(
     while stream.next_block(&mut block).map_err(failed)? {
         if *segment.get_or_insert(block.segment) != block.segment {
             return Err(wrong(
-                "the log has a gap, and periods are counted without one: cut the longest piece out with time_range_s"
+                "the log has a gap, but periods must be complete: select the longest piece with time_range_s"
                     .to_owned(),
             ));
         }
@@ -298,7 +228,7 @@ fn mean_period(
     }
     let samples = (period_s * rate_hz).round() as usize;
     if samples < 2 {
-        return Err(wrong(format!("a period of {period_s} s holds fewer than two samples at {rate_hz:.1} Hz")));
+        return Err(wrong(format!("a period of {period_s} s has fewer than two samples at {rate_hz:.1} Hz")));
     }
     let skipped = (skip_s - begins_s).max(0.0) * rate_hz;
     let channels = at_phases(&channels, skipped, period_s * rate_hz / samples as f64);
@@ -306,25 +236,30 @@ fn mean_period(
     let length = views.first().map_or(0, |channel| channel.len());
     if length / 2 < samples {
         return Err(wrong(format!(
-            "{:.2} s are left, fewer than two periods of {period_s} s: record at least two, better ten; or give the true period_s",
+            "{:.2} s remain, fewer than two periods of {period_s} s: record at least two periods, better ten, or correct period_s",
             length as f64 / rate_hz
         )));
     }
     let averaged = averaged_periods(&views, samples).map_err(|error| wrong(error.to_string()))?;
-    check_repeats(model, &averaged, period_s).map_err(wrong)?;
+    check_repeats(model, &averaged, period_s, &rows.settings.thresholds.motion).map_err(wrong)?;
     let covariance = filter.covariance(&views, &averaged);
     let rows = filter.rows(model, &averaged);
     Ok(MeanPeriod { averaged, samples, covariance, rows })
 }
 
-/// Checks that the positions of all periods are alike; else what is wrong.
-fn check_repeats(model: &RegressorModel, averaged: &AveragedPeriods, period_s: f64) -> Result<(), String> {
+/// Checks that the positions of all periods agree; returns a message otherwise.
+fn check_repeats(
+    model: &RegressorModel,
+    averaged: &AveragedPeriods,
+    period_s: f64,
+    thresholds: &MotionThresholds,
+) -> Result<(), String> {
     for (joint, described) in model.model().joints().iter().enumerate() {
         let mean = &averaged.mean[joint];
         let middle = mean.iter().sum::<f64>() / mean.len() as f64;
         let size = (mean.iter().map(|q| (q - middle).powi(2)).sum::<f64>() / mean.len() as f64).sqrt();
         let difference = averaged.sample_covariance[joint][joint].max(0.0).sqrt();
-        if difference > MOST_DIFFERENCE * size.max(NO_MOTION) {
+        if difference > thresholds.max_period_difference * size.max(thresholds.min_motion) {
             return Err(format!(
                 "the motion does not repeat every {period_s} s: positions of {} differ by {difference:.2e} rad from period to period, and move by {size:.2e} rad (root mean squares); \
                  fix period_s, or skip the start with skip_s",
@@ -335,8 +270,8 @@ fn check_repeats(model: &RegressorModel, averaged: &AveragedPeriods, period_s: f
     Ok(())
 }
 
-/// Channels from `from` on at steps of `step` samples, so that a period is a whole number of them: cubic interpolation
-/// where these lie between samples.
+/// Resamples channels from `from` on with a step of `step` samples, so that a period is a whole number of samples;
+/// cubic interpolation between samples.
 fn at_phases(channels: &[Vec<f64>], from: f64, step: f64) -> Vec<Vec<f64>> {
     let length = channels.first().map_or(0, Vec::len);
     let on_samples = (step - 1.0).abs() * (length as f64) < 1e-3;
@@ -358,12 +293,10 @@ fn at_phases(channels: &[Vec<f64>], from: f64, step: f64) -> Vec<Vec<f64>> {
     channels.iter().map(|channel| (0..count).map(|k| value(channel, first + k as f64 * step)).collect()).collect()
 }
 
-/// Regressors of single instants and their derivatives by the motion.
 struct Instants<'a> {
     model: &'a RegressorModel,
     workspace: BatchWorkspace,
     panels: Panels,
-    /// Of the central differences, variable by variable.
     steps: Vec<f64>,
 }
 
@@ -372,9 +305,9 @@ impl<'a> Instants<'a> {
         Self { model, workspace: BatchWorkspace::new(model.model()), panels: Panels::default(), steps }
     }
 
-    /// Hands the instants of a mean period to `visit`. Rows of a mean over more periods count more; `weight` is the
-    /// root of how much.
-    fn of(&mut self, mean: &MeanPeriod, weight: f64, visit: &mut InstantVisitor<'_>) -> Result<(), Stop> {
+    /// Passes the instants of a mean period to `visit`. `weight` is the square root of the relative weight of a mean
+    /// over more periods.
+    fn of(&mut self, mean: &MeanPeriod, weight: f64, visit: &mut InstantVisitor<'_>) -> Result<(), PassError> {
         let (model, layout) = (self.model.model(), self.model.layout());
         let (dof, columns) = (model.dof(), layout.columns().len());
         let variables = 3 * dof;
@@ -412,7 +345,7 @@ impl<'a> Instants<'a> {
     }
 }
 
-/// As the other estimators' result. Error bars grow with what the model leaves beyond the noise.
+/// Converts to the result of the other estimators. Error bars grow if the residual exceeds the noise.
 fn estimate_of(found: MaximumLikelihoodEstimate, problem: &LinearProblem) -> Result<Estimate, EstimationError> {
     let joints = problem.joints().len();
     let degrees_of_freedom = found.degrees_of_freedom as f64;

@@ -1,9 +1,8 @@
-//! From the rows of the training logs to base parameters: every estimator that is offered, with its settings and its
-//! findings.
+//! Estimators of base parameters from the rows of training logs, with their settings and findings.
 //!
 //! **To add an estimator**, three files: one here with its settings and a function from [`TrainingRows`] to an
-//! [`Estimate`]; a variant of [`Estimator`], which the compiler then asks for here; and its name in the study file
-//! (`study/estimator.rs` of `dynident`), where the compiler asks for the rest.
+//! [`Estimate`]; a variant of [`Estimator`]; and its name in the study file (`study/estimator.rs` of `dynident`). The
+//! compiler reports the other places.
 
 mod automatic;
 mod band_motion;
@@ -18,6 +17,7 @@ mod instruments;
 mod maximum_likelihood;
 mod noise_in_regressor;
 mod noise_weighted;
+mod period_settings;
 mod periodic_model;
 mod robust;
 mod row_pass;
@@ -27,14 +27,16 @@ mod simulated_loop;
 mod simultaneous;
 mod spline_motion;
 mod spline_torque;
+mod start_values;
 
 pub use error::EstimatorError;
 pub use function::{EstimatorFunction, EstimatorRule};
 pub use instrumental::InstrumentSettings;
 pub use instruments::{InstrumentSource, SmoothedMotion};
-pub use maximum_likelihood::{PeriodError, PeriodSettings, PeriodicFit};
+pub use maximum_likelihood::PeriodicFit;
 pub use noise_in_regressor::{EstimateContrast, NoiseInRegressor, NoiseVerdict};
 pub use noise_weighted::NoiseLevels;
+pub use period_settings::{PeriodError, PeriodSettings};
 pub use periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord};
 pub use robust::GrossErrors;
 pub use settings::EstimationSettings;
@@ -50,47 +52,47 @@ use dynident_estimation::{
 use dynident_rows::{Logs, RegressorModel};
 use simulated_loop::ComparedSignal;
 
-/// How base parameters are estimated, with the settings that belong to the estimator alone.
+/// Method for the estimation of base parameters, with its settings.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub enum Estimator {
-    /// Ordinary least squares: every joint's newton metre counts alike.
+    /// Ordinary least squares: equal weights of all joints.
     Ordinary,
-    /// Weighted least squares: every joint counts by its own noise.
+    /// Weighted least squares: joints are weighted by their noise.
     #[default]
     Weighted,
     /// Generalised least squares: errors of the joints at one instant are correlated.
     Generalized,
-    /// Iteratively reweighted with Huber's weights: rows far off count less.
+    /// Iteratively reweighted least squares with Huber's weights: outliers get less weight.
     Huber,
-    /// Iteratively reweighted with Tukey's weights: rows far off do not count.
+    /// Iteratively reweighted least squares with Tukey's weights: outliers are ignored.
     Tukey,
-    /// Reweighted by the noise around every row: noisy stretches of a joint count less.
+    /// Reweighted by the local noise level: noisy parts of a joint's rows get less weight.
     NoiseWeighted(NoiseLevels),
-    /// Weighted least squares, or instrumental variables where noise in the regressor biases it and the instruments are
+    /// Weighted least squares, or instrumental variables if noise in the regressor biases it and the instruments are
     /// strong.
     Auto(InstrumentSettings),
     /// Instrumental variables: noise in the regressor does not bias the estimate.
     Instrumental(InstrumentSettings),
-    /// A caller's own rule on the rows as factors.
+    /// A caller's rule on the factors of the rows.
     Function(EstimatorFunction),
-    /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
+    /// Maximum likelihood for a repeated motion: noise of motion and torque from the differences between periods.
     MaximumLikelihood(PeriodSettings),
-    /// Motion and parameters together, for a motion that is a Fourier series: noise of positions and torques weighed
-    /// against each other.
+    /// Motion and parameters together, for a motion that is a Fourier series, weighted by the noise of positions and
+    /// torques.
     Simultaneous(PeriodSettings),
-    /// The same for any motion, a smoothing spline whose smoothness comes from the likelihood.
+    /// The same for any motion, as a smoothing spline whose smoothness follows from the likelihood.
     SplineMotion(SplineMotionSettings),
-    /// Regression on the motion of the simulated closed loop: no measured position enters the regressor.
+    /// Regression on the motion of the simulated closed loop, without measured positions in the regressor.
     Didim(Box<SimulatedLoopSettings>),
-    /// The simulated closed loop's torque fitted to the measured one (closed-loop input error).
+    /// Fits the torque of the simulated closed loop to the measured torque (closed-loop input error).
     Clie(Box<SimulatedLoopSettings>),
-    /// The simulated closed loop's positions fitted to the measured ones (closed-loop output error).
+    /// Fits the positions of the simulated closed loop to the measured positions (closed-loop output error).
     Cloe(Box<SimulatedLoopSettings>),
 }
 
 impl Estimator {
-    /// The name in files and messages.
+    /// Name in files and messages.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Ordinary => "ordinary",
@@ -110,8 +112,7 @@ impl Estimator {
         }
     }
 
-    /// Whether its values are those of least squares on the rows as they are, with one weight for each joint; of `Auto`
-    /// before it has found noise.
+    /// Whether the values are those of least squares with one weight per joint; for `Auto` before it finds noise.
     pub fn is_plain(&self) -> bool {
         match self {
             Self::Ordinary | Self::Weighted | Self::Auto(_) => true,
@@ -132,8 +133,8 @@ impl Estimator {
 }
 
 impl Estimator {
-    /// Whether it is made from rows of the measured motion, filtered as the torque is, so that a lag measured on these
-    /// rows is the one that it suffers.
+    /// Whether the estimator uses rows of the measured motion, filtered as the torque, so that a lag estimated from
+    /// these rows applies to it.
     pub fn reads_filtered_rows(&self) -> bool {
         match self {
             Self::Ordinary
@@ -155,37 +156,37 @@ impl Estimator {
     }
 }
 
-/// What an estimator alone can determine, beside its estimate. Exhaustive, so that whoever writes results is asked for
-/// a new kind.
+/// Findings of an estimator in addition to its estimate. Exhaustive, so that the compiler reports a new kind to code
+/// that writes results.
 #[derive(Clone, Debug, Default)]
 pub enum Findings {
     /// Nothing.
     #[default]
     None,
-    /// How a robust estimator weighed the rows.
+    /// Weights of the rows in a robust estimator.
     GrossErrors(GrossErrors),
-    /// Correlation of the joints' errors at one instant, joint by joint.
+    /// Correlation of the joints' errors at one instant.
     NoiseCorrelation(Vec<Vec<f64>>),
-    /// Lowest and highest noise level found around a row, joint by joint, Nm (N).
+    /// Lowest and highest noise level of each joint's rows, Nm (N).
     NoiseLevels(Vec<[f64; 2]>),
-    /// What the periods of a repeated motion say.
+    /// Periods of a repeated motion.
     Periodic(PeriodicFit),
-    /// Motion and noise of every training log by the simultaneous fit.
+    /// Motion and noise of every training log in the simultaneous fit.
     Series(Vec<SeriesFit>),
     /// Motion as a smoothing spline and noise of every training log.
     Spline(SplineFit),
-    /// How the fit to a simulated closed loop went.
+    /// Fit to a simulated closed loop.
     Simulated(SimulatedFit),
 }
 
-/// Base parameters with their covariance, and what came out beside them.
+/// Base parameters with their covariance, and findings.
 #[derive(Clone, Debug)]
 pub struct Estimation {
     /// The estimate.
     pub estimate: Estimate,
-    /// What the estimator alone can determine.
+    /// Findings of the estimator.
     pub findings: Findings,
-    /// Least squares against instruments, where there are any.
+    /// Comparison of least squares with instruments, if made.
     pub noise_in_regressor: Option<NoiseInRegressor>,
 }
 
@@ -196,20 +197,20 @@ impl Estimation {
     }
 }
 
-/// The rows that parameters are estimated from: as factors, and as logs for estimators that come back to the rows.
+/// Rows for the estimation: as factors, and as logs for estimators that read the rows again.
 #[derive(Clone, Copy, Debug)]
 pub struct TrainingRows<'a> {
     /// All recordings of the task.
     pub logs: &'a Logs<'a>,
-    /// What makes their rows.
+    /// Model of the rows.
     pub model: &'a RegressorModel,
-    /// Recordings to fit to, in the order of the problem's logs.
+    /// Training recordings, in the order of the problem's logs.
     pub training: &'a [usize],
     /// The rows as triangular factors.
     pub problem: &'a LinearProblem,
-    /// The estimator, and how far what it gives is trusted.
+    /// Estimator and error bars.
     pub settings: &'a EstimationSettings,
-    /// What is known of the bodies, for simulations that begin at a consistent set.
+    /// Prior knowledge of the bodies, for simulations that start at a consistent set.
     pub consistency: Option<&'a ConsistencySettings>,
 }
 
@@ -219,11 +220,11 @@ impl TrainingRows<'_> {
     }
 }
 
-/// The estimate that the settings ask for, and what noise in the regressor does to least squares where that is asked:
-/// with instruments of `source`, or of the logs' own motion.
+/// Computes the estimate, and tests the effect of noise in the regressor on least squares if requested, with
+/// instruments from `source` or from the logs' own motion.
 ///
 /// # Errors
-/// Rows that do not carry an estimate, and what the estimator chosen needs and does not find.
+/// The rows do not determine an estimate, or a requirement of the estimator is not met.
 pub fn estimate(
     rows: &TrainingRows<'_>,
     source: Option<&mut dyn InstrumentSource>,
@@ -243,7 +244,7 @@ pub fn estimate(
     }
     let (estimate, findings) = without_instruments(rows)?;
     let mut estimation = Estimation { findings, ..Estimation::plain(estimate) };
-    // What the instruments are compared with is least squares in any case.
+    // Instruments are always compared with least squares.
     let compared = if settings.estimator.is_plain() { None } else { Some(weighted) };
     let least_squares = || compared.map_or_else(|| Ok(estimation.estimate.clone()), |weighted| weighted());
     estimation.noise_in_regressor = match &settings.exogeneity_test {
@@ -257,7 +258,6 @@ pub fn estimate(
     Ok(estimation)
 }
 
-/// As [`estimate`] with instruments from outside.
 fn with_source(rows: &TrainingRows<'_>, source: &mut dyn InstrumentSource) -> Result<Estimation, EstimatorError> {
     let settings = rows.settings;
     let own = match &settings.estimator {
@@ -272,7 +272,6 @@ fn with_source(rows: &TrainingRows<'_>, source: &mut dyn InstrumentSource) -> Re
     Ok(Estimation { estimate, findings, noise_in_regressor: Some(noise) })
 }
 
-/// The estimate of estimators that need no instruments; of those that can do without, theirs without.
 fn without_instruments(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), EstimatorError> {
     let settings = rows.settings;
     let simulated = |loop_settings, compared| {

@@ -1,20 +1,20 @@
-//! Rows weighted by the noise around them.
+//! Weights of rows from the local noise level.
 
-use super::row_pass::{KeptRows, Stop};
+use super::row_pass::{KeptRows, PassError};
 use super::{EstimationSettings, EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, NoiseLevelSettings, noise_weighted_least_squares};
 use serde::{Deserialize, Serialize};
 
-/// How the noise around a row is found; see [`NoiseLevelSettings`].
+/// Estimation of the local noise level; see [`NoiseLevelSettings`].
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseLevels {
-    /// Rows of one joint and log, centred on a row, whose residuals say how large the noise is there; 51 by default.
+    /// Rows of one joint and log, centred on a row, whose residuals determine its noise level; 51 by default.
     pub window_rows: usize,
     /// Share of the joint's mean square residual in every level's square, 0 to 1; 1e-3 by default.
     pub pooled_share: f64,
-    /// Most passes over the logs; 30 by default.
+    /// Maximum number of passes over the logs; 30 by default.
     pub max_passes: usize,
 }
 
@@ -26,7 +26,7 @@ impl Default for NoiseLevels {
 }
 
 impl NoiseLevels {
-    /// The estimator's settings.
+    /// Settings of the estimator.
     pub fn settings(&self, estimation: &EstimationSettings) -> NoiseLevelSettings {
         NoiseLevelSettings {
             window_rows: self.window_rows,
@@ -39,13 +39,13 @@ impl NoiseLevels {
     }
 }
 
-/// The estimate with one pass over the rows for every reweighting.
 pub(super) fn noise_weighted(
     rows: &TrainingRows<'_>,
     levels: &NoiseLevels,
 ) -> Result<(Estimate, Findings), EstimatorError> {
     let settings = levels.settings(rows.settings);
     let mut kept = KeptRows::new();
-    let found = noise_weighted_least_squares::<Stop>(rows.problem, &settings, |visit| kept.every_row(rows, visit))?;
+    let found =
+        noise_weighted_least_squares::<PassError>(rows.problem, &settings, |visit| kept.every_row(rows, visit))?;
     Ok((found.estimate, Findings::NoiseLevels(found.level_range)))
 }

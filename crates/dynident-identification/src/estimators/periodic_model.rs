@@ -1,5 +1,4 @@
-//! Unknown motion and unknown parameters of a record whose motion is a Fourier series: what the simultaneous fit asks
-//! of a robot.
+//! Robot model for the simultaneous fit: unknown motion (a Fourier series) and unknown parameters.
 
 use core::f64::consts::TAU;
 use dynident_dynamics::{BatchWorkspace, MotionGradient, Panels, regressor_panels, regressor_panels_adjoint};
@@ -8,24 +7,23 @@ use dynident_model::terms::JointMotion;
 use dynident_rows::RegressorModel;
 use nalgebra::{DMatrix, DVector};
 
-/// Samples whose regressor is made at a time.
-const BLOCK: usize = 256;
+const BLOCK_SAMPLES: usize = 256;
 
-/// Rows in a period of the highest harmonic, at least: so many that over one row the series hardly changes.
-const ROWS_OF_HARMONIC: f64 = 60.0;
+/// Minimum number of rows per period of the highest harmonic, so that the series hardly changes within a row.
+const MIN_ROWS_PER_HARMONIC: f64 = 60.0;
 
-/// Positions and torques as they were logged, on a uniform clock and without a gap.
+/// Recorded positions and torques on a uniform clock without a gap.
 #[derive(Clone, Debug)]
 pub struct PeriodicRecord {
-    /// Samples a second.
+    /// Sample rate, hertz.
     pub rate_hz: f64,
-    /// Positions (rad, m), joint after joint in the model's order, as many samples each.
+    /// Positions (rad, m), joint-major, joints in the order of the model.
     pub q: Vec<f64>,
-    /// Torques (N m, N), likewise.
+    /// Torques (N m, N), in the same layout.
     pub tau: Vec<f64>,
 }
 
-/// The functions of a Fourier series: a constant, then sine and cosine of every harmonic.
+/// Basis of a Fourier series: a constant, then sine and cosine of every harmonic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FourierSeries {
     /// Period of the first harmonic, s.
@@ -35,18 +33,17 @@ pub struct FourierSeries {
 }
 
 impl FourierSeries {
-    /// How many successive samples may count as one row: at least sixty rows remain in a period of the highest
-    /// harmonic.
+    /// Maximum number of successive samples per row: at least sixty rows remain in a period of the highest harmonic.
     pub fn samples_of_row(&self, rate_hz: f64) -> usize {
-        (rate_hz * self.period_s / (ROWS_OF_HARMONIC * self.harmonics as f64)).floor().max(1.0) as usize
+        (rate_hz * self.period_s / (MIN_ROWS_PER_HARMONIC * self.harmonics as f64)).floor().max(1.0) as usize
     }
 }
 
-/// Positions and torques of one record over joints' Fourier coefficients (constant, then sine and cosine of every
-/// harmonic) and base parameters.
+/// Positions and torques of one record as functions of the joints' Fourier coefficients (constant, then sine and cosine
+/// of every harmonic) and of base parameters.
 ///
-/// A row is the mean of `mean_of` successive samples: below the rate of rows nothing is lost, and there are fewer.
-/// Channels are the joints' positions, then their torques. Torque terms must depend on the motion of one instant alone.
+/// A row is the mean of `mean_of` successive samples, which keeps the content below the rate of the rows. Channels are
+/// the positions of the joints, then their torques. Torque terms must depend on the motion of one instant only.
 #[derive(Debug)]
 pub struct PeriodicModel<'a> {
     model: &'a RegressorModel,
@@ -54,9 +51,9 @@ pub struct PeriodicModel<'a> {
     mean_of: usize,
     /// Angular frequency of every harmonic, rad/s.
     omega: Vec<f64>,
-    /// The series' functions at every sample, (samples, 1 + 2 harmonics).
+    /// Basis at every sample, (samples, 1 + 2 harmonics).
     basis: DMatrix<f64>,
-    /// Their means over each row.
+    /// Means of the basis over each row.
     row_basis: DMatrix<f64>,
     /// Means of the positions, (rows, joints).
     row_q: DMatrix<f64>,
@@ -64,7 +61,7 @@ pub struct PeriodicModel<'a> {
 }
 
 impl<'a> PeriodicModel<'a> {
-    /// For a record whose motion is this series.
+    /// Model of a record whose motion is this series.
     pub fn new(model: &'a RegressorModel, record: &'a PeriodicRecord, series: FourierSeries, mean_of: usize) -> Self {
         let joints = model.dof();
         let samples = record.q.len() / joints.max(1);
@@ -93,7 +90,6 @@ impl<'a> PeriodicModel<'a> {
         self.row_basis.nrows()
     }
 
-    /// Unknowns of one joint's motion.
     fn own(&self) -> usize {
         self.basis.ncols()
     }
@@ -102,14 +98,12 @@ impl<'a> PeriodicModel<'a> {
         self.model.dof()
     }
 
-    /// Coefficients of the series that fit the positions best, joint by joint; `None` where the record does not
-    /// distinguish them.
+    /// Least-squares coefficients of the positions, by joint; `None` if the record does not determine them.
     pub fn fitted_motion(&self) -> Option<Vec<f64>> {
         let normal = self.row_basis.tr_mul(&self.row_basis).cholesky()?;
         Some(normal.solve(&self.row_basis.tr_mul(&self.row_q)).as_slice().to_vec())
     }
 
-    /// Coefficients of the derivative's series.
     fn derivative(&self, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
         let mut rate = DMatrix::zeros(coefficients.nrows(), coefficients.ncols());
         for joint in 0..coefficients.ncols() {
@@ -121,15 +115,15 @@ impl<'a> PeriodicModel<'a> {
         rate
     }
 
-    /// Walks over the samples in blocks with their motion and regressor.
+    /// Visits the samples in blocks with their motion and regressor.
     fn walk(&mut self, motion: &[f64], mut visit: impl FnMut(&mut BatchWorkspace, usize, &JointMotion<'_>, &Panels)) {
         let coefficients = DMatrix::from_column_slice(self.own(), self.joints(), motion);
         let rate = self.derivative(&coefficients);
         let second = self.derivative(&rate);
         let samples = self.basis.nrows();
         let mut panels = Panels::default();
-        for first in (0..samples).step_by(BLOCK) {
-            let count = BLOCK.min(samples - first);
+        for first in (0..samples).step_by(BLOCK_SAMPLES) {
+            let count = BLOCK_SAMPLES.min(samples - first);
             let basis = self.basis.rows(first, count);
             let [q, dq, ddq] = [&coefficients, &rate, &second].map(|c| basis * c);
             let motion = JointMotion { samples: count, q: q.as_slice(), dq: dq.as_slice(), ddq: ddq.as_slice() };
@@ -138,7 +132,7 @@ impl<'a> PeriodicModel<'a> {
         }
     }
 
-    /// Means of the positions less the series, (rows, joints).
+    /// Means of the positions minus the series, (rows, joints).
     pub(super) fn position_residuals(&self, motion: &[f64]) -> DMatrix<f64> {
         &self.row_q - &self.row_basis * DMatrix::from_column_slice(self.own(), self.joints(), motion)
     }
@@ -174,7 +168,7 @@ impl SimultaneousModel for PeriodicModel<'_> {
         let rows = self.row_basis.nrows();
         let mut by_parameters: Vec<DMatrix<f64>> =
             (0..joints).map(|_| DMatrix::zeros(rows, parameters.len())).collect();
-        // Slopes of each torque by positions, velocities and accelerations, means over rows: (rows, 3 joints).
+        // Derivatives of each torque by positions, velocities and accelerations, means over rows: (rows, 3 joints).
         let mut slopes: Vec<DMatrix<f64>> = (0..joints).map(|_| DMatrix::zeros(rows, 3 * joints)).collect();
         let share = 1.0 / mean_of as f64;
         self.walk(motion, |workspace, first, block, panels| {
@@ -237,8 +231,8 @@ impl SimultaneousModel for PeriodicModel<'_> {
 }
 
 impl PeriodicModel<'_> {
-    /// Derivatives of one torque by the coefficients of all joints. Over a row's few samples the series hardly changes:
-    /// the mean of slope times function is the product of their means.
+    /// Derivatives of one torque by the coefficients of all joints. The series hardly changes within a row, so the mean
+    /// of slope times basis is approximated by the product of the means.
     fn by_coefficients(&self, slopes: &DMatrix<f64>) -> DMatrix<f64> {
         let (joints, own) = (self.joints(), self.own());
         let mut out = DMatrix::zeros(slopes.nrows(), joints * own);
@@ -258,8 +252,7 @@ impl PeriodicModel<'_> {
     }
 }
 
-/// Several records, each with a motion of its own, and one set of parameters. Channels and unknowns follow one another
-/// record by record.
+/// Several records with separate motions and one set of parameters. Channels and unknowns are ordered by record.
 pub(super) struct PeriodicRecords<'a>(pub(super) Vec<PeriodicModel<'a>>);
 
 impl SimultaneousModel for PeriodicRecords<'_> {
@@ -287,7 +280,7 @@ impl SimultaneousModel for PeriodicRecords<'_> {
     }
 }
 
-/// Means of `count` successive rows; what is left at the end is dropped, for its mean would be noisier.
+/// Means of `count` successive rows; an incomplete last row is dropped, because its mean would be noisier.
 fn means(matrix: &DMatrix<f64>, count: usize) -> DMatrix<f64> {
     let rows = matrix.nrows() / count;
     DMatrix::from_fn(rows, matrix.ncols(), |row, column| {
@@ -303,8 +296,8 @@ mod tests {
     use dynident_model::sample::Random;
     use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
 
-    /// Against differences of the residuals, which know nothing of slopes: their error is rounding over the step, 1e-7
-    /// to 1e-6 of entries that are of order one to a hundred.
+    /// Compared with differences of the residuals: their error is rounding over the step, 1e-7 to 1e-6 for entries of
+    /// order one to a hundred.
     #[test]
     fn derivatives_are_those_of_the_residuals() {
         let robot = read_urdf(include_str!("../../../../robots/planar2r.urdf")).unwrap().model;
@@ -353,7 +346,7 @@ mod tests {
                     let differences = DVector::from_iterator(above[place].len(), differences);
                     let scale = differences.amax().max(1.0);
                     let found = column.map_or_else(|| DVector::zeros(differences.len()), nalgebra::Matrix::into_owned);
-                    // Means of products against products of means: the series turns by ωΔt = 0.04 rad over three
+                    // Mean of products compared with product of means: the series turns by ωΔt = 0.04 rad over three
                     // samples.
                     let tolerance = if mean_of == 1 { 1e-5 } else { 2e-2 };
                     let error = (&found - &differences).amax();

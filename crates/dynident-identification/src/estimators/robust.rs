@@ -1,21 +1,20 @@
-//! Iteratively reweighted least squares: rows far off count less, or not at all.
+//! Iteratively reweighted least squares: outliers get less weight, or none.
 
-use super::row_pass::{KeptRows, Stop};
+use super::row_pass::{KeptRows, PassError};
 use super::{EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, RobustSettings, RowWeight, robust_least_squares};
 use serde::{Deserialize, Serialize};
 
-/// What a robust estimator thought of the rows, joint by joint.
+/// Weights of the rows in a robust estimator, by joint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct GrossErrors {
-    /// Share of rows whose weight is below one half.
+    /// Share of rows with a weight below one half.
     pub share: Vec<f64>,
     /// Mean weight of the rows.
     pub mean_weight: Vec<f64>,
 }
 
-/// The estimate with one pass over the rows for every reweighting.
 pub(super) fn robust(rows: &TrainingRows<'_>, weight: RowWeight) -> Result<(Estimate, Findings), EstimatorError> {
     let estimation = rows.settings;
     let settings = RobustSettings {
@@ -25,7 +24,7 @@ pub(super) fn robust(rows: &TrainingRows<'_>, weight: RowWeight) -> Result<(Esti
         ..RobustSettings::default()
     };
     let mut kept = KeptRows::new();
-    let found = robust_least_squares::<Stop>(rows.problem, &settings, |visit| kept.every_row(rows, visit))?;
+    let found = robust_least_squares::<PassError>(rows.problem, &settings, |visit| kept.every_row(rows, visit))?;
     let errors = GrossErrors { share: found.outlier_share, mean_weight: found.mean_weight };
     Ok((found.estimate, Findings::GrossErrors(errors)))
 }

@@ -1,26 +1,25 @@
-//! Every row of the training logs once more, for estimators that reweight them.
+//! Repeated passes over the rows of training logs, for estimators that reweight them.
 
 use super::{EstimatorError, TrainingRows};
 use dynident_estimation::{EstimationError, RowBlock, RowVisitor};
 use dynident_rows::{JointRows, LogError, RowConsumer};
 
-/// What stops an estimator that comes back to the logs: itself, or what reads or simulates them.
-pub(crate) enum Stop {
+/// Error of the estimator, or of the code that reads or simulates logs for it.
+pub(crate) enum PassError {
     Estimator(EstimationError),
     Log(EstimatorError),
 }
 
-impl From<EstimationError> for Stop {
+impl From<EstimationError> for PassError {
     fn from(error: EstimationError) -> Self {
         Self::Estimator(error)
     }
 }
 
-/// Numbers of filtered rows that are kept at most, 256 MiB.
-const MOST_KEPT_NUMBERS: usize = 1 << 25;
+/// Maximum number of values of filtered rows that are kept (256 MiB).
+const MAX_KEPT_VALUES: usize = 1 << 25;
 
-/// Rows of the training logs for estimators that come back to them: made once and kept if they fit, else made anew in
-/// every pass.
+/// Rows of the training logs for repeated passes; kept if they fit, otherwise computed again in every pass.
 pub(super) struct KeptRows {
     blocks: Option<Vec<KeptBlock>>,
     complete: bool,
@@ -38,8 +37,7 @@ impl KeptRows {
         Self { blocks: Some(Vec::new()), complete: false }
     }
 
-    /// One pass: every row of every training log.
-    pub(super) fn every_row(&mut self, rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), Stop> {
+    pub(super) fn every_row(&mut self, rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), PassError> {
         if let (Some(blocks), true) = (&self.blocks, self.complete) {
             for KeptBlock { log, joint, rows, panel } in blocks {
                 visit(&RowBlock { log: *log, joint: *joint, rows: *rows, panel })?;
@@ -51,7 +49,7 @@ impl KeptRows {
         for (log, &index) in rows.training.iter().enumerate() {
             let mut keep = |block: &RowBlock<'_>| {
                 numbers += block.panel.len();
-                if numbers > MOST_KEPT_NUMBERS {
+                if numbers > MAX_KEPT_VALUES {
                     self.blocks = None;
                 }
                 if let Some(blocks) = &mut self.blocks {
@@ -61,7 +59,7 @@ impl KeptRows {
                 visit(block)
             };
             let mut consumer = VisitorConsumer { log, visit: &mut keep, refused: None, counted: Vec::new() };
-            rows.logs.pass(rows.model, index).run(&mut consumer).map_err(|error| Stop::Log(error.into()))?;
+            rows.logs.pass(rows.model, index).run(&mut consumer).map_err(|error| PassError::Log(error.into()))?;
             if let Some(refused) = consumer.refused {
                 return Err(refused.into());
             }
@@ -72,7 +70,6 @@ impl KeptRows {
     }
 }
 
-/// Hands a log's rows to a visitor.
 struct VisitorConsumer<'a, 'b> {
     log: usize,
     visit: &'a mut RowVisitor<'b>,
@@ -95,11 +92,11 @@ impl RowConsumer for VisitorConsumer<'_, '_> {
     }
 }
 
-impl From<Stop> for EstimatorError {
-    fn from(stop: Stop) -> Self {
+impl From<PassError> for EstimatorError {
+    fn from(stop: PassError) -> Self {
         match stop {
-            Stop::Estimator(source) => Self::Estimation(source),
-            Stop::Log(error) => error,
+            PassError::Estimator(source) => Self::Estimation(source),
+            PassError::Log(error) => error,
         }
     }
 }

@@ -1,8 +1,8 @@
-//! DIDIM, CLIE and CLOE: from a controller and the commanded motion to an estimate.
+//! DIDIM, CLIE and CLOE: estimates from a controller and the commanded motion.
 
 use super::simulated_loop::{ComparedSignal, LoopLog, SimulatedLoop};
+use super::start_values::start_values;
 use super::{EstimatorError, TrainingRows};
-use crate::consistent::{ConsistencyError, ConsistencySettings, consistent_parameters};
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, EstimateStatus, EstimationError, LinearProblem, SegmentedFactor, SimulatedEstimate, SimulatedMotion,
@@ -11,78 +11,75 @@ use dynident_estimation::{
 use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, RunLimits, SensorSettings};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-/// Noise of the compared signal counts as at least this share of the signal's root mean square, so that noise-free data
-/// have weights.
-const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
-/// Rows times columns that are held in memory, of 8 bytes each.
-const MOST_ENTRIES: usize = 100_000_000;
-/// The noise of the joints is judged anew so often at most, until no joint's changes by more than a tenth.
-const ROUNDS: usize = 3;
-const SETTLED: f64 = 0.1;
+/// Minimum noise relative to the root mean square of the compared signal, so that noise-free data have finite weights.
+const MIN_RELATIVE_SIGMA: f64 = 1e-4;
+/// Maximum number of matrix entries (rows times columns) in memory, 8 bytes each.
+const MAX_ENTRIES: usize = 100_000_000;
+/// Maximum number of updates of the joints' noise.
+const MAX_ROUNDS: usize = 3;
+const MAX_NOISE_CHANGE: f64 = 0.1;
 
-/// Where the iteration begins.
+/// Start of the iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum SimulationStart {
-    /// At the one of the two below whose simulation is nearer to the record; at the other if that leads nowhere.
+    /// The one of the two below whose simulation is closer to the record; the other one if that fails.
     #[default]
     Nearer,
-    /// The consistent set that fits the measured rows best: a simulation with negative masses would get nowhere.
+    /// The consistent set with the best fit to the measured rows; a simulation with negative masses would fail.
     Estimate,
-    /// The robot's description.
+    /// The robot description.
     Description,
 }
 
-/// The experiment to simulate, and how the fit to it goes.
+/// The simulated experiment, and settings of the fit.
 #[derive(Clone, Debug)]
 pub struct SimulatedLoopSettings {
-    /// The controller that drove the robot.
+    /// Controller that drove the robot.
     pub controller: ControllerSettings,
-    /// Samples a second of the controller.
+    /// Rate of the controller, hertz.
     pub rate_hz: f64,
     /// Integrator, velocities and delays of the feedback, start and torque limits of the loop. Noise is not simulated.
     pub loop_settings: LoopSettings,
-    /// Where the iteration begins.
+    /// Start of the iteration.
     pub start: SimulationStart,
     /// Length of a step, in error bars over all directions, at which the iteration ends; 1e-3 is usual.
     pub tolerance: f64,
-    /// Most steps; 30 are usual.
+    /// Maximum number of steps; 30 are usual.
     pub max_iterations: usize,
     /// Step of the differences of CLIE and CLOE, relative to each parameter's size; 1e-4 is usual.
     pub difference: f64,
 }
 
-/// How a fit to the simulated closed loop went.
+/// Result of a fit to the simulated closed loop.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SimulatedFit {
-    /// The controller.
+    /// Name of the controller.
     pub controller: String,
-    /// Its samples a second.
+    /// Rate of the controller, hertz.
     pub rate_hz: f64,
-    /// What was compared: `torque` or `position`.
+    /// Compared signal: `torque` or `position`.
     pub compared: String,
-    /// Where the iteration began: at the `estimate` (the physically consistent set that fits the measured rows best) or
+    /// Start of the iteration: the `estimate` (the physically consistent set with the best fit to the measured rows) or
     /// the `description`.
     pub start: String,
-    /// Steps.
+    /// Number of steps.
     pub iterations: usize,
-    /// Simulations of all logs.
+    /// Number of simulations of all logs.
     pub simulations: usize,
-    /// For each joint the standard deviation of what the simulation leaves, Nm (N), or rad (m) where positions are
-    /// compared.
+    /// Standard deviation of each joint's residual, Nm (N), or rad (m) for positions.
     pub residual_std: Vec<f64>,
 }
 
-/// The estimate, and how it came about.
+/// Computes the estimate.
 ///
-/// The simulation has the study's controller (its model, if it needs one, is the description) and the log's commanded
-/// motion, and no noise; its motion is taken at the log's instants, and what it gives passes the same parallel filter
-/// as what was measured. Error bars are those of weighted least squares on the last linearised rows, so that coloured
-/// residuals count as everywhere.
+/// The simulation uses the study's controller (a model in it is that of the robot description) and the log's commanded
+/// motion, without noise. Its signals are sampled at the log's instants and pass the same parallel filter as the
+/// measured ones. Error bars are those of weighted least squares on the last linearised rows, so they include
+/// correlated residuals.
 pub(super) fn simulated(
     rows: &TrainingRows<'_>,
     experiment: &SimulatedLoopSettings,
@@ -109,9 +106,9 @@ pub(super) fn simulated(
         failure: None,
     };
     let entries = simulated.rows() * problem.columns().len();
-    if entries > MOST_ENTRIES {
+    if entries > MAX_ENTRIES {
         return Err(wrong(format!(
-            "{} rows of {} columns are too many to hold at once: give parallel_filter.factor, or a shorter part of the log",
+            "{} rows of {} columns do not fit into memory: set parallel_filter.factor, or use a shorter part of the log",
             simulated.rows(),
             problem.columns().len()
         )));
@@ -124,14 +121,14 @@ pub(super) fn simulated(
     let mut estimate = weighted_least_squares(&linearised(rows, &simulated, &found)?, &weighted)?;
     estimate.iterations = best.iterations;
     if found.status == EstimateStatus::IterationLimit {
-        // The step that these rows ask for made the simulation worse: the last values that were simulated are kept.
+        // The last step made the simulation worse, so keep the last simulated values.
         estimate.status = EstimateStatus::IterationLimit;
         estimate.values.clone_from(&found.values);
         let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
         estimate.relative_std_percent = estimate.std.iter().zip(&estimate.values).map(relative).collect();
     }
     let residual_std = std::mem::take(&mut estimate.joint_sigma);
-    // The model's residual of the measured torque, also where positions were compared: the torque's band is made of it.
+    // Residual of the measured torque, also if positions were compared, because the error band of the torque uses it.
     estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
     let fit = SimulatedFit {
         controller: controller.name().to_owned(),
@@ -145,7 +142,7 @@ pub(super) fn simulated(
     Ok((estimate, fit))
 }
 
-/// The loop of the experiment without noise, and with no limits but those of the torque.
+/// The experiment without noise and without limits other than those of the torque.
 fn noiseless(experiment: &SimulatedLoopSettings, compared: ComparedSignal) -> LoopSettings {
     let mut settings = experiment.loop_settings.clone();
     settings.limits = RunLimits { torque: settings.limits.torque, ..RunLimits::default() };
@@ -155,7 +152,7 @@ fn noiseless(experiment: &SimulatedLoopSettings, compared: ComparedSignal) -> Lo
     settings
 }
 
-/// The model of a controller that needs one: the robot's description.
+/// The model inside a controller that needs one: the robot description.
 fn controller_model(
     rows: &TrainingRows<'_>,
     controller: &ControllerSettings,
@@ -168,7 +165,7 @@ fn controller_model(
     let unknown = model.model().bodies_without_prior();
     if !unknown.is_empty() {
         return Err(wrong(format!(
-            "the controller \"{}\" needs the model that it had, and the description has no inertial of {}",
+            "the controller \"{}\" needs a model, but the robot description has no inertial of {}",
             controller.name(),
             unknown.join(", ")
         )));
@@ -177,8 +174,8 @@ fn controller_model(
     described.map(Some).map_err(|error| wrong(format!("[controller]: {error}")))
 }
 
-/// Iterates from the start whose simulation is nearest to the record, and from the others until one of them converges;
-/// the best outcome, with the iterations and simulations of all.
+/// Iterates from the start whose simulation is closest to the record, and from the others until one converges. Returns
+/// the best result, with the total numbers of iterations and simulations.
 fn best_outcome(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
@@ -207,7 +204,7 @@ fn best_outcome(
     Ok(StartOutcome { iterations, simulations, ..best })
 }
 
-/// The starts that can be simulated, the one nearest to the record first.
+/// Starts whose simulation succeeds, the closest to the record first.
 fn simulated_starts(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
@@ -233,7 +230,7 @@ fn simulated_starts(
     Ok(begun)
 }
 
-/// For each joint the standard deviation of its measured filtered torque from the model's, `√(RSS_j / (N_j − p/n))`.
+/// Standard deviation of each joint's residual of the measured filtered torque, `√(RSS_j / (N_j − p/n))`.
 pub(crate) fn torque_sigma(problem: &LinearProblem, values: &[f64]) -> Result<Vec<f64>, EstimationError> {
     let mut squares = vec![0.0; problem.joints().len()];
     for equation in problem.equations() {
@@ -245,14 +242,12 @@ pub(crate) fn torque_sigma(problem: &LinearProblem, values: &[f64]) -> Result<Ve
     Ok(squares.iter().zip(rows).map(|(sum, rows)| (sum / (rows as f64 - share).max(1.0)).sqrt()).collect())
 }
 
-/// A start that can be simulated.
 struct SimulatedStart {
     values: Vec<f64>,
     name: &'static str,
     sigma: Vec<f64>,
 }
 
-/// The result from one start.
 struct StartOutcome {
     found: SimulatedEstimate,
     start: &'static str,
@@ -265,7 +260,7 @@ fn log_sum(sigma: &[f64]) -> f64 {
     sigma.iter().map(|sigma| sigma.ln()).sum()
 }
 
-/// Iterates from one start; the joints' noise, which weighs their rows, is judged anew by what is left.
+/// Iterates from one start; the residuals update the noise of the joints, which weights their rows.
 fn settled(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
@@ -293,68 +288,24 @@ fn settled(
         measured: measured.clone(),
     };
     let (mut iterations, mut simulations) = (0, 0);
-    for round in 1..=ROUNDS {
+    for round in 1..=MAX_ROUNDS {
         let found = simulated_least_squares(&fit, &settings, simulated)?;
         iterations += found.iterations;
         simulations += found.simulations;
         let next = deviations(simulated, &found.residual, measured, found.rank.rank);
-        let changed = next.iter().zip(&sigma).any(|(new, old)| (new / old - 1.0).abs() > SETTLED);
+        let changed = next.iter().zip(&sigma).any(|(new, old)| (new / old - 1.0).abs() > MAX_NOISE_CHANGE);
         sigma = next;
-        if !changed || round == ROUNDS || found.status == EstimateStatus::IterationLimit {
+        if !changed || round == MAX_ROUNDS || found.status == EstimateStatus::IterationLimit {
             return Ok(StartOutcome { found, start: name, sigma, iterations, simulations });
         }
         fit.noise_std = by_row(simulated, &sigma);
         fit.start.clone_from(&found.values);
     }
-    // The last round returns.
     Err(EstimationError::NoSimulation.into())
 }
 
-/// Why there is nothing to begin with.
-#[derive(Debug, Error)]
-enum NoStartError {
-    #[error("there is no physically consistent set to start from: {0}")]
-    Inconsistent(ConsistencyError),
-    #[error("the description, which could be started from, has no inertial of {}", .0.join(", "))]
-    Undescribed(Vec<String>),
-    #[error("{0}; {1}")]
-    Both(Box<Self>, Box<Self>),
-}
-
-/// Where the iteration may begin, and what each is called.
-fn start_values(
-    rows: &TrainingRows<'_>,
-    choice: SimulationStart,
-    plain: &Estimate,
-) -> Result<Vec<(Vec<f64>, &'static str)>, NoStartError> {
-    let (model, problem) = (rows.model, rows.problem);
-    let mut starts = Vec::new();
-    let mut why = Vec::new();
-    if choice != SimulationStart::Description {
-        let default = ConsistencySettings::default();
-        let settings = rows.consistency.unwrap_or(&default);
-        match consistent_parameters(&model.parametric, problem, &plain.joint_sigma, settings) {
-            Ok(fit) => starts.push((fit.base_values, "estimate")),
-            Err(reason) => why.push(NoStartError::Inconsistent(reason)),
-        }
-    }
-    if choice != SimulationStart::Estimate {
-        if let Some(nominal) = model.parametric.nominal_base() {
-            starts.push((nominal.to_vec(), "description"));
-        } else {
-            let unknown = model.model().bodies_without_prior().into_iter().map(str::to_owned);
-            why.push(NoStartError::Undescribed(unknown.collect()));
-        }
-    }
-    let both = |first, second| NoStartError::Both(Box::new(first), Box::new(second));
-    match why.into_iter().reduce(both) {
-        Some(error) if starts.is_empty() => Err(error),
-        _ => Ok(starts),
-    }
-}
-
 fn failure(simulated: &SimulatedLoop<'_>) -> String {
-    simulated.failure.clone().unwrap_or_else(|| "its motion has grown beyond all numbers".to_owned())
+    simulated.failure.clone().unwrap_or_else(|| "the motion diverges".to_owned())
 }
 
 fn no_simulation(why: &str) -> String {
@@ -363,7 +314,7 @@ fn no_simulation(why: &str) -> String {
     )
 }
 
-/// Standard deviation of each joint's share of `residual`.
+/// Standard deviation of each joint's part of `residual`.
 fn deviations(
     simulated: &SimulatedLoop<'_>,
     residual: &DVector<f64>,
@@ -385,15 +336,15 @@ fn deviations(
     (0..joints)
         .map(|joint| {
             let rows = count[joint] as f64;
-            let least = LEAST_RELATIVE_SIGMA * (signal[joint] / rows.max(1.0)).sqrt();
+            let least = MIN_RELATIVE_SIGMA * (signal[joint] / rows.max(1.0)).sqrt();
             let sigma = (squares[joint] / (rows - share).max(1.0)).sqrt().max(least);
-            // Of a joint without torque and without residual.
+            // A joint without torque and without residual.
             if sigma > 0.0 { sigma } else { 1.0 }
         })
         .collect()
 }
 
-/// One number per joint as one per row.
+/// Repeats one value per joint for its rows.
 fn by_row(simulated: &SimulatedLoop<'_>, values: &[f64]) -> DVector<f64> {
     let all = simulated.logs.iter().flat_map(|log| log.rows.iter().zip(values));
     let repeated = all.flat_map(|(&rows, &value)| std::iter::repeat_n(value, rows));

@@ -1,26 +1,23 @@
-//! The closed loop of an experiment behind the estimators' seam: the same controller, reference, instants and filters
-//! as the logs, other parameters.
+//! Simulation of an experiment's closed loop for the estimators: controller, reference, instants and filters as in the
+//! logs, with other parameters.
 
-use super::row_pass::Stop;
+use super::row_pass::PassError;
 use super::{EstimatorError, TrainingRows};
 use dynident_estimation::{SimulatedCriterion, SimulatedMotion, SimulatedRows};
 use dynident_excitation::Motion;
 use dynident_model::terms::TorqueTerm;
-use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
-use dynident_rows::{JointRows, LogError, RegressorModel, RowBuilder, RowConsumer, motion_band_hz};
+use dynident_recording::{DecimationSettings, FilterError, MotionBlock};
+use dynident_rows::{JointFilters, JointRows, LogError, RegressorModel, RowBuilder, RowConsumer, motion_band_hz};
 use dynident_simulation::{
     ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, SimulationError, closed_loop,
 };
 use nalgebra::{DMatrix, DVector};
 
-/// What is compared with the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ComparedSignal {
-    /// Torque, with the regressor of the simulated motion beside it: DIDIM.
+    /// Torque, with the regressor of the simulated motion: DIDIM.
     TorqueRows,
-    /// Torque: CLIE.
     Torque,
-    /// Positions: CLOE.
     Position,
 }
 
@@ -41,7 +38,6 @@ impl ComparedSignal {
     }
 }
 
-/// Samples of a log without a gap.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
     segment: usize,
@@ -49,23 +45,21 @@ struct Piece {
     rows: usize,
 }
 
-/// What a log says of how it was made, and when its samples were taken.
+/// Reference, filter and instants of a log.
 pub(super) struct LoopLog {
     pub(super) name: String,
     rate_hz: f64,
     pieces: Vec<Piece>,
     filter: Option<DecimationSettings>,
     reference: Reference,
-    /// When the simulation begins, in seconds after the log's first row: with the commanded motion, or with the log if
-    /// that began later.
+    /// Start of the simulation, s after the log's first row: that of the commanded motion, or of the log if it begins
+    /// later.
     begins_s: f64,
-    /// For each joint its filtered rows.
     pub(super) rows: Vec<usize>,
-    /// The measured outputs, filtered, joint by joint.
+    /// Measured and filtered outputs of each joint.
     measured: Vec<Vec<f64>>,
 }
 
-/// The experiment over again.
 pub(super) struct SimulatedLoop<'a> {
     pub(super) model: &'a RegressorModel,
     pub(super) controller: &'a ControllerSettings,
@@ -73,14 +67,14 @@ pub(super) struct SimulatedLoop<'a> {
     pub(super) settings: LoopSettings,
     pub(super) compared: ComparedSignal,
     pub(super) logs: Vec<LoopLog>,
-    /// Makes an error from what is wrong.
+    /// Wraps a message in an error.
     pub(super) wrong: &'a dyn Fn(String) -> EstimatorError,
-    /// Why the last simulation that did not get through did not.
+    /// Reason for the last failed simulation.
     pub(super) failure: Option<String>,
 }
 
 impl LoopLog {
-    /// Log number `index`: its instants, its filtered outputs, and the commanded motion at the controller's rate.
+    /// Reads log `index`: its instants, its filtered outputs, and the commanded motion at the controller's rate.
     pub(super) fn read(
         training: &TrainingRows<'_>,
         index: usize,
@@ -93,13 +87,11 @@ impl LoopLog {
         let name = recording.name.clone();
         let Some(commanded) = recording.commanded.as_deref() else {
             return Err(wrong(format!(
-                "log `{name}`: say what the controller was commanded to follow: reference = \"trajectory.csv\" under [[log]]"
+                "log `{name}` has no commanded motion: give reference = \"trajectory.csv\" under [[log]]"
             )));
         };
         let Some(mut stream) = recording.open(model.model(), motion)? else {
-            return Err(wrong(format!(
-                "log `{name}`: a motion that is made already has no instants: give its raw samples"
-            )));
+            return Err(wrong(format!("log `{name}`: a prepared motion has no sampling instants; give raw samples")));
         };
         let places = recording.places(model.model())?;
         let filter = logs.filter.decimation(stream.rate_hz(), motion_band_hz(motion));
@@ -118,7 +110,7 @@ impl LoopLog {
         }
         let log_rate_hz = stream.rate_hz();
         if outputs.rows.iter().any(Vec::is_empty) {
-            let (rows, needed) = (samples as u64, outputs.needed());
+            let (rows, needed) = (samples as u64, outputs.filters.needed());
             return Err(LogError::NothingLeft { log: name, rows, needed }.into());
         }
         let begins_s = commanded.start_s().min(0.0);
@@ -131,7 +123,7 @@ impl LoopLog {
         };
         if let Some(time_s) = pieces.iter().filter(|piece| piece.rows > 0).find_map(over) {
             return Err(wrong(format!(
-                "log `{name}`: at {time_s:.3} s of the log its reference has not begun or is over while it still moves; cut the log with time_range_s, or fix the reference's start_s"
+                "log `{name}`: at {time_s:.3} s of the log the reference has not begun or is over while the robot still moves; cut the log with time_range_s, or fix the reference's start_s"
             )));
         }
         let count = ((ends_s - begins_s) * rate_hz).ceil() as usize + 2;
@@ -151,27 +143,25 @@ impl LoopLog {
 }
 
 impl SimulatedLoop<'_> {
-    /// What was measured, logs one after another and in each joint by joint: the order of all rows.
+    /// Measured outputs, ordered by log, then by joint: the order of all rows.
     pub(super) fn measured(&self) -> DVector<f64> {
         let all = self.logs.iter().flat_map(|log| log.measured.iter().flatten().copied());
         DVector::from_iterator(self.rows(), all)
     }
 
-    /// Rows of all logs and joints.
     pub(super) fn rows(&self) -> usize {
         self.logs.iter().flat_map(|log| &log.rows).sum()
     }
 
-    /// The robot with base parameters θ: its torques, and so its mass matrix, are those of every full set that has
-    /// these base parameters.
+    /// The robot with base parameters θ. Its torques and mass matrix are those of every full set with these base
+    /// parameters.
     fn plant(&self, theta: &[f64]) -> Result<Plant, SimulationError> {
         let model = ControllerModel::from_columns(self.model.model(), self.model.layout().columns(), theta)?;
         let (terms, values): (Vec<TorqueTerm>, Vec<f64>) = model.terms().iter().cloned().unzip();
         Plant::new(model.model(), &terms, &values)
     }
 
-    /// One log's rows of a run.
-    fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), EstimatorError> {
+    fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut CollectedRows) -> Result<(), EstimatorError> {
         let dof = self.model.model().dof();
         let motion = (self.compared != ComparedSignal::Torque)
             .then(|| sampled(run, log.begins_s))
@@ -238,9 +228,9 @@ impl SimulatedLoop<'_> {
 }
 
 impl SimulatedMotion for SimulatedLoop<'_> {
-    type Error = Stop;
+    type Error = PassError;
 
-    fn simulate(&mut self, parameters: &[f64]) -> Result<Option<SimulatedRows>, Stop> {
+    fn simulate(&mut self, parameters: &[f64]) -> Result<Option<SimulatedRows>, PassError> {
         let mut plant = match self.plant(parameters) {
             Ok(plant) => plant,
             Err(reason) => {
@@ -250,14 +240,17 @@ impl SimulatedMotion for SimulatedLoop<'_> {
         };
         let rows = self.rows();
         let with_regressor = self.compared == ComparedSignal::TorqueRows;
-        let mut out = Gathered {
+        let mut out = CollectedRows {
             output: Vec::with_capacity(rows),
             regressor: DMatrix::zeros(if with_regressor { rows } else { 0 }, parameters.len()),
             filled: 0,
         };
         for log in &self.logs {
             let in_loop = |error: SimulationError| {
-                Stop::Log((self.wrong)(format!("log `{}`: the closed loop cannot be simulated: {error}", log.name)))
+                PassError::Log((self.wrong)(format!(
+                    "log `{}`: the closed loop cannot be simulated: {error}",
+                    log.name
+                )))
             };
             let mut controller = self.controller.build(plant.dof(), self.controller_model.as_ref()).map_err(in_loop)?;
             let run = closed_loop(&mut plant, controller.as_mut(), &log.reference, &self.settings).map_err(in_loop)?;
@@ -265,53 +258,40 @@ impl SimulatedMotion for SimulatedLoop<'_> {
                 self.failure = Some(format!("log `{}`: {}", log.name, run.status));
                 return Ok(None);
             }
-            self.rows_of(log, &run, &mut out).map_err(Stop::Log)?;
+            self.rows_of(log, &run, &mut out).map_err(PassError::Log)?;
         }
         Ok(Some(SimulatedRows { output: DVector::from_vec(out.output), regressor: out.regressor }))
     }
 }
 
-/// Rows of all logs as they come.
-struct Gathered {
+struct CollectedRows {
     output: Vec<f64>,
     regressor: DMatrix<f64>,
     filled: usize,
 }
 
-/// One number per joint and sample through the parallel filter.
+/// One value per joint and sample through the parallel filter.
 struct Outputs {
-    decimators: Option<Vec<Decimator>>,
-    segments: Vec<usize>,
-    out: Vec<f64>,
+    filters: JointFilters,
+    segment: usize,
     rows: Vec<Vec<f64>>,
 }
 
 impl Outputs {
     fn new(dof: usize, filter: Option<&DecimationSettings>, rate_hz: f64) -> Result<Self, FilterError> {
-        let decimators = filter
-            .map(|settings| (0..dof).map(|_| Decimator::new(settings, rate_hz, 1)).collect::<Result<Vec<_>, _>>())
-            .transpose()?;
-        Ok(Self { decimators, segments: vec![0; dof], out: Vec::new(), rows: vec![Vec::new(); dof] })
-    }
-
-    fn needed(&self) -> usize {
-        self.decimators.as_ref().and_then(|all| all.first()).map_or(1, Decimator::length)
+        let filters = JointFilters::new(&vec![1; dof], rate_hz, filter)?;
+        Ok(Self { filters, segment: 0, rows: vec![Vec::new(); dof] })
     }
 
     fn take(&mut self, joint: usize, segment: usize, values: &[f64]) {
-        let Some(decimators) = &mut self.decimators else {
-            self.rows[joint].extend_from_slice(values);
-            return;
-        };
-        if std::mem::replace(&mut self.segments[joint], segment) != segment {
-            decimators[joint].finish();
+        if core::mem::replace(&mut self.segment, segment) != segment {
+            self.filters.restart();
         }
-        let rows = decimators[joint].push(values, values.len(), &mut self.out);
-        self.rows[joint].extend_from_slice(&self.out[..rows]);
+        let rows = self.filters.push(joint, values, values.len(), &[]);
+        self.rows[joint].extend_from_slice(&rows.panel[..rows.rows]);
     }
 }
 
-/// Keeps every joint's filtered panels.
 struct PanelRows {
     joints: Vec<Vec<(usize, Vec<f64>)>>,
 }
@@ -323,8 +303,8 @@ impl RowConsumer for PanelRows {
     }
 }
 
-/// The motion of a run at any time of the log's clock: between the controller's samples the quintic that has both ends'
-/// position, velocity and acceleration.
+/// The motion of a run at any time of the log's clock: quintic interpolation of position, velocity and acceleration
+/// between the controller's samples.
 fn sampled(run: &Run, begins_s: f64) -> Result<dynident_recording::Reference, FilterError> {
     let times: Vec<f64> = (0..run.samples).map(|sample| begins_s + run.time_s(sample)).collect();
     let joints: Vec<[Vec<f64>; 3]> = (0..run.joints.len())
@@ -333,7 +313,7 @@ fn sampled(run: &Run, begins_s: f64) -> Result<dynident_recording::Reference, Fi
     dynident_recording::Reference::sampled(&times, &joints)
 }
 
-/// The torque in force: that of the controller's last sample; rounding must not fetch the one before.
+/// The torque of the controller's last sample; a small offset protects against rounding.
 fn held_torque(run: &Run, joint: usize, time_s: f64) -> f64 {
     let sample = ((time_s * run.rate_hz).max(0.0) + 1e-6).floor() as usize;
     run.tau[run.of(joint)][sample.min(run.samples - 1)]

@@ -4,6 +4,7 @@
 use super::periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord, PeriodicRecords};
 use super::simulated::torque_sigma;
 use super::{EstimatorError, Findings, PeriodSettings, TrainingRows};
+use crate::thresholds::MotionThresholds;
 use dynident_estimation::{
     Estimate, LinearProblem, SimultaneousEstimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings,
     simultaneous_least_squares, weighted_least_squares,
@@ -12,34 +13,29 @@ use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
 use dynident_rows::LogError;
 use serde::{Deserialize, Serialize};
 
-/// Positions further from the series than this share of their own size are not those of such a motion.
-const MOST_REMAINDER: f64 = 0.1;
-/// A motion smaller than this counts as none, rad (m).
-const NO_MOTION: f64 = 1e-4;
-/// Most harmonics that are taken unasked: with more the motion's unknowns, and the time they take, are many.
-const MOST_HARMONICS: usize = 60;
+/// Maximum number of automatic harmonics; more cost much time.
+const MAX_HARMONICS: usize = 60;
 
-/// What the simultaneous fit found of one log's motion and noise.
+/// Motion and noise of one log in the simultaneous fit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SeriesFit {
     /// Period of the first harmonic, s.
     pub period_s: f64,
-    /// Harmonics of the series.
+    /// Number of harmonics.
     pub harmonics: usize,
     /// Rows of each channel.
     pub rows: usize,
-    /// How many samples a row is the mean of.
+    /// Samples per row.
     pub samples_of_row: usize,
-    /// For each joint the standard deviation of a row's position from the series, rad (m).
+    /// Standard deviation of a row's position from the series by joint, rad (m).
     pub position_std: Vec<f64>,
-    /// For each joint the standard deviation of a row's torque from the model's, N m (N).
+    /// Standard deviation of a row's torque from the model by joint, N m (N).
     pub torque_std: Vec<f64>,
-    /// For each joint the order of the autoregression that its torque noise was found to be; 0 for white noise.
+    /// Order of the autoregression of each joint's torque noise; 0 for white noise.
     pub torque_autoregression: Vec<usize>,
 }
 
-/// One log as it was recorded.
 struct RawRecord {
     record: PeriodicRecord,
     series: FourierSeries,
@@ -51,7 +47,6 @@ impl RawRecord {
     }
 }
 
-/// The estimate, and what was found of each log's motion.
 pub(super) fn simultaneous(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
@@ -61,7 +56,7 @@ pub(super) fn simultaneous(
     let terms = model.terms().iter();
     if let Some(term) = terms.clone().find(|t| t.has_memory() || t.needs_load() || t.needs_temperature()) {
         return Err(wrong(format!(
-            "{} depends on more than the motion of one instant: leave that law out, or take another method",
+            "{} depends on more than the motion of one instant: leave this law out, or use another method",
             term.symbol()
         )));
     }
@@ -94,7 +89,7 @@ pub(super) fn simultaneous(
     Ok((estimate, Findings::Series(fits)))
 }
 
-/// The motion's unknowns of all logs as the positions alone give them.
+/// Start values of the motion of all logs, from the positions alone.
 fn fitted_motion(
     rows: &TrainingRows<'_>,
     records: &PeriodicRecords<'_>,
@@ -105,10 +100,10 @@ fn fitted_motion(
         let name = &rows.logs.recordings[index].name;
         let Some(fitted) = record.fitted_motion() else {
             return Err(wrong(format!(
-                "log `{name}` does not distinguish the harmonics of its motion: give fewer with [estimator.periods] harmonics = ..., or a longer log"
+                "log `{name}` does not determine the harmonics of its motion: reduce [estimator.periods] harmonics, or give a longer log"
             )));
         };
-        check_motion(record, &fitted).map_err(|(joint, message)| {
+        check_motion(record, &fitted, &rows.settings.thresholds.motion).map_err(|(joint, message)| {
             wrong(format!("log `{name}`: positions of {} {message}", rows.model.joint_names()[joint]))
         })?;
         motion.extend(fitted);
@@ -116,7 +111,6 @@ fn fitted_motion(
     Ok(motion)
 }
 
-/// Motion and noise of each log, as fitted.
 fn series_fits(
     recorded: &[RawRecord],
     records: &mut PeriodicRecords<'_>,
@@ -143,7 +137,7 @@ fn series_fits(
     Ok(recorded.iter().enumerate().map(series).collect())
 }
 
-/// The estimate with joints, by their torque, in place of channels, which are each log's positions and torques.
+/// Converts an estimate by channel (positions and torques of each log) to one by joint, using the torque channels.
 fn of_joints(
     mut estimate: Estimate,
     problem: &LinearProblem,
@@ -164,8 +158,7 @@ fn of_joints(
     Ok(estimate)
 }
 
-/// Log number `index` as it was recorded, and the series of its motion: the harmonics that stand out of the noise,
-/// unless their number is given.
+/// Reads log `index` and selects the series of its motion: the stated number of harmonics, or those above the noise.
 fn read(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -178,16 +171,14 @@ fn read(
     let commanded = || recording.commanded.as_ref().and_then(|commanded| commanded.period_s());
     let Some(period_s) = periods.period_s.or_else(commanded) else {
         return Err(wrong(format!(
-            "log `{name}`: say after how many seconds the motion repeats: [estimator.periods] period_s = ..., or name the commanded motion of one period as the log's reference"
+            "log `{name}`: the period of the motion is unknown: set period_s in [estimator.periods], or give the commanded motion of one period as the log's reference"
         )));
     };
-    // Central differences leave positions as they are.
+    // Central differences do not change positions.
     let differentiator = DifferentiatorSettings::CentralDifferences { order: 4 };
     let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
     let Some(mut stream) = recording.open(model.model(), &motion)? else {
-        return Err(wrong(format!(
-            "log `{name}`: the positions of a motion that is made already are smoothed: give its raw samples"
-        )));
+        return Err(wrong(format!("log `{name}`: the positions of a prepared motion are smoothed; give raw samples")));
     };
     let (rate_hz, places) = (stream.rate_hz(), recording.places(model.model())?);
     let mut channels = vec![Vec::new(); 2 * places.len()];
@@ -195,7 +186,7 @@ fn read(
     while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {
         if *segment.get_or_insert(block.segment) != block.segment {
             return Err(wrong(format!(
-                "log `{name}` has a gap, and its noise is followed from sample to sample: cut the longest piece out with time_range_s"
+                "log `{name}` has a gap, but the noise model needs consecutive samples: select the longest piece with time_range_s"
             )));
         }
         let skipped = ((periods.skip_s - block.first_time_s).max(0.0) * rate_hz).ceil() as usize;
@@ -211,15 +202,15 @@ fn read(
     let length_s = channels.first().map_or(0, Vec::len) as f64 / rate_hz;
     if length_s < period_s * (1.0 - 1e-9) {
         return Err(wrong(format!(
-            "log `{name}`: {length_s:.2} s are left, less than one period of {period_s} s: record at least one, or give the true period_s"
+            "log `{name}`: {length_s:.2} s remain, less than one period of {period_s} s: record at least one period, or correct period_s"
         )));
     }
-    // The cut-off is twice the highest frequency that stands out of the noise.
+    // The cut-off is twice the highest frequency above the noise.
     let highest = (0.5 * stream.cutoff().cutoff_hz * period_s).ceil() as usize;
-    let harmonics = periods.harmonics.unwrap_or_else(|| highest.clamp(1, MOST_HARMONICS));
+    let harmonics = periods.harmonics.unwrap_or_else(|| highest.clamp(1, MAX_HARMONICS));
     if 4.0 * harmonics as f64 > rate_hz * period_s {
         return Err(wrong(format!(
-            "log `{name}`: {harmonics} harmonics of {:.3} Hz at {rate_hz:.1} samples a second: give fewer, [estimator.periods] harmonics = ...",
+            "log `{name}`: {harmonics} harmonics of {:.3} Hz are too many for a rate of {rate_hz:.1} Hz: reduce [estimator.periods] harmonics",
             period_s.recip()
         )));
     }
@@ -228,20 +219,24 @@ fn read(
     Ok(RawRecord { record, series: FourierSeries { period_s, harmonics } })
 }
 
-/// Whether the positions are those of the fitted series; if not, the joint and what is wrong.
-fn check_motion(record: &PeriodicModel<'_>, fitted: &[f64]) -> Result<(), (usize, String)> {
+/// Checks that the positions are those of the fitted series; otherwise returns the joint and a message.
+fn check_motion(
+    record: &PeriodicModel<'_>,
+    fitted: &[f64],
+    thresholds: &MotionThresholds,
+) -> Result<(), (usize, String)> {
     let root_mean = |values: &[f64]| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
     let left = record.position_residuals(fitted);
     let unknowns = fitted.len() / left.ncols().max(1);
     for (joint, left) in left.column_iter().enumerate() {
-        // Sine and cosine have the mean square one half.
+        // Sine and cosine have a mean square of one half.
         let size = root_mean(&fitted[joint * unknowns + 1..(joint + 1) * unknowns]) * (0.5 * unknowns as f64).sqrt();
         let remainder = root_mean(left.as_slice());
-        if remainder > MOST_REMAINDER * size.max(NO_MOTION) {
+        if remainder > thresholds.max_series_residual * size.max(thresholds.min_motion) {
             return Err((
                 joint,
                 format!(
-                    "are {remainder:.2e} from the Fourier series of that period and move by {size:.2e} rad (root mean squares): fix period_s, give more harmonics, or skip the start with skip_s"
+                    "differ by {remainder:.2e} rad from the Fourier series of this period and move by {size:.2e} rad (root mean squares): fix period_s, give more harmonics, or skip the start with skip_s"
                 ),
             ));
         }

@@ -1,4 +1,4 @@
-//! Motion and parameters from one likelihood, for any log: raw positions and torques, noise of both, the motion a
+//! Motion and parameters from one likelihood, for any log: raw positions and torques, noise of both, the motion as a
 //! smoothing spline.
 
 use super::simulated::torque_sigma;
@@ -12,30 +12,25 @@ use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
 use dynident_rows::LogError;
 use serde::{Deserialize, Serialize};
 
-/// Shorter pieces between two gaps are left out, samples.
-const LEAST_SAMPLES: usize = 64;
+/// Minimum length of a piece between two gaps, samples.
+const MIN_PIECE_SAMPLES: usize = 64;
 
-/// Where residuals of the filtered rows are so many times those of weighted least squares, what lasts in the torque's
-/// residuals is the model's error, and the whitening filter has taken the model's own motion for noise.
-const MOST_OVER_START: f64 = 1.25;
-
-/// What the fit of motion and parameters found.
+/// Results of the fit of motion and parameters.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SplineFit {
     /// Motion and noise of every training log.
     pub logs: Vec<SplineLogFit>,
-    /// The sum of squares with the parameters of weighted least squares, the motion by the positions alone and the
-    /// noise that was found.
+    /// Sum of squares with the parameters of weighted least squares, the motion from the positions alone and the
+    /// estimated noise.
     pub cost_at_start: f64,
-    /// What it came down to.
+    /// Final sum of squares.
     pub cost: f64,
-    /// Residuals of the filtered rows over those of weighted least squares, root mean square over the joints. Somewhat
-    /// above one where noise of the positions biases least squares; far above, the model's error is taken for noise.
+    /// Ratio of filtered residuals to those of weighted least squares, root mean square over the joints. It is slightly
+    /// above one if position noise biases least squares; far above one, model error was treated as noise.
     pub residual_over_start: f64,
 }
 
-/// The estimate, and what was found of each log's motion.
 pub(super) fn spline_motion(
     rows: &TrainingRows<'_>,
     settings: &SplineMotionSettings,
@@ -45,7 +40,7 @@ pub(super) fn spline_motion(
     let dof = model.dof();
     if problem.columns().len() != model.layout().columns().len() || problem.joints().len() != dof {
         return Err(wrong(
-            "payloads, parameters of single logs and joints without a row are not estimated together with the motion: take another method, or leave these logs out"
+            "payloads, parameters of single logs and joints without rows are not possible with the simultaneous method: use another method, or leave these logs out"
                 .to_owned(),
         ));
     }
@@ -90,14 +85,16 @@ pub(super) fn spline_motion(
         Ok((found, over_start))
     };
     let (mut found, mut over_start) = fitted(&settings)?;
-    if (over_start.is_nan() || over_start > MOST_OVER_START) && settings.most_autoregression > 0 {
+    if (over_start.is_nan() || over_start > estimation.thresholds.motion.max_spline_residual_ratio)
+        && settings.most_autoregression > 0
+    {
         let (white, of_white) = fitted(&SplineMotionSettings { most_autoregression: 0, ..settings })?;
         if over_start.is_nan() || over_start > of_white {
             (found, over_start) = (white, of_white);
         }
     }
     let mut estimate = found.estimate;
-    // Channels are torques first; an estimate speaks of joints, by their torque.
+    // Channels are torques first; the estimate is reported by joint.
     for of_channels in [&mut estimate.score_inflation, &mut estimate.effective_lag1, &mut estimate.segment_correlation]
     {
         of_channels.truncate(dof);
@@ -107,7 +104,7 @@ pub(super) fn spline_motion(
     Ok((estimate, Findings::Spline(fit)))
 }
 
-/// The pieces of recording number `index` as it was recorded, with temperatures where they were measured.
+/// Pieces of recording `index`, with measured temperatures if available.
 fn read(
     rows: &TrainingRows<'_>,
     log: usize,
@@ -117,10 +114,10 @@ fn read(
     let TrainingRows { logs, model, .. } = *rows;
     let recording = &logs.recordings[index];
     let name = &recording.name;
-    // Central differences leave positions as they are.
+    // Central differences do not change positions.
     let differentiator = DifferentiatorSettings::CentralDifferences { order: 4 };
     let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
-    let raw = "the positions of a motion that is made already are smoothed: give its raw samples, all of them";
+    let raw = "the positions of a prepared motion are smoothed; give all raw samples";
     let Some(whole) = recording.with_every_row() else {
         return Err(wrong(format!("log `{name}`: {raw}")));
     };
@@ -149,10 +146,10 @@ fn read(
         }
         logs.execution.progress.advance(block.rows as u64);
     }
-    pieces.retain(|channels| channels.first().is_some_and(|q| q.len() >= LEAST_SAMPLES));
+    pieces.retain(|channels| channels.first().is_some_and(|q| q.len() >= MIN_PIECE_SAMPLES));
     if pieces.is_empty() {
         return Err(wrong(format!(
-            "log `{name}` has no piece of {LEAST_SAMPLES} samples without a gap: give a longer log"
+            "log `{name}` has no piece of {MIN_PIECE_SAMPLES} samples without a gap: give a longer log"
         )));
     }
     let record = |mut channels: Vec<Vec<f64>>| {

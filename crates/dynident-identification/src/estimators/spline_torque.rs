@@ -1,4 +1,4 @@
-//! The torque of a robot and its derivatives by motion and parameters: what the spline fit asks of a robot.
+//! Torque of a robot and its derivatives by motion and parameters, for the spline fit.
 
 use dynident_dynamics::{
     BatchWorkspace, MotionGradient, Panels, TermHistory, regressor_panels, regressor_panels_adjoint,
@@ -9,23 +9,20 @@ use dynident_model::terms::{JointMotion, TorqueTerm};
 use dynident_rows::RegressorModel;
 use rayon::prelude::*;
 
-/// Samples that one thread takes at a time.
-const BLOCK: usize = 128;
+const BLOCK_SAMPLES: usize = 128;
 
-/// Torque and its derivatives, blocks of samples side by side.
+/// Torque and its derivatives, for several blocks of samples in parallel.
 ///
-/// Friction with a memory, of the load or of the temperature follows the motion, and its derivative by the motion
-/// counts as zero: the motion is not bent to please it.
+/// The derivative of friction with memory, load or temperature by the motion is taken as zero, so that the fit does not
+/// bend the motion for it.
 #[derive(Debug)]
 pub struct SplineTorque<'a> {
     model: &'a RegressorModel,
-    /// Temperatures of every record, joint-major; empty where none was measured.
+    /// Temperatures of every record, joint-major; empty if not measured.
     temperatures_c: Vec<Vec<f64>>,
-    /// Where such friction is.
     following: Option<(BatchWorkspace, TermHistory)>,
 }
 
-/// Some samples of a motion, joint-major.
 struct Part {
     first: usize,
     samples: usize,
@@ -33,8 +30,8 @@ struct Part {
 }
 
 impl<'a> SplineTorque<'a> {
-    /// Of this model; parameters are the columns of its layout. `temperatures_c` of every record, joint-major, where
-    /// friction needs them.
+    /// Torque of this model; parameters are the columns of its layout. `temperatures_c` of every record, joint-major,
+    /// if friction needs them.
     pub fn new(model: &'a RegressorModel, temperatures_c: Vec<Vec<f64>>) -> Self {
         let follows = |term: &TorqueTerm| term.has_memory() || term.needs_load() || term.needs_temperature();
         let following = model
@@ -45,7 +42,7 @@ impl<'a> SplineTorque<'a> {
         Self { model, temperatures_c, following }
     }
 
-    /// Panels of all parts where friction follows the motion: one after another.
+    /// Panels of all parts in order, if friction has memory.
     fn following(&mut self, record: usize, first: usize, parts: &[Part]) -> Option<Vec<Panels>> {
         let (workspace, history) = self.following.as_mut()?;
         if first == 0 {
@@ -69,24 +66,23 @@ impl<'a> SplineTorque<'a> {
     }
 }
 
-/// What needs no memory, for several threads.
+/// Torque without memory, for several threads.
 #[derive(Clone, Copy)]
 struct Instants<'a>(&'a RegressorModel);
 
 impl Instants<'_> {
     fn parts(motion: &JointMotion<'_>) -> Vec<Part> {
         let of = |first: usize| {
-            let samples = BLOCK.min(motion.samples - first);
+            let samples = BLOCK_SAMPLES.min(motion.samples - first);
             let cut = |values: &[f64]| -> Vec<f64> {
                 let joints = values.chunks_exact(motion.samples);
                 joints.flat_map(|own| own[first..first + samples].iter().copied()).collect()
             };
             Part { first, samples, motion: [motion.q, motion.dq, motion.ddq].map(cut) }
         };
-        (0..motion.samples).step_by(BLOCK).map(of).collect()
+        (0..motion.samples).step_by(BLOCK_SAMPLES).map(of).collect()
     }
 
-    /// Panels of a part.
     fn panels(self, workspace: &mut BatchWorkspace, part: &Part) -> Panels {
         let mut panels = Panels::default();
         let motion = part.view();
@@ -94,7 +90,6 @@ impl Instants<'_> {
         panels
     }
 
-    /// Torque of joint `joint` from its panel.
     fn torque_of(self, joint: usize, panels: &Panels, samples: usize, parameters: &[f64]) -> Vec<f64> {
         let mut torque = vec![0.0; samples];
         let columns = self.0.layout().joint_columns(joint);

@@ -1,20 +1,18 @@
-//! The friction that a joint may have when the data choose: terms, and for each term a grid of its constants, every one
-//! a column.
+//! Candidate friction of a joint: terms, and for each term a grid of its constants with one column per point.
 
 use dynident_model::Model;
 use dynident_model::terms::{
     CandidateJoint, CandidateLaw, CandidateRole, Coulomb, CoulombShape, GridPoint, TorqueTerm,
 };
 
-/// What a candidate model is made of.
 pub(super) type FrictionKind = &'static CandidateLaw;
 
-/// True when its constants are found on the grid; else all of its columns are taken.
+/// Whether one point of its grid is selected; otherwise all of its columns are used.
 pub(super) fn takes_one(kind: FrictionKind) -> bool {
     kind.constants > 0
 }
 
-/// Which of the columns are tried together: neighbours on the grid, all columns where there is no grid.
+/// Columns that are tried together: neighbours on the grid, or all columns without a grid.
 pub(super) fn options(kind: FrictionKind, columns: &[CandidateColumn]) -> Vec<Vec<usize>> {
     let of_kind: Vec<usize> = (0..columns.len()).filter(|&place| columns[place].kind == kind).collect();
     if !takes_one(kind) {
@@ -28,46 +26,45 @@ pub(super) fn options(kind: FrictionKind, columns: &[CandidateColumn]) -> Vec<Ve
     alone.into_iter().map(|place| vec![place]).chain(pairs).chain(only).collect()
 }
 
-/// One column that a joint may have.
 #[derive(Clone, Debug)]
 pub(crate) struct CandidateColumn {
     pub(crate) kind: FrictionKind,
     pub(crate) term: TorqueTerm,
-    /// What is stated when this column is chosen: itself, or both directions of a term that has two.
+    /// Terms stated if this column is selected: the term, or both directions of a directional term.
     pub(crate) stated: Vec<TorqueTerm>,
-    /// Number of its step on the first axis of the grid, in ascending order; none for one that is tried alone.
+    /// Step on the first axis of the grid, ascending; `None` for a single candidate.
     pub(crate) grid: Option<usize>,
 }
 
-/// A joint whose friction the training logs choose, and where the search begins.
+/// Search for a joint's friction from the training logs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionSearch {
-    /// The joint.
+    /// Name of the joint.
     pub joint: String,
-    /// Its stated Coulomb step: one of the candidates. None by default.
+    /// Stated Coulomb step, which becomes a candidate. `None` by default.
     pub coulomb: Option<CoulombShape>,
-    /// Velocity below which the sign step counts as zero, rad/s or m/s. 0 by default.
+    /// Velocity below which the sign step is zero, rad/s or m/s. 0 by default.
     pub dead_band: f64,
-    /// Width of the step of load-dependent friction where the logs show no smooth step and none is stated, rad/s or
-    /// m/s. By default [`CoulombShape::USUAL_WIDTH`] of a usual arm.
+    /// Width of the step of load-dependent friction if the logs show no smooth step and none is stated, rad/s or m/s.
+    /// By default [`CoulombShape::USUAL_WIDTH`] of an arm of usual size.
     pub width: Option<f64>,
-    /// Whether rows near rest count. Where they do not the step is as wide as stated or usual, and what differs from
-    /// other friction near rest alone (Stribeck, sigmoid, cube root, elements with hysteresis) is no candidate. True by
+    /// Whether rows near rest are used. Otherwise the step has the stated or usual width, and terms that differ from
+    /// others only near rest (Stribeck, sigmoid, cube root, elements with hysteresis) are not candidates. True by
     /// default.
     pub rows_near_rest: bool,
-    /// Largest variance inflation with which Coulomb friction may differ by direction: `1 / (1 - R²)`, R² the share of
-    /// the difference that gravity, offset and all other columns explain. Where gravity is constant or the joint has an
-    /// offset, only the rows near rest distinguish the difference from them, and its error bar is wider by the square
-    /// root of the inflation. Without a limit by default; an iteration, which does not
-    /// converge while a parameter is hardly known, takes [`MOST_INFLATION`](Self::MOST_INFLATION).
+    /// Maximum variance inflation for Coulomb friction that differs by direction: `1 / (1 - R²)`, where R² is the share
+    /// of the difference that gravity, offset and all other columns explain. If gravity is constant or the joint has an
+    /// offset, only the rows near rest distinguish the difference from them, and its error bar grows by the square root
+    /// of the inflation. Unlimited by default. An iteration, which does not converge while a parameter is poorly
+    /// determined, uses [`MOST_INFLATION`](Self::MOST_INFLATION).
     pub most_inflation: Option<f64>,
 }
 
 impl FrictionSearch {
-    /// The usual bound of a variance inflation in regression diagnostics.
+    /// The usual limit of variance inflation in regression diagnostics.
     pub const MOST_INFLATION: f64 = 10.0;
 
-    /// The search for a joint's friction with the defaults.
+    /// A search with default settings.
     pub fn of(joint: impl Into<String>) -> Self {
         Self {
             joint: joint.into(),
@@ -80,13 +77,13 @@ impl FrictionSearch {
     }
 }
 
-/// What velocities and positions of a usual arm are to one joint.
+/// Characteristic velocity and position of a joint, in units of an arm of usual size.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointScale {
     joint: usize,
-    /// A rad/s (m/s).
+    /// Scale of a velocity; 1 for a usual arm.
     pub(crate) velocity: f64,
-    /// A rad (m).
+    /// Scale of a position; 1 for a usual arm.
     position: f64,
 }
 
@@ -96,7 +93,7 @@ impl JointScale {
         Self { joint, velocity: 1.0, position: 1.0 }
     }
 
-    /// The narrowest step that is looked for beside the sign, rad/s (m/s).
+    /// Narrowest smooth step on the grid, rad/s (m/s).
     pub(super) fn narrowest_width(self) -> f64 {
         Coulomb::WIDTHS[0] * self.velocity
     }
@@ -107,14 +104,15 @@ impl JointScale {
     }
 }
 
-/// Viscous friction with a Coulomb step: the columns that tell how wide the step is before anything else is chosen.
+/// Viscous friction with a Coulomb step: the columns that determine the width of the step before other terms are
+/// selected.
 pub(crate) fn step_columns(search: &FrictionSearch, joint: JointScale) -> Vec<CandidateColumn> {
     let is_step = |column: &CandidateColumn| column.kind.role == CandidateRole::Base || column.kind.is_common_step();
     candidate_columns(search, joint, None).into_iter().filter(is_step).collect()
 }
 
-/// The columns to choose from at a joint; a term's columns stand together, in the order of its grid. `width` is about
-/// that of the step at rest, if that is known: a point of the grid, for what lies between two points looks like a
+/// Candidate columns of a joint; columns of a term are adjacent and in the order of its grid. `width` is the
+/// approximate width of the step if known. It is added to the grid, because a width between two points looks like a
 /// further term.
 pub(crate) fn candidate_columns(
     search: &FrictionSearch,
@@ -157,9 +155,9 @@ pub(crate) fn candidate_columns(
 mod tests {
     use super::*;
 
-    /// Without rows near rest: one step, as wide as stated, and no friction that is told by them alone.
+    /// Without rows near rest: one step with the stated width, and no terms that need rows near rest.
     #[test]
-    fn what_rows_near_rest_alone_show_is_no_candidate_without_them() {
+    fn terms_near_rest_are_no_candidates_without_rows_near_rest() {
         let scale = JointScale::usual(0);
         let kinds = |search: &FrictionSearch| -> Vec<FrictionKind> {
             let mut kinds: Vec<_> = candidate_columns(search, scale, None).iter().map(|column| column.kind).collect();
@@ -173,7 +171,7 @@ mod tests {
         assert_eq!(kinds(&all).len(), 10);
         let names: Vec<_> = kinds(&far).into_iter().map(|kind| kind.name).collect();
         assert_eq!(names, ["viscous", "asymmetric viscous", "coulomb", "asymmetric coulomb", "quadratic", "load"]);
-        // The one step is a choice of its own, though it has no neighbour on a grid.
+        // The single step is a separate choice without neighbours on a grid.
         let columns = candidate_columns(&far, scale, None);
         let options = options(kinds(&far)[2], &columns);
         assert_eq!(options.len(), 1, "{options:?}");

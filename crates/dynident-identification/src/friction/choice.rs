@@ -1,7 +1,8 @@
-//! Friction by cross-validation inside the training logs: joint by joint, in rounds, the others with what they have.
+//! Selection of friction by cross-validation within the training logs: joint by joint, in rounds, with the current
+//! friction of the other joints.
 //!
-//! All columns that a joint may have are in the factors already, so a candidate model is a selection of them (see
-//! [`CrossValidation`]); how one joint's are searched is in `search`.
+//! The factors contain all candidate columns, so a candidate model is a selection of them (see [`CrossValidation`]);
+//! `search` contains the search for one joint.
 
 use super::candidates::{CandidateColumn, JointScale};
 use super::joint_friction::JointFriction;
@@ -12,18 +13,18 @@ use dynident_model::terms::{TorqueTerm, sort_terms};
 use dynident_rows::RegressorModel;
 use rayon::prelude::*;
 
-/// Blocks of time; half as many where a log is too short for these.
+/// Numbers of time blocks; the second is for logs too short for the first.
 const FOLDS: [usize; 2] = [10, 5];
-/// Rounds over all joints: from the second on, the others have the friction that was chosen for them.
+/// Rounds over all joints; from the second on, the others have their selected friction.
 const ROUNDS: usize = 2;
-/// Root mean square velocity below which a joint does not move, rad/s or m/s of a usual arm: what the position noise of
-/// a standing joint looks like.
-const MOVING: f64 = 1.0e-3;
+/// Root mean square velocity below which a joint is at rest, rad/s or m/s of an arm of usual size; typical position
+/// noise of a resting joint.
+const MIN_SPEED: f64 = 1.0e-3;
 
-/// The robot with the choice in force: a joint's friction is replaced, its drive inertia and offset stay.
+/// The robot with the selected friction; drive inertia and offset of a joint are kept.
 ///
 /// # Errors
-/// Terms of joints that the robot does not have.
+/// Terms of unknown joints.
 pub fn chosen_model(
     robot: &ParametricModel,
     choice: &[JointFriction],
@@ -39,7 +40,7 @@ pub fn chosen_model(
     robot.with_terms(terms)
 }
 
-/// The rows in blocks, as many as there are segments for, and their number; `None` for fewer than the least.
+/// Divides the rows into blocks and returns their number; `None` if the logs are too short.
 fn cross_validation(problem: &LinearProblem) -> Result<Option<(CrossValidation<'_>, usize)>, EstimationError> {
     for folds in FOLDS {
         match CrossValidation::new(problem, folds) {
@@ -51,14 +52,14 @@ fn cross_validation(problem: &LinearProblem) -> Result<Option<(CrossValidation<'
     Ok(None)
 }
 
-/// Rows count as in the plain fit.
+/// Weights of the rows as in the plain fit.
 fn weights(plain: &Estimate, equal: bool) -> Vec<f64> {
     let of_sigma = |sigma: &f64| if equal || *sigma <= 0.0 { 1.0 } else { sigma.recip() };
     plain.joint_sigma.iter().map(of_sigma).collect()
 }
 
-/// The columns behind the base parameters (payloads, offsets of single logs, gains), which every candidate has: their
-/// places among the columns of `wide_problem`, as far as the fit `plain` of `model` excites them.
+/// Columns after the base parameters (payloads, offsets of single logs, gains), which every candidate model contains:
+/// their indices in `wide_problem`, if the fit `plain` of `model` excites them.
 pub(super) fn further_columns(
     model: &RegressorModel,
     plain: &Estimate,
@@ -71,9 +72,8 @@ pub(super) fn further_columns(
     (0..further).filter(move |place| !fixed.contains(&(base + place))).map(move |place| wide_base + place)
 }
 
-/// Chooses friction for joints whose `candidates` are among the columns of `wide_problem`; `plain` is the fit with the
-/// stated terms, in which joints have equal weights if `equal_weights`; `most_inflation` has a number for each of the
-/// candidates' joints.
+/// Selects friction for joints whose `candidates` are columns of `wide_problem`. `plain` is the fit with the stated
+/// terms, in which joints have equal weights if `equal_weights`. `most_inflation` has one value per joint.
 pub(crate) fn choose_friction(
     model: &RegressorModel,
     wide: &RegressorModel,
@@ -87,7 +87,7 @@ pub(crate) fn choose_friction(
     let refused = |joint: usize, reason: &str| JointFriction::as_stated(name(joint), reason);
     let choose: Vec<usize> = candidates.iter().map(|(joint, _)| *joint).collect();
     let Some((validation, folds)) = cross_validation(wide_problem)? else {
-        let reason = "the training logs are too short to be cut into blocks";
+        let reason = "the training logs are too short for cross-validation in blocks";
         return Ok(choose.iter().map(|&joint| refused(joint, reason)).collect());
     };
     let weights = weights(plain, equal_weights);
@@ -100,11 +100,11 @@ pub(crate) fn choose_friction(
         let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.term)).collect();
         let speed = norms[variable[0]] / (rows[joint].max(1) as f64).sqrt();
         let scale = JointScale::of(model.model(), joint);
-        if speed < MOVING * scale.velocity {
+        if speed < MIN_SPEED * scale.velocity {
             return Ok((refused(joint, "the joint does not move in the training logs"), Vec::new()));
         }
-        // The stated model, as far as the data excite it, without this joint's friction, and with that of others as
-        // chosen before.
+        // The stated model as far as it is excited, without this joint's friction, and with the selected friction of
+        // other joints.
         let chosen_before = |other: usize| choose.iter().position(|&c| c == other).and_then(|c| before[c].as_ref());
         let kept = |index: &usize| match &model.layout().columns()[*index] {
             Column::Term(term) if term.is_joint_friction() => {
@@ -120,7 +120,7 @@ pub(crate) fn choose_friction(
         match validation.joint(joint, &common, &variable, &weights) {
             Ok(prepared) => Ok(search(name(joint), scale, folds, inflation, &prepared, columns)),
             Err(EstimationError::TooFewRows { .. }) => {
-                Ok((refused(joint, "fewer rows than columns once a block is left out"), Vec::new()))
+                Ok((refused(joint, "fewer rows than columns without one block"), Vec::new()))
             }
             Err(error) => Err(error),
         }

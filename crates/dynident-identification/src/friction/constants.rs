@@ -1,21 +1,21 @@
-//! Steps at rest of a joint's terms, and the mean of terms that differ in their constants.
+//! Steps at zero velocity of a joint's terms, and means of terms with different constants.
 
 use super::candidates::JointScale;
 use dynident_dynamics::ParametricModel;
 use dynident_model::terms::{CoulombShape, StepRole, TorqueTerm};
 
-/// The step of a term that changes its sign at rest.
+/// Step of a term that changes its sign at rest.
 pub(super) fn step_of(term: &TorqueTerm) -> Option<CoulombShape> {
     term.step().filter(|_| term.kind().step_role() != StepRole::Fixed)
 }
 
-/// The step of a joint's dry friction; the sign function if its terms have none.
+/// Step of a joint's dry friction; the sign function by default.
 pub(crate) fn step_of_joint(robot: &ParametricModel, joint: usize) -> CoulombShape {
     let mut own = robot.terms().iter().filter(|term| term.own_joint() == Some(joint));
     own.find_map(step_of).unwrap_or(CoulombShape::Sign { dead_band: 0.0 })
 }
 
-/// Whether it is Coulomb friction, in one or both directions.
+/// Whether a term is Coulomb friction, in one or both directions.
 pub(crate) fn is_coulomb(term: &TorqueTerm) -> bool {
     term.kind().step_role() == StepRole::Joint
 }
@@ -28,9 +28,9 @@ pub(crate) fn smooth_width(term: &TorqueTerm) -> Option<f64> {
     }
 }
 
-/// The terms of a joint with one step at rest, that of Coulomb friction: they are one friction,
-/// `(F_c + F_s e^{-|q̇/v_s|^δ} + μ |τ|) s(q̇)`. Stribeck friction beside a smooth step keeps its own: where real joints
-/// creep before they break loose, the data tell the two apart.
+/// Gives the terms of a joint the step of its Coulomb friction, because they are one friction, `(F_c + F_s
+/// e^{-|q̇/v_s|^δ} + μ |τ|) s(q̇)`. Stribeck friction keeps a separate step if the Coulomb step is smooth: real joints
+/// creep before they break away, and the data distinguish both steps.
 pub(super) fn with_one_step(terms: Vec<TorqueTerm>) -> Vec<TorqueTerm> {
     let Some(step) = terms.iter().find(|term| is_coulomb(term)).and_then(step_of) else { return terms };
     let with_step = |term: TorqueTerm| match (term.kind().step_role(), step) {
@@ -41,10 +41,10 @@ pub(super) fn with_one_step(terms: Vec<TorqueTerm>) -> Vec<TorqueTerm> {
     terms.into_iter().map(with_step).collect()
 }
 
-/// One term in place of several that differ in their constants: at the mean of their coordinates, by their weights.
+/// Mean of terms that differ in their constants: weighted mean of their coordinates.
 ///
 /// # Panics
-/// If there is no term.
+/// If `weighted` is empty.
 pub(super) fn mean_term(weighted: &[(&TorqueTerm, f64)], scale: JointScale) -> TorqueTerm {
     let total: f64 = weighted.iter().map(|(_, weight)| weight).sum();
     let mut mean = weighted[0].0.kind().coordinates();
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_has_one_step_at_rest() {
+    fn friction_terms_of_a_joint_share_one_step() {
         let narrow = CoulombShape::Smooth { width: 0.01 };
         let load = |shape| TorqueTerm::Load(LoadFriction { joint: 0, shape });
         for step in [SMOOTH, SIGN] {
@@ -79,7 +79,7 @@ mod tests {
             let [of_stribeck, of_load] = if step == SIGN { [SIGN, narrow] } else { [narrow, SMOOTH] };
             assert_eq!(found, [coulomb, stribeck(of_stribeck), load(of_load)]);
         }
-        // Without Coulomb friction everything has its own.
+        // Without Coulomb friction every term has a separate step.
         assert_eq!(with_one_step(vec![stribeck(narrow)]), [stribeck(narrow)]);
     }
 }

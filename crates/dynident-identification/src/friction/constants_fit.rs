@@ -1,18 +1,18 @@
-//! The constants of chosen friction (width of a step, Stribeck velocity and exponent, ..), estimated together with all
-//! parameters.
+//! Estimation of friction constants (width of a step, Stribeck velocity and exponent, ..) together with all parameters.
 //!
-//! The torque depends on a constant c through the column of its term alone. Around the constants so far
-//! `τ = Y(c) θ + Σ_k ∂(Y θ)/∂c_k δ_k`, so that with one column more for each constant least squares finds the step δ
-//! and what it costs the parameters (Gauss and Newton; for problems that are linear but for some unknowns: Golub and
-//! Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). The derivative is the difference of the term's columns on both sides
-//! of c, which stand in the factors of one pass over the logs. Steps end where they are small beside their own standard
-//! deviation. The last step's covariance is that of the constants, and parameters answer to them by
-//! `∂θ/∂c = Cov(θ, c) Cov(c, c)⁻¹`: their error bars have to hold it.
+//! A constant c changes the torque only through the column of its term. Around the current constants `τ = Y(c) θ + Σ_k
+//! ∂(Y θ)/∂c_k δ_k`, so that with one additional column per constant least squares finds the step δ and its effect on
+//! the parameters (Gauss-Newton; for separable problems: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). The
+//! derivative is the difference of the term's columns on both sides of c, which one pass over the logs adds to the
+//! factors. Iteration ends when the steps are small compared with their standard deviations. The covariance of the last
+//! step is that of the constants. The sensitivity of the parameters is `∂θ/∂c = Cov(θ, c) Cov(c, c)⁻¹`, and their error
+//! bars must include it.
 
 use super::candidates::JointScale;
 use super::constants::step_of;
 use super::joint_friction::{FrictionConstant, JointFriction};
-use super::weak_terms::{Weak, has_doubtful_term, without_weakest};
+use super::weak_terms::{TermTest, Weak};
+use crate::thresholds::FrictionThresholds;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, HALF_WIDTH_95, JointRows, LinearProblem, SegmentedFactor};
 use dynident_model::terms::{CoulombShape, TorqueTerm};
@@ -20,50 +20,44 @@ use dynident_rows::RegressorModel;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Half the distance of the columns that a derivative is the difference of, in units of a constant's logarithm.
-const STEP: f64 = 0.1;
-/// Furthest that a constant goes in one pass, likewise: a step of the grid on which the search began.
-const FURTHEST: f64 = 0.7;
-/// Standard deviation of what is known of a constant beforehand, likewise: its grid spans a factor of 40 to 100, a
-/// logarithm that is anywhere there has 1.1 to 1.3. It keeps constants in reach that the rows say nothing about.
-const KNOWN_BEFOREHAND: f64 = 1.2;
-/// Steps have ended once every one is below this share of its standard deviation, or of the constant.
-const SETTLED: (f64, f64) = (0.1, 2.0e-3);
-/// Times what white noise makes of a standard deviation that the one of bars may be: a step that is long beside so much
-/// has not ended, whatever the bars.
-const MOST_INFLATION: f64 = 10.0;
+/// Half distance of the central differences, in units of a constant's logarithm.
+const HALF_DIFFERENCE: f64 = 0.1;
+/// Maximum step of a constant's logarithm in one pass: one step of the grid.
+const MAX_STEP: f64 = 0.7;
+/// Prior standard deviation of a constant's logarithm. Its grid spans a factor of 40 to 100; a uniform distribution
+/// over it has 1.1 to 1.3. The prior bounds constants that the rows do not determine.
+const PRIOR_STD: f64 = 1.2;
+/// Convergence: every step is below this ratio of its standard deviation, or below this absolute value.
+const CONVERGENCE: (f64, f64) = (0.1, 2.0e-3);
+/// Maximum ratio of reported standard deviation to that of white noise. A step that is long compared with the product
+/// has certainly not converged.
+const MAX_STD_INFLATION: f64 = 10.0;
 
-/// Chosen friction and those of its constants that can be moved.
 #[derive(Clone, Debug)]
 pub(crate) struct FrictionConstants {
-    /// Joints with their terms.
     joints: Vec<(usize, Vec<TorqueTerm>)>,
     scales: Vec<JointScale>,
     axes: Vec<Axis>,
 }
 
-/// One constant and the terms of a joint that have it: steps at rest have one width.
+/// One constant and the terms of a joint that share it: steps at rest have one width.
 #[derive(Clone, Debug)]
 struct Axis {
-    /// Place among the joints.
     joint: usize,
     terms: Vec<usize>,
-    /// Which of the terms' coordinates.
     place: usize,
 }
 
-/// A step of the constants, and what is known of them there.
 #[derive(Clone, Debug)]
 pub(crate) struct ConstantsStep {
-    /// Steps of the constants' logarithms, one for each axis.
+    /// Steps of the constants' logarithms, one per axis.
     pub(crate) steps: Vec<f64>,
     std: Vec<f64>,
     error: ConstantsError,
-    /// The parameters with the constants free, over the model's columns first.
+    /// Parameters with free constants; columns of the model first.
     estimate: Estimate,
 }
 
-/// What the error of the constants adds to the covariance of the parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct ConstantsError {
     symbols: Vec<String>,
@@ -72,7 +66,7 @@ pub(crate) struct ConstantsError {
 }
 
 impl ConstantsError {
-    /// The covariance that this error adds to an estimate of the columns `symbols`; zero for columns that are held.
+    /// The covariance that this error adds to an estimate of the columns `symbols`; zero for held columns.
     pub(crate) fn covariance_of(&self, symbols: &[String], estimate: &Estimate) -> DMatrix<f64> {
         let is_fixed = |column: usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == column);
         let place = |column: usize| self.symbols.iter().position(|own| *own == symbols[column]);
@@ -90,25 +84,23 @@ impl ConstantsStep {
         &self.error
     }
 
-    /// Whether another pass would not change what is known.
-    pub(crate) fn has_settled(&self) -> bool {
+    pub(crate) fn has_converged(&self) -> bool {
         self.is_below(1.0)
     }
 
-    /// Whether a step with bars by white noise may have settled by those that are reported.
-    pub(crate) fn may_have_settled(&self) -> bool {
-        self.is_below(MOST_INFLATION)
+    /// Whether a step with white-noise error bars may have converged by the reported error bars.
+    pub(crate) fn may_have_converged(&self) -> bool {
+        self.is_below(MAX_STD_INFLATION)
     }
 
-    /// Whether all steps are small beside bars that are so many times as wide.
+    /// Whether all steps are small compared with their error bars times `inflation`.
     fn is_below(&self, inflation: f64) -> bool {
-        let small = |(step, std): (&f64, &f64)| step.abs() <= (SETTLED.0 * inflation * std).max(SETTLED.1);
+        let small = |(step, std): (&f64, &f64)| step.abs() <= (CONVERGENCE.0 * inflation * std).max(CONVERGENCE.1);
         self.steps.iter().zip(&self.std).all(small)
     }
 }
 
 impl FrictionConstants {
-    /// The constants of the friction that these joints of `model` chose.
     pub(crate) fn new(model: &RegressorModel, chosen: &[JointFriction]) -> Self {
         let of_joint = |own: &JointFriction| Some((model.model().joint_index(&own.joint)?, own.terms.clone()?));
         let joints: Vec<(usize, Vec<TorqueTerm>)> = chosen.iter().filter_map(of_joint).collect();
@@ -117,17 +109,15 @@ impl FrictionConstants {
         Self { joints, scales, axes }
     }
 
-    /// How many of them a joint has.
     pub(crate) fn count(&self, joint: usize) -> usize {
         self.axes.iter().filter(|axis| self.joints[axis.joint].0 == joint).count()
     }
 
-    /// Whether there is none to move.
     pub(crate) fn is_empty(&self) -> bool {
         self.axes.is_empty()
     }
 
-    /// The terms of the joints with their constants moved by these steps of their logarithms, one for each axis.
+    /// The terms of the joints with their constants moved by these steps of their logarithms, one per axis.
     pub(crate) fn moved(&self, steps: &[f64]) -> Vec<(usize, Vec<TorqueTerm>)> {
         let mut moved = self.joints.clone();
         for (place, (_, terms)) in moved.iter_mut().enumerate() {
@@ -145,40 +135,44 @@ impl FrictionConstants {
         moved
     }
 
-    /// The joints with a further term that is `weak` with the constants free, and their terms without it. `norms` are
-    /// those of the model's columns over all rows.
+    /// For each joint with a further term that is `weak` with free constants: its terms without the weakest one.
+    /// `norms` are those of the model's columns over all rows.
     pub(crate) fn without_weakest(
         &self,
         weak: Weak,
-        (model, norms): (&RegressorModel, &[f64]),
+        model: &RegressorModel,
+        norms: &[f64],
         last: &ConstantsStep,
+        thresholds: FrictionThresholds,
     ) -> Vec<(usize, Vec<TorqueTerm>)> {
-        let columns = model.layout().columns();
+        let test = TermTest { columns: model.layout().columns(), norms, estimate: &last.estimate, thresholds };
         let first = last.estimate.values.len() - self.axes.len();
         let of_joint = |(place, (joint, terms)): (usize, &(usize, Vec<TorqueTerm>))| {
             let own_constants = |term: &TorqueTerm| self.own_constants(place, term, first);
-            Some((*joint, without_weakest((terms, weak), (columns, norms), &last.estimate, own_constants)?))
+            Some((*joint, test.without_weakest(terms, weak, own_constants)?))
         };
         self.joints.iter().enumerate().filter_map(of_joint).collect()
     }
 
-    /// Whether a joint has further terms that may be chance, of which a first look at the same motion had none: its
-    /// terms were `before`. The rest is as in [`without_weakest`](Self::without_weakest).
+    /// Whether a joint has possibly insignificant further terms that were not in its first selection, `before`. Other
+    /// arguments as in [`without_weakest`](Self::without_weakest).
     pub(crate) fn has_doubtful_term(
         &self,
-        (joint, before): (usize, &[TorqueTerm]),
-        (model, norms): (&RegressorModel, &[f64]),
+        joint: usize,
+        before: &[TorqueTerm],
+        model: &RegressorModel,
+        norms: &[f64],
         last: &ConstantsStep,
+        thresholds: FrictionThresholds,
     ) -> bool {
         let first = last.estimate.values.len() - self.axes.len();
         let Some(place) = self.joints.iter().position(|(own, _)| *own == joint) else { return false };
         let own_constants = |term: &TorqueTerm| self.own_constants(place, term, first);
-        let columns = (model.layout().columns(), norms);
-        has_doubtful_term((&self.joints[place].1, before), columns, &last.estimate, own_constants)
+        let test = TermTest { columns: model.layout().columns(), norms, estimate: &last.estimate, thresholds };
+        test.has_doubtful_term(&self.joints[place].1, before, own_constants)
     }
 
-    /// Where the constants of a term of the joint at `place` stand among the columns of a step, whose axes begin at
-    /// `first`. One that several terms share stays with the others.
+    /// Columns of the constants that only this term of the joint at `place` has, in a step whose axes begin at `first`.
     fn own_constants(&self, place: usize, term: &TorqueTerm, first: usize) -> Vec<usize> {
         let terms = &self.joints[place].1;
         let is_own = |axis: &Axis| axis.joint == place && matches!(axis.terms[..], [only] if terms[only] == *term);
@@ -186,10 +180,10 @@ impl FrictionConstants {
         own.map(|(number, _)| first + number).collect()
     }
 
-    /// How many rows that hang together say what one independent row would, of the friction of a joint: the mean ratio
-    /// of variances `tr(Σ_w⁻¹ Σ) / p` of its p coefficients and constants, by the covariance that bars are made of and
-    /// by that for white noise (Rao and Scott, Annals of Statistics 12 (1984) 46); 1 at least, and where nothing is
-    /// known.
+    /// Design effect for the friction of a joint: number of correlated rows with the information of one independent
+    /// row. It is the mean variance ratio `tr(Σ_w⁻¹ Σ) / p` of its p coefficients and constants, with the reported
+    /// covariance Σ and that of white noise Σ_w (Rao and Scott, Annals of Statistics 12 (1984) 46); at least 1, and 1
+    /// if unknown.
     pub(crate) fn design_effect(&self, joint: usize, model: &RegressorModel, last: &ConstantsStep) -> f64 {
         let Some(place) = self.joints.iter().position(|(own, _)| *own == joint) else { return 1.0 };
         let estimate = &last.estimate;
@@ -207,7 +201,7 @@ impl FrictionConstants {
         if ratio.is_finite() { ratio.max(1.0) } else { 1.0 }
     }
 
-    /// The term on one side of the centre along an axis.
+    /// The term at a distance of `step` along an axis.
     fn beside(&self, axis: &Axis, number: usize, step: f64) -> TorqueTerm {
         let term = &self.joints[axis.joint].1[number];
         let mut own = term.kind().coordinates();
@@ -215,20 +209,20 @@ impl FrictionConstants {
         term.at(&own, self.scales[axis.joint].velocity)
     }
 
-    /// The terms on both sides of the centre along every axis: columns that a pass has to have beside the model's.
+    /// Terms on both sides of the constants along every axis: additional columns of a pass.
     pub(crate) fn neighbours(&self) -> Vec<TorqueTerm> {
         let of_axis = |axis: &Axis| -> Vec<TorqueTerm> {
-            axis.terms.iter().flat_map(|&number| [-STEP, STEP].map(|step| self.beside(axis, number, step))).collect()
+            axis.terms
+                .iter()
+                .flat_map(|&number| [-HALF_DIFFERENCE, HALF_DIFFERENCE].map(|step| self.beside(axis, number, step)))
+                .collect()
         };
         self.axes.iter().flat_map(of_axis).collect()
     }
 
-    /// The step that the rows ask for, with its covariance by `solve`. `fitted` are the values with the constants as
-    /// they are, over the columns of `model` and then those of loads; `wide_problem` has in addition the columns of
-    /// `wide`, all [`neighbours`](Self::neighbours) among them.
-    ///
-    /// # Errors
-    /// Rows that do not carry an estimate.
+    /// The step with its covariance, by `solve`. `fitted` are the values with the current constants, over the columns
+    /// of `model` and then those of loads. `wide_problem` also has the columns of `wide`, including all
+    /// [`neighbours`](Self::neighbours).
     pub(crate) fn step(
         &self,
         model: &RegressorModel,
@@ -245,16 +239,15 @@ impl FrictionConstants {
             steps.fold(0.0_f64, |most, (axis, _)| most.max(found.values[count + axis].abs()))
         };
         let step = |(place, axis): (usize, &Axis)| {
-            found.values[count + place] * (FURTHEST / furthest(axis.joint).max(FURTHEST))
+            found.values[count + place] * (MAX_STEP / furthest(axis.joint).max(MAX_STEP))
         };
-        // How parameters answer to the constants, by white noise: so least squares weighs them.
+        // Sensitivity with white noise, because least squares uses these weights.
         let white = found.covariance_white.view((count, count), (own, own)).into_owned();
         let across = found.covariance_white.view((0, count), (count, own)).into_owned();
         let covariance = match white.cholesky() {
             Some(white) => {
                 let answers = white.solve(&across.transpose()).transpose();
                 let further = &answers * found.covariance.view((count, count), (own, own)) * answers.transpose();
-                // As symmetric as a covariance is.
                 (&further + further.transpose()) * 0.5
             }
             None => DMatrix::zeros(count, count),
@@ -267,7 +260,7 @@ impl FrictionConstants {
         })
     }
 
-    /// `[Y(c) | ∂(Y θ)/∂c]`: the model's columns, those of loads, and one for each constant.
+    /// `[Y(c) | ∂(Y θ)/∂c]`: columns of the model, those of loads, and one per constant.
     fn linearised(
         &self,
         model: &RegressorModel,
@@ -278,7 +271,7 @@ impl FrictionConstants {
         let (own, further) = (model.layout().columns().len(), wide.layout().columns().len());
         let loads = wide_problem.columns().len() - further;
         let count = own + loads;
-        // Where a column of the wide problem stands in the new one; neighbours are no longer there.
+        // New index of a column of the wide problem; neighbours are removed.
         let kept = |column: usize| match column {
             column if column < own => Some(column),
             column if column < further => None,
@@ -286,7 +279,7 @@ impl FrictionConstants {
         };
         let old = |column: usize| if column < own { column } else { column - own + further };
 
-        // ∂(Y θ)/∂c = θ (Y(c + h) - Y(c - h)) / 2h, summed over the terms that have the constant.
+        // ∂(Y θ)/∂c = θ (Y(c + h) - Y(c - h)) / 2h, summed over the terms with this constant.
         let place = |term: &TorqueTerm| {
             wide.layout().columns().iter().position(|column| matches!(column, Column::Term(own) if own == term))
         };
@@ -298,9 +291,9 @@ impl FrictionConstants {
                 for &number in &axis.terms {
                     let centre = place(&self.joints[axis.joint].1[number]);
                     let value = centre.and_then(|centre| fitted.get(centre)).copied().unwrap_or(0.0);
-                    for step in [-STEP, STEP] {
+                    for step in [-HALF_DIFFERENCE, HALF_DIFFERENCE] {
                         if let Some(beside) = place(&self.beside(axis, number, step)) {
-                            of_axis.push((beside, value * step / (2.0 * STEP * STEP)));
+                            of_axis.push((beside, value * step / (2.0 * HALF_DIFFERENCE * HALF_DIFFERENCE)));
                         }
                     }
                 }
@@ -341,20 +334,20 @@ impl FrictionConstants {
             problem.add(&wide_problem.logs()[rows.log], rows.joint, columns, factor)?;
         }
 
-        // What is known beforehand: of parameters as before, of constants that they are somewhere near.
+        // Prior: that of the parameters is unchanged, constants are near their current values.
         let before = wide_problem.prior();
         let known = before.map_or(0, |prior| prior.sqrt_information().nrows());
         let mean = before.map_or_else(|| vec![0.0; count + self.axes.len()], |prior| padded(prior.mean()));
         let information =
             DMatrix::from_fn(known + self.axes.len(), count + self.axes.len(), |row, column| match before {
                 Some(prior) if row < known && column < count => prior.sqrt_information()[(row, old(column))],
-                _ if row >= known && column == count + row - known => KNOWN_BEFOREHAND.recip(),
+                _ if row >= known && column == count + row - known => PRIOR_STD.recip(),
                 _ => 0.0,
             });
         problem.with_prior(mean, information)
     }
 
-    /// The constants of every joint with their 95 % intervals, in the order of the joints that chose friction.
+    /// Constants of every joint with their 95 % intervals, in the order of the joints.
     pub(crate) fn with_intervals(&self, last: &ConstantsStep) -> Vec<(usize, Vec<FrictionConstant>)> {
         let of_joint = |(place, (joint, terms)): (usize, &(usize, Vec<TorqueTerm>))| {
             let of_axis = |(axis, std): (&Axis, &f64)| {
@@ -382,7 +375,7 @@ impl FrictionConstants {
     }
 }
 
-/// The constants of one joint's terms. What changes its sign at rest has one width: it is one friction.
+/// Axes of one joint's terms. Terms that change their sign at rest share one width, because they are one friction.
 fn axes_of(joint: usize, terms: &[TorqueTerm]) -> Vec<Axis> {
     let mut axes: Vec<Axis> = Vec::new();
     for (number, term) in terms.iter().enumerate() {

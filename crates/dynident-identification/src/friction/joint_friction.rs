@@ -1,36 +1,35 @@
-//! The friction of a joint, as it was chosen or stated, and the candidates that were compared.
+//! Friction of a joint, selected or stated, with the compared candidates.
 
 use super::candidates::FrictionKind;
 use dynident_model::terms::TorqueTerm;
 use serde::{Deserialize, Serialize};
 
-/// How the friction of one joint was chosen.
+/// Selection of one joint's friction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointFriction {
-    /// The joint.
+    /// Name of the joint.
     pub joint: String,
-    /// The friction that was chosen, or why the stated terms stay in force.
+    /// Selected friction, or the reason for keeping the stated terms.
     pub chosen: String,
-    /// The joint's friction; none when nothing was chosen.
+    /// Friction terms of the joint; `None` if nothing was selected.
     pub terms: Option<Vec<TorqueTerm>>,
-    /// The constants of these terms, estimated together with all parameters.
+    /// Constants of these terms, estimated together with all parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub constants: Vec<FrictionConstant>,
-    /// Blocks of time that were left out in turn.
+    /// Number of time blocks of the cross-validation.
     pub folds: usize,
-    /// The candidates that were compared, each with its best constants.
+    /// Compared candidates, each with its best constants.
     pub candidates: Vec<FrictionCandidate>,
 }
 
 impl JointFriction {
-    /// A joint whose friction stays as it is stated, for this reason.
+    /// Keeps the stated friction for this reason.
     pub fn as_stated(joint: impl Into<String>, reason: &str) -> Self {
         let chosen = format!("as the study states: {reason}");
         Self { joint: joint.into(), chosen, terms: None, constants: Vec::new(), folds: 0, candidates: Vec::new() }
     }
 
-    /// The same with these terms in the place of what was chosen before: with other constants, or fewer.
     pub(crate) fn choose(&mut self, terms: &[TorqueTerm]) {
         let name = name_of(terms);
         if self.terms.as_deref().map(name_of).is_some_and(|before| before != name) {
@@ -43,50 +42,49 @@ impl JointFriction {
     }
 }
 
-/// A constant of a friction term that the recordings chose.
+/// A constant of a selected friction term.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FrictionConstant {
-    /// The term: `coulomb`, `directional-coulomb`, `stribeck`, `sigmoid` or `load`.
+    /// Term: `coulomb`, `directional-coulomb`, `stribeck`, `sigmoid` or `load`.
     pub term: String,
-    /// The constant: `width`, `speed`, `exponent`, `steepness` or `offset_speed`.
+    /// Constant: `width`, `speed`, `exponent`, `steepness` or `offset_speed`.
     pub constant: String,
-    /// Its value: widths and velocities in rad/s (m/s), steepness in s/rad (s/m).
+    /// Value: widths and velocities in rad/s (m/s), steepness in s/rad (s/m).
     pub value: f64,
-    /// 95 % interval by the torque that the model leaves, with little known of the constant beforehand: a factor of 10
-    /// either way. It is symmetric on a logarithmic scale.
+    /// 95 % interval from the residual, with a weak prior of a factor of 10 in both directions. It is symmetric on a
+    /// logarithmic scale.
     pub interval_95: [f64; 2],
 }
 
 impl FrictionConstant {
-    /// The narrowest step at rest of `term` within the 95 % interval, rad/s (m/s). `None` if it is a constant of
-    /// another term, or does not set the width of the step.
+    /// The narrowest step at rest of `term` within the 95 % interval, rad/s (m/s). `None` if the constant belongs to
+    /// another term or does not set the width of the step.
     pub fn narrowest_step(&self, term: &TorqueTerm) -> Option<f64> {
         let widths = self.interval_95.iter().filter_map(|&end| term.kind().step_width_by(&self.constant, end));
         widths.reduce(f64::min).filter(|_| term.kind_name() == self.term)
     }
 }
 
-/// One model of a joint's friction.
+/// One candidate model of a joint's friction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FrictionCandidate {
-    /// Its terms.
+    /// Terms of the model.
     #[serde(rename = "law")]
     pub term: String,
     /// Symbols of the parameters that are not zero.
     pub parameters: Vec<String>,
-    /// Parameters and tuned constants.
+    /// Number of parameters and tuned constants.
     pub complexity: usize,
-    /// Root mean square of the joint's residual on blocks that were left out, Nm (N).
+    /// Root mean square of the joint's residual on left-out blocks, Nm (N).
     pub cv_error_nm: f64,
-    /// Mean square error above the least of all candidates, in standard errors of this difference; 0 for the least.
+    /// Mean square error above the minimum of all candidates, in standard errors of this difference; 0 for the minimum.
     pub excess_standard_errors: f64,
-    /// Whether it was chosen.
+    /// Whether it was selected.
     pub chosen: bool,
 }
 
-/// The kinds of some terms, as candidates are named.
 fn name_of(terms: &[TorqueTerm]) -> String {
     let mut kinds: Vec<FrictionKind> = terms.iter().filter_map(TorqueTerm::candidate).collect();
     kinds.sort_by_key(|kind| kind.rank());

@@ -1,4 +1,4 @@
-//! Which friction the joints have, chosen by the training logs.
+//! Selection of joint friction from the training logs.
 
 mod candidates;
 mod choice;

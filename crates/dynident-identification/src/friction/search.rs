@@ -1,16 +1,16 @@
-//! The search for one joint's friction among columns that its factors hold already.
+//! Search for one joint's friction among columns of its factors.
 //!
-//! Coulomb friction that differs by direction is tried where the rows distinguish it from gravity, offsets and the
-//! other columns: see [`FrictionSearch::most_inflation`](super::FrictionSearch::most_inflation).
+//! Coulomb friction that differs by direction is tried if the rows distinguish it from gravity, offsets and the other
+//! columns: see [`FrictionSearch::most_inflation`](super::FrictionSearch::most_inflation).
 //!
-//! Terms are added one at a time to viscous friction with a Coulomb step, and to that with a sigmoid, the one that
-//! lowers the error most first; of all candidates met, the simplest counts whose mean square error is within one
-//! standard error of the least (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 7.10; the
-//! standard error is that of the difference, block by block, because blocks differ among themselves far more than
-//! candidates do).
+//! The search starts with viscous friction and a Coulomb step, and with the same plus a sigmoid. It adds one term at a
+//! time, the one with the largest reduction of the error. Of all tried candidates, it selects the simplest one whose
+//! mean square error is within one standard error of the minimum (Hastie, Tibshirani and Friedman, *The Elements of
+//! Statistical Learning*, 7.10). The standard error is that of the difference by block, because blocks differ far more
+//! than candidates.
 //!
-//! A constant of a term (a width, a velocity) is taken between two neighbours of its grid, whose columns together say
-//! what the column between them would: so no further term is needed to patch up a grid that is too coarse.
+//! A constant of a term (a width, a velocity) may lie between two neighbours of its grid, whose columns together
+//! approximate the column between them. So a coarse grid does not cause additional terms.
 
 use super::candidates::{CandidateColumn, FrictionKind, JointScale, options, takes_one};
 use super::constants::{mean_term, with_one_step};
@@ -18,25 +18,23 @@ use super::joint_friction::{FrictionCandidate, JointFriction};
 use dynident_estimation::{FoldErrors, JointFolds};
 use dynident_model::terms::{CandidateRole, TorqueTerm};
 
-/// Terms added at most to viscous friction and a step.
-const MOST_ADDED: usize = 3;
+/// Maximum number of terms added to viscous friction and a step.
+const MAX_ADDED_TERMS: usize = 3;
 
-/// A candidate with the best of its constants.
 struct ScoredCandidate {
     kinds: Vec<FrictionKind>,
-    /// Places of its columns.
     places: Vec<usize>,
     errors: FoldErrors,
 }
 
 impl ScoredCandidate {
-    /// Columns of a kind that have a value at all, with it.
+    /// Columns of a kind with a nonzero value.
     fn present(&self, columns: &[CandidateColumn], kind: FrictionKind) -> Vec<(usize, f64)> {
         let values = self.places.iter().copied().zip(self.errors.coefficients.iter().copied());
         values.filter(|&(place, value)| value != 0.0 && columns[place].kind == kind).collect()
     }
 
-    /// Its terms that have a value at all, with their constants; both directions of one that has two.
+    /// Its terms with nonzero values, with their constants; both directions of a directional term.
     fn terms(&self, columns: &[CandidateColumn], scale: JointScale) -> Vec<TorqueTerm> {
         self.kinds.iter().flat_map(|&kind| self.terms_of(columns, kind, scale)).collect()
     }
@@ -53,14 +51,13 @@ impl ScoredCandidate {
             return stated;
         }
         let Some(&(first, _)) = present.first() else { return Vec::new() };
-        // As many terms as one point of the grid has.
+        // One point of the grid can have several terms.
         let weighted = |number: usize| -> Vec<(&TorqueTerm, f64)> {
             present.iter().map(|&(place, value)| (&columns[place].stated[number], value)).collect()
         };
         (0..columns[first].stated.len()).map(|number| mean_term(&weighted(number), scale)).collect()
     }
 
-    /// Symbols of the parameters that are not zero, each once.
     fn parameters(&self, columns: &[CandidateColumn]) -> Vec<String> {
         let mut symbols: Vec<String> = Vec::new();
         for (place, _) in self.kinds.iter().flat_map(|&kind| self.present(columns, kind)) {
@@ -78,7 +75,6 @@ impl ScoredCandidate {
         self.parameters(columns).len() + constants.sum::<usize>()
     }
 
-    /// Its terms that have a value at all.
     fn present_name(&self, columns: &[CandidateColumn]) -> String {
         let is_present = |kind: &&FrictionKind| !self.present(columns, kind).is_empty();
         let names: Vec<&str> = self.kinds.iter().filter(is_present).map(|kind| kind.name).collect();
@@ -90,8 +86,8 @@ impl ScoredCandidate {
     }
 }
 
-/// The best constants of a model with the given terms. Constants of `before` are kept, but for those of the step, which
-/// shares its velocities with the new term.
+/// Best constants of a model with the given terms. Constants of `before` are kept, except those of the step, whose
+/// velocities overlap with those of the new term.
 fn tuned(
     folds: &JointFolds,
     columns: &[CandidateColumn],
@@ -124,14 +120,14 @@ fn tuned(
         places,
         errors,
     });
-    // The first of equals, so that the choice is the same everywhere.
+    // The first of equals, for reproducible results.
     evaluated
         .reduce(|best, next| if next.errors.rms() < best.errors.rms() { next } else { best })
         .unwrap_or_else(|| ScoredCandidate { kinds, places: Vec::new(), errors: folds.errors(&[], &[]) })
 }
 
-/// Variance inflation of the difference between both directions of a model's Coulomb step, with the model's other
-/// columns and the common ones in the fit: `|s|` is constant except near rest, and so may be gravity. 1 for a model
+/// Variance inflation of the difference between both directions of a model's Coulomb step, given the model's other
+/// columns and the common ones: `|s|` is constant except near rest, and gravity can be constant too. 1 for a model
 /// without that step.
 fn asymmetry_inflation(folds: &JointFolds, columns: &[CandidateColumn], model: &ScoredCandidate) -> f64 {
     let steps: Vec<(usize, f64)> = model
@@ -143,7 +139,7 @@ fn asymmetry_inflation(folds: &JointFolds, columns: &[CandidateColumn], model: &
     let whole: f64 = steps.iter().map(|(_, value)| value).sum();
     let (mut difference, mut sum) = (Vec::new(), Vec::new());
     for (place, value) in steps {
-        // A sign has no number on the grid: the narrowest smooth step is taken in its place.
+        // A sign step has no grid index; the narrowest smooth step replaces it.
         let step = columns[place].grid.unwrap_or(0);
         let is_direction = |at: &usize| is_step_by_direction(columns[*at].kind) && columns[*at].grid == Some(step);
         let mut directions = (0..columns.len()).filter(is_direction);
@@ -165,19 +161,18 @@ fn asymmetry_inflation(folds: &JointFolds, columns: &[CandidateColumn], model: &
     folds.variance_inflation(&difference, &others)
 }
 
-/// Whether it is the step at rest with a parameter for each direction.
 fn is_step_by_direction(kind: FrictionKind) -> bool {
     kind.is_step && !kind.is_common_step()
 }
 
-/// Terms added one at a time to `start`, each time the one that lowers the error most; all that was tried goes into
-/// `met`.
+/// Adds terms to `start` one at a time, always the one with the largest reduction of the error. All tried models are
+/// appended to `tried`.
 fn add_terms(
     folds: &JointFolds,
     columns: &[CandidateColumn],
     start: Vec<FrictionKind>,
-    most_inflation: f64,
-    met: &mut Vec<ScoredCandidate>,
+    max_inflation: f64,
+    tried: &mut Vec<ScoredCandidate>,
 ) {
     let mut additions: Vec<FrictionKind> = columns
         .iter()
@@ -185,63 +180,62 @@ fn add_terms(
         .filter(|kind| matches!(kind.role, CandidateRole::InPlaceOf(_) | CandidateRole::Addition))
         .collect();
     additions.dedup();
-    let mut at = met.len();
-    met.push(tuned(folds, columns, start, None));
+    let mut at = tried.len();
+    tried.push(tuned(folds, columns, start, None));
     let is_distinct =
-        most_inflation == f64::INFINITY || asymmetry_inflation(folds, columns, &met[at]) <= most_inflation;
+        max_inflation == f64::INFINITY || asymmetry_inflation(folds, columns, &tried[at]) <= max_inflation;
     additions.retain(|kind| is_distinct || !is_step_by_direction(kind));
-    for _ in 0..MOST_ADDED {
-        let start = met.len();
+    for _ in 0..MAX_ADDED_TERMS {
+        let start = tried.len();
         for &added in &additions {
             let replaced = added.replaces();
-            let has = |kind: FrictionKind| met[at].kinds.contains(&kind);
+            let has = |kind: FrictionKind| tried[at].kinds.contains(&kind);
             if has(added) || replaced.is_some_and(|replaced| !has(replaced)) {
                 continue;
             }
             let mut kinds: Vec<FrictionKind> =
-                met[at].kinds.iter().copied().filter(|kind| Some(*kind) != replaced).collect();
+                tried[at].kinds.iter().copied().filter(|kind| Some(*kind) != replaced).collect();
             kinds.push(added);
             kinds.sort_by_key(|kind| kind.rank());
-            let with_constants_kept = tuned(folds, columns, kinds, Some(&met[at]));
-            met.push(with_constants_kept);
+            let with_constants_kept = tuned(folds, columns, kinds, Some(&tried[at]));
+            tried.push(with_constants_kept);
         }
         let Some(best) =
-            (start..met.len()).reduce(|a, b| if met[b].errors.rms() < met[a].errors.rms() { b } else { a })
+            (start..tried.len()).reduce(|a, b| if tried[b].errors.rms() < tried[a].errors.rms() { b } else { a })
         else {
             break;
         };
-        if met[best].errors.rms() >= met[at].errors.rms() {
+        if tried[best].errors.rms() >= tried[at].errors.rms() {
             break;
         }
         at = best;
     }
 }
 
-/// The choice for one joint, and the places of its columns.
 pub(super) fn search(
     joint: String,
     scale: JointScale,
     count: usize,
-    most_inflation: f64,
+    max_inflation: f64,
     folds: &JointFolds,
     columns: &[CandidateColumn],
 ) -> (JointFriction, Vec<usize>) {
-    let mut met = Vec::new();
+    let mut tried = Vec::new();
     let of_role = |role: CandidateRole| TorqueTerm::candidates().filter(move |kind| kind.role == role);
     for start in of_role(CandidateRole::Start) {
         let kinds = of_role(CandidateRole::Base).chain([start]).collect();
-        add_terms(folds, columns, kinds, most_inflation, &mut met);
+        add_terms(folds, columns, kinds, max_inflation, &mut tried);
     }
     let least =
-        (0..met.len()).reduce(|a, b| if met[b].errors.rms() < met[a].errors.rms() { b } else { a }).unwrap_or(0);
-    let excess: Vec<[f64; 2]> = met.iter().map(|one| one.errors.excess_over(&met[least].errors)).collect();
+        (0..tried.len()).reduce(|a, b| if tried[b].errors.rms() < tried[a].errors.rms() { b } else { a }).unwrap_or(0);
+    let excess: Vec<[f64; 2]> = tried.iter().map(|one| one.errors.excess_over(&tried[least].errors)).collect();
     let within = |index: &usize| *index == least || excess[*index][0] <= excess[*index][1];
-    // Of equally simple ones the better.
+    // Among equally simple candidates, prefer the smaller error.
     let order = |a: &usize, b: &usize| {
-        let complexity = |index: usize| met[index].complexity(columns);
-        complexity(*a).cmp(&complexity(*b)).then(met[*a].errors.rms().total_cmp(&met[*b].errors.rms()))
+        let complexity = |index: usize| tried[index].complexity(columns);
+        complexity(*a).cmp(&complexity(*b)).then(tried[*a].errors.rms().total_cmp(&tried[*b].errors.rms()))
     };
-    let chosen = (0..met.len()).filter(within).min_by(order).unwrap_or(least);
+    let chosen = (0..tried.len()).filter(within).min_by(order).unwrap_or(least);
     let candidate = |(index, one): (usize, &ScoredCandidate)| FrictionCandidate {
         term: one.name(),
         parameters: one.parameters(columns),
@@ -254,14 +248,14 @@ pub(super) fn search(
         },
         chosen: index == chosen,
     };
-    let best = &met[chosen];
+    let best = &tried[chosen];
     let friction = JointFriction {
         joint,
         chosen: best.present_name(columns),
         terms: Some(with_one_step(best.terms(columns, scale))),
         constants: Vec::new(),
         folds: count,
-        candidates: met.iter().enumerate().map(candidate).collect(),
+        candidates: tried.iter().enumerate().map(candidate).collect(),
     };
     let present = best.kinds.iter().flat_map(|&kind| best.present(columns, kind)).map(|(place, _)| place).collect();
     (friction, present)

@@ -1,22 +1,22 @@
-//! Where the constants of a joint's friction begin a second time.
+//! Second start values of friction constants.
 //!
-//! Steps of Gauss and Newton end at the best constants near their start, and two starts are known to lie in the wrong
-//! valley. A dry step (the sign) has no width that could move: it is the limit of a narrow one, and noise of the
-//! velocity can make it look best on a grid. (With Stribeck friction it stays: that is dry as well, and with a step of
-//! its own it takes up what is at rest.) And a Coulomb step wider than half the velocity at which Stribeck friction
-//! has fallen off leaves the step at rest to the Stribeck term: the two have changed places.
+//! Gauss-Newton finds the local minimum near its start, and two starts are known to lie near the wrong minimum. A dry
+//! step (sign function) has no width that could change: it is the limit of a narrow step, and velocity noise can make
+//! it look best on a grid. (With Stribeck friction it is kept, because a separate Stribeck step would absorb the
+//! friction at rest.) And with a Coulomb step wider than half the Stribeck velocity, the two terms have exchanged their
+//! roles: the Stribeck term describes the step at rest.
 
 use super::candidates::JointScale;
 use super::constants::{is_coulomb, smooth_width, step_of, with_one_step};
 use dynident_model::terms::{CoulombShape, StepRole, TorqueTerm};
 
-/// A Coulomb step this many times as wide as the Stribeck term's own step, half the Stribeck velocity, is done where
-/// Stribeck friction begins to fall off.
-const WIDE: f64 = 2.0;
-/// Part of the Stribeck term's own step that a Coulomb step of the same friction has at least.
-const NARROW: f64 = 0.5;
+/// Ratio of Coulomb step width to that of the Stribeck term (half the Stribeck velocity) above which both terms have
+/// exchanged their roles.
+const MAX_WIDTH_RATIO: f64 = 2.0;
+/// Minimum ratio of Coulomb step width to that of the Stribeck term.
+const MIN_WIDTH_RATIO: f64 = 0.5;
 
-/// The same terms with the step at rest where the other valley is; `None` where they are in it already.
+/// The same terms with the step near the other minimum; `None` if they already are.
 pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Vec<TorqueTerm>> {
     let step = step_of(terms.iter().find(|term| is_coulomb(term))?)?;
     let own_width = |term: &TorqueTerm| match term.kind().step_role() {
@@ -26,7 +26,7 @@ pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Ve
     let stribeck = terms.iter().find_map(own_width);
     let width = match (step, stribeck) {
         (CoulombShape::Sign { dead_band: 0.0 }, None) => scale.narrowest_width(),
-        (CoulombShape::Smooth { width }, Some(of_stribeck)) if width > WIDE * of_stribeck => of_stribeck,
+        (CoulombShape::Smooth { width }, Some(of_stribeck)) if width > MAX_WIDTH_RATIO * of_stribeck => of_stribeck,
         _ => return None,
     };
     let moved = |term: &TorqueTerm| {
@@ -35,12 +35,12 @@ pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Ve
     Some(with_one_step(terms.iter().map(moved).collect()))
 }
 
-/// Whether Coulomb and Stribeck friction can be one friction: with a Coulomb step far narrower than that of the
-/// Stribeck term the joint is dry, and Stribeck friction that is not comes out too large.
+/// Whether Coulomb and Stribeck friction can be one friction. If the Coulomb step is far narrower than that of the
+/// Stribeck term, the joint is dry, and smooth Stribeck friction is overestimated.
 pub(crate) fn is_one_friction(terms: &[TorqueTerm]) -> bool {
     let width = |is_wanted: fn(&TorqueTerm) -> bool| terms.iter().filter(|term| is_wanted(term)).find_map(smooth_width);
     match (width(is_coulomb), width(|term| matches!(term.kind().step_role(), StepRole::Own { .. }))) {
-        (Some(coulomb), Some(stribeck)) => coulomb >= NARROW * stribeck,
+        (Some(coulomb), Some(stribeck)) => coulomb >= MIN_WIDTH_RATIO * stribeck,
         _ => true,
     }
 }
@@ -70,28 +70,29 @@ mod tests {
     }
 
     #[test]
-    fn a_dry_step_begins_as_a_narrow_one() {
+    fn second_start_of_a_dry_step_is_narrow() {
         let viscous = TorqueTerm::Viscous(Viscous { joint: 0 });
         let found = second_start(&[viscous.clone(), coulomb(DRY)], USUAL);
         assert_eq!(found, Some(vec![viscous.clone(), coulomb(smooth(0.002))]));
-        // A width that a study has stated for a dead band is its own; what is smooth and alone can move already.
+        // A width stated as a dead band is kept; a single smooth step can already move.
         assert_eq!(second_start(&[coulomb(CoulombShape::Sign { dead_band: 0.01 })], USUAL), None);
         assert_eq!(second_start(&[viscous, coulomb(smooth(0.1))], USUAL), None);
     }
 
     #[test]
-    fn a_step_that_changed_places_with_stribeck_friction_begins_below_it() {
+    fn second_start_of_exchanged_terms_is_below_the_stribeck_velocity() {
         let found = second_start(&[coulomb(smooth(0.14)), stribeck(smooth(0.02)), load(smooth(0.14))], USUAL);
-        // Load-dependent friction goes with it: it is one friction.
+        // Load-dependent friction has the same step, because it is one friction.
         assert_eq!(found, Some(vec![coulomb(smooth(0.02)), stribeck(smooth(0.02)), load(smooth(0.02))]));
         assert_eq!(second_start(&[coulomb(smooth(0.03)), stribeck(smooth(0.02))], USUAL), None);
-        // A dry joint's Stribeck friction is dry, and stays so.
+        // Stribeck friction of a dry joint stays dry.
         assert_eq!(second_start(&[coulomb(DRY), stribeck(DRY)], USUAL), None);
     }
 
-    /// The paper's arm with dry friction came out with 0.0025 beside 0.0116 and Stribeck friction 15 % too large.
+    /// The arm of the paper with dry friction had widths of 0.0025 and 0.0116, and Stribeck friction was 15 % too
+    /// large.
     #[test]
-    fn a_dry_joint_has_no_wide_stribeck_friction() {
+    fn wide_stribeck_friction_of_a_dry_joint_is_rejected() {
         assert!(!is_one_friction(&[coulomb(smooth(0.0025)), stribeck(smooth(0.0116))]));
         assert!(is_one_friction(&[coulomb(smooth(0.015)), stribeck(smooth(0.0175))]));
         assert!(is_one_friction(&[coulomb(DRY), stribeck(DRY)]));

@@ -1,12 +1,11 @@
-//! Which lag is taken off the rows: none, one for all joints, or joints with one of their own.
+//! Selection of the lag to compensate: none, one for all joints, or separate lags of some joints.
 //!
-//! A lag of a recorder or a bus is the same for all joints, so their common lag is what is looked for first: the
-//! generalised mean of the joints' lags, its bar widened by what the joints differ by beyond their own bars (Paule and
-//! Mandel, J. Res. NBS 87 (1982) 377). What friction or elasticity leaves looks like a lag too, another in every joint:
-//! it widens the bar and is not taken off. Joints get lags of their own only once a common one has been taken off, for
-//! friction that was chosen with a lag in the rows makes up for some of it, at each joint for another part. A lag that
-//! is not known leaves its mark on the parameters in any case, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, and the error bars
-//! hold it.
+//! A lag of a recorder or a bus is the same for all joints, so the common lag is estimated first: the generalised mean
+//! of the joints' lags, with an error bar widened by the spread between joints beyond their own error bars (Paule and
+//! Mandel, J. Res. NBS 87 (1982) 377). Unmodelled friction or elasticity also looks like a lag, a different one in
+//! every joint; it widens the error bar and is not compensated. Joints get separate lags only after a common one was
+//! compensated, because friction that was selected with a lag in the rows absorbs a different part of it at each joint.
+//! An unknown lag changes the parameters by `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, which the error bars include.
 
 use super::fit::LagFit;
 use super::measured::TorqueLag;
@@ -16,67 +15,61 @@ use dynident_recording::log::OneOrMany;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// A lag is taken off where it moves some parameter by this share of its error bar.
-const MATTERS: f64 = 0.3;
-/// Joints have lags of their own where one common lag is as unlikely as this many standard deviations, ...
-const UNLIKE: f64 = 4.0;
-/// ... and those where their own takes off this share of the torque's square that the model leaves, more than all that
-/// stays: what friction leaves looks like a lag and takes off less.
-const OWN_SHARE: f64 = 0.5;
-/// Halvings of the interval that holds the spread between joints: to a millionth of what they differ by.
+/// Halvings of the interval of the spread between joints.
 const BISECTIONS: usize = 20;
 
-/// Whose lag was taken off.
+/// Kind of the compensated lag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LagKind {
-    /// None: the rows show none, or none that matters.
+    /// None: no significant lag.
     #[default]
     None,
     /// One for all joints.
     Common,
-    /// One for each of some joints.
+    /// Separate lags of some joints.
     Joints,
-    /// The study states it.
+    /// Stated by the study.
     Stated,
 }
 
-/// What was taken off the rows, and how well the rest is known.
+/// The compensated lag and the remaining uncertainty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LagChoice {
-    /// Whose lag was taken off.
+    /// Kind of the compensated lag.
     pub kind: LagKind,
-    /// Seconds that were taken off, joint by joint; empty for none.
+    /// Compensated lag of each joint, s; empty if none.
     pub lag_s: Vec<f64>,
-    /// One lag for all joints by all training logs, with what was taken off where that is the same for all (of joints
-    /// of their own what is left after it); none where the logs determine none.
+    /// Common lag of all joints and training logs, including a compensated common lag (for separate lags of joints,
+    /// only the rest); `None` if the logs do not determine it.
     pub common: Option<TorqueLag>,
-    /// χ² of the joints' lags about the common one, per degree of freedom: far above 1 where they differ.
+    /// χ² of the joints' lags about the common one, per degree of freedom; far above 1 if they differ.
     pub scatter: Option<f64>,
 }
 
 impl LagChoice {
-    /// What was taken off, for rows that are made alike:
-    /// [`MotionSettings::torque_lag_s`](dynident_recording::MotionSettings::torque_lag_s). None where nothing was.
+    /// Compensated lag for rows with the same settings:
+    /// [`MotionSettings::torque_lag_s`](dynident_recording::MotionSettings::torque_lag_s). `None` if nothing was
+    /// compensated.
     pub fn taken_off(&self) -> Option<OneOrMany<f64>> {
         (!self.lag_s.is_empty()).then(|| OneOrMany::Many(self.lag_s.clone()))
     }
 
-    /// The longest lag that was taken off a joint, either way; seconds, 0 where nothing was.
+    /// Largest compensated lag of a joint in either direction, s.
     pub fn longest_s(&self) -> f64 {
         self.lag_s.iter().fold(0.0, |longest, lag_s| longest.max(lag_s.abs()))
     }
 
-    /// The longest lag that was compensated at a joint, in either direction, less half the width of the 95 % interval
-    /// of the common lag; s. Zero if no lag was compensated or the interval includes zero.
+    /// Largest compensated lag of a joint in either direction, minus the half width of the 95 % interval of the common
+    /// lag, s. Zero if no lag was compensated or the interval includes zero.
     pub fn certain_s(&self) -> f64 {
         let half_width_s = self.common.as_ref().map_or(0.0, |common| common.half_width_95_s);
         (self.longest_s() - half_width_s).max(0.0)
     }
 
-    /// What was done, in a sentence without a full stop; none where there is nothing to tell.
+    /// The selection as a sentence without a full stop; `None` if there is nothing to report.
     pub fn sentence(&self) -> Option<String> {
         let ms = |seconds: f64| format!("{:.1}", 1e3 * seconds);
         let taken_off = || self.lag_s.first().copied().unwrap_or(0.0);
@@ -85,25 +78,25 @@ impl LagChoice {
             LagKind::None => {
                 let common = self.common?;
                 let bar = ms(common.half_width_95_s);
-                format!("none that matters ({} +- {bar} ms, 95 %, one for all joints)", ms(common.lag_s))
+                format!("not significant ({} +- {bar} ms, 95 %, one for all joints)", ms(common.lag_s))
             }
             LagKind::Common => {
                 let bar = self.common.map_or_else(String::new, |common| format!(" +- {}", ms(common.half_width_95_s)));
                 let lag_s = taken_off();
-                format!("{}{bar} ms {} the motion at all joints, taken off", ms(lag_s.abs()), side(lag_s))
+                format!("{}{bar} ms {} the motion at all joints, compensated", ms(lag_s.abs()), side(lag_s))
             }
-            LagKind::Joints => "another at each joint, taken off".to_owned(),
+            LagKind::Joints => "different at each joint, compensated".to_owned(),
             LagKind::Stated => {
                 let is_one = self.lag_s.iter().all(|lag_s| *lag_s == taken_off());
                 let what = if is_one { format!("{} ms", ms(taken_off())) } else { "joint by joint".to_owned() };
-                format!("{what} as stated, taken off")
+                format!("{what} as stated, compensated")
             }
         })
     }
 }
 
-/// The choice that a fit's lags ask for, beyond what was `taken_off` before (seconds, joint by joint, or empty);
-/// `estimate` is the one whose parameters are to be kept from harm.
+/// Selects the lag from a fit, in addition to the lag compensated before, `taken_off` (s, by joint, or empty).
+/// `estimate` contains the parameters that the lag must not disturb.
 pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, candidates: LagCandidates) -> LagChoice {
     let dof = fit.joints.len();
     let before = |joint: usize| taken_off.get(joint).copied().unwrap_or(0.0);
@@ -113,11 +106,16 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
     };
     let total = |rest: &dyn Fn(usize) -> f64| (0..dof).map(|joint| before(joint) + rest(joint)).collect::<Vec<f64>>();
     let as_before = LagChoice { lag_s: taken_off.to_vec(), ..LagChoice::default() };
-    let all = telling_joints(fit);
-    let Some(Mean { lag, scatter, .. }) = common(fit, &all) else { return as_before };
+    let all = informative_joints(fit);
+    let Some(CommonLag { lag, scatter, .. }) = common(fit, &all) else { return as_before };
+    let thresholds = &fit.thresholds;
     let matters = |rest: &[f64]| {
         let moved = fit.answers() * DVector::from_column_slice(rest);
-        moved.iter().take(fit.parameters).zip(&estimate.std).any(|(moved, std)| moved.abs() > MATTERS * std)
+        moved
+            .iter()
+            .take(fit.parameters)
+            .zip(&estimate.std)
+            .any(|(moved, std)| moved.abs() > thresholds.min_parameter_shift * std)
     };
     let choice = LagChoice { common: Some(lag.after(taken_off_s)), scatter, ..as_before };
 
@@ -127,11 +125,13 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
         return LagChoice { kind: LagKind::Common, lag_s: rest, ..choice };
     }
 
-    // Joints whose own lag explains much of what the model leaves, where one lag for all does not do.
+    // Separate lags of joints, if they explain much of the residual and a common lag does not.
     let freedoms = all.len().saturating_sub(1) as f64;
-    let unlike = scatter.is_some_and(|scatter| (scatter - 1.0) * freedoms > UNLIKE * (2.0 * freedoms).sqrt());
-    let may_own = unlike && candidates == LagCandidates::CommonOrJoints;
-    let own: Vec<usize> = all.iter().copied().filter(|&joint| may_own && fit.share(joint) > OWN_SHARE).collect();
+    let is_scattered = scatter
+        .is_some_and(|scatter| (scatter - 1.0) * freedoms > thresholds.max_scatter_std * (2.0 * freedoms).sqrt());
+    let may_be_separate = is_scattered && candidates == LagCandidates::CommonOrJoints;
+    let is_own = |joint: usize| may_be_separate && fit.share(joint) > thresholds.min_own_share;
+    let own: Vec<usize> = all.iter().copied().filter(|&joint| is_own(joint)).collect();
     if !own.is_empty() {
         let others: Vec<usize> = all.iter().copied().filter(|joint| !own.contains(joint)).collect();
         let of_others =
@@ -148,17 +148,16 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
     choice
 }
 
-/// What is unknown of the lags, as it is in parameters and unknown gains: `S Σ_δ^½` with `S = ∂θ/∂δ`, of a lag for all
-/// joints, or of joints of their own. Where no lag was taken off, what is known of lags beforehand bounds it. None for
-/// a lag that the study states. Where joints may have no lag of their own (`candidates`) what they differ by stays in
-/// the rows, and is unknown of each.
+/// Effect of the lag's uncertainty on parameters and unknown gains, `S Σ_δ^½` with `S = ∂θ/∂δ`, for a common lag or for
+/// separate ones. Without a compensated lag, the prior uncertainty of lags bounds it. `None` for a stated lag. If
+/// joints cannot have separate lags (`candidates`), their spread stays in the rows and is part of the uncertainty.
 fn lag_error(fit: &LagFit, choice: &LagChoice, candidates: LagCandidates) -> Option<DMatrix<f64>> {
     let answers = fit.answers();
     let usual = |std_s: f64| (std_s.powi(-2) + fit.usual_lag_s.powi(-2)).powf(-0.5);
     Some(match choice.kind {
         LagKind::Stated => return None,
         LagKind::Joints => {
-            // Joints of their own do not err together.
+            // Errors of separate lags are independent.
             let std = |joint: &Option<TorqueLag>| joint.map_or(0.0, |lag| lag.std_s);
             let stds = DVector::from_iterator(fit.joints.len(), fit.joints.iter().map(std));
             answers * DMatrix::from_diagonal(&stds)
@@ -168,7 +167,7 @@ fn lag_error(fit: &LagFit, choice: &LagChoice, candidates: LagCandidates) -> Opt
             let std_s = if choice.kind == LagKind::None { usual(shared.std_s) } else { shared.std_s };
             let of_all = answers.column_sum() * std_s;
             let of_all = DMatrix::from_column_slice(of_all.len(), 1, of_all.as_slice());
-            let telling = telling_joints(fit);
+            let telling = informative_joints(fit);
             let spread_s = match candidates {
                 LagCandidates::CommonOrJoints => 0.0,
                 LagCandidates::Common => common(fit, &telling).map_or(0.0, |mean| mean.spread_s),
@@ -199,7 +198,7 @@ pub(super) fn covariance_of_lag(
     Some(further)
 }
 
-/// Standard deviations that the error of the lags makes in the gains that are unknown, as shares of them.
+/// Relative standard deviations of the unknown gains caused by the error of the lags.
 pub(crate) fn gain_errors(fit: &LagFit, choice: &LagChoice) -> Vec<f64> {
     let Some(half) = lag_error(fit, choice, LagCandidates::CommonOrJoints) else {
         return vec![0.0; fit.first - fit.parameters];
@@ -207,9 +206,9 @@ pub(crate) fn gain_errors(fit: &LagFit, choice: &LagChoice) -> Vec<f64> {
     (fit.parameters..fit.first).map(|row| half.row(row).norm()).collect()
 }
 
-/// The joints whose lags tell more than what is known beforehand, or all that have one where none does: a joint at rest
+/// Joints whose lags are more precise than the prior, or all joints with a lag if there are none. A joint at rest only
 /// has a lag of its noise.
-fn telling_joints(fit: &LagFit) -> Vec<usize> {
+fn informative_joints(fit: &LagFit) -> Vec<usize> {
     let lags = fit.joints.iter().enumerate().filter_map(|(joint, lag)| Some((joint, lag.as_ref()?)));
     let telling: Vec<usize> =
         lags.clone().filter(|(_, lag)| lag.std_s < fit.usual_lag_s).map(|(joint, _)| joint).collect();
@@ -220,23 +219,22 @@ fn is_beyond_its_bar(lag: &TorqueLag) -> bool {
     lag.lag_s.abs() > lag.half_width_95_s
 }
 
-/// One lag for some joints.
-struct Mean {
+struct CommonLag {
     lag: TorqueLag,
     scatter: Option<f64>,
-    /// Standard deviation of the joints' lags about it beyond their own errors, seconds.
+    /// Standard deviation of the joints' lags about it beyond their own errors, s.
     spread_s: f64,
 }
 
-/// The lag that some joints share: the generalised mean with a spread τ between the joints beside their own errors,
-/// `χ²(τ) = n − 1` (Paule and Mandel, J. Res. NBS 87 (1982) 377). What friction leaves has one sign at all joints, so
-/// that it does not average out: the whole spread is in the interval by which a lag is judged; its standard deviation,
-/// by which parameters' bars are widened, is that of the mean.
-fn common(fit: &LagFit, joints: &[usize]) -> Option<Mean> {
+/// Common lag of some joints: the generalised mean with a spread τ between the joints in addition to their own errors,
+/// `χ²(τ) = n − 1` (Paule and Mandel, J. Res. NBS 87 (1982) 377). Unmodelled friction has one sign at all joints and
+/// does not average out, so the interval that decides about a lag includes the whole spread. The standard deviation,
+/// which widens the error bars of the parameters, is that of the mean.
+fn common(fit: &LagFit, joints: &[usize]) -> Option<CommonLag> {
     let lags: Vec<TorqueLag> = joints.iter().filter_map(|&joint| fit.joints[joint]).collect();
     let covariance = fit.covariance(joints);
     let values = DVector::from_iterator(lags.len(), lags.iter().map(|lag| lag.lag_s));
-    // Few segments: lags of all joints together may be less than independent.
+    // With few segments the covariance of all joints can be singular.
     let covariance = match covariance.clone().cholesky() {
         Some(_) => covariance,
         None => DMatrix::from_diagonal(&covariance.diagonal()),
@@ -245,7 +243,7 @@ fn common(fit: &LagFit, joints: &[usize]) -> Option<Mean> {
     let freedoms = lags.len().saturating_sub(1) as f64;
     let (mut spread, mut shared) = (0.0, alone);
     if alone.chi_square > freedoms && freedoms > 0.0 {
-        // χ² falls as the spread grows, and is below n − 1 where the spread is that of the values themselves.
+        // χ² decreases with the spread, and is below n − 1 at the spread of the values themselves.
         let mut bounds = [0.0, values.iter().fold(0.0_f64, |most, value| most.max((value - alone.mean).abs()))];
         bounds[1] *= (lags.len() as f64).sqrt();
         for _ in 0..BISECTIONS {
@@ -259,14 +257,13 @@ fn common(fit: &LagFit, joints: &[usize]) -> Option<Mean> {
     let (lag_s, half_width_95_s) = (shared.mean, quantile * std_s.hypot(spread));
     let matters = lag_s.abs() > half_width_95_s && lags.iter().any(|lag| lag.matters);
     let scatter = (freedoms > 0.0).then(|| alone.chi_square / freedoms);
-    (std_s.is_finite() && lag_s.is_finite()).then_some(Mean {
+    (std_s.is_finite() && lag_s.is_finite()).then_some(CommonLag {
         lag: TorqueLag { lag_s, std_s, half_width_95_s, matters, taken_off_s: 0.0 },
         scatter,
         spread_s: spread,
     })
 }
 
-/// The generalised mean for one spread between the joints.
 #[derive(Clone, Copy)]
 struct SharedLag {
     mean: f64,

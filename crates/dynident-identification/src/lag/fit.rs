@@ -1,10 +1,10 @@
-//! Lags and parameters together, from the samples of one log or of several.
+//! Estimates lags and parameters together, from the samples of one or several logs.
 //!
-//! A model that was fitted to late torque has absorbed a part of the lag (the inertia's column a quarter period on is
-//! the viscous one), and what a prior's wrong inertias leave looks like a lag of many milliseconds. So lag and
+//! A model that was fitted to late torque has absorbed a part of the lag (the inertia's column shifted by a quarter
+//! period is the viscous one), and wrong inertias of a prior look like a lag of many milliseconds. So lag and
 //! parameters are estimated together: `τ(t + d) = Y(t) θ − (δ − d) ∂(Yθ)/∂t` with the torque taken `d` later, until `d`
-//! is the lag `δ` itself. The last step's covariance, from time segments, is the lag's. What the model cannot say
-//! (backlash, elasticity) is in it as far as it differs from segment to segment.
+//! equals the lag `δ`. The covariance of the last step, from time segments, is that of the lag. It includes model
+//! errors (backlash, elasticity) as far as they differ between segments.
 
 use super::measured::TorqueLag;
 use super::rows::{DelayRows, NODES, lagrange};
@@ -12,6 +12,7 @@ use super::samples::DelayCheck;
 use super::unknowns::Unknowns;
 use crate::estimators::EstimationSettings;
 use crate::log_noise::{LogNoise, weighted_by_log};
+use crate::thresholds::LagThresholds;
 use dynident_estimation::{
     Estimate, EstimationError, LinearProblem, SegmentedFactor, weighted_least_squares, weighted_values,
 };
@@ -19,43 +20,34 @@ use dynident_rows::{Logs, RegressorModel};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Standard deviation of a lag of which nothing is known but that it is one of a drive or a bus, seconds of a usual arm
-/// ([`OwnScale`](dynident_model::OwnScale)): drives and buses are made as fast as their machine needs them.
-const USUAL_LAG_S: f64 = 5.0e-3;
-/// Longest lag looked for, seconds of a usual arm: drives and buses stay below.
-pub(crate) const LONGEST_DELAY_S: f64 = 0.1;
-/// Steps at most; two to four are usual.
-const MOST_STEPS: usize = 12;
-/// The steps end when no lag moves by more than this share of its standard deviation, or by so many samples.
-const SETTLED: (f64, f64) = (0.02, 1.0e-6);
+/// Maximum number of steps; two to four are usual.
+const MAX_STEPS: usize = 12;
+/// Convergence: no lag moves by more than this ratio of its standard deviation, or by this number of samples.
+const CONVERGENCE: (f64, f64) = (0.02, 1.0e-6);
 
-/// Lags by joint, with the parameters that were estimated with them.
+/// Lags by joint, with the parameters estimated together with them.
 #[derive(Debug)]
 pub struct LagFit {
-    /// Parameters, gains that are unknown, then what the last step adds to each joint's lag, seconds.
+    /// Parameters, unknown gains, then the change of each joint's lag in the last step, s.
     pub(crate) last: Estimate,
     /// Number of parameters: base parameters, payloads, offsets of single logs.
     pub(crate) parameters: usize,
-    /// The first lag's column.
     pub(crate) first: usize,
-    /// Lag of torque behind motion by joint; `None` where the samples do not determine it.
+    /// Lag of torque behind motion by joint; `None` if the samples do not determine it.
     pub(crate) joints: Vec<Option<TorqueLag>>,
-    /// Filtered rows by joint.
     pub(crate) rows: Vec<usize>,
-    /// Standard deviation of a lag of which nothing is known, seconds.
     pub(crate) usual_lag_s: f64,
+    pub(crate) thresholds: LagThresholds,
 }
 
 impl LagFit {
-    /// Covariance of the lags of some joints, s².
     pub(crate) fn covariance(&self, joints: &[usize]) -> DMatrix<f64> {
         let of = |row: usize, column: usize| (self.first + joints[row], self.first + joints[column]);
         DMatrix::from_fn(joints.len(), joints.len(), |row, column| self.last.covariance[of(row, column)])
     }
 
-    /// How parameters and unknown gains answer to each joint's lag, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`: what they are
-    /// estimated to be where the lag is taken to be larger, per second; zero for a lag that the samples do not
-    /// determine.
+    /// Sensitivity of parameters and unknown gains to each joint's lag, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, per second;
+    /// zero for a lag that the samples do not determine.
     pub(crate) fn answers(&self) -> DMatrix<f64> {
         let known: Vec<usize> = (0..self.joints.len()).filter(|&joint| self.joints[joint].is_some()).collect();
         let mut answers = DMatrix::zeros(self.first, self.joints.len());
@@ -72,7 +64,7 @@ impl LagFit {
         answers
     }
 
-    /// The share of the torque's square that the model leaves which a joint's own lag takes off.
+    /// Share of the squared residual that a joint's own lag explains.
     pub(crate) fn share(&self, joint: usize) -> f64 {
         let Some(lag) = self.joints[joint] else { return 0.0 };
         let column = self.first + joint;
@@ -81,19 +73,16 @@ impl LagFit {
     }
 }
 
-/// The samples of some logs with the rows made of them, about one lag for each joint.
 struct Samples<'a> {
     checks: &'a [DelayCheck<'a>],
     with: (&'a Logs<'a>, &'a EstimationSettings),
     unknowns: Unknowns<'a>,
-    /// Log by log, joint by joint.
     rows: Vec<Vec<DelayRows>>,
-    /// Seconds.
     lag_s: Vec<f64>,
 }
 
-/// Fits the lags of the joints, the same in all logs, which share their noise or have their own. `None` for logs too
-/// short to fit to.
+/// Fits the lags of the joints, common to all logs, with shared or separate noise of the logs. `None` for logs that are
+/// too short.
 pub(crate) fn fit_lags(
     checks: &[DelayCheck<'_>],
     unknowns: Unknowns<'_>,
@@ -103,8 +92,8 @@ pub(crate) fn fit_lags(
     fitted(checks.first()?.model(), checks, unknowns, noise, with).ok()
 }
 
-/// The lags of one log alone with what was taken off before it was read, by joint; `None` where it does not determine
-/// one. A lag matters where its rest does.
+/// Lags of one log by joint, including the lag compensated before; `None` if not determined. A lag matters if its rest
+/// does.
 pub(crate) fn lags_of_log(check: DelayCheck<'_>, with: (&Logs<'_>, &EstimationSettings)) -> Vec<Option<TorqueLag>> {
     let joints = check.model().model().dof();
     let taken_off = &with.0.motion.torque_lag_s;
@@ -127,12 +116,12 @@ fn fitted(
     let cutoff_hz = logs.motion.differentiator.cutoff_hz();
     let dof = model.model().dof();
     let own = model.model().own_scale();
-    let longest_s = own.seconds(LONGEST_DELAY_S);
+    let longest_s = own.seconds(settings.thresholds.lag.max_lag_s);
     let start = |joint: usize| {
         let coarse = |check: &DelayCheck<'_>| Some(check.coarse(joint, cutoff_hz, longest_s)? / check.rate_hz());
         checks.iter().find_map(coarse).unwrap_or(0.0).clamp(-longest_s, longest_s)
     };
-    // A log that shows the model worse than another says less of the lag, too.
+    // Noisy logs get less weight for the lag too.
     let weighted = |problem: LinearProblem| match noise {
         LogNoise::Shared => Ok(problem),
         LogNoise::Own => weighted_by_log(settings, problem),
@@ -140,16 +129,16 @@ fn fitted(
     let mut samples = Samples::new(checks, unknowns, with, (0..dof).into_par_iter().map(start).collect())?;
     let first = unknowns.count();
     let fastest_hz = checks.iter().map(DelayCheck::rate_hz).fold(0.0, f64::max);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let step = weighted_values(&weighted(samples.problem(|rows| &rows.merged)?)?, &settings.weighted())?;
-        let mut has_settled = true;
+        let mut has_converged = true;
         for joint in 0..dof {
             let (rest, std) = (step.values[first + joint], step.white_std[first + joint]);
-            has_settled &= rest.abs() <= (SETTLED.0 * std).max(SETTLED.1 / fastest_hz);
+            has_converged &= rest.abs() <= (CONVERGENCE.0 * std).max(CONVERGENCE.1 / fastest_hz);
             samples.lag_s[joint] = (samples.lag_s[joint] + rest).clamp(-longest_s, longest_s);
         }
         samples.follow()?;
-        if has_settled {
+        if has_converged {
             break;
         }
     }
@@ -157,8 +146,9 @@ fn fitted(
     let joints = (0..dof).map(|joint| samples.joint_lag(&last, first + joint, longest_s, fastest_hz)).collect();
     let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
     let rows = (0..dof).map(of_joint).collect();
-    let usual_lag_s = own.seconds(USUAL_LAG_S);
-    Ok(LagFit { parameters: unknowns.values.len(), first, joints, rows, last, usual_lag_s })
+    let usual_lag_s = own.seconds(settings.thresholds.lag.prior_std_s);
+    let (parameters, thresholds) = (unknowns.values.len(), settings.thresholds.lag);
+    Ok(LagFit { last, parameters, first, joints, rows, usual_lag_s, thresholds })
 }
 
 impl<'a> Samples<'a> {
@@ -176,7 +166,7 @@ impl<'a> Samples<'a> {
         Ok(Self { checks, with, unknowns, rows, lag_s })
     }
 
-    /// Makes the rows again whose nodes no longer surround their lag.
+    /// Computes rows again if their nodes no longer surround the lag.
     fn follow(&mut self) -> Result<(), EstimationError> {
         for (check, rows) in self.checks.iter().zip(&mut self.rows) {
             for (joint, rows) in rows.iter_mut().enumerate() {
@@ -189,15 +179,15 @@ impl<'a> Samples<'a> {
         Ok(())
     }
 
-    /// The lag in `column` of the last step, if it settled below the longest.
+    /// The lag in `column` of the last step, if it converged below the maximum.
     fn joint_lag(&self, last: &Estimate, column: usize, longest_s: f64, fastest_hz: f64) -> Option<TorqueLag> {
         let joint = column - self.unknowns.count();
         let (rest, std) = (last.values[column], last.std[column]);
         let lag_s = self.lag_s[joint] + rest;
         let excited = last.rank.fixed.iter().all(|fixed| fixed.column != column);
-        let settled = rest.abs() <= (0.5 * std).max(1.0e3 * SETTLED.1 / fastest_hz);
+        let converged = rest.abs() <= (0.5 * std).max(1.0e3 * CONVERGENCE.1 / fastest_hz);
         let half_width = last.half_width_95[column];
-        if !excited || !settled || lag_s.abs() >= 0.999 * longest_s || half_width >= longest_s {
+        if !excited || !converged || lag_s.abs() >= 0.999 * longest_s || half_width >= longest_s {
             return None;
         }
         let of_log = |(check, rows): (&DelayCheck<'_>, &Vec<DelayRows>)| {
@@ -216,7 +206,7 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// Parameters and unknown gains, then the rest of every joint's lag in seconds.
+    /// Parameters and unknown gains, then the rest of every joint's lag, s.
     fn problem(
         &self,
         factor: impl Fn(&DelayRows) -> &SegmentedFactor + Sync,
@@ -226,7 +216,7 @@ impl<'a> Samples<'a> {
         let (first, dof) = (self.unknowns.count(), self.lag_s.len());
         let names = (0..first + dof).map(|column| format!("column {column}")).collect();
         let joints = (0..dof).map(|joint| format!("joint {joint}")).collect();
-        // What the logs do not determine stays as it was fitted, for the slope was made with it.
+        // Undetermined parameters stay as fitted, because the slope was computed with them.
         let mut fallback = self.unknowns.values.to_vec();
         fallback.resize(first + dof, 0.0);
         let mut problem = LinearProblem::new(names, joints).with_fallback(fallback)?;

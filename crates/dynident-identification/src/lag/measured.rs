@@ -1,39 +1,39 @@
-//! By how much torque comes after its motion, as a number with its error bar.
+//! Lag of the torque behind the motion, with its error bar.
 
 use dynident_recording::{Finding, Level};
 use serde::{Deserialize, Serialize};
 
-/// Lags below a picosecond are rounding, and so are their error bars.
-const ROUNDING_S: f64 = 1.0e-12;
+/// Lags and error bars below a picosecond are rounding errors.
+const MIN_STD_S: f64 = 1.0e-12;
 
-/// By how much one joint's torque comes after the motion.
+/// Lag of one joint's torque behind the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueLag {
-    /// Seconds; negative where the torque comes before.
+    /// Lag, s; negative if the torque is early.
     pub lag_s: f64,
-    /// Its standard deviation.
+    /// Standard deviation, s.
     pub std_s: f64,
-    /// Half the width of its 95 % interval; of a lag of all joints with the whole spread between them.
+    /// Half width of its 95 % interval, s; for a common lag of all joints including the whole spread between them.
     pub half_width_95_s: f64,
-    /// Whether what was not taken off is beyond its interval and moves more torque than the model leaves unexplained.
+    /// Whether the uncompensated part is outside of its interval and changes the torque by more than the residual.
     pub matters: bool,
-    /// What of it was taken off the rows before the fit, seconds.
+    /// Part that was compensated before the fit, s.
     #[serde(default)]
     pub taken_off_s: f64,
 }
 
 impl TorqueLag {
-    /// The whole lag, of which `taken_off_s` was taken off before this rest was measured.
+    /// Adds a lag that was compensated before this rest was measured.
     pub(crate) fn after(self, taken_off_s: f64) -> Self {
         Self { lag_s: taken_off_s + self.lag_s, taken_off_s, ..self }
     }
 }
 
-/// One lag from those of several logs: the mean weighted by their variances. Where logs differ by more than their error
-/// bars say, the bar grows to what they differ by (Birge, Phys. Rev. 40 (1932) 207).
+/// Common lag of several logs: the mean weighted by their variances. If logs differ by more than their error bars, the
+/// error bar grows accordingly (Birge, Phys. Rev. 40 (1932) 207).
 pub fn pooled_delay(lags: &[TorqueLag]) -> Option<TorqueLag> {
-    let weight = |lag: &TorqueLag| lag.std_s.max(ROUNDING_S).powi(-2);
+    let weight = |lag: &TorqueLag| lag.std_s.max(MIN_STD_S).powi(-2);
     let total: f64 = lags.iter().map(weight).sum();
     let first = lags.first()?;
     let mean = lags.iter().map(|lag| weight(lag) * lag.lag_s).sum::<f64>() / total;
@@ -47,14 +47,14 @@ pub fn pooled_delay(lags: &[TorqueLag]) -> Option<TorqueLag> {
     Some(TorqueLag { lag_s: mean, std_s, half_width_95_s, matters, taken_off_s })
 }
 
-/// The lags that matter as sentences.
+/// Findings on significant lags.
 pub fn delay_findings(lags: &[Option<TorqueLag>], joints: &[String]) -> Vec<Finding> {
     let of_joint = |(joint, lag): (&String, &Option<TorqueLag>)| {
         lag.filter(|lag| lag.matters || lag.taken_off_s != 0.0).map(|lag| {
             let side = if lag.lag_s > 0.0 { "after" } else { "before" };
             let taken_off = match lag.taken_off_s {
                 0.0 => String::new(),
-                taken_off_s => format!("; {:.1} ms were taken off", 1e3 * taken_off_s.abs()),
+                taken_off_s => format!("; {:.1} ms were compensated", 1e3 * taken_off_s.abs()),
             };
             let message = format!(
                 "comes {:.1} +- {:.1} ms {side} the motion (95 %), estimated together with the model{taken_off}",
@@ -72,12 +72,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn logs_that_agree_sharpen_the_lag_and_logs_that_do_not_widen_it() {
+    fn agreeing_logs_narrow_the_lag_interval_and_scattered_logs_widen_it() {
         let lag = |lag_s| TorqueLag { lag_s, std_s: 1e-3, half_width_95_s: 2e-3, matters: true, taken_off_s: 0.0 };
         assert_eq!(pooled_delay(&[]), None);
         assert_eq!(pooled_delay(&[lag(5e-3)]), Some(lag(5e-3)));
         let agreeing = pooled_delay(&[lag(5e-3), lag(5e-3)]).unwrap_or(lag(0.0));
-        // Two equal measurements: the mean's deviation is that of one by √2.
+        // Two equal measurements: the deviation of the mean is that of one divided by √2.
         assert!((agreeing.std_s - 1e-3 / 2_f64.sqrt()).abs() < 1e-12 && (agreeing.lag_s - 5e-3).abs() < 1e-12);
         let apart = pooled_delay(&[lag(0.0), lag(10e-3)]).unwrap_or(lag(0.0));
         // Half the difference of two is the deviation of their mean.

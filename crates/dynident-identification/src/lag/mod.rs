@@ -1,5 +1,5 @@
-//! Does the torque come late? The lag between motion and torque with its error bar, as an unknown of the fit: measured
-//! together with the parameters, chosen (none, one for all joints, or joints of their own), and taken off the rows.
+//! Lag between motion and torque with its error bar: estimated together with the parameters, selected (none, one for
+//! all joints, or separate ones), and compensated.
 
 mod choice;
 mod fit;
@@ -17,7 +17,7 @@ pub use measured::{TorqueLag, delay_findings, pooled_delay};
 pub use pass::{lag_fit, lags_of_recordings};
 pub use rounds::LagRounds;
 
+pub(crate) use crate::thresholds::LONGEST_DELAY_S;
 pub(crate) use choice::gain_errors;
-pub(crate) use fit::LONGEST_DELAY_S;
 pub(crate) use pass::lags_after_pass;
 pub(crate) use samples::{DELAY_SAMPLES, DelayCheck};

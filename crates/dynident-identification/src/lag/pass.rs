@@ -1,4 +1,4 @@
-//! The samples of recordings that lags are estimated from.
+//! Samples of recordings for the estimation of lags.
 
 use super::fit::{LagFit, fit_lags, lags_of_log};
 use super::measured::{TorqueLag, pooled_delay};
@@ -10,7 +10,6 @@ use crate::settings::IdentificationSettings;
 use dynident_rows::{
     JointRows, LogError, LogPass, Logs, RawSamples, Recording, RegressorModel, RowConsumer, Samples, Silent,
 };
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 impl RowConsumer for DelayCheck<'_> {
@@ -25,14 +24,13 @@ impl RowConsumer for DelayCheck<'_> {
     }
 }
 
-/// The lags of the joints by all recordings `chosen` together, beyond what the settings of `logs` take off. `values`
-/// are what a fit to them found over the `columns`: base parameters of the model, payloads, offsets of single logs. Of
-/// the `gains` that were found with them, those that the logs determine are unknowns beside the lags. Recordings have
-/// noise of their own where the settings say so. None where the recordings are too short, and where rows inside of a
-/// motion are left out.
+/// Estimates the lags of the joints from all recordings `chosen`, in addition to the lag that the settings of `logs`
+/// compensate. `values` are the results of a fit over the `columns`: base parameters, payloads, offsets of single logs.
+/// Of the `gains` found with them, those that the logs determine are unknowns too. Recordings have separate noise if
+/// the settings require it. `None` if recordings are too short or rows inside a motion are excluded.
 ///
 /// # Errors
-/// What reading them can give.
+/// A recording cannot be read.
 pub fn lag_fit(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -51,12 +49,11 @@ pub fn lag_fit(
     Ok(checks.and_then(|checks| fit_lags(&checks, unknowns, settings.log_noise, with)))
 }
 
-/// The whole lag of each joint by the recordings `chosen`, each with the base parameters that `theta` gives for it:
-/// those of single recordings, pooled. None for a joint where none determines it, and where rows inside of a motion are
-/// left out.
+/// Complete lag of each joint, pooled over the recordings `chosen`. `theta` returns the base parameters of a recording.
+/// `None` for a joint that no recording determines, and if rows inside a motion are excluded.
 ///
 /// # Errors
-/// What reading them can give.
+/// A recording cannot be read.
 pub fn lags_of_recordings(
     logs: &Logs<'_>,
     settings: &EstimationSettings,
@@ -72,10 +69,7 @@ pub fn lags_of_recordings(
     Ok((0..model.model().dof()).map(|joint| pooled_delay(&of_joint(joint))).collect())
 }
 
-/// The whole lag of each joint by recording number `index`, whose pass `check` has seen.
-///
-/// # Errors
-/// What reading it again can give, where the pass left out rows of a motion.
+/// Complete lag of each joint in recording `index`, after a pass with `check`.
 pub(crate) fn lags_after_pass(
     check: DelayCheck<'_>,
     with: (&Logs<'_>, &EstimationSettings),
@@ -87,7 +81,7 @@ pub(crate) fn lags_after_pass(
     }
 }
 
-/// The samples of the recordings `chosen`; none where one of them has rows that are left out.
+/// Samples of the recordings `chosen`; `None` if one of them excludes rows.
 fn checks<'a>(
     logs: &Logs<'_>,
     model: &'a RegressorModel,
@@ -107,17 +101,12 @@ fn checks<'a>(
         pass.run(&mut samples)?;
         Ok(samples)
     };
-    let places = 0..chosen.len();
-    let checks = if logs.execution.parallel() {
-        places.into_par_iter().map(of_log).collect::<Result<_, _>>()
-    } else {
-        places.map(of_log).collect()
-    };
-    checks.map(Some)
+    let places: Vec<usize> = (0..chosen.len()).collect();
+    logs.execution.try_map(&places, |&place| of_log(place)).map(Some)
 }
 
-/// The recording with every row: rows that are left out would move those behind them. `None` where rows inside do not
-/// count.
+/// The recording with every row, because excluded rows would shift the following ones. `None` if rows inside are
+/// unusable.
 fn whole(recording: &Recording) -> Option<Cow<'_, Recording>> {
     match &recording.samples {
         Samples::Log(_) => Some(Cow::Borrowed(recording)),

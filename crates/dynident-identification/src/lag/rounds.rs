@@ -1,4 +1,4 @@
-//! Fitting again without the lag that the rows show.
+//! Repeated fits with compensation of the lag.
 
 use super::choice::{LagChoice, LagKind, choose_lag, covariance_of_lag};
 use super::fit::LagFit;
@@ -7,12 +7,10 @@ use dynident_estimation::Estimate;
 use dynident_recording::log::OneOrMany;
 use nalgebra::DMatrix;
 
-/// Rounds of measuring the lag and making the rows again without it, at most; one or two are usual.
-const MOST_ROUNDS: usize = 3;
+const MAX_ROUNDS: usize = 3;
 
-/// Rounds of fitting and measuring the lag that the fit's rows show, until they show none that moves parameters. Begin
-/// with the default, fit without [`torque_lag_s`](Self::torque_lag_s), and go on as long as [`again`](Self::again) says
-/// so.
+/// Repeats fit and lag estimation until no significant lag is left in the rows. Begin with the default, fit without
+/// [`torque_lag_s`](Self::torque_lag_s), and continue while [`again`](Self::again) returns true.
 #[derive(Clone, Debug, Default)]
 pub struct LagRounds {
     candidates: LagCandidates,
@@ -21,29 +19,29 @@ pub struct LagRounds {
 }
 
 impl LagRounds {
-    /// Rounds that look for these lags.
+    /// Rounds with these candidate lags.
     pub fn of(candidates: LagCandidates) -> Self {
         Self { candidates, ..Self::default() }
     }
 
-    /// The same with a lag that was taken off before.
+    /// Sets a lag that was compensated before.
     #[must_use]
     pub fn after(self, choice: LagChoice) -> Self {
         Self { choice, ..self }
     }
 
-    /// What the next fit's rows are made without: for
+    /// Lag to compensate in the next fit: for
     /// [`MotionSettings::torque_lag_s`](dynident_recording::MotionSettings::torque_lag_s).
     pub fn torque_lag_s(&self) -> Option<OneOrMany<f64>> {
         self.choice.taken_off()
     }
 
-    /// Whether to fit once more, now without the lag that `fit` found in the rows of `estimate`. `fit` is `None` where
-    /// the rows do not determine a lag.
+    /// Whether to fit again, now with compensation of the lag that `fit` found in the rows of `estimate`. `fit` is
+    /// `None` if the rows do not determine a lag.
     pub fn again(&mut self, fit: Option<&LagFit>, estimate: &Estimate) -> bool {
         let Some(fit) = fit else { return false };
         let next = choose_lag(fit, &self.choice.lag_s, estimate, self.candidates);
-        if next.kind != LagKind::None && self.done < MOST_ROUNDS {
+        if next.kind != LagKind::None && self.done < MAX_ROUNDS {
             self.choice = next;
             self.done += 1;
             return true;
@@ -53,13 +51,13 @@ impl LagRounds {
         false
     }
 
-    /// The covariance that the remaining uncertainty of the lag adds to `estimate`, after the last round. `None` where
-    /// the rows do not determine a lag, and for a lag that the study states.
+    /// The covariance that the remaining uncertainty of the lag adds to `estimate`, after the last round. `None` if the
+    /// rows do not determine a lag, and for a stated lag.
     pub fn error(&self, fit: Option<&LagFit>, estimate: &Estimate) -> Option<DMatrix<f64>> {
         covariance_of_lag(fit?, &self.choice, self.candidates, estimate)
     }
 
-    /// What was taken off in the end.
+    /// The final selection.
     pub fn choice(self) -> LagChoice {
         self.choice
     }

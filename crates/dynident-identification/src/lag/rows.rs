@@ -1,36 +1,33 @@
-//! Rows for estimating a lag: regressor, slope of the predicted torque, and the torque at six neighbouring samples,
-//! from which it is known at any time between.
+//! Rows for the estimation of a lag: regressor, slope of the predicted torque, and the torque at six neighbouring
+//! samples for interpolation.
 
 use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor};
 use dynident_recording::{DecimationSettings, Decimator};
 use dynident_rows::{JointRows, divide_by_coverage as divide};
 
-/// Samples that torque between samples is made from.
+/// Samples used to interpolate the torque.
 pub(crate) const NODES: usize = 6;
-/// The first of them, from the centre.
+/// Offset of the first node from the centre, samples.
 const FIRST_NODE: isize = -2;
-/// Samples that the slope needs on either side.
+/// Samples that the slope needs on each side.
 const SLOPE_REACH: isize = 2;
 
-/// One uninterrupted piece of a log.
 pub(crate) struct Piece {
     pub(crate) segment: usize,
-    /// Predicted torque sample by sample, by joint.
+    /// Predicted torque of each sample, by joint.
     pub(crate) model: Vec<Vec<f64>>,
-    /// Measured torque sample by sample, by joint.
+    /// Measured torque of each sample, by joint.
     pub(crate) measured: Vec<Vec<f64>>,
-    /// Samples left out of the regressor before the filter, ascending, by joint.
+    /// Indices of masked samples, ascending, by joint.
     left_out: Vec<Vec<usize>>,
     /// Filtered regressor rows by joint.
     pub(crate) rows: Vec<Vec<FilteredRows>>,
 }
 
-/// A block of one joint's regressor behind the filter.
 pub(crate) struct FilteredRows {
     pub(crate) rows: usize,
-    /// Column by column.
+    /// Column-major.
     pub(crate) regressor: Vec<f64>,
-    /// See [`JointRows::coverage`].
     pub(crate) coverage: Vec<f64>,
 }
 
@@ -41,7 +38,7 @@ impl Piece {
         Self { segment, model: none(), measured: none(), left_out: vec![Vec::new(); joints], rows }
     }
 
-    /// Of the samples that a joint got last, those that do not count (none if empty).
+    /// Marks invalid samples among those added last.
     pub(crate) fn leave_out(&mut self, joint: usize, set_aside: &[bool]) {
         let first = self.measured[joint].len() - set_aside.len();
         let marked = set_aside.iter().enumerate().filter(|(_, marked)| **marked);
@@ -49,13 +46,11 @@ impl Piece {
     }
 }
 
-/// One joint's rows `[Y | −∂(Yθ)/∂t | τ at the six nodes]`, filtered alike; the last node stands where a factor has its
-/// torque.
+/// One joint's filtered rows `[Y | −∂(Yθ)/∂t | τ at the six nodes]`. The last node has the place of a factor's torque.
 pub(crate) struct DelayRows {
     pub(crate) factor: SegmentedFactor,
-    /// The same rows as one segment.
     pub(crate) merged: SegmentedFactor,
-    /// The sample after which the lag lies, give or take one.
+    /// The sample after which the lag lies, within one sample.
     pub(crate) centre: isize,
     /// Root mean square of the filtered slope, Nm (N) per sample.
     pub(crate) slope_rms: f64,
@@ -78,7 +73,7 @@ impl DelayRows {
         let (mut shares, mut counted) = (Vec::new(), Vec::new());
         for piece in pieces {
             let (measured, left_out) = (&piece.measured[joint], &piece.left_out[joint]);
-            let further = Further::new(&piece.model[joint], measured, left_out, centre, rate_hz, filter);
+            let further = LagColumns::new(&piece.model[joint], measured, left_out, centre, rate_hz, filter);
             let mut first = 0;
             for FilteredRows { rows, regressor, coverage } in &piece.rows[joint] {
                 let from = further.valid.start.max(first).min(first + rows);
@@ -92,7 +87,6 @@ impl DelayRows {
                 for column in further.values.chunks_exact(further.rows.max(1)) {
                     let whole = panel.len();
                     panel.extend_from_slice(&column[from..to]);
-                    // As the regressor's rows were.
                     divide(&mut panel[whole..], &shares);
                 }
                 if to > from {
@@ -114,16 +108,15 @@ impl DelayRows {
     }
 }
 
-/// Slope and shifted torques behind the filter, and which of their rows stand on samples that are there.
-struct Further {
+/// Filtered slope and shifted torques, and the range of rows based on existing samples.
+struct LagColumns {
     rows: usize,
     values: Vec<f64>,
     valid: core::ops::Range<usize>,
 }
 
-impl Further {
-    /// Of the predicted torque, the measured one, and the samples that are left out of both as they were of the
-    /// regressor.
+impl LagColumns {
+    /// Computed from the predicted torque, the measured torque and the samples masked in the regressor.
     fn new(
         model: &[f64],
         measured: &[f64],
@@ -134,7 +127,7 @@ impl Further {
     ) -> Self {
         let n = model.len() as isize;
         let at = |signal: &[f64], k: isize| usize::try_from(k).ok().and_then(|k| signal.get(k).copied()).unwrap_or(0.0);
-        // Differences of order four: less than 1 % short at a tenth of the sampling rate.
+        // Differences of order four: the error is below 1 % at a tenth of the sample rate.
         let slope =
             |k: isize| (8.0 * (at(model, k + 1) - at(model, k - 1)) - (at(model, k + 2) - at(model, k - 2))) / 12.0;
         let mut signals: Vec<f64> = (0..n).map(|k| -slope(k)).collect();
@@ -167,7 +160,7 @@ impl Further {
     }
 }
 
-/// Weights of the six nodes for the value `x` samples after the centre: Lagrange's polynomial of degree five.
+/// Weights of the six nodes for the value `x` samples after the centre: Lagrange polynomial of degree five.
 pub(crate) fn lagrange(x: f64) -> [f64; NODES] {
     let node = |k: usize| (k as isize + FIRST_NODE) as f64;
     core::array::from_fn(|i| {
@@ -190,17 +183,17 @@ mod tests {
     }
 
     #[test]
-    fn rows_at_the_ends_are_left_out() {
+    fn rows_at_the_ends_are_invalid() {
         let signal: Vec<f64> = (0..50).map(f64::from).collect();
         for (centre, valid) in [(0, 2..47), (4, 2..43), (-5, 7..48)] {
-            let found = Further::new(&signal, &signal, &[], centre, 100.0, None);
+            let found = LagColumns::new(&signal, &signal, &[], centre, 100.0, None);
             assert_eq!(found.valid, valid, "{centre}");
             for k in valid {
-                // The slope of a ramp, and the ramp itself further on.
+                // The slope of a ramp, and the ramp shifted.
                 assert!((found.values[k] + 1.0).abs() < 1e-12);
                 assert_eq!(found.values[50 + k], (k as isize + centre - 2) as f64);
             }
         }
-        assert!(Further::new(&signal[..3], &signal[..3], &[], 20, 100.0, None).valid.is_empty());
+        assert!(LagColumns::new(&signal[..3], &signal[..3], &[], 20, 100.0, None).valid.is_empty());
     }
 }

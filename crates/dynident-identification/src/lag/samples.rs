@@ -1,4 +1,4 @@
-//! The samples of a log that its lags are estimated from.
+//! Samples of a log for the estimation of its lags.
 
 use super::rows::{DelayRows, FilteredRows, Piece};
 use crate::estimators::EstimationSettings;
@@ -6,15 +6,15 @@ use dynident_estimation::EstimationError;
 use dynident_recording::{DecimationSettings, Decimator, best_lag};
 use dynident_rows::{JointRows, Logs, RawSamples, RegressorModel, motion_band_hz, predicted_torque};
 
-/// Samples that are looked at: some tens of seconds of any log.
+/// Maximum number of samples: some tens of seconds of any log.
 pub(crate) const DELAY_SAMPLES: usize = 20_000;
-/// Samples of a low-passed signal that are compared, in a period of its cut-off: a parabola through three of them finds
-/// a peak within a thousandth of the period.
-const COMPARED: f64 = 20.0;
-/// Numbers that are kept at most, 64 MB.
-const MOST_NUMBERS: usize = 8_000_000;
+/// Samples of the low-passed signal per period of its cut-off for the correlation. A parabola through three of them
+/// finds a peak within a thousandth of the period.
+const SAMPLES_PER_PERIOD: f64 = 20.0;
+/// Maximum number of values that are kept (64 MB).
+const MAX_KEPT_VALUES: usize = 8_000_000;
 
-/// Gathers a log's first samples, then determines their lags.
+/// Collects the first samples of a log and determines their lags.
 pub(crate) struct DelayCheck<'a> {
     model: &'a RegressorModel,
     theta: &'a [f64],
@@ -32,7 +32,6 @@ impl<'a> DelayCheck<'a> {
         Self { model, theta, pieces, samples: 0, numbers: 0, full: false, rate_hz: 0.0, buffer }
     }
 
-    /// Rows as they leave the parallel filter; the samples that they belong to came before.
     pub(super) fn take_filtered(&mut self, rows: &JointRows<'_>) {
         let Some(piece) = self.pieces.last_mut().filter(|_| !self.full) else { return };
         let regressor = &rows.panel[..self.model.layout().joint_columns(rows.joint).len() * rows.rows];
@@ -42,7 +41,7 @@ impl<'a> DelayCheck<'a> {
     }
 
     pub(super) fn take_raw(&mut self, samples: &RawSamples<'_>) {
-        self.full |= self.samples >= DELAY_SAMPLES || self.numbers >= MOST_NUMBERS;
+        self.full |= self.samples >= DELAY_SAMPLES || self.numbers >= MAX_KEPT_VALUES;
         if self.full {
             return;
         }
@@ -65,25 +64,22 @@ impl<'a> DelayCheck<'a> {
         }
     }
 
-    /// What makes its rows.
     pub(crate) fn model(&self) -> &'a RegressorModel {
         self.model
     }
 
-    /// The base parameters that the rest is predicted with.
     pub(crate) fn theta(&self) -> &'a [f64] {
         self.theta
     }
 
-    /// Samples a second.
     pub(crate) fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// Where to begin: the best match of prediction and torque, where a shift matters; samples.
+    /// Start value, samples: the best match of prediction and torque, if a shift matters.
     pub(crate) fn coarse(&self, joint: usize, cutoff_hz: Option<f64>, longest_s: f64) -> Option<f64> {
         let piece = self.pieces.iter().max_by_key(|piece| piece.measured[joint].len())?;
-        let factor = cutoff_hz.map_or(1, |hz| (self.rate_hz / (COMPARED * hz)).clamp(1.0, 1000.0) as usize);
+        let factor = cutoff_hz.map_or(1, |hz| (self.rate_hz / (SAMPLES_PER_PERIOD * hz)).clamp(1.0, 1000.0) as usize);
         let settings = DecimationSettings { factor, cutoff_hz, ..DecimationSettings::default() };
         let smooth = |signal: &[f64]| -> Option<Vec<f64>> {
             let mut out = Vec::new();
@@ -98,10 +94,6 @@ impl<'a> DelayCheck<'a> {
         lag.matters().then_some(lag.samples * factor as f64)
     }
 
-    /// A joint's rows about a lag of `shift` samples.
-    ///
-    /// # Errors
-    /// Too few rows.
     pub(crate) fn rows(
         &self,
         logs: &Logs<'_>,

@@ -1,31 +1,29 @@
-//! What a lag is measured beside: the parameters of a fit, and what each joint's rows of each log are in terms of them.
+//! Unknowns of a lag estimation in addition to the lags.
 
 use crate::payload::{LoadColumns, SeenColumns};
 use nalgebra::DVector;
 
-/// The parameters of a fit that a lag is estimated together with.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unknowns<'a> {
-    /// Values by the fit, in the order of the columns.
+    /// Values of the fit, in the order of the columns.
     pub(crate) values: &'a [f64],
-    /// Columns of payloads and offsets with the numbers of the logs; none where the values are base parameters.
+    /// Columns of payloads and offsets with the indices of the logs; `None` if the values are base parameters.
     pub(crate) loads: Option<(&'a LoadColumns, &'a [usize])>,
-    /// Joints whose gain is an unknown too: the share by which it is larger than the torque was made with.
+    /// Joints with an unknown relative error of the gain.
     pub(crate) gains: &'a [usize],
 }
 
 impl<'a> Unknowns<'a> {
-    /// Base parameters of a single log.
     pub(crate) fn of_log(theta: &'a [f64]) -> Self {
         Self { values: theta, loads: None, gains: &[] }
     }
 
-    /// Columns before those of the lags: parameters, then gains.
+    /// Number of columns before those of the lags: parameters, then gains.
     pub(crate) fn count(&self) -> usize {
         self.values.len() + self.gains.len()
     }
 
-    /// What a joint's `own` columns of the layout are made of in log number `place`, whose base parameters are `theta`.
+    /// Columns of the problem behind the columns `own` of a joint in log `place`, whose base parameters are `theta`.
     pub(crate) fn seen(&self, place: usize, joint: usize, own: &[usize], theta: &[f64]) -> SeenColumns {
         let mut seen = match self.loads {
             Some((columns, logs)) => columns.seen(logs[place], own),

@@ -1,5 +1,4 @@
-//! From what the logs say about a payload to a body with mass, centre of mass and inertia, and to a
-//! consistent one.
+//! Payload as a body with mass, centre of mass and inertia, from an estimate, and the nearest consistent body.
 
 use super::columns::PayloadColumns;
 use dynident_estimation::consistent::{
@@ -9,18 +8,16 @@ use dynident_estimation::{Estimate, EstimationError, TriangularFactor};
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
-/// What data leave open is taken from a body of the payload's mass with this radius of gyration about the link's
-/// origin, metres.
-const LENGTH_M: f64 = 0.1;
-/// A known mass is held to this share: a solver inside of the limits needs some room.
-const MASS_WIDTH: f64 = 1.0e-4;
-/// Least mass of that body, kg.
-const LEAST_MASS_KG: f64 = 0.01;
-/// Error bars count as at least this share of what a body of that size has: noise-free logs would leave nothing for the
-/// prior in double precision.
-const LEAST_RELATIVE_STD: f64 = 1.0e-5;
+/// Radius of gyration about the link's origin, m, of the reference body for undetermined parameters.
+const GYRATION_RADIUS_M: f64 = 0.1;
+/// Relative tolerance of a known mass; an interior-point solver needs some room.
+const MASS_TOLERANCE: f64 = 1.0e-4;
+/// Minimum mass of the reference body, kg.
+const MIN_MASS_KG: f64 = 0.01;
+/// Minimum standard deviation relative to a body of this size. Noise-free logs would make the prior vanish in double
+/// precision.
+const MIN_RELATIVE_STD: f64 = 1.0e-5;
 
-/// Mass, centre of mass (3) and inertia about it (6: xx, xy, xz, yy, yz, zz), from ten parameters in a frame.
 pub(crate) fn at_centre_of_mass(p: &[f64; 10]) -> [f64; 10] {
     let (m, h) = (p[0], [p[1], p[2], p[3]]);
     let square: f64 = h.iter().map(|h| h * h).sum();
@@ -31,7 +28,6 @@ pub(crate) fn at_centre_of_mass(p: &[f64; 10]) -> [f64; 10] {
     out
 }
 
-/// The Jacobian of [`at_centre_of_mass`].
 pub(crate) fn jacobian(p: &[f64; 10]) -> DMatrix<f64> {
     let (m, h) = (p[0], [p[1], p[2], p[3]]);
     let square: f64 = h.iter().map(|h| h * h).sum();
@@ -53,7 +49,7 @@ pub(crate) fn jacobian(p: &[f64; 10]) -> DMatrix<f64> {
 
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
-/// Why no body fits what logs say of a payload.
+/// Reason for a missing consistent body.
 #[derive(Debug, Error)]
 pub(crate) enum NoBodyError {
     #[error("its covariance is not positive definite")]
@@ -64,7 +60,7 @@ pub(crate) enum NoBodyError {
     Physical(#[from] PhysicalError),
 }
 
-/// The consistent body nearest to the estimate in the metric of its covariance; otherwise the reason why there is none.
+/// The consistent body nearest to the estimate in the metric of its covariance.
 pub(crate) fn nearest_consistent_body(
     name: &str,
     columns: &PayloadColumns,
@@ -75,10 +71,10 @@ pub(crate) fn nearest_consistent_body(
     let determined: Vec<usize> = (0..n).filter(|place| !fixed(place)).collect();
     let value = |place: usize| estimate.values[columns.first + place];
     let known_mass = columns.mass.as_ref().map(|(mass, _)| *mass);
-    let estimated = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(LEAST_MASS_KG);
+    let estimated = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(MIN_MASS_KG);
     let mass = known_mass.unwrap_or(estimated);
-    let reference = rough_body(mass, LENGTH_M);
-    // Both accounts of the error together: one from few segments has directions without any.
+    let reference = rough_body(mass, GYRATION_RADIUS_M);
+    // Sum of both covariances, because one from few segments is singular.
     let entry = |i: usize, j: usize| estimate.covariance[(i, j)] + estimate.covariance_white[(i, j)];
     let mut covariance = DMatrix::from_fn(determined.len(), determined.len(), |i, j| {
         entry(columns.first + determined[i], columns.first + determined[j])
@@ -86,10 +82,10 @@ pub(crate) fn nearest_consistent_body(
     for (i, &place) in determined.iter().enumerate() {
         let length = match columns.kept[place] {
             0 => 1.0,
-            1..=3 => LENGTH_M,
-            _ => LENGTH_M * LENGTH_M,
+            1..=3 => GYRATION_RADIUS_M,
+            _ => GYRATION_RADIUS_M * GYRATION_RADIUS_M,
         };
-        covariance[(i, i)] += (LEAST_RELATIVE_STD * mass * length).powi(2);
+        covariance[(i, i)] += (MIN_RELATIVE_STD * mass * length).powi(2);
     }
     // V = L Lᵀ: rows L⁻¹ φ = L⁻¹ φ̂ have unit noise.
     let lower = covariance.cholesky().ok_or(NoBodyError::Covariance)?.l();
@@ -104,7 +100,7 @@ pub(crate) fn nearest_consistent_body(
     panel[n * determined.len()..].copy_from_slice(target.as_slice());
     let factor = TriangularFactor::from_rows(n, &panel, determined.len())?;
     let map = BaseMap::from_regrouping(&columns.kept, &columns.dropped, &columns.regrouping)?;
-    let mass_kg = known_mass.map(|mass| [mass * (1.0 - MASS_WIDTH), mass * (1.0 + MASS_WIDTH)]);
+    let mass_kg = known_mass.map(|mass| [mass * (1.0 - MASS_TOLERANCE), mass * (1.0 + MASS_TOLERANCE)]);
     let body = PhysicalBody { name: name.to_owned(), reference, known: None, mass_kg, com_box_m: None, inside: None };
     let problem = PhysicalProblem::new(map, vec![body], Vec::new(), &factor)?;
     Ok(physical_fit(&problem, &PhysicalSettings::default())?)

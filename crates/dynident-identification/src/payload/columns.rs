@@ -1,8 +1,8 @@
-//! The parameters of a task beside the arm's: payloads and offsets of single logs, and what each log sees of them.
+//! Columns in addition to the arm's parameters: payloads and offsets of single logs, and their effect on each log.
 //!
-//! A payload with parameters π in the frame of its link adds `A π` to the ten parameters of the body that it is fixed
-//! to, and so `M π` with `M = B_body A` to the base parameters (`θ = B π_all`). No log needs other columns than the
-//! arm's: log ℓ is explained by the base vector `θ_ℓ = T_ℓ x + c_ℓ`, with x all that is to be estimated and c a known
+//! A payload with parameters π in the frame of its link adds `A π` to the ten parameters of its body, and so `M π` with
+//! `M = B_body A` to the base parameters (`θ = B π_all`). So the regressor columns are those of the arm for every log:
+//! log ℓ has the base vector `θ_ℓ = T_ℓ x + c_ℓ`, where x contains all unknowns and c is a known payload.
 //! payload.
 
 use super::error::PayloadError;
@@ -15,81 +15,73 @@ use dynident_model::{INERTIAL_NAMES, InertialParameters};
 use dynident_rows::{Recording, RegressorModel, Role, of_role};
 use nalgebra::{DMatrix, DVector};
 
-/// A payload's parameter is a sum of earlier ones when the part of its change that they do not make is below this
-/// share: the structure is known to 1e-9 or so.
-const DEPENDENT: f64 = 1.0e-6;
-/// Share of a dropped parameter below which it does not stand in a sum.
-const IN_SUM: f64 = 1.0e-9;
+/// Relative tolerance below which a payload's parameter is a combination of earlier ones; the structure is accurate to
+/// about 1e-9.
+const DEPENDENCE_TOLERANCE: f64 = 1.0e-6;
+/// Minimum coefficient of a dropped parameter in a sum.
+const MIN_COEFFICIENT: f64 = 1.0e-9;
 
-/// Something that recordings were made with, at a link of the robot. A [`Recording`] carries it by its name.
+/// A payload at a link of the robot. A [`Recording`] refers to it by name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Payload {
-    /// What recordings call it.
+    /// Name used by recordings.
     pub name: String,
-    /// The link that it is fixed to, in whose frame its parameters are.
+    /// Link to which it is fixed; its parameters are in the frame of this link.
     pub link: String,
-    /// Its ten inertial parameters, where they are known; otherwise they are estimated.
+    /// Its ten inertial parameters if known; otherwise they are estimated.
     pub known: Option<InertialParameters>,
-    /// Its mass, where only that is known: the rest is estimated.
+    /// Its mass if only the mass is known; the rest is estimated.
     pub known_mass_kg: Option<f64>,
 }
 
-/// Columns of one payload to estimate.
 #[derive(Clone, Debug)]
 pub(crate) struct PayloadColumns {
-    /// Its number among the study's payloads.
     pub(crate) payload: usize,
-    /// Its first column.
     pub(crate) first: usize,
-    /// Which of the ten parameters have columns.
     pub(crate) kept: Vec<usize>,
-    /// The others.
     pub(crate) dropped: Vec<usize>,
-    /// How often a kept one holds a dropped one, shape (kept, dropped).
+    /// Coefficients of dropped parameters in the kept ones, shape (kept, dropped).
     pub(crate) regrouping: DMatrix<f64>,
-    /// What the kept ones add to the base parameters, shape (base, kept).
+    /// Effect of the kept parameters on the base parameters, shape (base, kept).
     pub(crate) change: DMatrix<f64>,
-    /// Its mass where that is known, and what it adds to the base parameters at the link's origin.
+    /// Known mass, and its effect on the base parameters at the link's origin.
     pub(crate) mass: Option<(f64, DVector<f64>)>,
 }
 
-/// What one joint's rows of one log are, `W (T x + c)`, in terms of the columns that they see.
+/// Rows of one joint in one log, `W (T x + c)`, in terms of the problem's columns.
 pub(crate) struct SeenColumns {
-    /// The columns of the problem.
     pub(crate) columns: Vec<usize>,
-    /// Rows of `T` of the joint's own base columns, for those columns.
+    /// Rows of `T` for the joint's base columns.
     pub(crate) map: DMatrix<f64>,
-    /// `c` of its own base columns: a known payload.
+    /// `c` for the joint's base columns: a known payload.
     pub(crate) known: DVector<f64>,
 }
 
 impl SeenColumns {
-    /// Of a log that sees the arm alone.
     pub(crate) fn of_base(own: &[usize]) -> Self {
         let count = own.len();
         Self { columns: own.to_vec(), map: DMatrix::identity(count, count), known: DVector::zeros(count) }
     }
 }
 
-/// Columns of a problem: the arm's base parameters, then payloads, then offsets of single logs.
+/// Columns of a problem: base parameters of the arm, then payloads, then offsets of single logs.
 #[derive(Clone, Debug)]
 pub struct LoadColumns {
     base: usize,
-    /// Symbols of all further columns.
     symbols: Vec<String>,
     pub(crate) payloads: Vec<PayloadColumns>,
-    /// (log, joint, column) of the offsets that are columns of their own.
+    /// (log, joint, column) of separate offsets.
     pub offsets: Vec<(usize, usize, usize)>,
-    /// For every log of the study `T_ℓ`, (base, columns), and `c_ℓ`; none where the log sees the arm alone.
+    /// `T_ℓ`, (base, columns), and `c_ℓ` of every log; `None` for the arm alone.
     logs: Vec<Option<(DMatrix<f64>, Vec<f64>)>>,
 }
 
 impl LoadColumns {
-    /// The columns of a task, in terms of the columns of the model's layout; `known_arm` where the arm is held, with
-    /// what of it is fitted again.
+    /// Columns of a task, in terms of the columns of the model's layout. `known_arm` holds the arm and states which of
+    /// its parameters are fitted again.
     ///
     /// # Errors
-    /// If a payload or its link is not there, or something is asked for that does not go together with payloads.
+    /// A payload or its link is missing, or settings are incompatible with payloads.
     pub fn new(
         settings: &IdentificationSettings,
         recordings: &[Recording],
@@ -115,7 +107,7 @@ impl LoadColumns {
                 }
                 continue;
             }
-            // A known mass is no column; what it adds comes off the torque.
+            // A known mass has no column; its torque is subtracted.
             let mass = section.known_mass_kg.map(|mass| (mass, matrix.column(0) * mass));
             if let Some((_, added)) = &mass {
                 known[number] = Some(added.as_slice().to_vec());
@@ -124,7 +116,7 @@ impl LoadColumns {
             let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
             let unit = |k: usize| if norms[k] > 0.0 { norms[k] } else { 1.0 };
             let scaled = DMatrix::from_fn(matrix.nrows(), 10, |row, k| matrix[(row, k)] / unit(k));
-            let split = independent_columns(&scaled, DEPENDENT);
+            let split = independent_columns(&scaled, DEPENDENCE_TOLERANCE);
             let (kept, dropped) = (split.independent, split.dependent);
             let regrouping = DMatrix::from_fn(kept.len(), dropped.len(), |row, column| {
                 split.regrouping[(row, column)] * unit(dropped[column]) / unit(kept[row])
@@ -145,7 +137,7 @@ impl LoadColumns {
         if per_log(settings) {
             let joints = model.joint_names();
             let with_offset = |joint: &usize| model.terms().contains(&TorqueTerm::Offset(Offset { joint: *joint }));
-            // The last log's are the others' with the opposite sign: the base parameters hold the mean.
+            // The last log's offsets are the negative sum of the others, so that the base parameters are the mean.
             for &log in training.split_last().map_or(&[][..], |(_, rest)| rest) {
                 for joint in (0..model.model().dof()).filter(with_offset) {
                     offsets.push((log, joint, base + symbols.len()));
@@ -159,7 +151,7 @@ impl LoadColumns {
         Ok(columns)
     }
 
-    /// The arm's part of an estimate: its base parameters alone.
+    /// The arm's part of an estimate: base parameters only.
     pub fn arm_estimate(&self, estimate: &Estimate) -> Estimate {
         let mut arm = estimate.clone();
         let base = self.base;
@@ -212,27 +204,26 @@ impl LoadColumns {
         Some((map, known))
     }
 
-    /// True when all logs see the arm alone.
+    /// Whether all logs have the arm alone.
     pub fn is_plain(&self) -> bool {
         self.logs.iter().all(Option::is_none)
     }
 
-    /// The arm's base parameters.
+    /// Number of base parameters of the arm.
     pub fn base(&self) -> usize {
         self.base
     }
 
-    /// All columns.
+    /// Number of all columns.
     pub fn count(&self) -> usize {
         self.base + self.symbols.len()
     }
 
-    /// Symbols of all columns.
     pub(crate) fn symbols(&self, model: &RegressorModel) -> Vec<String> {
         model.layout().columns().iter().map(Column::symbol).chain(self.symbols.iter().cloned()).collect()
     }
 
-    /// `θ_ℓ = T_ℓ x + c_ℓ`: the base parameters that explain a log.
+    /// `θ_ℓ = T_ℓ x + c_ℓ`: base parameters of a log.
     pub fn base_values(&self, log: usize, x: &[f64]) -> Vec<f64> {
         match &self.logs[log] {
             None => x[..self.base].to_vec(),
@@ -243,7 +234,7 @@ impl LoadColumns {
         }
     }
 
-    /// Covariance of those.
+    /// Covariance of [`base_values`](Self::base_values).
     pub fn base_covariance(&self, log: usize, covariance: &DMatrix<f64>) -> DMatrix<f64> {
         let all = covariance.view((0, 0), (self.count(), self.count()));
         match &self.logs[log] {
@@ -259,18 +250,18 @@ impl LoadColumns {
         known
     }
 
-    /// What a joint sees in log `index` of all columns by way of its `own` base columns.
+    /// Columns of the problem that act on a joint in log `index` through its base columns `own`.
     pub(crate) fn seen(&self, index: usize, own: &[usize]) -> SeenColumns {
         let Some((map, known)) = &self.logs[index] else { return SeenColumns::of_base(own) };
-        // Further columns that the joint does not feel would only be zeros.
+        // Additional columns that do not act on the joint would be zero.
         let further = (self.base..self.count()).filter(|&column| own.iter().any(|&row| map[(row, column)] != 0.0));
         let columns: Vec<usize> = own.iter().copied().chain(further).collect();
         let known = DVector::from_iterator(own.len(), own.iter().map(|&global| known[global]));
         SeenColumns { map: map.select_rows(own).select_columns(&columns), columns, known }
     }
 
-    /// Adds one joint's rows of a log to a problem over all columns; the known payload's torque is taken off unless the
-    /// gain of the joint is not known yet.
+    /// Adds one joint's rows of a log to a problem over all columns. The torque of a known payload is subtracted unless
+    /// the joint's gain is unknown.
     pub(crate) fn add(
         &self,
         problem: &mut LinearProblem,
@@ -292,10 +283,10 @@ impl LoadColumns {
         problem.add(log, joint, columns, factor.mapped(&local)?)
     }
 
-    /// The rows as they are for the arm alone once all that differs from log to log stands at its estimate.
+    /// Rows for the arm alone, with all other columns at their estimates.
     ///
     /// # Errors
-    /// A problem of other columns.
+    /// A problem with other columns.
     pub fn arm_problem(&self, problem: &LinearProblem, x: &[f64]) -> Result<LinearProblem, EstimationError> {
         let mut arm = LinearProblem::new(problem.columns()[..self.base].to_vec(), problem.joints().to_vec())
             .with_fallback(problem.fallback()[..self.base].to_vec())?
@@ -320,22 +311,23 @@ impl LoadColumns {
 }
 
 impl PayloadColumns {
-    /// What each column sums: `Ixx + Iyy`, in the frame of the payload's link.
+    /// Parameters or sums of the columns, for example `Ixx + Iyy`, in the frame of the payload's link.
     pub(crate) fn expressions(&self) -> Vec<String> {
         let of_row = |(row, &kept): (usize, &usize)| {
             let further = self.dropped.iter().enumerate().filter_map(|(column, &dropped)| {
                 let share = self.regrouping[(row, column)];
                 let sign = if share < 0.0 { "-" } else { "+" };
-                (share.abs() > IN_SUM).then(|| format!(" {sign} {:.4} {}", share.abs(), INERTIAL_NAMES[dropped]))
+                (share.abs() > MIN_COEFFICIENT)
+                    .then(|| format!(" {sign} {:.4} {}", share.abs(), INERTIAL_NAMES[dropped]))
             });
             format!("{}{}", INERTIAL_NAMES[kept], further.collect::<String>())
         };
         self.kept.iter().enumerate().map(of_row).collect()
     }
 
-    /// Whether kept parameter number `row` stands for itself alone.
+    /// Whether kept parameter `row` is a single parameter.
     pub(crate) fn alone(&self, row: usize) -> bool {
-        self.regrouping.row(row).iter().all(|share| share.abs() <= IN_SUM)
+        self.regrouping.row(row).iter().all(|share| share.abs() <= MIN_COEFFICIENT)
     }
 }
 
@@ -343,7 +335,7 @@ fn per_log(settings: &IdentificationSettings) -> bool {
     settings.offsets == OffsetChoice::PerLog
 }
 
-/// What is asked for and payloads cannot be with.
+/// Rejects settings that are incompatible with payloads.
 fn check(
     settings: &IdentificationSettings,
     recordings: &[Recording],
@@ -384,7 +376,7 @@ fn check(
     Ok(())
 }
 
-/// Column `place` of B, with zeros for columns of the layout that are no base parameters.
+/// Column `place` of B, with zeros for columns of the layout that are not base parameters.
 fn base_column(model: &RegressorModel, place: usize, rows: usize) -> DVector<f64> {
     let base = model.base();
     let mut column = DVector::zeros(rows);
@@ -396,7 +388,7 @@ fn base_column(model: &RegressorModel, place: usize, rows: usize) -> DVector<f64
     column
 }
 
-/// M: what ten parameters in the frame of `link` add to the base parameters.
+/// M: effect of the ten parameters in the frame of `link` on the base parameters.
 fn change_of_base(model: &RegressorModel, link: &str) -> Result<DMatrix<f64>, PayloadError> {
     let bodies = model.model().bodies().iter().enumerate();
     let found = bodies.flat_map(|(body, b)| b.links.iter().map(move |link| (body, link))).find(|(_, l)| l.name == link);
@@ -420,10 +412,10 @@ fn change_of_base(model: &RegressorModel, link: &str) -> Result<DMatrix<f64>, Pa
     Ok(matrix)
 }
 
-/// What every payload that is known adds to the base parameters, by name.
+/// Effect of every known payload on the base parameters, by name.
 ///
 /// # Errors
-/// If its link is not there.
+/// A link is missing.
 pub fn known_payloads(payloads: &[Payload], model: &RegressorModel) -> Result<Vec<(String, Vec<f64>)>, PayloadError> {
     let mut known = Vec::new();
     for payload in payloads {

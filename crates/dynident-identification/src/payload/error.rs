@@ -1,39 +1,39 @@
-//! What does not go together with payloads, offsets per log, gains and known arms.
+//! Errors of payloads, offsets per log, gains and known arms.
 
 use thiserror::Error;
 
-/// Why payloads, offsets per log, gains or a known arm cannot be had as they are asked for.
+/// Invalid combination of payloads, offsets per log, gains or a known arm.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum PayloadError {
-    /// A recording that carries something unknown.
+    /// A recording has an unknown payload.
     #[error("a [[log]] carries payload `{name}`, but the [[payload]]s are: {}; name one of them or describe it",
         if known.is_empty() { "none".to_owned() } else { known.join(", ") })]
     UnknownPayload {
-        /// What it carries.
+        /// Name of the payload.
         name: String,
-        /// The payloads that there are.
+        /// Known payloads.
         known: Vec<String>,
     },
-    /// A link that is not there.
-    #[error("payload at link `{link}`: no moving link has that name; they are {}", known.join(", "))]
+    /// The link does not exist.
+    #[error("payload at link `{link}`: no moving link has this name; the moving links are {}", known.join(", "))]
     UnknownLink {
-        /// The link.
+        /// Name of the link.
         link: String,
-        /// The links that there are.
+        /// Links of the robot.
         known: Vec<String>,
     },
-    /// A payload to estimate that is only in recordings to test on.
+    /// Only test recordings have the payload to estimate.
     #[error(
         "payload `{name}` is unknown, and no log to fit to carries it: give its mass_kg and com_m, or a [[log]] with the role \"identify\""
     )]
     NotTrained {
-        /// The payload.
+        /// Name of the payload.
         name: String,
     },
-    /// A known arm and nothing to estimate.
+    /// A known arm without anything to estimate.
     #[error(
-        "[arm]: the arm is held and nothing is left to estimate: describe a [[payload]] without mass_kg and let a [[log]] carry it, or say what to `refit`"
+        "[arm]: the arm is held and there is nothing to estimate: describe a [[payload]] without mass_kg and name it in a [[log]], or set `refit`"
     )]
     NothingToEstimate,
     /// A known arm with unknown gains.
@@ -41,34 +41,36 @@ pub enum PayloadError {
         "[arm] and drive.gains = \"unknown\": with a known arm the gains are known; state them as torque.scale of the format"
     )]
     GainsOfKnownArm,
-    /// An estimator that does not take further columns.
+    /// The estimator does not support additional columns.
     #[error(
-        "payloads, offsets per log, a known arm and unknown gains go with estimator.method = \"weighted\" or \"ordinary\", without instruments and without essential: \
-         leave those out"
+        "payloads, offsets per log, a known arm and unknown gains require estimator.method = \"weighted\" or \"ordinary\", without instruments and without essential: \
+         remove the incompatible settings"
     )]
     Estimator,
-    /// Friction that is to be chosen for an arm that is known.
+    /// Selection of friction for a known arm.
     #[error(
-        "[arm] and friction = \"auto\": a known arm has the friction of its result; leave friction out, with refit = \"friction\" to find its parameters again"
+        "[arm] and friction = \"auto\": a known arm has the friction of its result; leave friction out, and set refit = \"friction\" to estimate its parameters again"
     )]
     FrictionOfKnownArm,
-    /// Drive inertia that is to be tested of an arm that is known.
-    #[error("[arm]: a known arm has the drive inertia of its result; test none")]
+    /// Test of drive inertia for a known arm.
+    #[error("[arm]: a known arm has the drive inertia of its result; do not test it")]
     DrivesOfKnownArm,
-    /// Friction that depends on the bare arm's load.
+    /// Friction that depends on the load of the bare arm.
     #[error(
-        "load-dependent friction does not go with payloads, for its load is the bare arm's: leave out the law `load`"
+        "load-dependent friction is not possible with payloads, because its load is that of the bare arm: leave out the law `load`"
     )]
     LoadFriction,
-    /// Gains that no recording determines.
+    /// No recording determines the gains.
     #[error(
         "drive.gains = \"unknown\" needs training logs both without and with a payload that is known: give a [[payload]] with mass_kg and com_m, and a [[log]] that carries it"
     )]
     GainsNeedPayload,
-    /// A covariance of the known arm that is not one.
-    #[error("{found} covariances of the known arm where {expected} base parameters are: give one for each pair")]
+    /// The covariance of the known arm has the wrong size.
+    #[error(
+        "the covariance of the known arm has {found} rows, but there are {expected} base parameters: give one row for each"
+    )]
     ArmCovariance {
-        /// Base parameters.
+        /// Number of base parameters.
         expected: usize,
         /// Rows of the covariance.
         found: usize,

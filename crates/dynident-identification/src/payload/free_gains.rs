@@ -1,27 +1,26 @@
-//! Gains that were found beside the parameters, as further unknowns of fits to rows in newton metres.
+//! Gains as additional unknowns of fits to rows in newton metres.
 
 use super::gains::DriveGain;
 use dynident_estimation::{EstimationError, LinearProblem};
 use nalgebra::DMatrix;
 
-/// The joints whose gains are unknowns: those that the logs determine.
+/// Joints with unknown gains that the logs determine.
 pub(crate) fn free_gains(gains: &[DriveGain]) -> Vec<usize> {
     (0..gains.len()).filter(|&joint| gains[joint].identified).collect()
 }
 
-/// The rows with a column for each of the joints `free`, behind all others: the share κ by which the joint's gain is
-/// larger than the one that its torque was made with. From `u_j = W_j (θ + c)/g_j` follows, to first order about the
-/// fit θ̂ with the gain ĝ and `g_j = ĝ_j/(1 + κ_j)`,
+/// Adds a column after all others for each of the joints `free`: the relative error κ of the joint's gain. From `u_j =
+/// W_j (θ + c)/g_j` follows, to first order about the fit θ̂ with the gain ĝ and `g_j = ĝ_j/(1 + κ_j)`,
 ///
 /// ```text
 ///     ĝ_j u_j − W_j c = W_j θ + κ_j W_j (θ̂ + c)
 /// ```
 ///
-/// The column is made of the regressor, so that noise of the torque is not in it. `known` is c, log by log, and
-/// `values` is θ̂, over the columns of the problem.
+/// The column is computed from the regressor, so it contains no torque noise. `known` is c of each log, and `values` is
+/// θ̂, over the columns of the problem.
 ///
 /// # Errors
-/// Values of another number of columns.
+/// The number of values is wrong.
 pub fn with_free_gains(
     problem: LinearProblem,
     free: &[usize],

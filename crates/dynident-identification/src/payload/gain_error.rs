@@ -1,19 +1,16 @@
-//! What an error of stated drive gains does to a payload.
+//! Effect of an error of stated drive gains on a payload.
 
 use super::columns::LoadColumns;
 use dynident_estimation::{Estimate, EstimationError, LinearProblem};
 use nalgebra::{DMatrix, DVector};
 
-/// The covariance that the error of the joints' gains adds to the payloads of an estimate; `None` without payloads or
-/// without an error of the gains.
+/// Covariance that the error of the gains adds to the payloads of an estimate; `None` without payloads or without an
+/// error.
 ///
-/// An estimate is linear in torque, `x = Σ_j x_j` with `x_j = (Σ_k W_kᵀW_k/σ_k²)⁻¹ W_jᵀ(τ_j − W_j θ_held)/σ_j²` the
-/// part that joint j's torque makes. A gain that is off by the share ε_j makes x_j larger by it, and the arm with it:
-/// of an arm that is held (`held`, found with the same gains) the torque is taken off first. With independent gains of
-/// standard deviation `share` the payload's covariance grows by `share² Σ_j x_j x_jᵀ`.
-///
-/// # Errors
-/// An estimate of other columns.
+/// An estimate is linear in torque, `x = Σ_j x_j`, where `x_j = (Σ_k W_kᵀW_k/σ_k²)⁻¹ W_jᵀ(τ_j − W_j θ_held)/σ_j²` is
+/// the part of joint j. A relative gain error ε_j scales x_j by `1 + ε_j`. The same error scales a held arm (`held`,
+/// found with the same gains), so its torque is subtracted first. With independent gains of standard deviation `share`
+/// the payload's covariance grows by `share² Σ_j x_j x_jᵀ`.
 pub(crate) fn gain_error(
     problem: &LinearProblem,
     columns: &LoadColumns,

@@ -1,4 +1,4 @@
-//! Drive gains: newton metres per unit of what is logged, from logs without and with a known payload.
+//! Drive gains: newton metres per logged unit, from logs without and with a known payload.
 
 use super::columns::LoadColumns;
 use super::error::PayloadError;
@@ -7,30 +7,27 @@ use dynident_estimation::{Estimate, EstimationError, GainProblem, JointGain, Lin
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Beyond this share of its value the half width of a gain's interval means that the logs do not determine it.
-const WIDEST: f64 = 0.5;
-
 /// The drive gain of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DriveGain {
-    /// The joint.
+    /// Name of the joint.
     pub joint: String,
-    /// Torque per unit of what is logged, Nm (N): a factor for `torque.scale` of the format. Where it is not
-    /// identified, what it was held at.
+    /// Torque per logged unit, Nm (N): a factor for `torque.scale` of the format. If not identified, the value at which
+    /// it was held.
     pub gain: f64,
     /// Its standard deviation.
     pub std: f64,
-    /// Half the width of its 95 % interval.
+    /// Half width of its 95 % interval.
     pub half_width_95: f64,
     /// Whether the logs determine it.
     pub identified: bool,
-    /// Why not; none where they do.
+    /// Reason if the logs do not determine it.
     pub reason: Option<String>,
 }
 
 impl DriveGain {
-    /// The gain with a further error, whose standard deviation is this `share` of it.
+    /// Adds an error with standard deviation `share` relative to the gain.
     pub(crate) fn widen(&mut self, share: f64) {
         let further = (share * self.gain).abs();
         let wider = self.std.hypot(further);
@@ -41,16 +38,15 @@ impl DriveGain {
     }
 }
 
-/// What a fit with unknown gains found.
 pub(crate) struct Gains {
     pub(crate) of_joints: Vec<DriveGain>,
     /// Over the columns of the problem, in SI units.
     pub(crate) estimate: Estimate,
-    /// The problem with its torque in newton metres and without the known payloads' torque.
+    /// The problem in newton metres, without the torque of known payloads.
     pub(crate) problem: LinearProblem,
 }
 
-/// What the known payloads of the logs `training` add to the base parameters, log by log, if gains can be had by it.
+/// Effect of the known payloads on the base parameters of each training log, if it is sufficient to estimate gains.
 pub(crate) fn known_loads(columns: &LoadColumns, training: &[usize]) -> Result<Vec<Vec<f64>>, PayloadError> {
     let known: Vec<Vec<f64>> = training.iter().map(|&log| columns.known(log)).collect();
     let (with, without): (Vec<bool>, Vec<bool>) =
@@ -61,7 +57,7 @@ pub(crate) fn known_loads(columns: &LoadColumns, training: &[usize]) -> Result<V
     Ok(known)
 }
 
-/// Gains and parameters together; `rows` has the torque as logged and the `known` payloads still in it.
+/// Estimates gains and parameters together; `rows` contain the logged torque including the `known` payloads.
 pub(crate) fn drive_gains(
     settings: &EstimationSettings,
     known: &[Vec<f64>],
@@ -71,15 +67,19 @@ pub(crate) fn drive_gains(
     let scale: Vec<f64> = found.gains.iter().map(|gain| gain.gain).collect();
     let problem = in_newton_metres(rows, known, &scale)?;
     let estimate = without_gains(found.estimate, rows.columns().len(), &scale);
-    Ok(Gains { of_joints: found.gains.into_iter().map(drive_gain).collect(), estimate, problem })
+    let of_joint = |gain| drive_gain(gain, settings.thresholds.gain.max_half_width);
+    Ok(Gains { of_joints: found.gains.into_iter().map(of_joint).collect(), estimate, problem })
 }
 
-fn drive_gain(gain: JointGain) -> DriveGain {
-    let wide = gain.half_width_95 > WIDEST * gain.gain.abs();
+fn drive_gain(gain: JointGain, max_half_width: f64) -> DriveGain {
+    let wide = gain.half_width_95 > max_half_width * gain.gain.abs();
     let reason = if !gain.identified {
-        Some("joint does not feel the payload: any gain fits as well, with other parameters; move it so that the payload's weight or inertia loads it".to_owned())
+        Some("joint does not feel the payload, so any gain fits equally well; move it so that the payload's weight or inertia loads it".to_owned())
     } else if wide {
-        Some("joint hardly feels the payload: its interval is wider than half its value; a heavier payload, farther out, or a motion that loads the joint more would determine".to_owned())
+        Some(format!(
+            "joint hardly feels the payload: the half width of its interval exceeds {:.0} % of its value; use a heavier payload, a larger distance, or a motion that loads the joint more",
+            100.0 * max_half_width
+        ))
     } else {
         None
     };
@@ -104,7 +104,7 @@ fn in_newton_metres(rows: &LinearProblem, known: &[Vec<f64>], scale: &[f64]) -> 
     Ok(problem)
 }
 
-/// The estimate without its last columns, residuals in newton metres.
+/// Removes the last columns; residuals are in newton metres.
 fn without_gains(full: Estimate, count: usize, scale: &[f64]) -> Estimate {
     let mut estimate = full;
     estimate.names.truncate(count);

@@ -1,4 +1,4 @@
-//! An arm that is known from an earlier identification, with its covariance.
+//! An arm from an earlier identification, with its covariance.
 
 use super::columns::LoadColumns;
 use super::error::PayloadError;
@@ -10,7 +10,7 @@ use dynident_model::terms::TorqueTerm;
 use dynident_rows::RegressorModel;
 use nalgebra::DMatrix;
 
-/// Base parameters of an arm, and how well they are known.
+/// Base parameters of an arm with their uncertainty.
 #[derive(Clone, Debug)]
 pub struct KnownArm {
     values: Vec<f64>,
@@ -20,10 +20,10 @@ pub struct KnownArm {
 }
 
 impl KnownArm {
-    /// An arm with these base parameters and their covariance, found at the cut-off `cutoff_hz` of the motion.
+    /// An arm with these base parameters and their covariance, identified with the motion cut-off `cutoff_hz`.
     ///
     /// # Errors
-    /// A covariance of another size.
+    /// The covariance has the wrong size.
     pub fn new(
         values: Vec<f64>,
         covariance: DMatrix<f64>,
@@ -36,17 +36,16 @@ impl KnownArm {
         Ok(Self { values, covariance, refit, cutoff_hz })
     }
 
-    /// What of the arm is fitted again.
+    /// Parameters of the arm that are fitted again.
     pub fn refit(&self) -> Refit {
         self.refit
     }
 
-    /// The motion's cut-off that it was found with.
+    /// Motion cut-off of the earlier identification.
     pub fn cutoff_hz(&self) -> Option<f64> {
         self.cutoff_hz
     }
 
-    /// The columns that are held.
     pub(crate) fn held(&self, model: &RegressorModel, columns: &LoadColumns) -> Vec<usize> {
         let is_held = |column: &usize| match &model.layout().columns()[*column] {
             Column::Term(TorqueTerm::Offset(_)) => self.refit == Refit::Nothing,
@@ -56,7 +55,7 @@ impl KnownArm {
         (0..columns.base()).filter(is_held).collect()
     }
 
-    /// Payloads, offsets per log and what is fitted again, with the arm held.
+    /// Estimates payloads, offsets per log and refitted parameters, with the arm held.
     pub(crate) fn estimate(
         &self,
         model: &RegressorModel,

@@ -1,4 +1,4 @@
-//! What differs from log to log: payloads, offsets, gains; and payloads on an arm that is known already.
+//! Differences between logs: payloads, offsets, gains; and payloads on a known arm.
 
 mod body;
 mod columns;

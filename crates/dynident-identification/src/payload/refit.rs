@@ -1,5 +1,3 @@
-//! Which parameters of a known arm are fitted again together with a payload.
-
 use serde::{Deserialize, Serialize};
 
 /// Parameters of a known arm that are fitted again together with the payload.
@@ -12,6 +10,6 @@ pub enum Refit {
     Nothing,
     /// The joints' offsets.
     Offset,
-    /// Offsets and friction: both change with the temperature from run to run.
+    /// Offsets and friction, which change with temperature from run to run.
     Friction,
 }

@@ -1,4 +1,4 @@
-//! What logs say about payloads: values with error bars, and a body that it may be.
+//! Estimated payloads: values with error bars, and a consistent body.
 
 use super::body::{at_centre_of_mass, jacobian, nearest_consistent_body};
 use super::columns::{LoadColumns, Payload, PayloadColumns};
@@ -12,11 +12,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Measured {
-    /// The value.
+    /// Value.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation.
     pub std: f64,
-    /// Half the width of its 95 % interval.
+    /// Half width of the 95 % interval.
     pub half_width_95: f64,
 }
 
@@ -24,67 +24,67 @@ pub struct Measured {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PayloadParameter {
-    /// What it sums, in the frame of the payload's link: `Ixx + Iyy`.
+    /// Parameter or sum, for example `Ixx + Iyy`, in the frame of the payload's link.
     pub expression: String,
-    /// Its unit.
+    /// Unit.
     pub unit: String,
-    /// The estimate; zero where it is not excited.
+    /// Estimate; zero if not excited.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation.
     pub std: f64,
-    /// Half the width of its 95 % interval.
+    /// Half width of the 95 % interval.
     pub half_width_95: f64,
-    /// False when the logs do not excite it.
+    /// Whether the logs excite it.
     pub excited: bool,
 }
 
-/// The physically consistent payload nearest to the estimate in the metric of its covariance. What the logs leave open
-/// is no measured value.
+/// The physically consistent payload nearest to the estimate in the metric of its covariance. Undetermined parameters
+/// of it are not measured values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ConsistentPayload {
-    /// Mass.
+    /// Mass, kg.
     pub mass_kg: f64,
-    /// Centre of mass in the link's frame.
+    /// Centre of mass in the link's frame, m.
     pub com_m: [f64; 3],
     /// Inertia about the centre of mass, axes of the link's frame: xx, xy, xz, yy, yz, zz.
     pub inertia_at_com_kgm2: [f64; 6],
-    /// How far it lies from the estimate, in standard deviations.
+    /// Distance from the estimate, in standard deviations.
     pub moved_sigma: f64,
-    /// Whether the logs want it outside of what is physically consistent.
+    /// Whether the estimate is outside of the consistent set, so that the body is on its boundary.
     pub on_the_boundary: bool,
 }
 
-/// What was found of one payload.
+/// Result for one payload.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PayloadResult {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// The link in whose frame it is described.
+    /// Link that defines the frame.
     pub link: String,
-    /// Training logs that carry it.
+    /// Training logs with this payload.
     pub logs: Vec<String>,
-    /// What the logs say about its ten parameters about the link's origin, one by one or as sums.
+    /// Estimates of its ten parameters about the link's origin, single or as sums.
     pub parameters: Vec<PayloadParameter>,
-    /// Mass, kg, with a bar of zero where the study says it; none where it is not determined alone.
+    /// Mass, kg, with a zero error bar if the study states it; `None` if not determined separately.
     pub mass_kg: Option<Measured>,
-    /// Centre of mass in the link's frame, m; none for coordinates that are not determined alone.
+    /// Centre of mass in the link's frame, m; `None` for coordinates that are not determined separately.
     pub com_m: [Option<Measured>; 3],
-    /// Inertia about the centre of mass, axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz; none where it is not
-    /// determined alone.
+    /// Inertia about the centre of mass, axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz; `None` if not
+    /// determined separately.
     pub inertia_at_com_kgm2: [Option<Measured>; 6],
-    /// The parameters that the logs do not determine, in words.
+    /// Parameters that the logs do not determine, as sentences.
     pub not_identified: Vec<String>,
-    /// A body that it may be; none where there is none.
+    /// A consistent body.
     pub possible: Option<ConsistentPayload>,
-    /// Why there is none.
+    /// Reason for a missing consistent body.
     pub failure: Option<String>,
-    /// What it adds to the base parameters, in their order: what `validate` predicts the torque of logs with it by.
+    /// Effect on the base parameters, in their order; `validate` uses it for logs with this payload.
     pub base_parameters_added: Vec<f64>,
 }
 
-/// All payloads that were estimated.
+/// Results of all estimated payloads.
 pub fn payload_results(
     recordings: &[Recording],
     payloads: &[Payload],
@@ -157,7 +157,6 @@ fn result(
     }
 }
 
-/// The parameters that the logs do not determine, in words.
 fn not_identified(columns: &PayloadColumns, parameters: &[PayloadParameter]) -> Vec<String> {
     let mut not_identified: Vec<String> = parameters
         .iter()
@@ -174,13 +173,13 @@ fn not_identified(columns: &PayloadColumns, parameters: &[PayloadParameter]) -> 
         if homes.is_empty() {
             format!("{}: no motion of this robot determines it", INERTIAL_NAMES[dropped])
         } else {
-            format!("{}: determined only as a part of {}", INERTIAL_NAMES[dropped], homes.join(", "))
+            format!("{}: determined only as part of {}", INERTIAL_NAMES[dropped], homes.join(", "))
         }
     }));
     not_identified
 }
 
-/// Mass, centre of mass and inertia about it, each where all that it is made of is determined alone.
+/// Mass, centre of mass and inertia about it, if all contributing parameters are determined separately.
 fn figures(columns: &PayloadColumns, estimate: &Estimate, excited: &dyn Fn(usize) -> bool) -> [Option<Measured>; 10] {
     let place = |k: usize| {
         let place = columns.kept.iter().position(|&kept| kept == k)?;
@@ -196,7 +195,7 @@ fn figures(columns: &PayloadColumns, estimate: &Estimate, excited: &dyn Fn(usize
         (Some(i), Some(j)) => estimate.covariance[(i, j)],
         _ => 0.0,
     });
-    // The interval of a function of several parameters is as wide, beside its deviation, as the widest of theirs.
+    // The interval of a function of several parameters uses their largest quantile.
     let width = places
         .iter()
         .flatten()

@@ -1,10 +1,9 @@
-//! What a long log is chosen from: an excerpt of bounded length, at a rate that its motion needs.
+//! Excerpts of long logs for model selection.
 //!
-//! Drives, cut-off, friction and lag are chosen in dozens of passes, and what a choice gains from more rows fades long
-//! before an hour of recording has passed. So the choices of long recordings are made on an excerpt: first every n-th
-//! row behind a low-pass, as far as the motion lets the rate fall, which keeps all that the rows say; then, of what is
-//! still long, pieces spread evenly over the log ([`Pieces`](pieces::Pieces)). Numbers are made of all rows: with the
-//! choices at hand a long log is read once.
+//! Drives, cut-off, friction and lag are selected in dozens of passes, and more rows add little after some minutes of
+//! recording. So selection uses an excerpt of bounded length: first every n-th row after a low-pass, as far as the
+//! motion allows the lower rate; then, if still too long, pieces spread evenly over the log
+//! ([`Pieces`](pieces::Pieces)). The final fit uses all rows and reads a long log once.
 
 mod pieces;
 
@@ -17,31 +16,29 @@ use dynident_recording::{
 };
 use pieces::Pieces;
 
-/// Rows of all training recordings together from which on an excerpt is made, and which it has at most: at 1 kHz two to
-/// three minutes, several times the length of the public recordings.
-const LONG: u64 = 200_000;
-/// Samples of an excerpt in a period of the cut-off that the positions ask for, at least. Steps of friction are far
-/// shorter than the motion's periods: with 100 samples in one the Stribeck effect of a simulated arm was not told any
-/// more where all samples tell it, with 400 it was.
-const SAMPLES_IN_PERIOD: f64 = 400.0;
-/// The low-pass before samples are left out passes frequencies below 0.4 of the rate that remains.
-const HALF_GAIN: f64 = 0.45;
-const TRANSITION: f64 = 0.1;
-/// Recordings of no more rows are kept whole, and of longer ones at least as many rows.
-const LEAST: u64 = 20_000;
-/// Periods of the cut-off in a piece, at least: filters feel its ends for one or two.
-const PERIODS_IN_PIECE: f64 = 30.0;
-/// Where more of an excerpt's rows than this would be left out because some joint's torque does not count there, there
-/// is none: it would say less of the other joints.
-const MOST_LEFT_OUT: f64 = 0.1;
+/// Total training rows above which an excerpt is made, and its maximum size. At 1 kHz this is two to three minutes,
+/// several times the length of the public recordings.
+const MAX_TOTAL_ROWS: u64 = 200_000;
+/// Minimum number of samples in an excerpt per period of the positions' cut-off. Friction steps are far shorter than
+/// this period: with 100 samples the Stribeck effect of a simulated arm was no longer identifiable, with 400 it was.
+const MIN_SAMPLES_PER_PERIOD: f64 = 400.0;
+/// Half-gain frequency of the low-pass before decimation, as a ratio of the decimated rate. Frequencies below 0.4 pass.
+const HALF_GAIN_RATIO: f64 = 0.45;
+const TRANSITION_RATIO: f64 = 0.1;
+/// Minimum number of rows kept of each log; shorter logs are kept whole.
+const MIN_ROWS_PER_LOG: u64 = 20_000;
+/// Minimum length of a piece in periods of the cut-off; the filters' end effects last one or two periods.
+const MIN_PERIODS_PER_PIECE: f64 = 30.0;
+/// Maximum ratio of rows with invalid torque of some joint. Above it no excerpt is made, because the other joints would
+/// lose these rows too.
+const MAX_REJECTED_RATIO: f64 = 0.1;
 
-/// The recordings of a task with excerpts in place of the long ones among `training`. `None` if they are not long
-/// together, if nothing is left to choose (`has_choices`: drive inertia or friction are left to the logs), and if a
-/// setting is a number of samples: the factor of the parallel filter, or a differentiator that has no cut-off or follows
-/// a commanded motion.
+/// Replaces the long recordings among `training` by excerpts. `None` if their total length is small, if there is
+/// nothing to select (`has_choices`: automatic drive inertia or friction), or if a setting is in samples: the factor of
+/// the parallel filter, or a differentiator without a cut-off or with a reference.
 ///
 /// # Errors
-/// Recordings that cannot be read.
+/// A recording cannot be read.
 pub fn excerpts(
     recordings: &[Recording],
     settings: RowSettings<'_>,
@@ -59,15 +56,15 @@ pub fn excerpts(
     }
     let rows = |index: usize| recordings[index].estimated_rows().unwrap_or(0);
     let all: u64 = training.iter().map(|&index| rows(index)).sum();
-    if all <= LONG {
+    if all <= MAX_TOTAL_ROWS {
         return Ok(None);
     }
     let mut found = recordings.to_vec();
     let mut changed = false;
     for &index in training {
-        let share = ((LONG as f64 * rows(index) as f64 / all as f64) as u64).max(LEAST) as usize;
+        let share = ((MAX_TOTAL_ROWS as f64 * rows(index) as f64 / all as f64) as u64).max(MIN_ROWS_PER_LOG) as usize;
         if let Samples::Log(log) = &recordings[index].samples
-            && rows(index) > LEAST
+            && rows(index) > MIN_ROWS_PER_LOG
             && let Some((excerpt, whole)) =
                 excerpt(&recordings[index], log, settings.motion, share, execution.parallel())?
         {
@@ -79,8 +76,7 @@ pub fn excerpts(
     Ok(changed.then_some(found))
 }
 
-/// At most about `most` rows of a log, read `beside` by a thread of its own or here; `None` where too many of them
-/// would be left out.
+/// Excerpt of about `most` rows of a log, read in a separate thread with `beside`. `None` if too many rows are invalid.
 fn excerpt(
     recording: &Recording,
     log: &Log,
@@ -89,7 +85,7 @@ fn excerpt(
     beside: bool,
 ) -> Result<Option<(Log, Whole)>, LogError> {
     let named = |source: RecordingError| LogError::recording(&recording.name, source);
-    // Logged velocities and accelerations are for comparison only; lag and ends are for the passes that come.
+    // Logged velocities and accelerations only serve comparison; later passes handle lag and ends.
     let mut read = log.clone();
     (read.format.velocity, read.format.acceleration) = (None, None);
     let motion = MotionSettings { keep_outliers: settings.keep_outliers, ..MotionSettings::default() };
@@ -97,9 +93,9 @@ fn excerpt(
     let stream = MotionStream::with_differentiator(&read, &motion, build).map_err(named)?.without_channels();
     let mut stream = if beside { stream.read_beside() } else { stream };
     let given_hz = settings.differentiator.cutoff_hz().unwrap_or(0.0);
-    let needed_hz = SAMPLES_IN_PERIOD * stream.cutoff().cutoff_hz.max(given_hz);
+    let needed_hz = MIN_SAMPLES_PER_PERIOD * stream.cutoff().cutoff_hz.max(given_hz);
     let factor = ((stream.rate_hz() / needed_hz) as usize).clamp(1, 1000);
-    let piece_s = PERIODS_IN_PIECE / stream.cutoff().cutoff_hz;
+    let piece_s = MIN_PERIODS_PER_PIECE / stream.cutoff().cutoff_hz;
     let least = (piece_s * stream.rate_hz() / factor as f64) as usize;
 
     let mut thinning = Thinning::new(factor, Pieces::new(most, least));
@@ -111,28 +107,26 @@ fn excerpt(
     let Some(samples) = thinning.samples(log.joints.len(), log.format.temperature.is_some()) else { return Ok(None) };
     let mut excerpt = samples.into_log(&log.source().label(), &log.joints).map_err(named)?;
     excerpt.format.bridge_gaps = log.format.bridge_gaps;
-    // White noise of the log, thinned out below a low-pass.
+    // The log's white noise after the low-pass.
     let thinned = |noise: &f64| noise / (factor as f64).sqrt();
     let position_noise = stream.position_noise().iter().map(thinned).collect();
     Ok(Some((excerpt, Whole { rows, cutoff: stream.cutoff().clone(), position_noise })))
 }
 
-/// Rows at a lower rate.
 struct Thinning {
     factor: usize,
     pieces: Pieces,
     segment: Option<usize>,
-    /// One for positions, torques and temperatures, and the time of the segment's first sample.
+    /// Filter of positions, torques and temperatures, and the time of the segment's first sample.
     decimator: Option<(Decimator, f64)>,
-    /// Samples of the segment in which some joint's torque does not count, from sample `first_marked` on.
+    /// Samples of the segment with invalid torque of some joint, from sample `first_marked` on.
     marked: Vec<bool>,
     first_marked: usize,
-    /// Rows of the segment that have come out.
     produced: u64,
     panel: Vec<f64>,
     out: Vec<f64>,
     rows: usize,
-    left_out: usize,
+    rejected: usize,
 }
 
 impl Thinning {
@@ -148,19 +142,18 @@ impl Thinning {
             panel: Vec::new(),
             out: Vec::new(),
             rows: 0,
-            left_out: 0,
+            rejected: 0,
         }
     }
 
-    /// The next samples of a log.
     fn take(&mut self, block: &MotionBlock) -> Result<(), FilterError> {
         let columns = (block.q.len() + block.tau.len() + block.temperature_c.len()) / block.rows.max(1);
         if self.segment != Some(block.segment) || self.decimator.is_none() {
             let reduced_hz = block.rate_hz / self.factor as f64;
             let filter = DecimationSettings {
                 factor: self.factor,
-                cutoff_hz: (self.factor > 1).then_some(HALF_GAIN * reduced_hz),
-                transition_hz: (self.factor > 1).then_some(TRANSITION * reduced_hz),
+                cutoff_hz: (self.factor > 1).then_some(HALF_GAIN_RATIO * reduced_hz),
+                transition_hz: (self.factor > 1).then_some(TRANSITION_RATIO * reduced_hz),
                 ..DecimationSettings::default()
             };
             self.decimator = Some((Decimator::new(&filter, block.rate_hz, columns)?, block.first_time_s));
@@ -183,11 +176,11 @@ impl Thinning {
             centre = decimator.input_row(self.produced) as usize;
             self.produced += 1;
             self.rows += 1;
-            // A row stands for the samples nearest to it, and counts where at least half of them do.
+            // A row represents the samples nearest to it and is valid if at least half of them are.
             let from = centre.saturating_sub(self.factor / 2).max(self.first_marked) - self.first_marked;
             let nearest = &self.marked[from..(centre + self.factor / 2 + 1 - self.first_marked).min(self.marked.len())];
             if 2 * nearest.iter().filter(|marked| **marked).count() > nearest.len() {
-                self.left_out += 1;
+                self.rejected += 1;
                 continue;
             }
             let time_s = *first_time_s + centre as f64 / block.rate_hz;
@@ -201,9 +194,9 @@ impl Thinning {
         Ok(())
     }
 
-    /// What has come out, joint by joint; `None` where too many rows had to be left out.
+    /// Samples of the excerpt; `None` if too many rows were rejected.
     fn samples(self, joints: usize, has_temperature: bool) -> Option<JointSamples> {
-        if self.left_out as f64 > MOST_LEFT_OUT * self.rows as f64 {
+        if self.rejected as f64 > MAX_REJECTED_RATIO * self.rows as f64 {
             return None;
         }
         let (time_s, mut columns) = self.pieces.columns();
@@ -217,7 +210,7 @@ impl Thinning {
     }
 }
 
-/// Positions as they are on the uniform clock, and no derivatives.
+/// Returns positions on the uniform clock, with zero derivatives.
 #[derive(Debug)]
 struct AsLogged;
 

@@ -1,28 +1,25 @@
-//! Pieces of a stream of rows, spread evenly over it, at most so many rows however long it is.
+//! Evenly spaced pieces of a stream of rows, within a maximum number of rows.
 
-/// A piece has at most this part of the rows that there is room for: few pieces, so that little is lost at their ends.
-const PIECES: usize = 8;
+/// Divisor of the maximum number of rows for the length of a piece: few pieces have few end effects.
+const PIECES_PER_EXCERPT: usize = 8;
 
-/// Rows that were kept: pieces of equal length, shorter only where the stream was interrupted, every `stride`-th of
-/// them.
+/// Kept rows: every `stride`-th piece, all of equal length except before interruptions.
 ///
-/// While a stream lasts, its length is not known. So all pieces are kept until there is no room for another; then every
-/// other one goes, from then on every other one is not kept, and so on. In the end about half of the rows that there is
-/// room for or more are left, of pieces at equal distances, whatever the stream's length.
+/// The length of a stream is unknown while it lasts. So all pieces are kept until the room is full. Then every other
+/// piece is dropped and the stride doubles. At the end about half of the maximum number of rows or more is used, in
+/// equally spaced pieces.
 pub(super) struct Pieces {
-    /// Rows that there is room for, and rows of one piece.
+    /// Maximum number of rows, and rows per piece.
     most: usize,
     length: usize,
     stride: usize,
-    /// Pieces that have begun, kept or not.
     begun: usize,
     kept: Vec<Piece>,
-    /// Whether the piece that was begun last is kept, and its rows so far.
+    /// Whether the current piece is kept, and its number of rows.
     keeping: bool,
     rows: usize,
 }
 
-/// Some rows: the number of the piece, and row by row its time and its numbers.
 struct Piece {
     number: usize,
     time_s: Vec<f64>,
@@ -31,18 +28,17 @@ struct Piece {
 }
 
 impl Pieces {
-    /// Room for about `most` rows in pieces of at least `least`; for two pieces in any case.
+    /// At most about `most` rows in pieces of at least `least` rows; always room for two pieces.
     pub(super) fn new(most: usize, least: usize) -> Self {
-        let length = (most / PIECES).max(least).max(1);
+        let length = (most / PIECES_PER_EXCERPT).max(least).max(1);
         Self { most, length, stride: 1, begun: 0, kept: Vec::new(), keeping: false, rows: length }
     }
 
-    /// What follows does not go on with what came before.
+    /// Starts a new piece after an interruption.
     pub(super) fn begin(&mut self) {
         self.rows = self.length;
     }
 
-    /// The next row.
     pub(super) fn push(&mut self, time_s: f64, values: impl Iterator<Item = f64>) {
         if self.rows >= self.length {
             self.next();
@@ -77,7 +73,7 @@ impl Pieces {
         self.kept.iter().map(|piece| piece.time_s.len()).sum()
     }
 
-    /// Times, and column by column the numbers of all rows that were kept.
+    /// Times, and the values of all kept rows column by column.
     pub(super) fn columns(self) -> (Vec<f64>, Vec<Vec<f64>>) {
         let width = self.kept.iter().map(|piece| piece.width).max().unwrap_or(0);
         let of_column = |column: usize| -> Vec<f64> {
@@ -94,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_short_stream_is_kept_whole_and_a_long_one_in_even_pieces() {
+    fn short_streams_are_kept_whole_and_long_ones_in_even_pieces() {
         for (rows, stride) in [(1, 1), (800, 1), (801, 2), (1_600, 2), (50_000, 64)] {
             let mut pieces = Pieces::new(800, 0);
             for row in 0..rows {
@@ -111,14 +107,14 @@ mod tests {
     }
 
     #[test]
-    fn pieces_are_as_long_as_they_have_to_be() {
+    fn pieces_have_the_minimum_length() {
         let mut pieces = Pieces::new(800, 500);
         (0..5_000).for_each(|row| pieces.push(f64::from(row), core::iter::empty()));
         assert_eq!(pieces.columns().0, (0..500).chain(4_000..4_500).map(f64::from).collect::<Vec<_>>());
     }
 
     #[test]
-    fn a_piece_ends_where_the_stream_is_interrupted() {
+    fn an_interruption_ends_a_piece() {
         let mut pieces = Pieces::new(80, 0);
         for row in 0..400 {
             if row == 5 {
@@ -126,7 +122,7 @@ mod tests {
             }
             pieces.push(f64::from(row), core::iter::once(0.0));
         }
-        // Pieces of 10 rows, but for the first of 5: 41 pieces, of which every eighth is left.
+        // Pieces of 10 rows, except the first of 5 rows: 41 pieces, of which every eighth is kept.
         let expected: Vec<f64> =
             (0..400).filter(|row| if *row < 5 { true } else { ((row - 5) / 10 + 1) % 8 == 0 }).map(f64::from).collect();
         assert_eq!(pieces.columns().0, expected);

@@ -1,98 +1,98 @@
-//! What can be wrong with a recording on the way to rows.
+//! Errors of a recording.
 
 use dynident_estimation::EstimationError;
 use dynident_recording::{FilterError, RecordingError};
 use thiserror::Error;
 
-/// Why a recording gives no rows, with the recording and the fix in its message.
+/// Reason why a recording gives no rows; the message names the recording and the fix.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// A log that cannot be read.
+    /// The log cannot be read.
     #[error("log `{log}`: {source}")]
     Recording {
-        /// The log.
+        /// Log.
         log: String,
-        /// What is wrong.
+        /// Cause.
         source: Box<RecordingError>,
     },
-    /// A log of other joints than the model has.
-    #[error("log `{log}`: there is no joint `{joint}` among its columns, which are of {}", known.join(", "))]
+    /// A joint of the model is missing in the log.
+    #[error("log `{log}`: joint `{joint}` is missing; the columns belong to {}", known.join(", "))]
     NoSuchJoint {
-        /// The log.
+        /// Log.
         log: String,
-        /// The model's joint.
+        /// Joint of the model.
         joint: String,
-        /// The log's joints.
+        /// Joints of the log.
         known: Vec<String>,
     },
-    /// A log whose samples could not be opened.
-    #[error("log `{log}` has no samples: give its raw samples or a motion that is made already")]
+    /// The samples of the log cannot be opened.
+    #[error("log `{log}` has no samples; give raw samples or a prepared motion")]
     NoSamples {
-        /// The log.
+        /// Log.
         log: String,
     },
-    /// A parallel filter that does not exist at the log's rate.
+    /// The parallel filter is impossible at the log's rate.
     #[error("log `{log}`, [parallel_filter]: {source}")]
     Filter {
-        /// The log.
+        /// Log.
         log: String,
-        /// What is wrong.
+        /// Cause.
         source: FilterError,
     },
-    /// A log without the temperature that friction depends on.
+    /// The log lacks the temperature on which friction depends.
     #[error(
-        "log `{log}`: friction of joint `{joint}` depends on the temperature, which the log does not have; give its columns as temperature of the format, or leave out the law `temperature`"
+        "log `{log}`: friction of joint `{joint}` depends on the temperature, but the log has no temperature; give its columns with the key `temperature` of the format, or remove the law `temperature`"
     )]
     NoTemperature {
-        /// The log.
+        /// Log.
         log: String,
-        /// The first joint that needs it.
+        /// First joint that needs it.
         joint: String,
     },
-    /// A log that goes where a declared torque says nothing.
+    /// The log leaves the domain of a declared torque.
     #[error(
-        "log `{log}`, {time_s:.3} s: torque {torque} = {law} says nothing of {at}; widen the table, keep the expression defined with max(.., 0) or the like, or leave these rows out with drop_time_s"
+        "log `{log}`, {time_s:.3} s: torque {torque} = {law} is undefined at {at}; widen the table, keep the expression defined, for example with max(.., 0), or exclude these rows with drop_time_s"
     )]
     Undeclared {
-        /// The log.
+        /// Log.
         log: String,
-        /// When, in seconds after its first row.
+        /// Time, seconds.
         time_s: f64,
-        /// The torque.
+        /// Symbol of the torque.
         torque: String,
-        /// What it follows.
+        /// Its law.
         law: String,
-        /// Positions and velocities there.
+        /// Positions and velocities at that time.
         at: String,
     },
-    /// A log that leaves no rows after filtering.
+    /// The log has no rows after the filter.
     #[error(
         "log `{log}`: {rows} samples leave nothing behind the parallel filter, which needs {needed}; give a longer part of the log, a higher cut-off, or parallel_filter.enabled = false"
     )]
     NothingLeft {
-        /// The log.
+        /// Log.
         log: String,
         /// Samples of the log.
         rows: u64,
         /// Samples that one filtered row needs.
         needed: usize,
     },
-    /// Rows of a log that carry no factor.
+    /// The rows of the log cannot be factored.
     #[error("{log}: {source}")]
     Rows {
-        /// The log's label.
+        /// Log.
         log: String,
-        /// What is wrong.
+        /// Cause.
         source: EstimationError,
     },
-    /// Rows that their consumer refuses.
+    /// The consumer rejects the rows.
     #[error(transparent)]
     Refused(#[from] EstimationError),
 }
 
 impl LogError {
-    /// A log that cannot be read.
+    /// Wraps an error of a log.
     pub fn recording(log: &str, source: RecordingError) -> Self {
         Self::Recording { log: log.to_owned(), source: Box::new(source) }
     }

@@ -1,4 +1,4 @@
-//! One recording of a task: its samples, what it is for, and what is known about how it was made.
+//! A recording of a task: samples, role, and properties.
 
 mod error;
 mod motion_record;
@@ -14,20 +14,20 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// What a recording is for.
+/// Role of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// The model is fitted to it.
+    /// Used to fit the model.
     #[default]
     Identify,
-    /// The model is tested on it.
+    /// Used to test the model.
     Validate,
 }
 
 impl Role {
-    /// The name in files.
+    /// Name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Identify => "identify",
@@ -36,61 +36,61 @@ impl Role {
     }
 }
 
-/// Where the motion of a recording comes from.
+/// Source of the motion of a recording.
 #[derive(Clone, Debug)]
 pub enum Samples {
-    /// Raw samples of a file, a stream or of arrays: clock, filters and derivatives are made here. Joints are found by
-    /// name.
+    /// Raw samples of a file, a stream or arrays; Dynident resamples, filters and differentiates them. Joints are found
+    /// by name.
     Log(Box<Log>),
-    /// A motion that is made already, joints in the model's order.
+    /// Prepared motion, joints in the order of the model.
     Motion(Box<MotionRecord>),
 }
 
 /// One recording.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// What it is called in results and messages.
+    /// Name in results and messages.
     pub name: String,
-    /// What it is for.
+    /// Role.
     pub role: Role,
-    /// Its samples.
+    /// Samples.
     pub samples: Samples,
-    /// The motion that was commanded, joints in the model's order: for differentiators and estimators that need it.
+    /// Commanded motion, joints in the order of the model, for differentiators and estimators that need it.
     pub commanded: Option<Arc<Reference>>,
-    /// The payload that it was recorded with, by name.
+    /// Name of the payload during the recording.
     pub payload: Option<String>,
-    /// What is known of the longer recording that it is an excerpt of; none where it is whole.
+    /// Properties of the complete recording if this is an excerpt.
     pub whole: Option<Whole>,
 }
 
-/// What a recording says that is kept as an [excerpt](crate::excerpt), at the excerpt's rate.
+/// Properties of the complete recording, stored with its [excerpt](crate::excerpt).
 #[derive(Clone, Debug)]
 pub struct Whole {
-    /// Rows of the whole.
+    /// Number of rows.
     pub rows: u64,
-    /// The cut-off that the whole's positions suggest.
+    /// Cut-off that the positions suggest.
     pub cutoff: CutoffChoice,
-    /// Standard deviation of the noise of one sample, in the log's order of joints.
+    /// Standard deviation of the noise of one sample, joints in the order of the log.
     pub position_noise: Vec<f64>,
 }
 
 impl Recording {
-    /// A log to fit to.
+    /// A log for the fit.
     pub fn training(name: impl Into<String>, log: Log) -> Self {
         Self::new(name.into(), Role::Identify, Samples::Log(Box::new(log)))
     }
 
-    /// A log to test on.
+    /// A log for the test.
     pub fn held_out(name: impl Into<String>, log: Log) -> Self {
         Self::new(name.into(), Role::Validate, Samples::Log(Box::new(log)))
     }
 
-    /// A motion that is made already, to fit to.
+    /// A prepared motion for the fit.
     pub fn of_motion(name: impl Into<String>, motion: MotionRecord) -> Self {
         Self::new(name.into(), Role::Identify, Samples::Motion(Box::new(motion)))
     }
 
-    /// A log to fit to of which only factors are left: a name, and no sample to pass over.
+    /// A training log of which only factors are left: it has a name but no samples.
     pub fn without_samples(name: String) -> Self {
         let motion = Arc::new(MotionBlock::default());
         let record = MotionRecord { label: name.clone(), motion, usable: Vec::new(), windows: None, raw: None };
@@ -101,7 +101,7 @@ impl Recording {
         Self { name, role, samples, commanded: None, payload: None, whole: None }
     }
 
-    /// What messages about its rows call it: a file's path, or the label of its samples.
+    /// Label in messages about its rows: the path of a file, or the label of its samples.
     pub fn label(&self) -> String {
         match &self.samples {
             Samples::Log(log) => log.source().label(),
@@ -109,7 +109,7 @@ impl Recording {
         }
     }
 
-    /// Rows, about.
+    /// Approximate number of rows.
     pub fn estimated_rows(&self) -> Option<u64> {
         match &self.samples {
             Samples::Log(log) => log.source().estimated_rows(),
@@ -117,8 +117,7 @@ impl Recording {
         }
     }
 
-    /// The same with every row, where only a few samples at the ends do not count: for what needs rows without a gap.
-    /// `None` where rows inside do not count.
+    /// Includes every row if only samples at the ends are unusable. `None` if rows in between are unusable.
     pub fn with_every_row(&self) -> Option<Self> {
         match &self.samples {
             Samples::Log(_) => Some(self.clone()),
@@ -129,12 +128,12 @@ impl Recording {
         }
     }
 
-    /// Rows of what it is an excerpt of, or its own, about.
+    /// Approximate number of rows of the complete recording.
     pub fn rows_of_whole(&self) -> Option<u64> {
         self.whole.as_ref().map_or_else(|| self.estimated_rows(), |whole| Some(whole.rows))
     }
 
-    /// Whether it has the temperatures of the joints.
+    /// Whether the recording has joint temperatures.
     pub fn has_temperature(&self) -> bool {
         match &self.samples {
             Samples::Log(log) => log.format.temperature.is_some(),
@@ -142,10 +141,10 @@ impl Recording {
         }
     }
 
-    /// For each joint of the model its place among the recording's joints.
+    /// Index in the recording of each joint of the model.
     ///
     /// # Errors
-    /// A joint that the recording does not have.
+    /// The recording lacks a joint.
     pub fn places(&self, model: &Model) -> Result<Vec<usize>, LogError> {
         match &self.samples {
             Samples::Log(log) => {
@@ -163,10 +162,10 @@ impl Recording {
         }
     }
 
-    /// Settings whose lags stand in the order of the recording's joints.
+    /// Settings with lags in the order of the recording's joints.
     ///
     /// # Errors
-    /// A joint that the recording does not have.
+    /// The recording lacks a joint.
     pub fn in_log_order<'m>(
         &self,
         model: &Model,
@@ -184,11 +183,11 @@ impl Recording {
         Ok(Cow::Owned(MotionSettings { torque_lag_s: Some(OneOrMany::Many(ordered)), ..motion.clone() }))
     }
 
-    /// Its log on the way to a motion, with these settings; the commanded motion goes along where the differentiator
-    /// needs it. `None` for a motion that is made already and whose raw samples are not at hand.
+    /// Opens the log as a motion stream, with the commanded motion if the differentiator needs it. `None` for a
+    /// prepared motion without raw samples.
     ///
     /// # Errors
-    /// What opening it can give.
+    /// The log cannot be opened.
     pub fn open(&self, model: &Model, motion: &MotionSettings) -> Result<Option<MotionStream>, LogError> {
         let log = match &self.samples {
             Samples::Log(log) => log,
@@ -205,7 +204,7 @@ impl Recording {
                 }
                 commanded.reordered(&order).map(Arc::new)
             }
-            // The differentiator says that it needs one.
+            // The differentiator reports a missing reference.
             _ => None,
         };
         let stream = MotionStream::following(log, &*self.in_log_order(model, motion)?, reference.as_ref());

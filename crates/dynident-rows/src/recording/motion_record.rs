@@ -1,26 +1,26 @@
-//! A motion that is made already.
+//! Prepared motions.
 
 use dynident_recording::{Log, MotionBlock, MotionSettings};
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// A motion that is made already, with its torques: joints in the model's order, one uninterrupted piece.
+/// A prepared motion with its torques: joints in the order of the model, one uninterrupted piece.
 #[derive(Clone, Debug)]
 pub struct MotionRecord {
-    /// What messages call it.
+    /// Label in messages.
     pub label: String,
     /// Positions, velocities, accelerations and torques.
     pub motion: Arc<MotionBlock>,
-    /// Sample by sample whether it can be used at all; empty if all can. A filtered row sees none that cannot.
+    /// Whether each sample is usable; empty if all are. A filtered row uses no unusable sample.
     pub usable: Vec<bool>,
-    /// For each joint the times (from, to; s) at which its torque counts; `None` if it always does.
+    /// For each joint the intervals (from, to; s) with valid torque; `None` if torque is always valid.
     pub windows: Option<Vec<Vec<[f64; 2]>>>,
-    /// The raw samples that it was made from, for estimators that smooth or simulate anew; joints in the model's order.
+    /// Raw samples for estimators that smooth or simulate again; joints in the order of the model.
     pub raw: Option<Log>,
 }
 
 impl MotionRecord {
-    /// The record as `settings` ask for it: without the lag of the torque that they state.
+    /// Applies `settings`: corrects a stated torque lag.
     pub fn as_set(&self, settings: &MotionSettings) -> Cow<'_, Self> {
         match &settings.torque_lag_s {
             Some(lag_s) => {
@@ -31,7 +31,7 @@ impl MotionRecord {
         }
     }
 
-    /// The same with every row, where only samples at the ends do not count.
+    /// Includes every row if only samples at the ends are unusable.
     pub fn with_every_row(&self) -> Option<Self> {
         let first = self.usable.iter().position(|usable| *usable).unwrap_or(0);
         let last = self.usable.iter().rposition(|usable| *usable).unwrap_or(0);

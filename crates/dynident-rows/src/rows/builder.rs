@@ -1,4 +1,4 @@
-//! Blocks of a motion into rows of regressor and torque, filtered alike.
+//! Rows of regressor and torque from blocks of a motion.
 
 use super::RowConsumer;
 use super::joint_filters::JointFilters;
@@ -10,7 +10,7 @@ use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_recording::{DecimationSettings, FilterError, MotionBlock};
 
-/// Turns blocks of a motion into rows of regressor and torque, filtered alike.
+/// Converts blocks of a motion into filtered rows of regressor and torque.
 #[derive(Debug)]
 pub struct RowBuilder<'a> {
     maker: PanelMaker<'a>,
@@ -18,10 +18,9 @@ pub struct RowBuilder<'a> {
     panels: SamplePanels,
 }
 
-/// Makes panels of samples into rows.
 #[derive(Debug)]
 pub(super) struct PanelFilter<'a> {
-    /// Of every joint the first columns that are not made into rows: bodies that only tell the load.
+    /// For each joint the number of leading columns that are not filtered: bodies that only provide the load.
     unfiltered: Vec<usize>,
     filters: JointFilters,
     mask: Option<RowMask<'a>>,
@@ -30,10 +29,10 @@ pub(super) struct PanelFilter<'a> {
 }
 
 impl<'a> RowBuilder<'a> {
-    /// For samples at `rate_hz`, joint `j` of the model standing at place `places[j]` of the motion.
+    /// Builder for samples at `rate_hz`; joint `j` of the model has index `places[j]` in the motion.
     ///
     /// # Errors
-    /// A filter that does not exist at this rate.
+    /// The filter is impossible at this rate.
     pub fn new(
         model: &'a RegressorModel,
         places: &[usize],
@@ -43,8 +42,8 @@ impl<'a> RowBuilder<'a> {
         Self::of(PanelMaker::new(model, places), vec![0; model.dof()], rate_hz, filter)
     }
 
-    /// The same of nothing but some `terms` of the model: each joint's rows have those that it feels, in their order,
-    /// and its torque.
+    /// Builder of only some `terms` of the model: the rows of each joint have the terms that act on it, in order, and
+    /// its torque.
     pub(super) fn of_terms(
         model: &'a RegressorModel,
         terms: &[Column],
@@ -74,18 +73,18 @@ impl<'a> RowBuilder<'a> {
         Ok(Self { maker, filter, panels: SamplePanels::default() })
     }
 
-    /// The same that leaves out rows that do not count.
+    /// Adds a mask of invalid rows.
     pub fn with_mask(mut self, mask: Option<RowMask<'a>>) -> Self {
         self.filter.mask = mask;
         self
     }
 
-    /// Where the model's joints stand in the motion.
+    /// Indices of the model's joints in the motion.
     pub fn places(&self) -> &[usize] {
         self.maker.places()
     }
 
-    /// Samples to either side of a filtered row that it is made from.
+    /// Samples on each side of a filtered row that the filter uses.
     pub fn reach(&self) -> usize {
         self.filter.filters.reach()
     }
@@ -95,30 +94,30 @@ impl<'a> RowBuilder<'a> {
         self.filter.filters.needed()
     }
 
-    /// Filtered rows of each joint so far, whether they counted or not.
+    /// Filtered rows of each joint up to now, valid or not.
     pub fn filtered_rows(&self) -> u64 {
         self.filter.filtered_rows
     }
 
-    /// Samples so far.
+    /// Samples up to now.
     pub fn samples(&self) -> u64 {
         self.maker.samples()
     }
 
-    /// How often each joint moved at which velocity so far.
+    /// Velocity histograms of the joints.
     pub fn into_velocities(self) -> Vec<VelocityHistogram> {
         self.maker.into_velocities()
     }
 
-    /// What makes panels of samples, and what makes rows of panels.
+    /// The two stages: samples to panels, panels to rows.
     pub(super) fn halves(&mut self) -> (&mut PanelMaker<'a>, &mut PanelFilter<'a>) {
         (&mut self.maker, &mut self.filter)
     }
 
-    /// Makes the rows of the next samples.
+    /// Processes the next samples.
     ///
     /// # Errors
-    /// What the consumer returns.
+    /// Errors of the consumer.
     pub fn take(&mut self, block: &MotionBlock, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
         let Self { maker, filter, panels } = self;
         let mut from = 0;
@@ -131,7 +130,6 @@ impl<'a> RowBuilder<'a> {
 }
 
 impl PanelFilter<'_> {
-    /// Makes the rows of the next panels.
     pub(super) fn take(&mut self, samples: &SamplePanels, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
         let raw = samples.as_raw();
         if raw.segment != self.segment {

@@ -1,4 +1,4 @@
-//! Logs that go where a declared torque says nothing.
+//! Logs outside of the domain of a declared torque.
 
 use super::samples::in_model_order;
 use crate::recording::LogError;
@@ -6,11 +6,7 @@ use crate::regressor_model::RegressorModel;
 use dynident_model::terms::{JointMotion, TorqueTerm};
 use dynident_recording::MotionBlock;
 
-/// That every declared torque of the model has a value at each settled sample of a block: an expression that is
-/// defined, a table that reaches so far.
-///
-/// # Errors
-/// [`LogError::Undeclared`] with the first sample where one has not.
+/// Checks that every declared torque of the model is defined at each settled sample of a block.
 pub(super) fn require_declared(
     model: &RegressorModel,
     log: &str,

@@ -1,18 +1,17 @@
-//! Which rows of a motion that is made already count.
+//! Masks of the rows of prepared motions.
 
 use super::JointRows;
 use crate::recording::MotionRecord;
 use dynident_recording::MotionBlock;
 
-/// Leaves out rows that do not count.
+/// Drops invalid rows.
 #[derive(Debug)]
 pub struct RowMask<'a> {
     record: &'a MotionRecord,
-    /// How many of the samples before each cannot be used.
+    /// Number of unusable samples before each sample.
     unusable_before: Vec<usize>,
     half: usize,
     factor: usize,
-    /// Rows of each joint so far.
     done: Vec<usize>,
     places: Vec<usize>,
     kept: Vec<f64>,
@@ -20,8 +19,8 @@ pub struct RowMask<'a> {
 }
 
 impl<'a> RowMask<'a> {
-    /// The mask of a record's rows behind a filter that reaches `half` samples to either side and keeps every
-    /// `factor`-th row; `None` where all count.
+    /// Mask of a record's rows after a filter with half-length `half` and decimation `factor`; `None` if all rows are
+    /// valid.
     pub fn of(record: &'a MotionRecord, half: usize, factor: usize) -> Option<Self> {
         if record.usable.is_empty() && record.windows.is_none() {
             return None;
@@ -46,7 +45,7 @@ impl<'a> RowMask<'a> {
         })
     }
 
-    /// The rows that count of a joint's next `all`.
+    /// The valid rows among the next rows of a joint.
     pub fn apply<'s>(&'s mut self, all: &JointRows<'_>) -> JointRows<'s> {
         let Self { record, unusable_before, half, factor, done, places, kept, coverage } = self;
         let &JointRows { joint, rows, .. } = all;

@@ -1,17 +1,19 @@
-//! From samples to rows of regressor and torque, filtered alike: what every estimator and every examination reads.
+//! Filtered rows of regressor and torque, the input of all estimators and examinations.
 //!
-//! Samples flow in blocks: positions to motion, motion to regressor blocks, regressor and torque through the same
-//! low-pass and decimation, then to a [`RowConsumer`]. The regressor of samples is never stored; filtered rows are,
-//! while they are few.
+//! Samples flow in blocks: positions to motion, motion to regressor, regressor and torque through the same low-pass and
+//! decimation, then to a [`RowConsumer`]. The unfiltered regressor is never stored; filtered rows are stored if they
+//! fit.
 
-mod beside;
 mod builder;
+mod collector;
 mod coverage;
 mod declared;
 mod filter;
 mod joint_filters;
+mod kept_log;
 mod mask;
 mod motion_noise;
+mod panel_pipeline;
 mod pass;
 mod row_block;
 mod row_store;
@@ -24,8 +26,9 @@ pub use builder::RowBuilder;
 pub use coverage::{divide_by_coverage, set_aside};
 pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
 pub use joint_filters::JointFilters;
+pub use kept_log::KeptLog;
 pub use motion_noise::noise_factors;
-pub use pass::{KeptLog, LogPass, LogStatistics};
+pub use pass::{LogPass, LogStatistics};
 pub use row_block::RowBlock;
 pub use samples::in_model_order;
 pub use velocities::VelocityHistogram;
@@ -33,73 +36,71 @@ pub use velocities::VelocityHistogram;
 use crate::recording::LogError;
 use dynident_dynamics::Panels;
 
-/// Samples that are made into regressor blocks at a time: small enough for the cache, large enough to spread the
-/// filter's overhead.
+/// Samples per panel: small enough for the cache, large enough to reduce the overhead of the filter.
 pub const PANEL_SAMPLES: usize = 256;
 
 /// Filtered rows of one joint.
 #[derive(Clone, Copy, Debug)]
 pub struct JointRows<'a> {
-    /// The joint.
+    /// Index of the joint.
     pub joint: usize,
     /// Number of rows.
     pub rows: usize,
-    /// The joint's columns of the layout one after another, each of `rows` numbers, then its torque (N m, N).
+    /// Column-major: the joint's columns of the layout with `rows` values each, then its torque (N m, N).
     pub panel: &'a [f64],
-    /// Row by row the share of the filter's weight on samples that count, by which the row was divided (at least by one
-    /// half); empty where all do. [`counted`](Self::counted) leaves out rows with less than half.
+    /// For each row the share of the filter's weight on valid samples, by which the row was divided (at least one
+    /// half); empty if all samples are valid. [`counted`](Self::counted) drops rows with less than half.
     pub coverage: &'a [f64],
 }
 
 /// Unfiltered samples of all joints.
 #[derive(Clone, Debug)]
 pub struct RawSamples<'a> {
-    /// Number of the uninterrupted piece of the log.
+    /// Index of the uninterrupted segment of the log.
     pub segment: usize,
-    /// Samples a second.
+    /// Sample rate, hertz.
     pub rate_hz: f64,
-    /// Regressor blocks with the torque as logged, or as smoothed with `smooth_torque`.
+    /// Regressor with the logged torque, smoothed if `smooth_torque` is set.
     pub panels: &'a Panels,
-    /// For each joint whether a sample's torque does not count (outlier, held, in a gap that was bridged); empty if all
-    /// count.
+    /// For each joint whether the torque of each sample is invalid (outlier, repeated value, bridged gap); empty if all
+    /// are valid.
     pub set_aside: &'a [Vec<bool>],
-    /// The samples whose motion does not rest on samples that a filter invented at the ends of a piece.
+    /// Samples without the end effects of the differentiator.
     pub settled: core::ops::Range<usize>,
 }
 
-/// What is done with a log's rows.
+/// Receives the rows of a log.
 pub trait RowConsumer {
-    /// Takes rows as they leave the parallel filter. Joints of the same instants come in their order, with as many rows
-    /// each unless windows leave some out.
+    /// Receives filtered rows. Joints of the same instants arrive in order, with the same number of rows unless windows
+    /// exclude some.
     ///
     /// # Errors
-    /// What stops the pass.
+    /// Any error stops the pass.
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError>;
 
-    /// Takes the same samples before the filter; they come before their rows. Ignored by default.
+    /// Receives the samples before the filter, ahead of their rows. Ignored by default.
     ///
     /// # Errors
-    /// What stops the pass.
+    /// Any error stops the pass.
     fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
         let _ = samples;
         Ok(())
     }
 
-    /// Whether [`raw`](Self::raw) has to be called: true by default. Rows that nobody wants the samples of need not be
-    /// made of them anew where an earlier pass over the same motion has left them.
+    /// Whether [`raw`](Self::raw) must be called; true by default. If not, a pass can reuse rows stored by an earlier
+    /// pass.
     fn reads_samples(&self) -> bool {
         true
     }
 
-    /// A consumer for each joint that takes its rows alone, where joints do not matter to each other: they may be
-    /// served side by side. None by default.
+    /// One consumer per joint, if joints are independent and may be processed in parallel. `None` by default.
     fn joints(&mut self) -> Option<Vec<&mut (dyn RowConsumer + Send)>> {
         None
     }
 }
 
-/// `panel · θ` of one joint: the torque that base parameters `theta` predict for its rows; `columns` are the joint's
-/// columns of the layout.
+/// Computes `panel · θ` of one joint, the torque that base parameters `theta` predict for its rows. `columns` are the
+/// joint's columns of the layout.
 pub fn predicted_torque(panel: &[f64], rows: usize, columns: &[usize], theta: &[f64], out: &mut Vec<f64>) {
     out.clear();
     out.resize(rows, 0.0);

@@ -1,4 +1,4 @@
-//! What the noise of the positions makes of the rows.
+//! Effect of position noise on the rows.
 
 use super::builder::RowBuilder;
 use super::filter::motion_band_hz;
@@ -11,27 +11,26 @@ use dynident_model::sample::Random;
 use dynident_recording::{Derivatives, Differentiator, ImportReport, MotionBlock, Place};
 use rayon::prelude::*;
 
-/// Samples that are looked at: a power from so many is right within a tenth or so, which costs some milliseconds.
-const SAMPLES: usize = 4096;
-/// Most times that a short log is looked at with other noise.
-const MOST_REPEATS: usize = 8;
-/// Longest series of noise.
-const LONGEST: usize = 1 << 16;
+/// Number of samples: enough for a noise power within about 10 %, in some milliseconds.
+const NOISE_SAMPLES: usize = 4096;
+/// Maximum number of noise realisations for a short log.
+const MAX_REPEATS: usize = 8;
+/// Maximum length of a noise series, samples.
+const MAX_SERIES_SAMPLES: usize = 1 << 16;
 const SEED: u64 = 0x6e6f_6973_6521;
 
-/// For every joint of the model the rows that noise adds to those of a log: `W(m + n) − W(m)` with m the motion as it
-/// was measured and n noise of the positions that has passed the same differentiator, and both the parallel filter. Of
-/// these rows N it is `NᵀN` that matters: what noise makes of `WᵀW`. Their last column, the torque, is zero.
+/// Computes the rows N that position noise adds for every joint: `N = W(m + n) − W(m)`, where m is the measured motion
+/// and n is position noise after the same differentiator, both after the parallel filter. `NᵀN` is the contribution of
+/// noise to `WᵀW`. The last column of N, the torque, is zero.
 ///
-/// n is white noise of the standard deviation that the importer found for each joint, with a fixed seed. m has its own
-/// noise already: products of two noisy velocities come out up to twice too large, which errs to the side of noise.
-/// Long logs are looked at in pieces, short ones several times; the rows are weighted to be `filtered_rows`.
+/// n is white noise with the standard deviation that the importer found for each joint, with a fixed seed. m already
+/// contains noise, so products of two noisy velocities are overestimated by a factor of up to two. Long logs are
+/// sampled in pieces, short ones several times; the rows are weighted to represent `filtered_rows`.
 ///
-/// `None` where no noise is known: for a motion that was made already, and for differentiators that follow a commanded
-/// motion.
+/// `None` if the noise is unknown: for a prepared motion, and for differentiators that follow a commanded motion.
 ///
 /// # Errors
-/// A log that cannot be read again.
+/// The log cannot be read again.
 pub fn noise_factors(
     pass: &LogPass<'_>,
     model: &RegressorModel,
@@ -56,20 +55,20 @@ pub fn noise_factors(
     let filter = pass.filter.decimation(rate_hz, pass.torque_hz.or_else(|| motion_band_hz(pass.motion)));
     let places = pass.recording.places(model.model())?;
     let builder = || RowBuilder::new(model, &places, rate_hz, filter.as_ref()).map_err(in_filter);
-    let (pieces, read) = pass.some_pieces(SAMPLES, (SAMPLES / 4).max(4 * builder()?.needed()))?;
+    let (pieces, read) = pass.some_pieces(NOISE_SAMPLES, (NOISE_SAMPLES / 4).max(4 * builder()?.needed()))?;
     let samples: usize = pieces.iter().map(|piece| piece.rows).sum();
     let differentiator = settings.build_following(report.cutoff.cutoff_hz, None).map_err(in_filter)?;
-    let repeats = (SAMPLES / samples.max(1)).clamp(1, MOST_REPEATS);
+    let repeats = (NOISE_SAMPLES / samples.max(1)).clamp(1, MAX_REPEATS);
     let mut random = Random::new(SEED);
     let noise = |_| Noise::new(differentiator.as_ref(), &mut random, &report.position_noise, (rate_hz, read, samples));
     let noise: Vec<Noise> = (0..repeats).map(noise).collect::<Result<_, _>>().map_err(in_filter)?;
-    // The rows with noise and those without, side by side: the same samples give the same panels in the same order.
+    // The same samples give the same panels in the same order, with and without noise.
     let rows = |block: &(dyn Fn(usize, &MotionBlock, usize) -> MotionBlock + Sync)| -> Result<JointPanels, LogError> {
         let (mut builder, mut panels) = (builder()?, JointPanels(vec![Vec::new(); model.dof()]));
         for repeat in 0..repeats {
             let mut from = 0;
             for piece in &pieces {
-                // A segment of its own each time, so that no filter goes on from one to the next.
+                // Separate segments, so that filters restart.
                 let segment = piece.segment + repeat * pieces.len() + 1;
                 builder.take(&MotionBlock { segment, ..block(repeat, piece, from) }, &mut panels)?;
                 from += piece.rows;
@@ -95,7 +94,7 @@ pub fn noise_factors(
     Ok(Some(factors))
 }
 
-/// Noise of all joints: of position, velocity and acceleration, joint-major.
+/// Noise of position, velocity and acceleration of all joints, joint-major.
 struct Noise {
     length: usize,
     derivatives: [Vec<f64>; 3],
@@ -108,10 +107,10 @@ impl Noise {
         position_noise: &[f64],
         (rate_hz, read, length): (f64, usize, usize),
     ) -> Result<Self, dynident_recording::FilterError> {
-        // Where a sample depends on the whole piece, the piece is as long as the log.
+        // A differentiator without a finite context needs a series as long as the log.
         let (whole, margin) = match differentiator.context_samples(rate_hz) {
             Some(context) => (length + 2 * context, context),
-            None => (read.clamp(length, LONGEST.max(length)), 0),
+            None => (read.clamp(length, MAX_SERIES_SAMPLES.max(length)), 0),
         };
         let whole = whole.max(differentiator.minimum_samples());
         let mut derivatives: [Vec<f64>; 3] = Default::default();
@@ -127,7 +126,7 @@ impl Noise {
         Ok(Self { length, derivatives })
     }
 
-    /// A piece with noise on it, the piece's first sample with sample `from` of the noise.
+    /// The piece with noise added; its first sample gets sample `from` of the noise.
     fn on(&self, piece: &MotionBlock, from: usize) -> MotionBlock {
         let mut noisy = piece.clone();
         let [q, dq, ddq] = &self.derivatives;
@@ -141,7 +140,6 @@ impl Noise {
     }
 }
 
-/// The rows of every joint, panel by panel.
 struct JointPanels(Vec<Vec<Vec<f64>>>);
 
 impl RowConsumer for JointPanels {

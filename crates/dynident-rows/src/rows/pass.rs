@@ -1,12 +1,14 @@
-//! One pass over a recording: its rows to a consumer.
+//! Passes over one recording, which send its rows to a consumer.
 
 use super::RowConsumer;
-use super::beside::panels_beside;
 use super::builder::RowBuilder;
+use super::collector::ForwardingCollector;
 use super::declared::require_declared;
 use super::filter::{ParallelFilterSettings, motion_band_hz};
+use super::kept_log::{BlockCache, KeptLog, MAX_KEPT_VALUES};
 use super::mask::RowMask;
-use super::row_store::{Keeping, Passed, RowStore};
+use super::panel_pipeline::pipelined_panels;
+use super::row_store::{PassStatistics, RowStore};
 use super::samples::SamplePanels;
 use super::velocities::VelocityHistogram;
 use crate::progress::Progress;
@@ -17,66 +19,43 @@ use dynident_dynamics::Column;
 use dynident_recording::{DecimationSettings, ImportReport, MotionBlock, MotionSettings, MotionStream};
 use std::sync::OnceLock;
 
-/// Numbers of all logs' motions together would be too many; of one log at most so many are kept, 256 MiB.
-const MOST_KEPT_NUMBERS: usize = 1 << 25;
-
-/// The motion of a log that was read once.
-#[derive(Debug)]
-pub struct KeptLog {
-    blocks: Vec<MotionBlock>,
-    rate_hz: f64,
-    report: ImportReport,
-    /// What filters have made of it.
-    pub(super) rows: RowStore,
-}
-
-impl KeptLog {
-    fn new(blocks: Vec<MotionBlock>, rate_hz: f64, report: ImportReport) -> Self {
-        Self { blocks, rate_hz, report, rows: RowStore::default() }
-    }
-
-    fn samples(&self) -> usize {
-        self.blocks.iter().map(|block| block.rows).sum()
-    }
-}
-
-/// What is known of a recording once its rows have passed.
+/// Properties of a recording after a pass.
 #[derive(Clone, Debug)]
 pub struct LogStatistics {
-    /// What the importer found; `None` for a motion that was made already.
+    /// Report of the importer; `None` for a prepared motion.
     pub report: Option<ImportReport>,
-    /// Cut-off of the differentiator in force.
+    /// Cut-off of the differentiator in use, hertz.
     pub motion_cutoff_hz: Option<f64>,
-    /// Rate after decimation.
+    /// Rate after decimation, hertz.
     pub filtered_rate_hz: f64,
-    /// Gain one half of the parallel filter, if there is one.
+    /// Half-gain frequency of the parallel filter, hertz; `None` without a filter.
     pub filter_cutoff_hz: Option<f64>,
     /// Filtered rows of each joint.
     pub filtered_rows: u64,
-    /// How often each joint of the model moved at which velocity.
+    /// Velocity histogram of each joint of the model.
     pub velocities: Vec<VelocityHistogram>,
 }
 
-/// One recording to be passed: everything but the consumer.
+/// Inputs of a pass over one recording, except the consumer.
 #[derive(Clone, Copy)]
 pub struct LogPass<'a> {
-    /// The recording.
+    /// Recording to read.
     pub recording: &'a Recording,
-    /// What makes its rows.
+    /// Model that defines the rows.
     pub model: &'a RegressorModel,
-    /// The motion settings with the cut-off that is in force for all logs.
+    /// Motion settings with the cut-off that all logs share.
     pub motion: &'a MotionSettings,
-    /// The parallel filter.
+    /// Parallel filter.
     pub filter: &'a ParallelFilterSettings,
-    /// The cut-off that the parallel filter follows, where it is not the motion's.
+    /// Cut-off that the parallel filter follows, hertz; `None` for that of the motion.
     pub torque_hz: Option<f64>,
-    /// Whether a second thread reads, and joints whose rows are kept are served side by side.
+    /// Whether a second thread reads, and stored rows are sent to the joints' consumers in parallel.
     pub reader_thread: bool,
-    /// Stop after about so many samples.
+    /// Approximate number of samples after which the pass ends.
     pub most_samples: Option<u64>,
-    /// Hears of the samples that have passed.
+    /// Receives the number of samples read.
     pub progress: &'a dyn Progress,
-    /// Where the log's motion is kept for later passes, if it fits.
+    /// Storage of the log's motion for later passes, if it fits.
     pub kept: Option<&'a OnceLock<KeptLog>>,
 }
 
@@ -86,7 +65,6 @@ impl core::fmt::Debug for LogPass<'_> {
     }
 }
 
-/// The motion behind a pass.
 enum Motion<'a> {
     Kept(&'a KeptLog),
     Stream(Box<MotionStream>),
@@ -107,9 +85,8 @@ impl LogPass<'_> {
     /// Sends the recording's rows to `consumer`.
     ///
     /// # Errors
-    /// A recording that cannot be read, lacks a temperature that friction needs, goes where a declared torque says
-    /// nothing, or leaves no rows behind the filter;
-    /// and what the consumer returns.
+    /// The recording cannot be read, lacks a temperature that friction needs, leaves the domain of a declared torque,
+    /// or has no rows after the filter. Errors of the consumer.
     pub fn run(&self, consumer: &mut dyn RowConsumer) -> Result<LogStatistics, LogError> {
         let Recording { name, samples, .. } = self.recording;
         if let Some(joint) = self.model.joint_that_needs_temperature().filter(|_| !self.recording.has_temperature()) {
@@ -156,7 +133,7 @@ impl LogPass<'_> {
             Motion::Stream(stream) => {
                 let keeps = self.kept.is_some() && filter.as_ref().is_some_and(|one| self.may_keep_rows(one, consumer));
                 let blocks = if keeps {
-                    let mut keeping = Keeping::new(consumer, self.model.dof());
+                    let mut keeping = ForwardingCollector::new(consumer, self.model.dof());
                     let blocks = self.stream(stream, &mut builder, &mut keeping)?;
                     made = keeping.rows;
                     blocks
@@ -165,20 +142,19 @@ impl LogPass<'_> {
                 };
                 report = Some(stream.report());
                 if let (Some(kept), Some(blocks)) = (self.kept, blocks) {
-                    // Another thread may have kept the same meanwhile.
+                    // Another thread may have stored the same motion in the meantime.
                     let _ = kept.set(KeptLog::new(blocks, rate_hz, stream.report()));
                 }
             }
         }
         let (rows, needed) = (builder.filtered_rows(), builder.needed());
-        let passed = Passed::from(builder);
+        let passed = PassStatistics::from(builder);
         if let (Some(made), Some(kept), Some(filter)) = (made, self.kept.and_then(OnceLock::get), &filter) {
             kept.rows.keep(self.model, filter, made, passed.clone());
         }
         self.statistics(report, rate_hz, filter.as_ref(), rows, needed, passed)
     }
 
-    /// What is known of a recording that has passed.
     fn statistics(
         &self,
         report: Option<ImportReport>,
@@ -186,7 +162,7 @@ impl LogPass<'_> {
         filter: Option<&DecimationSettings>,
         filtered_rows: u64,
         needed: usize,
-        passed: Passed,
+        passed: PassStatistics,
     ) -> Result<LogStatistics, LogError> {
         if filtered_rows == 0 {
             let log = self.recording.name.clone();
@@ -203,7 +179,7 @@ impl LogPass<'_> {
         })
     }
 
-    /// Whether this pass may take rows that others have filtered, and leave its own.
+    /// Whether this pass can use rows that other passes have filtered, and store its own.
     fn may_keep_rows(&self, filter: &DecimationSettings, consumer: &dyn RowConsumer) -> bool {
         !consumer.reads_samples()
             && self.most_samples.is_none()
@@ -211,7 +187,7 @@ impl LogPass<'_> {
             && filter.factor > 1
     }
 
-    /// Sends the rows of a log that is kept to `consumer`; only those columns are made that no pass has left.
+    /// Sends the rows of a stored log to `consumer` and filters only the columns that are not stored yet.
     fn kept_rows(
         &self,
         kept: &KeptLog,
@@ -223,7 +199,7 @@ impl LogPass<'_> {
         let in_filter = |source| LogError::Filter { log: name.clone(), source };
         let mut needed = 0;
         let mut made = 0;
-        let mut pass = |terms: Option<&[Column]>, consumer: &mut dyn RowConsumer| -> Result<Passed, LogError> {
+        let mut pass = |terms: Option<&[Column]>, consumer: &mut dyn RowConsumer| -> Result<PassStatistics, LogError> {
             let mut builder = match terms {
                 None => RowBuilder::new(self.model, places, kept.rate_hz, Some(filter)),
                 Some(terms) => RowBuilder::of_terms(self.model, terms, places, kept.rate_hz, Some(filter)),
@@ -236,13 +212,13 @@ impl LogPass<'_> {
         let rows = kept.rows.rows(self.model, filter, &mut pass)?;
         self.progress.advance(rows.samples() - made);
         rows.give(self.model, consumer, self.reader_thread)?;
-        let passed = Passed { samples: rows.samples(), velocities: rows.velocities().to_vec() };
+        let passed = PassStatistics { samples: rows.samples(), velocities: rows.velocities().to_vec() };
         self.statistics(Some(kept.report.clone()), kept.rate_hz, Some(filter), rows.count(), needed, passed)
     }
 
-    /// Gives the motion to `take`, block by block and without its regressor, all of it or as many samples as are asked
-    /// for: as it was kept, or read once and kept if it fits. Returns what the importer found; `None` for a motion that
-    /// was made already.
+    /// Passes the motion to `take` block by block, without its regressor, until the end or until `most_samples`. Uses
+    /// the stored motion; otherwise reads the log and stores it if it fits. Returns the importer's report; `None` for a
+    /// prepared motion.
     pub fn each_block(
         &self,
         take: &mut dyn FnMut(&MotionBlock) -> Result<(), LogError>,
@@ -282,7 +258,6 @@ impl LogPass<'_> {
                 }
                 let report = stream.report();
                 if let (Some(kept), Some(blocks)) = (self.kept, keeper.blocks) {
-                    // Another thread may have kept the same meanwhile.
                     let _ = kept.set(KeptLog::new(blocks, stream.rate_hz(), report.clone()));
                 }
                 Ok(Some(report))
@@ -290,9 +265,9 @@ impl LogPass<'_> {
         }
     }
 
-    /// Some pieces of the motion, spread over the whole log where it was kept, else its first ones: about `samples`
-    /// samples in pieces of `piece` or less, a piece with a segment of its own each. None for a motion that was made
-    /// already. The second number is how many samples the pieces were taken from.
+    /// Selects pieces of the motion: about `samples` samples, in pieces of at most `piece` samples, each with a
+    /// separate segment number. The pieces are spread over a stored log; otherwise they come from its beginning. Empty
+    /// for a prepared motion. The second value is the number of samples from which the pieces were selected.
     pub fn some_pieces(&self, samples: usize, piece: usize) -> Result<(Vec<MotionBlock>, usize), LogError> {
         let piece = piece.max(1);
         let of = |blocks: &[MotionBlock]| {
@@ -340,7 +315,6 @@ impl LogPass<'_> {
         Ok(())
     }
 
-    /// Sends the rows of blocks that are kept to `consumer`, all of them or as many as are asked for.
     fn take_all(
         &self,
         blocks: &[MotionBlock],
@@ -360,7 +334,7 @@ impl LogPass<'_> {
         Ok(())
     }
 
-    /// Sends the rows of blocks to `consumer`, with a second thread that gets them and makes their panels.
+    /// Sends the rows of blocks to `consumer`; a second thread gets the blocks and makes their panels.
     fn beside<B: Borrow<MotionBlock> + Send>(
         &self,
         builder: &mut RowBuilder<'_>,
@@ -376,7 +350,7 @@ impl LogPass<'_> {
             Ok(maker.make(block, from, panels))
         };
         let filter = |panels: &SamplePanels| filter.take(panels, consumer);
-        panels_beside(next, make, filter, |block| {
+        pipelined_panels(next, make, filter, |block| {
             self.progress.advance(block.borrow().rows as u64);
             keep(block)
         })
@@ -386,16 +360,15 @@ impl LogPass<'_> {
         self.most_samples.is_some_and(|most| builder.samples() >= most)
     }
 
-    /// Where the blocks of a log go that is read whole and seems to fit.
+    /// Cache for the blocks of a log that is read completely and seems to fit.
     fn block_cache(&self) -> BlockCache {
         let rows = self.recording.estimated_rows().unwrap_or(0) as usize;
-        let seems_to_fit = rows.saturating_mul(4 * self.model.dof()) <= MOST_KEPT_NUMBERS;
+        let seems_to_fit = rows.saturating_mul(4 * self.model.dof()) <= MAX_KEPT_VALUES;
         let keeps = self.kept.is_some() && self.most_samples.is_none() && seems_to_fit;
-        BlockCache { blocks: keeps.then(Vec::new), numbers: 0 }
+        BlockCache::new(keeps)
     }
 
-    /// Reads a log to its end, or to as many samples as are asked for; returns its blocks if it was read whole and they
-    /// fit.
+    /// Reads a log to its end or until `most_samples`; returns its blocks if it was read completely and they fit.
     fn stream(
         &self,
         stream: &mut MotionStream,
@@ -424,32 +397,6 @@ impl LogPass<'_> {
     }
 }
 
-/// Keeps blocks until they are too many.
-struct BlockCache {
-    blocks: Option<Vec<MotionBlock>>,
-    numbers: usize,
-}
-
-impl BlockCache {
-    /// Returns the block if it is not kept.
-    fn keep(&mut self, block: MotionBlock) -> Option<MotionBlock> {
-        let MotionBlock { q, dq, ddq, tau, tau_smooth, temperature_c, .. } = &block;
-        // Marks take an eighth of a number each.
-        self.numbers += block.set_aside.len() / 8;
-        self.numbers += [q, dq, ddq, tau, tau_smooth, temperature_c].into_iter().map(Vec::len).sum::<usize>();
-        if self.numbers > MOST_KEPT_NUMBERS {
-            self.blocks = None;
-        }
-        match &mut self.blocks {
-            Some(blocks) => {
-                blocks.push(block);
-                None
-            }
-            None => Some(block),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::test_log::TestLog;
@@ -457,7 +404,7 @@ mod tests {
     use dynident_dynamics::ParametricModel;
 
     #[test]
-    fn a_pass_over_blocks_ends_where_enough_has_passed() {
+    fn a_pass_over_blocks_ends_after_most_samples() {
         let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
         let model = dynident_model::load_robot(robot).unwrap().model;
         let model = RegressorModel::from(ParametricModel::new(model, Vec::new()).unwrap());

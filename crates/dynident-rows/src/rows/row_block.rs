@@ -1,24 +1,24 @@
-//! Rows of one joint, gathered until they are a block.
+//! Blocks of a joint's rows.
 
 use dynident_estimation::factor::BLOCK_ROWS;
 
-/// Takes a joint's rows as they leave a filter, some at a time, and gives them on in blocks of [`BLOCK_ROWS`]: a factor
-/// takes in a large block in a fraction of the time of its parts, and its numbers do not depend on how they come.
+/// Collects rows of a joint into blocks of [`BLOCK_ROWS`]. A factor absorbs a large block much faster than its parts,
+/// and the result does not depend on how the rows arrive.
 #[derive(Clone, Debug)]
 pub struct RowBlock {
-    /// Column by column, with room for a whole block in each.
+    /// Column-major, with room for a whole block per column.
     values: Vec<f64>,
     columns: usize,
     rows: usize,
 }
 
 impl RowBlock {
-    /// No rows yet of so many columns, the torque among them.
+    /// Empty block with this number of columns, torque included.
     pub fn new(columns: usize) -> Self {
         Self { values: vec![0.0; columns * BLOCK_ROWS], columns, rows: 0 }
     }
 
-    /// Takes `rows` rows, column by column; whole blocks go to `take`.
+    /// Adds `rows` rows (column-major); complete blocks go to `take`.
     pub fn push<E>(
         &mut self,
         panel: &[f64],
@@ -41,7 +41,7 @@ impl RowBlock {
         Ok(())
     }
 
-    /// Gives the rest to `take`.
+    /// Passes the remaining rows to `take`.
     pub fn finish<E>(mut self, take: impl FnOnce(&[f64], usize) -> Result<(), E>) -> Result<(), E> {
         if self.rows == 0 {
             return Ok(());
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blocks_are_the_same_however_rows_come() {
+    fn blocks_do_not_depend_on_the_arrival_of_rows() {
         let count = 2 * BLOCK_ROWS + 77;
         let value = |column: usize, row: usize| (1000 * column + row) as f64;
         for pieces in [1, 5, BLOCK_ROWS, BLOCK_ROWS + 3, count] {

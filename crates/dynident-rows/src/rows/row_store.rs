@@ -1,10 +1,11 @@
-//! Rows that passes over a log have filtered before.
+//! Storage of filtered rows for later passes.
 //!
-//! Passes over one motion differ in few columns: friction whose constants move, candidates, terms that know another
-//! load. All others come out of the same filter with the same numbers, so they are kept while they are few, and a pass
-//! makes only the columns that it does not find. What a consumer sees is what it would see without, bit for bit.
+//! Passes over one motion differ in few columns: friction with other constants, candidate terms, terms with another
+//! load. All other columns are identical, so they are stored, and a pass filters only the missing columns. The rows are
+//! bit-identical to those without storage.
 
 use super::builder::RowBuilder;
+use super::collector::{CollectedJoint, Collector, MAX_STORED_VALUES};
 use super::velocities::VelocityHistogram;
 use super::{JointRows, RowConsumer};
 use crate::recording::LogError;
@@ -15,49 +16,44 @@ use dynident_recording::DecimationSettings;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Numbers that are kept of one log, at most: 64 MiB.
-const MOST_NUMBERS: usize = 1 << 23;
-
-/// A column of one joint as it left the filter.
 type Filtered = Arc<Vec<f64>>;
 
-/// Sends all columns of a model, or some of its terms, through a filter to a consumer.
-pub(super) type FilterPass<'p> = dyn FnMut(Option<&[Column]>, &mut dyn RowConsumer) -> Result<Passed, LogError> + 'p;
+/// Filters all columns of a model, or some of its terms, into a consumer.
+pub(super) type FilterPass<'p> =
+    dyn FnMut(Option<&[Column]>, &mut dyn RowConsumer) -> Result<PassStatistics, LogError> + 'p;
 
-/// The filtered rows of one log, by filter.
+/// Filtered rows of one log, by filter.
 #[derive(Debug, Default)]
 pub(super) struct RowStore(Mutex<Vec<Arc<FilteredRows>>>);
 
-/// What one filter has made of a log: the same rows for any model of the same bodies.
+/// Rows of one log after one filter, valid for any model of the same bodies.
 #[derive(Clone, Debug)]
 pub(super) struct FilteredRows {
     filter: DecimationSettings,
     model: Model,
-    /// Rows of every panel of samples, as they go to a consumer.
+    /// Number of rows per panel of samples, as sent to a consumer.
     pieces: Vec<usize>,
     joints: Vec<FilteredJoint>,
     samples: u64,
     velocities: Vec<VelocityHistogram>,
 }
 
-/// All rows of one joint.
 #[derive(Clone, Debug, Default)]
 struct FilteredJoint {
     columns: Vec<(Column, Filtered)>,
     torque: Filtered,
-    /// The rows' coverage, one where all samples count.
+    /// Coverage of the rows; 1 if all samples are valid.
     coverage: Filtered,
 }
 
 impl RowStore {
-    /// Whether the rows that this filter makes of `samples` samples are few enough to be kept.
+    /// Whether the filtered rows of `samples` samples fit.
     pub(super) fn has_room(model: &RegressorModel, filter: &DecimationSettings, samples: usize) -> bool {
         let columns: usize = (0..model.dof()).map(|joint| model.layout().joint_columns(joint).len() + 2).sum();
-        samples / filter.factor * columns <= MOST_NUMBERS
+        samples / filter.factor * columns <= MAX_STORED_VALUES
     }
 
-    /// The rows of `model` behind `filter`: what is kept of them, and the rest of what `pass` sends to its consumer
-    /// from a builder of all columns or of some terms.
+    /// Rows of `model` after `filter`: the stored columns, and the missing ones from `pass`.
     pub(super) fn rows(
         &self,
         model: &RegressorModel,
@@ -79,46 +75,50 @@ impl RowStore {
                 FilteredRows::new(model, filter, made, passed)
             }
         };
-        self.put(rows.fewer(model));
+        self.put(rows.without_rarely_used(model));
         Ok(Arc::new(rows))
     }
 
-    /// Keeps all rows of a pass over samples that were read for it.
-    pub(super) fn keep(&self, model: &RegressorModel, filter: &DecimationSettings, made: Collector, passed: Passed) {
-        self.put(FilteredRows::new(model, filter, made, passed).fewer(model));
+    pub(super) fn keep(
+        &self,
+        model: &RegressorModel,
+        filter: &DecimationSettings,
+        made: Collector,
+        passed: PassStatistics,
+    ) {
+        self.put(FilteredRows::new(model, filter, made, passed).without_rarely_used(model));
     }
 
-    /// Keeps rows in place of those of the same filter; of other filters the oldest go first.
+    /// Replaces the rows of the same filter; drops the oldest other filters if there is no room.
     fn put(&self, rows: FilteredRows) {
         let mut all = self.lock();
         all.retain(|kept| !kept.is_of(&rows.model, &rows.filter));
         all.push(Arc::new(rows));
-        while all.len() > 1 && all.iter().map(|kept| kept.numbers()).sum::<usize>() > MOST_NUMBERS {
+        while all.len() > 1 && all.iter().map(|kept| kept.numbers()).sum::<usize>() > MAX_STORED_VALUES {
             all.remove(0);
         }
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Arc<FilteredRows>>> {
-        // What is kept is whole at any time.
+        // The content is consistent even if another thread panicked.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// What a pass has seen beside its rows.
 #[derive(Clone)]
-pub(super) struct Passed {
+pub(super) struct PassStatistics {
     pub(super) samples: u64,
     pub(super) velocities: Vec<VelocityHistogram>,
 }
 
-impl From<RowBuilder<'_>> for Passed {
+impl From<RowBuilder<'_>> for PassStatistics {
     fn from(builder: RowBuilder<'_>) -> Self {
         Self { samples: builder.samples(), velocities: builder.into_velocities() }
     }
 }
 
 impl FilteredRows {
-    fn new(model: &RegressorModel, filter: &DecimationSettings, made: Collector, passed: Passed) -> Self {
+    fn new(model: &RegressorModel, filter: &DecimationSettings, made: Collector, passed: PassStatistics) -> Self {
         let layout = model.layout();
         let of_joint = |(joint, made): (usize, CollectedJoint)| {
             let columns = layout.joint_columns(joint).iter().map(|&column| layout.columns()[column].clone());
@@ -140,7 +140,7 @@ impl FilteredRows {
         self.filter == *filter && self.model == *model
     }
 
-    /// The terms of the model that are not here, in its order; `None` where bodies are not.
+    /// Terms of the model that are not stored, in order; `None` if a body is missing.
     fn missing_terms(&self, model: &RegressorModel) -> Option<Vec<Column>> {
         let layout = model.layout();
         let mut missing = vec![false; layout.columns().len()];
@@ -154,7 +154,7 @@ impl FilteredRows {
         missing.iter().all(|column| matches!(column, Column::Term(_))).then_some(missing)
     }
 
-    /// The same with further terms, which the collector has in their order.
+    /// Adds terms, in the order of the collector.
     fn with_terms(&self, terms: &[Column], made: Collector) -> Self {
         let mut all = self.clone();
         for (joint, (kept, made)) in all.joints.iter_mut().zip(made.joints).enumerate() {
@@ -165,20 +165,20 @@ impl FilteredRows {
         all
     }
 
-    /// What is worth being kept for other models: no columns that know a load, which changes with every fit; and of
-    /// those that this model does not have none where all are too many.
-    fn fewer(&self, model: &RegressorModel) -> Self {
+    /// Drops columns that depend on a load, because the load changes with every fit. If the rest does not fit, drops
+    /// the columns that are not in this model.
+    fn without_rarely_used(&self, model: &RegressorModel) -> Self {
         let layout = model.layout();
-        let mut fewer = self.clone();
-        for kept in &mut fewer.joints {
+        let mut without_rarely_used = self.clone();
+        for kept in &mut without_rarely_used.joints {
             kept.columns.retain(|(column, _)| !matches!(column, Column::Term(term) if term.needs_load()));
         }
-        if fewer.numbers() > MOST_NUMBERS {
-            for kept in &mut fewer.joints {
+        if without_rarely_used.numbers() > MAX_STORED_VALUES {
+            for kept in &mut without_rarely_used.joints {
                 kept.columns.retain(|(column, _)| layout.columns().contains(column));
             }
         }
-        fewer
+        without_rarely_used
     }
 
     fn numbers(&self) -> usize {
@@ -186,23 +186,20 @@ impl FilteredRows {
         rows * self.joints.iter().map(|joint| joint.columns.len() + 2).sum::<usize>()
     }
 
-    /// Filtered rows of each joint.
     pub(super) fn count(&self) -> u64 {
         self.pieces.iter().sum::<usize>() as u64
     }
 
-    /// Samples that they were made of.
     pub(super) fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// How often each joint moved at which velocity.
     pub(super) fn velocities(&self) -> &[VelocityHistogram] {
         &self.velocities
     }
 
-    /// Sends the rows of the model to a consumer, in the pieces in which a pass over samples would; `beside` each other
-    /// for all joints where the consumer lets it.
+    /// Sends the rows of the model to a consumer in the same pieces as a pass over samples; joints in parallel if
+    /// `beside` is set and the consumer supports it.
     pub(super) fn give(
         &self,
         model: &RegressorModel,
@@ -232,7 +229,7 @@ impl FilteredRows {
     }
 }
 
-/// The columns of a joint in a model's order, its torque last.
+/// Columns of a joint in the order of a model, torque last.
 struct JointPieces<'k> {
     joint: usize,
     columns: Vec<&'k [f64]>,
@@ -247,7 +244,6 @@ impl<'k> JointPieces<'k> {
         Self { joint, columns, coverage: &kept.coverage }
     }
 
-    /// Some of its rows, gathered in `panel`.
     fn piece<'p>(&'p self, from: usize, rows: usize, panel: &'p mut Vec<f64>) -> JointRows<'p> {
         panel.clear();
         for column in &self.columns {
@@ -265,76 +261,6 @@ impl FilteredJoint {
     }
 }
 
-/// Takes all rows of a pass together.
-pub(super) struct Collector {
-    pieces: Vec<usize>,
-    joints: Vec<CollectedJoint>,
-}
-
-#[derive(Clone, Default)]
-struct CollectedJoint {
-    columns: Vec<Vec<f64>>,
-    coverage: Vec<f64>,
-}
-
-impl Collector {
-    fn new(dof: usize) -> Self {
-        Self { pieces: Vec::new(), joints: vec![CollectedJoint::default(); dof] }
-    }
-}
-
-impl RowConsumer for Collector {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        if rows.joint == 0 {
-            self.pieces.push(rows.rows);
-        }
-        let joint = &mut self.joints[rows.joint];
-        joint.columns.resize_with(rows.panel.len() / rows.rows, Vec::new);
-        for (column, values) in joint.columns.iter_mut().zip(rows.panel.chunks_exact(rows.rows)) {
-            column.extend_from_slice(values);
-        }
-        if rows.coverage.is_empty() {
-            joint.coverage.resize(joint.coverage.len() + rows.rows, 1.0);
-        } else {
-            joint.coverage.extend_from_slice(rows.coverage);
-        }
-        Ok(())
-    }
-
-    fn reads_samples(&self) -> bool {
-        false
-    }
-}
-
-/// Sends rows on to a consumer and takes them together, until they are too many.
-pub(super) struct Keeping<'c> {
-    consumer: &'c mut dyn RowConsumer,
-    /// None once they are too many.
-    pub(super) rows: Option<Collector>,
-    numbers: usize,
-}
-
-impl<'c> Keeping<'c> {
-    pub(super) fn new(consumer: &'c mut dyn RowConsumer, dof: usize) -> Self {
-        Self { consumer, rows: Some(Collector::new(dof)), numbers: 0 }
-    }
-}
-
-impl RowConsumer for Keeping<'_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        self.numbers += rows.panel.len() + rows.rows;
-        self.rows = self.rows.take().filter(|_| self.numbers <= MOST_NUMBERS);
-        if let Some(kept) = &mut self.rows {
-            kept.filtered(rows)?;
-        }
-        self.consumer.filtered(rows)
-    }
-
-    fn reads_samples(&self) -> bool {
-        false
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::test_log::TestLog;
@@ -345,7 +271,7 @@ mod tests {
         Coulomb, CoulombShape, DriveChoice, LoadFriction, MaxwellSlip, Stribeck, TorqueTerm, terms_per_joint,
     };
 
-    /// All rows to the last bit; with samples in hand a pass makes every column itself.
+    /// Bits of all rows. A consumer that reads samples makes the pass compute every column.
     #[derive(Default)]
     struct Bits {
         rows: Vec<(usize, usize, Vec<u64>, Vec<u64>)>,
@@ -356,7 +282,7 @@ mod tests {
     impl RowConsumer for Bits {
         fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
             let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
-            // Where all samples count, ones say so as well as nothing.
+            // An empty coverage is equivalent to ones.
             let covered = if rows.coverage.is_empty() { &vec![1.0; rows.rows][..] } else { rows.coverage };
             self.rows.push((rows.joint, rows.rows, bits(rows.panel), bits(covered)));
             Ok(())
@@ -372,7 +298,6 @@ mod tests {
         }
     }
 
-    /// A consumer for each joint.
     struct ByJoint(Vec<Bits>);
 
     impl RowConsumer for ByJoint {
@@ -390,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pass_over_rows_that_are_kept_sees_what_a_pass_over_samples_sees() {
+    fn stored_rows_are_bit_identical_to_filtered_samples() {
         let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
         let model = dynident_model::load_robot(robot).unwrap().model;
         let smooth = CoulombShape::Smooth { width: 0.02 };
@@ -408,7 +333,7 @@ mod tests {
             let of_bodies: Vec<f64> = (0..plain.layout().columns().len()).map(|k| values + 0.1 * k as f64).collect();
             wide.with_load_of(&plain, &of_bodies)
         };
-        // One after another: what is kept grows, loads change, and columns are asked for again.
+        // In sequence: storage grows, loads change, and columns recur.
         let models = [
             plain.clone(),
             plain.with_further_columns(coulomb(0.05).chain([stribeck(0), slip(3)])),
@@ -442,6 +367,8 @@ mod tests {
                 }
             }
         }
-        assert!(log.kept.get().unwrap().rows.lock().iter().map(|rows| rows.numbers()).sum::<usize>() <= MOST_NUMBERS);
+        assert!(
+            log.kept.get().unwrap().rows.lock().iter().map(|rows| rows.numbers()).sum::<usize>() <= MAX_STORED_VALUES
+        );
     }
 }

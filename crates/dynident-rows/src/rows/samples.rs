@@ -1,4 +1,4 @@
-//! Samples of a motion as panels of regressor and torque, before any filter.
+//! Panels of regressor and torque before any filter.
 
 use super::coverage::set_aside;
 use super::velocities::VelocityHistogram;
@@ -12,7 +12,7 @@ use dynident_model::terms::JointMotion;
 use dynident_recording::MotionBlock;
 use std::borrow::Cow;
 
-/// Some samples of a block's positions, velocities and accelerations, joints in the model's order.
+/// Positions, velocities and accelerations of some samples of a block, joints in the order of the model.
 pub fn in_model_order(block: &MotionBlock, places: &[usize], from: usize, samples: usize, motion: &mut [Vec<f64>; 3]) {
     for (to, source) in motion.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
         to.clear();
@@ -22,12 +22,12 @@ pub fn in_model_order(block: &MotionBlock, places: &[usize], from: usize, sample
     }
 }
 
-/// Makes the panels of a motion, some hundred samples after the other.
+/// Computes the panels of a motion, [`PANEL_SAMPLES`] samples at a time.
 #[derive(Debug)]
 pub(super) struct PanelMaker<'a> {
     model: &'a RegressorModel,
     layout: Cow<'a, PanelLayout>,
-    /// Whether bodies' columns are made: some columns of terms need none.
+    /// Whether columns of bodies are computed; some terms do not need them.
     has_bodies: bool,
     places: Vec<usize>,
     workspace: BatchWorkspace,
@@ -39,7 +39,7 @@ pub(super) struct PanelMaker<'a> {
     samples: u64,
 }
 
-/// Some samples of all joints, with the torque as logged.
+/// Panels of all joints, with the logged torque.
 #[derive(Debug, Default)]
 pub(super) struct SamplePanels {
     panels: Panels,
@@ -62,20 +62,20 @@ impl SamplePanels {
 }
 
 impl<'a> PanelMaker<'a> {
-    /// All columns of a model, joint `j` of which stands at place `places[j]` of the motion.
+    /// All columns of a model; joint `j` has index `places[j]` in the motion.
     pub(super) fn new(model: &'a RegressorModel, places: &[usize]) -> Self {
         let (layout, load) = (Cow::Borrowed(model.layout()), model.load_parameters.clone());
         Self::of_layout(model, layout, true, load, places)
     }
 
-    /// Nothing but some `terms` of the model and what they need: where they know the load, bodies stand before them.
+    /// Only some `terms` of the model, after the columns of the bodies if a term depends on the load.
     pub(super) fn of_terms(model: &'a RegressorModel, terms: &[Column], places: &[usize]) -> Self {
         let needs_load = terms.iter().any(|column| matches!(column, Column::Term(term) if term.needs_load()));
         let known = model.layout().columns();
         let bodies = known.iter().filter(|column| needs_load && matches!(column, Column::Body { .. }));
         let columns: Vec<Column> = bodies.chain(terms).cloned().collect();
         let load = model.load_parameters.as_ref().filter(|_| needs_load).map(|parameters| {
-            // One for every column, those of terms unread.
+            // One value per column; those of terms are not read.
             let of_column =
                 |column: &Column| known.iter().position(|known| known == column).map_or(0.0, |place| parameters[place]);
             columns.iter().map(of_column).collect()
@@ -106,27 +106,23 @@ impl<'a> PanelMaker<'a> {
         }
     }
 
-    /// Which columns the panels have.
     pub(super) fn layout(&self) -> &PanelLayout {
         &self.layout
     }
 
-    /// Where the model's joints stand in the motion.
     pub(super) fn places(&self) -> &[usize] {
         &self.places
     }
 
-    /// Samples so far.
     pub(super) fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// How often each joint moved at which velocity so far.
     pub(super) fn into_velocities(self) -> Vec<VelocityHistogram> {
         self.velocities
     }
 
-    /// Makes the panels of a block's samples from `from` on, as many as a panel has; returns where the next begin.
+    /// Computes one panel of a block from sample `from`; returns the first sample of the next panel.
     pub(super) fn make(&mut self, block: &MotionBlock, from: usize, out: &mut SamplePanels) -> usize {
         if block.segment != self.segment {
             self.segment = block.segment;
@@ -174,7 +170,7 @@ impl<'a> PanelMaker<'a> {
     }
 }
 
-/// The samples of a panel whose motion does not rest on samples invented at the ends of a piece.
+/// Samples of a panel without the end effects of the differentiator.
 fn settled(block: &MotionBlock, from: usize, samples: usize) -> Range<usize> {
     let [begin, end] = block.unsettled;
     let inside = begin..block.rows.saturating_sub(end);

@@ -1,5 +1,3 @@
-//! A recording for tests of passes.
-
 use super::{KeptLog, LogPass, ParallelFilterSettings};
 use crate::progress::Silent;
 use crate::recording::Recording;
@@ -7,7 +5,7 @@ use crate::regressor_model::RegressorModel;
 use dynident_recording::{DifferentiatorSettings, JointSamples, MotionSettings};
 use std::sync::OnceLock;
 
-/// A recording, its filters, and what passes over it leave.
+/// A recording with its filters and stored motion, for tests of passes.
 pub(crate) struct TestLog {
     recording: Recording,
     motion: MotionSettings,
@@ -26,7 +24,7 @@ impl TestLog {
         }
     }
 
-    /// A pass over all samples in one thread, with rows above the motion's band.
+    /// A single-threaded pass over all samples, with rows above the motion's band.
     pub(crate) fn pass<'p>(&'p self, model: &'p RegressorModel) -> LogPass<'p> {
         LogPass {
             recording: &self.recording,
@@ -42,7 +40,7 @@ impl TestLog {
     }
 }
 
-/// Two holes and some torques that are none, at 500 Hz.
+/// A log at 500 Hz with two gaps and some torque outliers.
 fn recording(joints: &[String]) -> Recording {
     let rows = (0..20_000).filter(|row| !(7_000..7_300).contains(row) && !(15_000..15_500).contains(row));
     let time_s: Vec<f64> = rows.map(|row| f64::from(row) / 500.0).collect();

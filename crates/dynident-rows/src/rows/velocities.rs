@@ -1,43 +1,43 @@
-//! How often a joint moved at which velocity: what friction laws are compared over once the log is out of reach.
+//! Velocity histograms of joints, used to compare friction laws without the log.
 
 use serde::{Deserialize, Serialize};
 
-/// Bins on either side of rest at most: the largest velocity lies in the upper half of them.
-const MOST_BINS: usize = 128;
+/// Maximum number of bins on each side of zero; the largest velocity is in the upper half of them.
+const MAX_BINS: usize = 128;
 
-/// The first width of a bin, rad/s (m/s): below every velocity that matters.
-const LEAST_WIDTH: f64 = 1.0 / (1 << 20) as f64;
+/// Initial bin width, rad/s (m/s), smaller than any relevant velocity.
+const MIN_BIN_WIDTH_RAD_S: f64 = 1.0 / (1 << 20) as f64;
 
-/// Samples of a joint by velocity, in bins of one width on either side of rest. The width is a power of two, the least
-/// at which 128 bins hold the largest velocity, so that the counts do not depend on the order of samples.
+/// Samples of a joint by velocity, in bins of equal width on each side of zero. The width is the smallest power of two
+/// with which 128 bins reach the largest velocity, so that the result does not depend on the order of samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct VelocityHistogram {
-    /// Width of a bin, rad/s (m/s).
+    /// Bin width, rad/s (m/s).
     pub width_rad_s: f64,
-    /// Samples of velocity zero.
+    /// Samples with velocity zero.
     pub resting: u64,
-    /// Samples by positive velocity, from rest up: bin k holds `k width <= dq < (k + 1) width`.
+    /// Samples with positive velocity: bin k contains `k width <= dq < (k + 1) width`.
     pub forward: Vec<u64>,
-    /// Samples by negative velocity, from rest down.
+    /// Samples with negative velocity, mirrored.
     pub backward: Vec<u64>,
 }
 
 impl Default for VelocityHistogram {
     fn default() -> Self {
-        Self { width_rad_s: LEAST_WIDTH, resting: 0, forward: Vec::new(), backward: Vec::new() }
+        Self { width_rad_s: MIN_BIN_WIDTH_RAD_S, resting: 0, forward: Vec::new(), backward: Vec::new() }
     }
 }
 
 impl VelocityHistogram {
-    /// Counts samples; what is no finite number is left out.
+    /// Adds samples; values that are not finite are ignored.
     pub fn add(&mut self, velocities: &[f64]) {
         for &dq in velocities.iter().filter(|dq| dq.is_finite()) {
             if dq == 0.0 {
                 self.resting += 1;
                 continue;
             }
-            while dq.abs() >= self.width_rad_s * MOST_BINS as f64 {
+            while dq.abs() >= self.width_rad_s * MAX_BINS as f64 {
                 self.widen();
             }
             let bin = (dq.abs() / self.width_rad_s) as usize;
@@ -56,8 +56,8 @@ impl VelocityHistogram {
         }
     }
 
-    /// The middle of every bin that holds samples with their number, rad/s (m/s). The bins beside rest are left out:
-    /// there friction holds the joint, and noise decides the sign of its velocity.
+    /// Centre (rad/s, m/s) and sample count of every bin that is not empty. The bins next to zero are omitted: there
+    /// the joint sticks, and noise determines the sign of its velocity.
     pub fn moving(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
         let side = |counts: &'_ [u64], sign: f64| {
             let bins = counts.iter().enumerate().skip(1).filter(|(_, samples)| **samples > 0);
@@ -91,11 +91,11 @@ mod tests {
     }
 
     #[test]
-    fn rest_and_what_is_no_number_do_not_move() {
+    fn resting_and_non_finite_velocities_are_not_moving() {
         let mut histogram = VelocityHistogram::default();
         histogram.add(&[0.0, f64::NAN, f64::INFINITY, 1.0, -1e-3, 0.5]);
         assert_eq!(histogram.resting, 1);
-        // 1.0 fills bin 64 of 1/64; a thousandth is beside rest.
+        // 1.0 is in bin 64 of width 1/64; a thousandth is in the bin next to zero.
         let moving: Vec<_> = histogram.moving().collect();
         assert_eq!(moving, [(32.5 / 64.0, 1), (64.5 / 64.0, 1)]);
         assert_eq!(VelocityHistogram::default().moving().count(), 0);

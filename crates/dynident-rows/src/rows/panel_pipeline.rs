@@ -1,4 +1,4 @@
-//! Two halves of a pass beside each other: one thread reads samples and makes their panels, another filters them.
+//! Two-thread pipeline of a pass: one thread reads samples and computes panels, another filters them.
 
 use super::samples::SamplePanels;
 use crate::recording::LogError;
@@ -6,32 +6,29 @@ use core::borrow::Borrow;
 use dynident_recording::MotionBlock;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-/// Panels that may wait between the two.
-const WAITING: usize = 4;
+/// Maximum number of panels in the queue.
+const MAX_QUEUED_PANELS: usize = 4;
 
-/// What the first half gives to the second.
-enum Made<B> {
+enum MakerOutput<B> {
     Panels(SamplePanels),
-    /// A block all of whose panels have gone before.
+    /// A block whose panels were all sent before.
     Block(B),
 }
 
-/// Takes blocks of `next` (which may use the memory of one that is not needed any more), makes their panels by `make`
-/// (from a sample on; it returns where the next begin) on a thread of its own, at most so many ahead that memory is
-/// bounded, and gives each to `filter` here; behind its last panels the block itself to `keep`, which returns blocks
-/// that it does not keep. The order of work is the same as without the thread.
+/// Runs a pass in two threads with the same order of work as one thread.
 ///
-/// # Errors
-/// The first of either side.
-pub(super) fn panels_beside<B: Borrow<MotionBlock> + Send>(
+/// A new thread takes blocks from `next`, which can reuse the memory of a returned block, and computes their panels
+/// with `make`, which returns the first sample of the next panel. A bounded queue limits memory. This thread passes
+/// each panel to `filter`, and each block after its last panel to `keep`, which returns blocks that it does not store.
+pub(super) fn pipelined_panels<B: Borrow<MotionBlock> + Send>(
     mut next: impl FnMut(Option<B>) -> Result<Option<B>, LogError> + Send,
     mut make: impl FnMut(&MotionBlock, usize, &mut SamplePanels) -> Result<usize, LogError> + Send,
     mut filter: impl FnMut(&SamplePanels) -> Result<(), LogError>,
     mut keep: impl FnMut(B) -> Option<B>,
 ) -> Result<(), LogError> {
-    let (made_to, made): (SyncSender<Made<B>>, Receiver<Made<B>>) = sync_channel(WAITING);
-    let (used_to, used) = sync_channel(WAITING + 1);
-    let (unkept_to, unkept) = sync_channel(WAITING + 1);
+    let (made_to, made): (SyncSender<MakerOutput<B>>, Receiver<MakerOutput<B>>) = sync_channel(MAX_QUEUED_PANELS);
+    let (used_to, used) = sync_channel(MAX_QUEUED_PANELS + 1);
+    let (unkept_to, unkept) = sync_channel(MAX_QUEUED_PANELS + 1);
     std::thread::scope(|scope| {
         let maker = scope.spawn(move || -> Result<(), LogError> {
             while let Some(block) = next(unkept.try_recv().ok())? {
@@ -39,12 +36,12 @@ pub(super) fn panels_beside<B: Borrow<MotionBlock> + Send>(
                 while from < block.borrow().rows {
                     let mut panels: SamplePanels = used.try_recv().unwrap_or_default();
                     from = make(block.borrow(), from, &mut panels)?;
-                    if made_to.send(Made::Panels(panels)).is_err() {
-                        // The filtering side has stopped on an error of its own.
+                    if made_to.send(MakerOutput::Panels(panels)).is_err() {
+                        // The filtering thread has stopped on an error.
                         return Ok(());
                     }
                 }
-                if made_to.send(Made::Block(block)).is_err() {
+                if made_to.send(MakerOutput::Block(block)).is_err() {
                     return Ok(());
                 }
             }
@@ -52,19 +49,19 @@ pub(super) fn panels_beside<B: Borrow<MotionBlock> + Send>(
         });
         let mut outcome = Ok(());
         for made in made {
-            // A full channel back only means that the memory is dropped.
+            // If the return channel is full, the memory is dropped.
             match made {
-                Made::Panels(panels) => {
+                MakerOutput::Panels(panels) => {
                     outcome = filter(&panels);
                     drop(used_to.try_send(panels));
                 }
-                Made::Block(block) => drop(keep(block).map(|block| unkept_to.try_send(block))),
+                MakerOutput::Block(block) => drop(keep(block).map(|block| unkept_to.try_send(block))),
             }
             if outcome.is_err() {
                 break;
             }
         }
-        // Dropping the receiver (above, by the loop) lets a blocked maker go on to its end.
+        // The loop has dropped the receiver, so a blocked maker can finish.
         match maker.join() {
             Ok(made) => outcome.and(made),
             Err(panic) => std::panic::resume_unwind(panic),

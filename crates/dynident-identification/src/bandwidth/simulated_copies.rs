@@ -1,186 +1,62 @@
-//! Recordings that stand in for themselves: their motion without its noise, a first fit's torque, and their noise.
+//! Simulated copies of recordings: their denoised motion, the torque of a first fit, and their noise.
 
-use super::thinned::Thinned;
+use super::read_logs::{JointByJoint, ReadLogs};
 use crate::error::IdentificationError;
 use crate::settings::IdentificationSettings;
 use crate::training::plain_fit;
 use dynident_model::sample::Random;
 use dynident_recording::derivative::ButterworthZeroPhase;
-use dynident_recording::{
-    DecimationSettings, Decimator, Derivatives, Differentiator, FilterError, MotionBlock, MotionSettings, MotionStream,
-    Place, SampleRanges,
-};
+use dynident_recording::{Derivatives, Differentiator, FilterError, MotionBlock, MotionSettings, Place};
 use dynident_rows::{
     Execution, JointRows, LogError, LogSpectrum, Logs, ParallelFilterSettings, RegressorModel, RowBuilder, RowConsumer,
-    Samples, predicted_torque,
+    predicted_torque,
 };
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
-/// Samples a second of the copy, in units of the highest candidate.
-const RATE: f64 = 4.0;
-/// Samples of all pieces together, at most: enough to tell errors apart, and milliseconds.
-const MOST_SAMPLES: usize = 4096;
-/// Simulated copies of the recordings.
+/// Maximum number of samples of all pieces; enough to compare errors, within milliseconds.
+const MAX_SAMPLES: usize = 4096;
 const COPIES: usize = 4;
-/// Shortest piece that counts.
-const SHORTEST: usize = 32;
-/// Of each copy, how far along its piece the torque's noise is moved.
-const SHIFTS: [f64; COPIES] = [0.29, 0.53, 0.83, 0.11];
-/// Part of the torque's noise that is kept where the noise of the positions seems to make all of it.
-const LEAST_LEFT: f64 = 1.0e-4;
-/// Periods of the slowest cut-off within which an end is felt.
-const INVENTED: f64 = 1.5;
-/// The golden ratio.
-const GOLDEN: f64 = 1.618_033_988_749_895;
+/// Minimum length of a piece, samples.
+const MIN_PIECE_SAMPLES: usize = 32;
+/// For each copy the shift of the torque noise, relative to the length of a piece.
+const NOISE_SHIFTS: [f64; COPIES] = [0.29, 0.53, 0.83, 0.11];
+/// Minimum share of the torque noise's power that is kept if the position noise seems to explain all of it.
+const MIN_NOISE_SHARE: f64 = 1.0e-4;
+/// Length of the end effects, in periods of the slowest cut-off.
+const END_EFFECT_PERIODS: f64 = 1.5;
+const GOLDEN_RATIO: f64 = 1.618_033_988_749_895;
 const SEED: u64 = 0x005E_ED0F_7157;
 
-/// One uninterrupted piece.
 struct Piece {
-    /// The motion without its noise and the torque that the first fit makes of it.
+    /// Denoised motion with the torque of the first fit.
     motion: MotionBlock,
-    /// What the first fit leaves of the measured torque.
     noise: Vec<f64>,
 }
 
-/// What encoders and torque sensors say of a piece in one copy, joint-major.
+/// Measurements of a piece in one copy, joint-major.
 struct Measured {
     q: Vec<f64>,
     tau: Vec<f64>,
 }
 
-/// The recordings' motion and noise, and parameters that are known for once.
-pub(super) struct StandIn {
+/// Motion and noise of the recordings, with known parameters.
+pub(super) struct SimulatedCopies {
     pieces: Vec<Piece>,
-    /// Copy by copy, piece by piece.
     copies: Vec<Vec<Measured>>,
-    /// Joint by joint `WᵀW` over the same motions with each joint at another time (postures and velocities that no fit
-    /// has seen together), in units of the torque's spread; none for a joint without torque.
+    /// For each joint `WᵀW` over the same motions with each joint at another time (combinations of postures and
+    /// velocities that were not used for the fit), in units of the torque's spread; `None` for a joint without torque.
     unseen: Vec<Option<DMatrix<f64>>>,
     theta: Vec<f64>,
     position_noise: Vec<f64>,
-    /// What the noise of the torque is multiplied by, so that a part of the recordings is as uncertain as the whole.
+    /// Factor on the torque noise, so that a part of the recordings is as uncertain as the whole.
     scale: f64,
     log_rate_hz: f64,
     thinning: usize,
 }
 
-/// A low-pass of its own for each joint: where its motion has faded into the noise.
-#[derive(Debug)]
-struct JointByJoint(Vec<ButterworthZeroPhase>);
-
-impl Differentiator for JointByJoint {
-    fn name(&self) -> &'static str {
-        "joint-by-joint"
-    }
-
-    fn minimum_samples(&self) -> usize {
-        self.0.iter().map(Differentiator::minimum_samples).max().unwrap_or(1)
-    }
-
-    fn context_samples(&self, rate_hz: f64) -> Option<usize> {
-        self.0.iter().filter_map(|joint| joint.context_samples(rate_hz)).max()
-    }
-
-    fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError> {
-        self.0[place.joint].differentiate_at(place, q, out)
-    }
-}
-
-/// The recordings read so far: their motion without noise and their torque, thinned out.
-struct ReadLogs {
-    highest_hz: f64,
-    /// Of the first log; logs with another rate are left out.
-    log_rate_hz: f64,
-    thinning: usize,
-    blocks: Vec<MotionBlock>,
-    /// Largest variance of each joint's position noise.
-    noise_squares: Vec<f64>,
-    /// Highest frequency at which each joint's motion has faded into the noise.
-    reference_hz: Vec<f64>,
-    /// Samples that were read.
-    used: u64,
-    /// Samples of the whole logs.
-    seen: u64,
-}
-
-impl ReadLogs {
-    fn new(dof: usize, highest_hz: f64) -> Self {
-        Self {
-            highest_hz,
-            log_rate_hz: 0.0,
-            thinning: 1,
-            blocks: Vec::new(),
-            noise_squares: vec![0.0; dof],
-            reference_hz: vec![0.0; dof],
-            used: 0,
-            seen: 0,
-        }
-    }
-
-    /// Reads about `most` thinned samples of a log.
-    fn take(
-        &mut self,
-        logs: &Logs<'_>,
-        motion: &MotionSettings,
-        model: &RegressorModel,
-        log: &LogSpectrum,
-        most: usize,
-    ) -> Result<(), IdentificationError> {
-        let LogSpectrum { index, rate_hz, choice: spectrum, position_noise } = log;
-        let (recording, rate_hz, highest_hz) = (&logs.recordings[*index], *rate_hz, self.highest_hz);
-        let Samples::Log(log) = &recording.samples else { return Ok(()) };
-        let places = recording.places(model.model())?;
-        if self.log_rate_hz == 0.0 {
-            self.log_rate_hz = rate_hz;
-            self.thinning = (rate_hz / (RATE * highest_hz)).floor().clamp(1.0, 1000.0) as usize;
-        } else if (rate_hz / self.log_rate_hz - 1.0).abs() > 0.01 {
-            return Ok(());
-        }
-        let thinning = self.thinning;
-        let motion = recording.in_log_order(model.model(), motion)?.into_owned();
-        let motion = MotionSettings { smooth_torque: false, ..motion };
-        let faded = &spectrum.faded_hz;
-        let asked = spectrum.joints_hz.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        let build = || -> Result<Box<dyn Differentiator>, FilterError> {
-            let of = |hz: &Option<f64>| {
-                let cutoff_hz = hz.unwrap_or(asked).min(highest_hz).min(0.4 * rate_hz);
-                ButterworthZeroPhase::new(4, cutoff_hz)
-            };
-            Ok(Box::new(JointByJoint(faded.iter().map(of).collect::<Result<_, _>>()?)))
-        };
-        let named = |source| LogError::recording(&recording.name, source);
-        let mut stream = MotionStream::with_differentiator(log, &motion, |_| build()).map_err(named)?;
-        if logs.execution.parallel() {
-            stream = stream.read_beside();
-        }
-        // One filter for the torque; the motion without its noise has nothing to lose by being thinned out.
-        let filter = DecimationSettings { factor: thinning, ..DecimationSettings::default() };
-        let in_filter = |source| LogError::Filter { log: recording.name.clone(), source };
-        let decimator = || Decimator::new(&filter, rate_hz, 1).map_err(in_filter);
-        let mut pieces = Thinned::new(thinning, model.dof());
-        let mut block = MotionBlock::default();
-        let mut samples = 0;
-        while samples < most * thinning && stream.next_block(&mut block).map_err(named)? {
-            let rows = block.rows.min(most * thinning - samples);
-            pieces.take(&block, &places, rows, &decimator)?;
-            samples += rows;
-        }
-        self.used += samples as u64;
-        self.seen += recording.rows_of_whole().unwrap_or(samples as u64).max(samples as u64);
-        for (joint, &place) in places.iter().enumerate() {
-            let reference_hz = faded[place].unwrap_or(asked).min(highest_hz);
-            self.reference_hz[joint] = self.reference_hz[joint].max(reference_hz);
-            let noise = position_noise.get(place).copied().unwrap_or(0.0);
-            self.noise_squares[joint] = self.noise_squares[joint].max(noise * noise);
-        }
-        self.blocks.extend(pieces.finished());
-        Ok(())
-    }
-}
-
-impl StandIn {
-    /// Reads the recordings and fits to them; `highest_hz` is the highest candidate.
+impl SimulatedCopies {
+    /// Reads the recordings and makes the first fit; `highest_hz` is the highest candidate.
     pub(super) fn of(
         logs: &Logs<'_>,
         settings: &IdentificationSettings,
@@ -191,41 +67,41 @@ impl StandIn {
         let is_bare =
             |log: &&LogSpectrum| training.contains(&log.index) && logs.recordings[log.index].payload.is_none();
         let bare: Vec<&LogSpectrum> = logs.spectra().iter().filter(is_bare).collect();
-        let most = MOST_SAMPLES / bare.len().max(1);
+        let most = MAX_SAMPLES / bare.len().max(1);
         let mut read = ReadLogs::new(model.dof(), highest_hz);
         for log in bare {
             read.take(logs, &settings.motion, model, log, most)?;
         }
-        let ReadLogs { log_rate_hz, thinning, blocks, reference_hz, noise_squares, used, seen, .. } = read;
-        // The filters of the reference invent what lies beyond the ends.
+        let ReadLogs { log_rate_hz, thinning, blocks, reference_hz, noise_squares, used, total, .. } = read;
+        // The filters of the reference extrapolate beyond the ends.
         let slowest_hz = reference_hz.iter().copied().fold(f64::INFINITY, f64::min);
-        let ends = (INVENTED * log_rate_hz / thinning as f64 / slowest_hz).ceil() as usize;
+        let ends = (END_EFFECT_PERIODS * log_rate_hz / thinning as f64 / slowest_hz).ceil() as usize;
         let measured: Vec<MotionBlock> =
-            blocks.iter().map(|block| inside(block, ends)).filter(|block| block.rows >= SHORTEST).collect();
+            blocks.iter().map(|block| inside(block, ends)).filter(|block| block.rows >= MIN_PIECE_SAMPLES).collect();
         if measured.is_empty() || used == 0 {
             return Ok(None);
         }
         let fitted = Self::fitted(logs, settings, model, measured, log_rate_hz, thinning)?;
-        let Some(mut stand_in) = fitted else { return Ok(None) };
-        // White noise of the log, thinned out below a low-pass.
-        stand_in.position_noise = noise_squares.iter().map(|square| (square / thinning as f64).sqrt()).collect();
-        stand_in.scale = (used as f64 / seen as f64).sqrt();
+        let Some(mut simulated) = fitted else { return Ok(None) };
+        // The log's white noise after the low-pass.
+        simulated.position_noise = noise_squares.iter().map(|square| (square / thinning as f64).sqrt()).collect();
+        simulated.scale = (used as f64 / total as f64).sqrt();
         let rate_hz = log_rate_hz / thinning as f64;
         let reference = |hz: &f64| ButterworthZeroPhase::new(4, hz.min(0.4 * rate_hz));
         let reference = reference_hz.iter().map(reference).collect::<Result<Vec<_>, _>>();
         if let Ok(reference) = reference {
-            stand_in.take_motion_noise(model, &JointByJoint(reference))?;
+            simulated.take_motion_noise(model, &JointByJoint(reference))?;
         }
-        stand_in.copies = (0..COPIES).into_par_iter().map(|copy| stand_in.measured(copy)).collect();
-        Ok(Some(stand_in))
+        simulated.copies = (0..COPIES).into_par_iter().map(|copy| simulated.measured(copy)).collect();
+        Ok(Some(simulated))
     }
 
-    /// Takes from the torque's noise what the noise of the positions alone makes: the first fit saw it in the motion,
-    /// and every copy gets it anew.
+    /// Removes the effect of position noise from the torque noise: the residual of the first fit contains it, and every
+    /// copy adds new position noise.
     fn take_motion_noise(&mut self, model: &RegressorModel, reference: &JointByJoint) -> Result<(), LogError> {
         let (mut all, mut of_motion) = (vec![0.0_f64; model.dof()], vec![0.0_f64; model.dof()]);
         for (number, piece) in self.pieces.iter().enumerate() {
-            // Both through the same filter: what it does to the ends is no noise.
+            // Use the same filter for both, so that its end effects cancel.
             let seed = SEED ^ !(number as u64);
             let of = |q: &[f64]| differentiated(&piece.motion, q, reference);
             let noisy = of(&self.noisy_positions(piece, seed));
@@ -239,7 +115,7 @@ impl StandIn {
             }
         }
         let left = |(all, of_motion): (&f64, &f64)| {
-            if *all > 0.0 { (1.0 - of_motion / all).max(LEAST_LEFT).sqrt() } else { 1.0 }
+            if *all > 0.0 { (1.0 - of_motion / all).max(MIN_NOISE_SHARE).sqrt() } else { 1.0 }
         };
         let left: Vec<f64> = all.iter().zip(&of_motion).map(left).collect();
         for piece in &mut self.pieces {
@@ -253,19 +129,19 @@ impl StandIn {
         Ok(())
     }
 
-    /// A piece's positions with fresh noise.
+    /// Positions of a piece with new noise.
     fn noisy_positions(&self, piece: &Piece, seed: u64) -> Vec<f64> {
         let mut random = Random::new(seed);
         let joints = piece.motion.q.chunks_exact(piece.motion.rows).zip(&self.position_noise);
         joints.flat_map(|(q, noise)| q.iter().map(|q| q + noise * random.normal()).collect::<Vec<_>>()).collect()
     }
 
-    /// Copy number `copy` of all pieces: fresh noise on the positions, the torque's own at another time.
+    /// Copy `copy` of all pieces: new position noise, shifted torque noise.
     fn measured(&self, copy: usize) -> Vec<Measured> {
         let sign = if copy.is_multiple_of(2) { 1.0 } else { -1.0 };
         let one = |(number, piece): (usize, &Piece)| {
             let (rows, mut tau) = (piece.motion.rows, piece.motion.tau.clone());
-            let shift = (SHIFTS[copy] * rows as f64) as usize;
+            let shift = (NOISE_SHIFTS[copy] * rows as f64) as usize;
             for (tau, noise) in tau.chunks_exact_mut(rows).zip(piece.noise.chunks_exact(rows)) {
                 for (row, tau) in tau.iter_mut().enumerate() {
                     *tau += sign * self.scale * noise[(row + shift) % rows];
@@ -276,7 +152,6 @@ impl StandIn {
         self.pieces.iter().enumerate().map(one).collect()
     }
 
-    /// The first fit, its torque and what it leaves.
     fn fitted(
         logs: &Logs<'_>,
         settings: &IdentificationSettings,
@@ -305,7 +180,7 @@ impl StandIn {
             let torque = torque(model, &block, &theta)?;
             let mut noise: Vec<f64> =
                 block.tau.iter().zip(&torque).map(|(measured, torque)| measured - torque).collect();
-            // Where the torque does not count nothing is known of its noise; the copies leave it out as the fit does.
+            // The noise of invalid torque samples is unknown; the copies mask them as the fit does.
             noise
                 .iter_mut()
                 .zip(&block.set_aside)
@@ -319,18 +194,15 @@ impl StandIn {
         Ok(Some(Self { pieces, copies, unseen, theta, position_noise, scale: 1.0, log_rate_hz, thinning }))
     }
 
-    /// Samples a second of the recordings.
     pub(super) fn log_rate_hz(&self) -> f64 {
         self.log_rate_hz
     }
 
-    /// Samples of the recordings for each sample of the copy.
     pub(super) fn thinning(&self) -> usize {
         self.thinning
     }
 
-    /// The copies of the recordings as a fit with this cut-off sees them, one after another; `None` for one to which
-    /// the filter does not apply.
+    /// The differentiated copies for this cut-off; `None` for a copy to which the filter is not applicable.
     pub(super) fn copies(
         &self,
         settings: &MotionSettings,
@@ -346,8 +218,8 @@ impl StandIn {
         }))
     }
 
-    /// Mean square over joints of the torque that parameters `values` predict beside that of the first fit's, on motion
-    /// without noise that the fit has not seen, each in units of its spread.
+    /// Mean square over joints of the difference between the torques of parameters `values` and of the first fit, on
+    /// denoised motion that was not used for the fit, each in units of its spread.
     pub(super) fn square_error(&self, model: &RegressorModel, values: &[f64]) -> f64 {
         let of_joint = |(joint, squares): (usize, &Option<DMatrix<f64>>)| {
             let columns = model.layout().joint_columns(joint).iter();
@@ -360,8 +232,7 @@ impl StandIn {
     }
 }
 
-/// A motion with positions `q` (joint-major) and their derivatives in place of its own; `None` where the differentiator
-/// does not apply.
+/// A motion with positions `q` (joint-major) and their derivatives; `None` if the differentiator is not applicable.
 fn differentiated(motion: &MotionBlock, q: &[f64], differentiator: &dyn Differentiator) -> Option<MotionBlock> {
     let (rows, mut block) = (motion.rows, motion.clone());
     for (joint, q) in q.chunks_exact(rows).enumerate() {
@@ -374,19 +245,19 @@ fn differentiated(motion: &MotionBlock, q: &[f64], differentiator: &dyn Differen
     Some(block)
 }
 
-/// A motion without so many samples at both ends, but at least its middle half.
+/// Removes this number of samples at both ends, but keeps at least the middle half.
 fn inside(motion: &MotionBlock, ends: usize) -> MotionBlock {
     let ends = ends.min(motion.rows / 4);
     motion.part(ends..motion.rows - ends)
 }
 
-/// The same motion with each joint at another time; each goes on at its start behind its end.
+/// The same motion with each joint shifted cyclically in time.
 fn shifted(motion: &MotionBlock) -> MotionBlock {
     let mut other = motion.clone();
     for joint in 0..motion.joints {
         let own = joint * motion.rows..(joint + 1) * motion.rows;
-        // Multiples of the golden ratio's fraction: no two joints keep their distance in time.
-        let shift = ((GOLDEN * (joint + 1) as f64).fract() * motion.rows as f64) as usize;
+        // Multiples of the golden ratio's fraction, so that no two joints have the same shift.
+        let shift = ((GOLDEN_RATIO * (joint + 1) as f64).fract() * motion.rows as f64) as usize;
         for values in [&mut other.q, &mut other.dq, &mut other.ddq] {
             values[own.clone()].rotate_left(shift);
         }
@@ -394,7 +265,6 @@ fn shifted(motion: &MotionBlock) -> MotionBlock {
     other
 }
 
-/// Standard deviation of a joint's torque over all pieces.
 fn spread(pieces: &[Piece], joint: usize) -> f64 {
     let values = || pieces.iter().flat_map(|piece| piece.motion.joint(&piece.motion.tau, joint));
     let count = values().count() as f64;
@@ -402,7 +272,6 @@ fn spread(pieces: &[Piece], joint: usize) -> f64 {
     (values().map(|x| (x - mean) * (x - mean)).sum::<f64>() / count).sqrt()
 }
 
-/// What [`StandIn::unseen`] holds.
 fn unseen_rows(model: &RegressorModel, pieces: &[Piece]) -> Result<Vec<Option<DMatrix<f64>>>, LogError> {
     struct Squares<'a>(&'a RegressorModel, Vec<DMatrix<f64>>);
     impl RowConsumer for Squares<'_> {
@@ -429,7 +298,7 @@ fn unseen_rows(model: &RegressorModel, pieces: &[Piece]) -> Result<Vec<Option<DM
     Ok(squares.1.into_iter().enumerate().map(in_spreads).collect())
 }
 
-/// Sends the unfiltered rows of a motion to a consumer, whether their measured torque counts or not.
+/// Sends the unfiltered rows of a motion to a consumer, including rows with invalid torque.
 fn every_sample(model: &RegressorModel, block: &MotionBlock, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
     if !block.set_aside.is_empty() {
         let block = MotionBlock { set_aside: Vec::new(), ..block.clone() };

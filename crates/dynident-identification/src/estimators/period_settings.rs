@@ -1,0 +1,63 @@
+//! Settings of a repeated motion.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Maximum period of a motion, s: eleven days.
+const MAX_PERIOD_S: f64 = 1e6;
+
+/// The repeated motion.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct PeriodSettings {
+    /// Period of the motion, s; by default the length of the log's `reference`.
+    pub period_s: Option<f64>,
+    /// Time at the start of every log that is excluded until the motion repeats, s; 0 by default.
+    pub skip_s: f64,
+    /// Harmonics of the motion's Fourier series, for the simultaneous fit only; by default those above the noise.
+    pub harmonics: Option<usize>,
+}
+
+/// Invalid settings of a repeated motion.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PeriodError {
+    /// Invalid period.
+    #[error("period_s = {period_s:?}: give the period of the motion in seconds, at most {MAX_PERIOD_S:e}")]
+    Period {
+        /// Value.
+        period_s: f64,
+    },
+    /// Invalid start.
+    #[error("skip_s = {skip_s}: give 0 or more seconds")]
+    Skip {
+        /// Value.
+        skip_s: f64,
+    },
+    /// Invalid number of harmonics.
+    #[error("harmonics = {harmonics}: give 1 to 200")]
+    Harmonics {
+        /// Value.
+        harmonics: usize,
+    },
+}
+
+impl PeriodSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// The first invalid value.
+    pub fn validate(&self) -> Result<(), PeriodError> {
+        if let Some(period_s) = self.period_s.filter(|period| !(*period > 0.0 && *period <= MAX_PERIOD_S)) {
+            return Err(PeriodError::Period { period_s });
+        }
+        if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
+            return Err(PeriodError::Skip { skip_s: self.skip_s });
+        }
+        if let Some(harmonics) = self.harmonics.filter(|harmonics| !(1..=200).contains(harmonics)) {
+            return Err(PeriodError::Harmonics { harmonics });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,47 @@
+//! Start values of the fits to a simulated closed loop.
+
+use super::{SimulationStart, TrainingRows};
+use crate::consistent::{ConsistencyError, ConsistencySettings, consistent_parameters};
+use dynident_estimation::Estimate;
+use thiserror::Error;
+
+#[derive(Debug, Error)]
+pub(super) enum NoStartError {
+    #[error("no physically consistent set is available as start: {0}")]
+    Inconsistent(ConsistencyError),
+    #[error("the robot description cannot be the start, because it has no inertial of {}", .0.join(", "))]
+    Undescribed(Vec<String>),
+    #[error("{0}; {1}")]
+    Both(Box<Self>, Box<Self>),
+}
+
+pub(super) fn start_values(
+    rows: &TrainingRows<'_>,
+    choice: SimulationStart,
+    plain: &Estimate,
+) -> Result<Vec<(Vec<f64>, &'static str)>, NoStartError> {
+    let (model, problem) = (rows.model, rows.problem);
+    let mut starts = Vec::new();
+    let mut why = Vec::new();
+    if choice != SimulationStart::Description {
+        let default = ConsistencySettings::default();
+        let settings = rows.consistency.unwrap_or(&default);
+        match consistent_parameters(&model.parametric, problem, &plain.joint_sigma, settings) {
+            Ok(fit) => starts.push((fit.base_values, "estimate")),
+            Err(reason) => why.push(NoStartError::Inconsistent(reason)),
+        }
+    }
+    if choice != SimulationStart::Estimate {
+        if let Some(nominal) = model.parametric.nominal_base() {
+            starts.push((nominal.to_vec(), "description"));
+        } else {
+            let unknown = model.model().bodies_without_prior().into_iter().map(str::to_owned);
+            why.push(NoStartError::Undescribed(unknown.collect()));
+        }
+    }
+    let both = |first, second| NoStartError::Both(Box::new(first), Box::new(second));
+    match why.into_iter().reduce(both) {
+        Some(error) if starts.is_empty() => Err(error),
+        _ => Ok(starts),
+    }
+}
