@@ -2,8 +2,8 @@
 
 use super::test::tested_forms;
 use crate::error::IdentificationError;
+use crate::log_factors::{LogFactors, log_factors};
 use crate::settings::IdentificationSettings;
-use crate::training::{LogFactors, log_factors};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::{ValidationReport, nonnegative_least_squares};
 use dynident_model::terms::{TermClass, TorqueTerm, sort_terms};

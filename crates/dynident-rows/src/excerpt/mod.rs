@@ -88,7 +88,8 @@ fn excerpt(
     // Logged velocities and accelerations only serve comparison; later passes handle lag and ends.
     let mut read = log.clone();
     (read.format.velocity, read.format.acceleration) = (None, None);
-    let motion = MotionSettings { keep_outliers: settings.keep_outliers, ..MotionSettings::default() };
+    let (keep_outliers, limits) = (settings.keep_outliers, settings.limits.clone());
+    let motion = MotionSettings { keep_outliers, limits, ..MotionSettings::default() };
     let build = |_: &_| -> Result<Box<dyn Differentiator>, FilterError> { Ok(Box::new(AsLogged)) };
     let stream = MotionStream::with_differentiator(&read, &motion, build).map_err(named)?.without_channels();
     let mut stream = if beside { stream.read_beside() } else { stream };
