@@ -3,6 +3,7 @@
 use crate::bandwidth::CutoffByError;
 use crate::bars::{ErrorBars, ErrorSource};
 use crate::between_logs::BetweenLogs;
+use crate::conditional::resting_joints;
 use crate::consistent::inertials;
 use crate::decisions::Job;
 use crate::diagnosis::Diagnosis;
@@ -184,7 +185,14 @@ fn identified(
     let forms = if arm.is_some() || training.gains.is_some() {
         Vec::new()
     } else {
-        form_fits(&logs, settings, &training.model.parametric, &examined.consistent.parameters, &chosen)?
+        form_fits(
+            &logs,
+            settings,
+            &training.model.parametric,
+            &examined.consistent.parameters,
+            &chosen,
+            &resting_joints(&training),
+        )?
     };
     times.estimation_s += examined.estimation_s;
     times.examination_s = started.elapsed().as_secs_f64() - examined.estimation_s;

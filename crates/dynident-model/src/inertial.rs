@@ -1,8 +1,11 @@
 //! The ten inertial parameters of a body.
 
 use crate::spatial::{Mat3, Transform, Vec3};
-use crate::urdf::MAX_MAGNITUDE;
 use nalgebra::{Matrix3, Matrix4};
+
+/// Largest length, angle, mass or inertia accepted in a robot description. Larger numbers are mistakes, and their
+/// products would exceed the range of `f64`.
+pub const MAX_MAGNITUDE: f64 = 1e9;
 
 /// Names of the ten parameters in the project's order (order `p_i` of the paper, with its misprint corrected).
 pub const INERTIAL_NAMES: [&str; 10] = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];

@@ -6,7 +6,7 @@ use crate::log_factors::{LogFactors, log_factors};
 use crate::settings::IdentificationSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::{ValidationReport, nonnegative_least_squares};
-use dynident_model::terms::{TermClass, TorqueTerm, sort_terms};
+use dynident_model::terms::{JointMotion, JointProperty, TermClass, TorqueTerm, sort_terms};
 use dynident_rows::{Logs, RegressorModel, Role};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -36,7 +36,7 @@ pub struct FormFit {
 /// ```
 ///
 /// over the filtered rows. Terms that a class cannot hold are not in the prediction. Recordings with a payload are not
-/// used.
+/// used. Joints `resting` do not move in the recordings: their terms approximate those of the identified model.
 ///
 /// # Errors
 /// Recordings that cannot be read.
@@ -46,6 +46,7 @@ pub fn form_fits(
     robot: &ParametricModel,
     parameters: &[f64],
     training: &[usize],
+    resting: &[usize],
 ) -> Result<Vec<FormFit>, IdentificationError> {
     let is_bare = |index: &usize| logs.recordings[*index].payload.is_none();
     let training: Vec<usize> = training.iter().copied().filter(is_bare).collect();
@@ -60,7 +61,8 @@ pub fn form_fits(
         logs.end();
         factors?
     };
-    let fits: Vec<(FormFit, Vec<f64>)> = TermClass::ALL.iter().map(|&class| wide.fit(class, &factors)).collect();
+    let fits: Vec<(FormFit, Vec<f64>)> =
+        TermClass::ALL.iter().map(|&class| wide.fit(class, &factors, resting)).collect();
     let sets: Vec<&[f64]> = fits.iter().map(|(_, theta)| &theta[..]).collect();
     let mut reports = tested_forms(logs, &wide.model, &sets, &held_out)?;
     let mut found: Vec<FormFit> = fits.iter().map(|(fit, _)| fit.clone()).collect();
@@ -71,6 +73,11 @@ pub fn form_fits(
     }
     Ok(found)
 }
+
+/// Largest velocity at which friction of a resting joint is approximated, rad/s or m/s of a usual arm.
+const TYPICAL_VELOCITY: f64 = 1.0;
+/// Number of speeds in each direction at which it is approximated.
+const SPEEDS: usize = 50;
 
 /// The robot with the terms of all classes as columns.
 struct WideModel<'a> {
@@ -132,13 +139,14 @@ impl<'a> WideModel<'a> {
     }
 
     /// The terms of a class with their values, and the base parameters of the wide model for them.
-    fn fit(&self, class: TermClass, factors: &[LogFactors]) -> (FormFit, Vec<f64>) {
+    fn fit(&self, class: TermClass, factors: &[LogFactors], resting: &[usize]) -> (FormFit, Vec<f64>) {
         let mut fit =
             FormFit { class, terms: Vec::new(), values: Vec::new(), is_refitted: false, held_out: Vec::new() };
         let mut theta = self.theta_bodies.clone();
-        let others = self.robot.terms().iter().filter(|term| term.own_joint().is_none());
-        for term in others {
-            if class.holds_other_terms() {
+        // Couplings and springs keep their values.
+        let is_held = |term: &&TorqueTerm| term.own_joint().is_none() || is_spring(term);
+        for term in self.robot.terms().iter().filter(is_held) {
+            if class.holds(term) {
                 let value = self.value(term);
                 self.add(&mut theta, term, value);
                 fit.terms.push(term.clone());
@@ -150,13 +158,15 @@ impl<'a> WideModel<'a> {
         let known = theta.clone();
         for joint in 0..self.robot.dof() {
             let own: Vec<&TorqueTerm> =
-                self.robot.terms().iter().filter(|term| term.own_joint() == Some(joint)).collect();
+                self.robot.terms().iter().filter(|term| term.own_joint() == Some(joint) && !is_spring(term)).collect();
             let lists = class.terms_of_joint(self.robot.model(), self.robot.terms(), joint);
             let is_same = lists.len() == 1 && own.len() == lists[0].len() && own.iter().all(|t| lists[0].contains(t));
-            let (terms, values) = if is_same || factors.is_empty() {
-                let terms = lists.into_iter().next().unwrap_or_default();
-                let values = terms.iter().map(|term| self.value(term)).collect();
-                (terms, values)
+            let first = || lists.first().cloned().unwrap_or_default();
+            let (terms, values) = if is_same {
+                (first(), first().iter().map(|term| self.value(term)).collect())
+            } else if factors.is_empty() || resting.contains(&joint) {
+                fit.is_refitted = true;
+                (first(), self.approximated(joint, &first()))
             } else {
                 fit.is_refitted = true;
                 self.best_list(joint, lists, &known, factors)
@@ -186,6 +196,40 @@ impl<'a> WideModel<'a> {
         best.map_or_else(Default::default, |(_, terms, values)| (terms, values))
     }
 
+    /// The values of terms of a joint at rest that are nearest to the friction of the identified model, over velocities
+    /// up to that of a typical motion. Other terms keep their values.
+    fn approximated(&self, joint: usize, terms: &[TorqueTerm]) -> Vec<f64> {
+        let model = self.robot.model();
+        let most = model.own_scale().velocity(model.joints()[joint].turns(), TYPICAL_VELOCITY);
+        let zeros = vec![0.0; model.dof()];
+        let torque = |term: &TorqueTerm, dq: f64| {
+            let mut velocities = zeros.clone();
+            velocities[joint] = dq;
+            let motion = JointMotion { samples: 1, q: &zeros, dq: &velocities, ddq: &zeros };
+            let mut column = [dq.signum()];
+            if !term.has_memory() && !term.needs_load() {
+                term.column(joint, &motion, &mut column);
+            }
+            column[0]
+        };
+        let is_fitted = |term: &&TorqueTerm| term.own_joint() == Some(joint) && term.is_joint_friction();
+        let fitted: Vec<&TorqueTerm> = terms.iter().filter(is_fitted).collect();
+        let own: Vec<&TorqueTerm> =
+            self.robot.terms().iter().filter(is_fitted).filter(|term| !term.needs_temperature()).collect();
+        let speeds = (1..=SPEEDS).map(|k| most * k as f64 / SPEEDS as f64).flat_map(|dq| [dq, -dq]);
+        let (mut gram, mut right) = (DMatrix::zeros(fitted.len(), fitted.len()), DVector::zeros(fitted.len()));
+        for dq in speeds {
+            let row = DVector::from_iterator(fitted.len(), fitted.iter().map(|term| torque(term, dq)));
+            let tau: f64 = own.iter().map(|term| self.value(term) * torque(term, dq)).sum();
+            right += tau * &row;
+            gram += &row * row.transpose();
+        }
+        let nonnegative: Vec<bool> = fitted.iter().map(|term| term.is_nonnegative()).collect();
+        let x = nonnegative_least_squares(&gram, &right, &nonnegative);
+        let place = |term: &TorqueTerm| fitted.iter().position(|one| *one == term);
+        terms.iter().map(|term| place(term).map_or_else(|| self.value(term), |place| x[place])).collect()
+    }
+
     /// The values of terms of a joint that fit its rows best, and the sum of squares that they explain, negative.
     fn least_squares(
         &self,
@@ -212,4 +256,8 @@ impl<'a> WideModel<'a> {
         let squares = x.dot(&(&gram * &x)) - 2.0 * x.dot(&right);
         (x.iter().copied().collect(), squares)
     }
+}
+
+fn is_spring(term: &TorqueTerm) -> bool {
+    term.property() == Some(JointProperty::Stiffness)
 }

@@ -21,10 +21,13 @@ impl TermClass {
     /// All classes.
     pub const ALL: [Self; 3] = [Self::DampingAndFriction, Self::DampingFrictionAndInertia, Self::FunctionsOfMotion];
 
-    /// The terms of joint `joint` in a form of this class, for a robot with the terms `terms`. Several lists are
+    /// The terms of joint `joint`, without its spring, in a form of this class, for a robot with the terms `terms`. Several lists are
     /// alternatives: the one with the smallest residual should be taken.
     pub fn terms_of_joint(self, model: &Model, terms: &[TorqueTerm], joint: usize) -> Vec<Vec<TorqueTerm>> {
-        let own = || terms.iter().filter(move |term| term.own_joint() == Some(joint)).cloned();
+        let is_own = move |term: &&TorqueTerm| {
+            term.own_joint() == Some(joint) && term.property() != Some(JointProperty::Stiffness)
+        };
+        let own = || terms.iter().filter(is_own).cloned();
         let simple = || {
             let shape = CoulombShape::Sign { dead_band: 0.0 };
             vec![TorqueTerm::Viscous(Viscous { joint }), TorqueTerm::Coulomb(Coulomb { joint, shape })]
@@ -33,8 +36,7 @@ impl TermClass {
             Self::DampingAndFriction => vec![simple()],
             Self::DampingFrictionAndInertia => {
                 let drive = TorqueTerm::DriveInertia(DriveInertia { joint });
-                let is_held = |term: &TorqueTerm| *term == drive || term.property() == Some(JointProperty::Stiffness);
-                vec![simple().into_iter().chain(own().filter(is_held)).collect()]
+                vec![simple().into_iter().chain(own().find(|term| *term == drive)).collect()]
             }
             Self::FunctionsOfMotion => {
                 let kept: Vec<TorqueTerm> = own().filter(|term| Self::is_function_of_motion(term)).collect();
@@ -59,9 +61,14 @@ impl TermClass {
         !term.has_memory() && !term.needs_load() && !term.needs_temperature()
     }
 
-    /// Whether the class can hold terms of two joints (couplings) and declared torques.
-    pub fn holds_other_terms(self) -> bool {
-        self == Self::FunctionsOfMotion
+    /// Whether the class can hold a coupling of two joints or a spring, with its value.
+    pub fn holds(self, term: &TorqueTerm) -> bool {
+        let is_spring = term.property() == Some(JointProperty::Stiffness);
+        match self {
+            Self::DampingAndFriction => false,
+            Self::DampingFrictionAndInertia => is_spring,
+            Self::FunctionsOfMotion => true,
+        }
     }
 }
 

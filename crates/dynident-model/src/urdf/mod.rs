@@ -48,9 +48,7 @@ use thiserror::Error;
 /// Maximum number of moving joints.
 pub const MAX_MOVING_JOINTS: usize = 1000;
 
-/// Largest length, angle, mass or inertia accepted in a description. Larger numbers are mistakes, and their products
-/// would exceed the range of `f64`.
-pub const MAX_MAGNITUDE: f64 = 1e9;
+pub use crate::inertial::MAX_MAGNITUDE;
 
 /// Result of reading a URDF.
 #[derive(Clone, Debug, PartialEq)]

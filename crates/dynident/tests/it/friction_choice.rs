@@ -145,7 +145,7 @@ fn friction_is_chosen_by_default_where_no_key_states_it() {
     assert_eq!(text(&by_default), text(&choice("offsets = \"per-log\"")));
     let refused = choice("[estimator.physical]\nlaws = { fv1 = [0.5, 1.5] }");
     assert_eq!(refused.len(), 2);
-    assert!(refused.iter().all(|joint| joint.chosen.contains("known") && joint.drive.is_none()), "{refused:?}");
+    assert!(refused.iter().all(|joint| joint.chosen.contains("constrains") && joint.drive.is_none()), "{refused:?}");
 }
 
 fn job_with_stated(folder: &Path) -> Job {

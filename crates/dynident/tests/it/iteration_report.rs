@@ -84,7 +84,7 @@ fn every_run_and_joint_is_drawn_and_no_name_becomes_markup() {
     // unit (kg m, kg m²).
     let plots = page.matches("data-plot=\"plot-").count();
     assert_eq!(plots, 1 + 2 + 2 + 2 + 2);
-    for text in ["of run 1", "the truth", "converged", "Cramér-Rao", "run 2"] {
+    for text in ["from run 1", "the truth", "converged", "Cramér-Rao", "run 2"] {
         assert!(page.contains(text), "{text}");
     }
 }

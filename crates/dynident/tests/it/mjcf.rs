@@ -41,7 +41,8 @@ fn the_users_mjcf_gets_the_identified_values() {
         assert!(rotors.iter().all(|rotor| rotor.is_some() == is_mjcf), "{name}: {rotors:?}");
         sums.push(rotors.into_iter().flatten().sum::<f64>());
     }
-    let terms = found.result.joints.iter().flat_map(|joint| &joint.terms).filter(|term| term.symbol.starts_with("Ia"));
+    let form = found.result.forms.iter().find(|form| form.forms.contains(&"mjcf".to_owned())).unwrap();
+    let terms = form.terms.iter().filter(|term| term.symbol.starts_with("Ia"));
     let expected: f64 = terms.map(|term| term.value).sum();
     assert!((sums[0] - expected).abs() < 1e-12 && expected > 0.0, "{sums:?} {expected}");
 }

@@ -287,14 +287,14 @@ fn signs_of_single_joints_and_of_all_are_named() {
             rows: |rows| each(rows, |row| row[7..].iter_mut().for_each(|tau| *tau *= -1.0)),
             study: SAME,
             kind: "sign",
-            named: &["under [format.torque] write `sign = -1`"],
+            named: &["[format.torque] write `sign = -1`"],
         },
         Case {
             name: "all positions",
             rows: |rows| each(rows, |row| row[1..7].iter_mut().for_each(|q| *q *= -1.0)),
             study: SAME,
             kind: "sign",
-            named: &["under [format.position] write `sign = -1`"],
+            named: &["[format.position] write `sign = -1`"],
         },
         Case {
             name: "all joints",

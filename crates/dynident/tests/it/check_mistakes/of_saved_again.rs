@@ -77,5 +77,5 @@ fn a_model_is_not_confirmed_by_what_it_was_fitted_to() {
     again.log.retain(|log| log.file.ends_with("test.csv"));
     again.log[0].file = "again.csv".into();
     let doubted = validate(&result_path, &again, &path, &options()).unwrap();
-    assert!(doubted.problems.iter().any(|problem| problem.contains("fitted to")), "{:?}", doubted.problems);
+    assert!(doubted.problems.iter().any(|problem| problem.contains("is the training log")), "{:?}", doubted.problems);
 }
