@@ -102,7 +102,7 @@ fn what_makes_no_sense_is_named() {
             "mid-points",
         ),
         ("problem = \"step-wise\"", "problem = \"both\"", "unknown variant `both`"),
-        ("rest_limit = 1e-4", "joints = [\"joint3\"]", "no joint `joint3`"),
+        ("rest_limit = 1e-4", "joints = [\"joint3\"]", "unknown joint `joint3`"),
         ("offsets = [0.0, 0.0]", "offsets = [0.0, 4.0]", "joint `joint2` starts its stroke at 4 rad"),
         ("bits = 20", "bits = 80", "`bits` is 80"),
         ("bits = 20", "seed = 5", "search.seed"),

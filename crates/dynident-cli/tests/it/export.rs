@@ -62,7 +62,7 @@ fn what_does_not_belong_together_is_refused() {
         assert!(outcome.stderr.contains(says), "{}", outcome.stderr);
         assert_eq!(outcome.stdout, "");
     };
-    refused(run_in(at, &["export", "r/result.json", "--to", "c"]), "--study STUDY.toml is missing");
+    refused(run_in(at, &["export", "r/result.json", "--to", "simulator"]), "--study STUDY.toml is missing");
     refused(export(at, &["c", "--out", "arm.urdf"]), "arm.urdf");
     refused(export(at, &["c", "--out", "r/result.json"]), "result.json");
     refused(export(at, &["payload-ur"]), "no payload was estimated: add [[payload]] to the study");
@@ -74,6 +74,23 @@ fn what_does_not_belong_together_is_refused() {
     std::fs::write(at.join("r/result.json"), other.to_string()).unwrap();
     refused(export(at, &["c"]), "edited or damaged");
     refused(export(at, &["c", "--accept-edited"]), "use the study that the result was made with");
+    refused(run_in(at, &["export", "r", "--to", "c", "--accept-edited"]), "`bodies` differ from `model`");
+    other.as_object_mut().unwrap().remove("model");
+    std::fs::write(at.join("r/result.json"), other.to_string()).unwrap();
+    refused(run_in(at, &["export", "r", "--to", "c", "--accept-edited"]), "--study STUDY.toml");
+}
+
+/// A result holds its robot: no study is needed, and its folder is enough.
+#[test]
+fn a_result_is_exported_without_its_study() {
+    let folder = identified();
+    let at = folder.path();
+    for form in ["c", "python", "mjcf", "urdf", "sdf", "ros2-yaml", "json"] {
+        let (with, without) = (export(at, &[form]), run_in(at, &["export", "r", "--to", form]));
+        assert_eq!(without.status, 0, "{form}: {}", without.stderr);
+        assert_eq!(without.stdout, with.stdout, "{form}");
+        assert_eq!(without.stderr, with.stderr, "{form}");
+    }
 }
 
 #[test]

@@ -283,6 +283,6 @@ mod tests {
         let odd = BinaryGeneticSettings { population: 7, ..Default::default() };
         assert_eq!(go(&BOX, &odd), "setting `population` is 7; it must be an even number from 2 to 1,000,000");
         let error = go(&[[0.0, 1.0], [2.0, f64::NAN]], &BinaryGeneticSettings::default());
-        assert!(error.starts_with("variable 1: range 2 to NaN"), "{error}");
+        assert!(error.starts_with("variable 1: cannot search the range 2 to NaN"), "{error}");
     }
 }

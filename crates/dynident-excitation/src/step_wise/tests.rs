@@ -182,7 +182,7 @@ fn unusable_constants_are_named() {
     let problem = with(StrokeConstants { gravity: 0.0, ..level() });
     assert_eq!(problem.validate().unwrap_err().to_string(), "setting `gravity` is 0; it must be positive and finite");
     let problem = with(StrokeConstants { window_range: [3.0, 2.0], ..level() });
-    assert!(problem.validate().unwrap_err().to_string().starts_with("variable 2: range 3 to 2"));
+    assert!(problem.validate().unwrap_err().to_string().starts_with("variable 2: cannot search the range 3 to 2"));
     let problem = with(StrokeConstants { rate_hz: 1e9, ..level() });
     assert!(problem.gradient_solution(0, 1, never).unwrap_err().to_string().contains("`rate_hz`"));
     assert!(planar().gradient_solution(0, 0, never).is_err());

@@ -154,8 +154,8 @@ mod tests {
         let record = read(good).unwrap();
         assert_eq!((record.samples, &record.q, &record.tau), (2, &vec![1.0, 5.0, 2.0, 6.0], &vec![3.0, 7.0, 4.0, 8.0]));
         let message = |text: &str| read(text).unwrap_err().to_string();
-        assert!(message(good.trim_end()).contains("no end"));
-        assert!(message("").contains("no end") && message("\n").contains("empty"));
+        assert!(message(good.trim_end()).contains("unfinished"));
+        assert!(message("").contains("unfinished") && message("\n").contains("empty"));
         assert!(message("t_s,q1,q2,tau1\n").contains("tau2"));
         assert!(message(&good.replace("0.01", "0")).contains("line 3"));
         assert!(message(&good.replace(",7,", ",nan,")).contains("column tau1"));

@@ -184,7 +184,7 @@ fn every_condition_counts_by_itself() {
     assert!(message.contains("joint2") && message.contains("59.0 %") && message.contains("8.000 Nm"), "{message}");
     let late = TorqueLag { lag_s: -8e-3, std_s: 1e-4, half_width_95_s: 2e-4, matters: true, taken_off_s: 0.0 };
     let message = with(&|record| record.estimate.as_mut().unwrap().lag.common = Some(late));
-    assert!(message.contains("8.0 +- 0.2 ms before"), "{message}");
+    assert!(message.contains("8.0 +- 0.2 ms (95 %) before"), "{message}");
     let message = with(&|record| record.estimate.as_mut().unwrap().lag.lag_s = vec![0.0, -0.011]);
     assert!(message.contains("11.0 ms apart"), "{message}");
     let poor = Prediction { rows: 1000, inside: 0.6, rms_error: 0.4, half_width: 0.2 };

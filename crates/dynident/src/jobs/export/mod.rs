@@ -58,6 +58,12 @@ pub fn export_stored(stored: &ResultFile, result_path: &Path, target: Target) ->
         let message = "does not contain the robot: name the study that the result was made with (--study STUDY.toml)";
         return Err(Error::Result { path: result_path.to_owned(), message: message.to_owned() });
     };
+    let of_model = model.robot.joints.iter().map(|joint| (&joint.body.name, joint.body.parameters));
+    if !of_model.eq(stored.bodies.iter().map(|body| (&body.name, body.parameters))) {
+        let message =
+            "its `bodies` differ from `model`: name the study to export the edited bodies (--study STUDY.toml)";
+        return Err(Error::Result { path: result_path.to_owned(), message: message.to_owned() });
+    }
     let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
     written(stored, result_path, &model.robot().map_err(cannot)?, target)
 }
