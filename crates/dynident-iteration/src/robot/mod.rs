@@ -43,7 +43,7 @@ pub use stop_signal::StopSignal;
 pub use ways::{RunPart, WayRecords, Ways};
 pub use workspace::{WatchedPoint, WorkspaceBox, WorkspaceSettings};
 
-use crate::oscillation::OscillationLimits;
+use crate::signals::oscillation::OscillationLimits;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{LimitedQuantity, Record, Reference, Run, RunStatus, SimulationError, require_length};
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
 use super::envelope::target_at;
 use super::stop_reason::JointOscillation;
 use super::ways::RunPart;
-use crate::oscillation::{OscillationLimits, OscillationWatch, growing_oscillation};
-use crate::rests::highest_speeds;
+use crate::signals::oscillation::{OscillationLimits, OscillationWatch, growing_oscillation};
+use crate::signals::rests::highest_speeds;
 use dynident_simulation::{Record, Reference};
 
 /// Number of samples from which the rate of a log is computed.

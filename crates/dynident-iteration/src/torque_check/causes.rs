@@ -1,6 +1,6 @@
 use super::explanation::{Explanation, Fitted, TorqueCandidate};
 use super::{CheckWith, CommandSource, RowScale, TorqueCheck};
-use crate::leg::IterationTask;
+use crate::setup::leg::IterationTask;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

@@ -2,8 +2,8 @@
 //! positions in the log.
 
 use super::separable_fit::{JointColumns, SHARED, SharedParameter};
-use crate::leg::Leg;
-use crate::motion::on_uniform_clock;
+use crate::estimation::motion::on_uniform_clock;
+use crate::setup::leg::Leg;
 use dynident_recording::{DecimationSettings, Decimator, Derivatives, DifferentiatorSettings, Place};
 use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings, Measured, Target};

@@ -5,8 +5,8 @@
 //! clearly more than every other.
 
 use super::separable_fit::{JointColumns, centred, coefficients, dot, residual_of, rms, square};
-use crate::leg::IterationTask;
-use crate::torque_check_settings::TorqueCheckSettings;
+use crate::setup::leg::IterationTask;
+use crate::setup::torque_check_settings::TorqueCheckSettings;
 use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
 use serde::{Deserialize, Serialize};
 

@@ -33,9 +33,9 @@ pub use causes::TorqueCause;
 pub use explanation::TorqueCandidate;
 pub(crate) use row_scale::{LeastDeviation, RowScale, row_scales};
 
-use crate::leg::{IterationTask, Leg};
-use crate::settings::RunIdentificationSettings;
-use crate::torque_check_settings::{CauseSettings, TorqueCheckSettings};
+use crate::setup::leg::{IterationTask, Leg};
+use crate::setup::settings::RunIdentificationSettings;
+use crate::setup::torque_check_settings::{CauseSettings, TorqueCheckSettings};
 use agreement::agreement;
 use command::{CommandLaw, ObservedLeg, shared_parameters};
 use dynident_simulation::Record;

@@ -12,7 +12,7 @@ use super::command::LoggedMotion;
 use super::explanation::{JointData, friction_columns};
 use super::separable_fit::{centred, coefficients, dot, residual_of, rms, square};
 use super::{CheckedRun, TorqueCause};
-use crate::leg::IterationTask;
+use crate::setup::leg::IterationTask;
 use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
 
 /// Cut-off of the smoothed motion of a run that ended early, as a share of the sampling rate, and the smallest number

@@ -13,11 +13,11 @@
 //! one joint determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little
 //! with the others gets a wide error bar.
 
-use crate::error::IterationError;
-use crate::estimate::RunEstimate;
-use crate::leg::IterationTask;
-use crate::run_logs::{RunLog, identification_settings, recordings};
-use crate::settings::{RunIdentificationSettings, Scheme};
+use crate::estimation::estimate::RunEstimate;
+use crate::estimation::run_logs::{RunLog, identification_settings, recordings};
+use crate::setup::error::IterationError;
+use crate::setup::leg::IterationTask;
+use crate::setup::settings::{RunIdentificationSettings, Scheme};
 use dynident_estimation::{LinearProblem, WeightedSettings, weighted_least_squares};
 use dynident_identification::estimators::estimate;
 use dynident_identification::payload::with_free_gains;

@@ -1,0 +1,83 @@
+use crate::estimation::motion::measured_motion;
+use crate::setup::error::IterationError;
+use crate::setup::leg::{IterationTask, Leg};
+use crate::setup::settings::RunIdentificationSettings;
+use crate::signals::rests::{RestMargin, has_dry_friction};
+use dynident_identification::examination::LagCandidates;
+use dynident_identification::friction::FrictionSearch;
+use dynident_identification::rows::ParallelFilterSettings;
+use dynident_identification::{IdentificationSettings, LogNoise, Recording};
+use dynident_recording::DifferentiatorSettings;
+use dynident_simulation::{Record, require_length};
+use std::sync::Arc;
+
+/// The records of one run with its number.
+#[derive(Clone, Copy, Debug)]
+pub struct RunLog<'a> {
+    /// Number of the run, from 1.
+    pub run: usize,
+    /// Its legs.
+    pub legs: &'a [Leg],
+    /// One record per leg.
+    pub records: &'a [Record],
+    /// Standard deviation of each joint's residual in the run alone, Nm (N); used as weights in joint-by-joint
+    /// identification.
+    pub joint_sigma: &'a [f64],
+    /// The differentiator that the run selected; `None` for that of the settings.
+    pub differentiator: Option<&'a DifferentiatorSettings>,
+    /// Distance from rest above which the torque of each joint with dry friction is used, as selected by the run;
+    /// without an entry, only samples at rest are excluded.
+    pub rest_margins: &'a [RestMargin],
+}
+
+/// The records as recordings with computed motions, run by run and leg by leg.
+pub(crate) fn recordings(
+    task: &IterationTask,
+    runs: &[RunLog<'_>],
+    settings: &RunIdentificationSettings,
+) -> Result<Vec<Recording>, IterationError> {
+    let dry = has_dry_friction(&task.robot, &settings.friction);
+    let mut recordings = Vec::new();
+    for log in runs {
+        let legs = log.legs.len();
+        require_length("records of the run's legs", legs, log.records.len())?;
+        let own = log.differentiator.map(|differentiator| settings.with_differentiator(differentiator));
+        let settings = own.as_ref().unwrap_or(settings);
+        for (number, (leg, record)) in log.legs.iter().zip(log.records).enumerate() {
+            let margin = |joint: usize| log.rest_margins.get(joint).copied().unwrap_or_default();
+            let margins: Vec<Option<RestMargin>> =
+                (0..dry.len()).map(|joint| dry[joint].then(|| margin(joint))).collect();
+            let motion = measured_motion(record, leg, settings, &margins)?;
+            let of_leg = if legs > 1 { format!(", leg {}", number + 1) } else { String::new() };
+            let mut recording = Recording::of_motion(format!("run {}{of_leg}", log.run), motion);
+            recording.commanded = Some(Arc::clone(leg.commanded()));
+            recording.payload = leg.payload().map(str::to_owned);
+            recordings.push(recording);
+        }
+    }
+    Ok(recordings)
+}
+
+pub(crate) fn identification_settings(
+    task: &IterationTask,
+    settings: &RunIdentificationSettings,
+    runs: usize,
+) -> IdentificationSettings {
+    let mut identification = IdentificationSettings::default();
+    identification.motion.differentiator = settings.differentiator.clone();
+    identification.parallel_filter = ParallelFilterSettings::from(settings.parallel_filter.as_ref());
+    identification.estimation = settings.estimation.clone();
+    identification.estimation.held.clone_from(&task.known);
+    identification.consistency.clone_from(&settings.consistency);
+    // Poorly determined friction would prevent convergence.
+    let search = |own: &FrictionSearch| FrictionSearch {
+        most_inflation: own.most_inflation.or(Some(FrictionSearch::MOST_INFLATION)),
+        ..own.clone()
+    };
+    identification.friction = settings.friction.iter().map(search).collect();
+    identification.friction_before.clone_from(&settings.friction_before);
+    // With the same controller, friction causes another apparent lag at each joint and in each run.
+    identification.lags = LagCandidates::Common;
+    identification.log_noise = if runs > 1 { LogNoise::Own } else { LogNoise::Shared };
+    identification
+}

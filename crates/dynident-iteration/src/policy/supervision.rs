@@ -1,0 +1,70 @@
+use crate::policy::record::RunRecord;
+use crate::robot::{RobotRun, RunPurpose, StopSignal};
+use crate::setup::rehearsal::Rehearsal;
+
+/// A motion that is about to be commanded.
+#[derive(Clone, Debug)]
+pub struct NextMotion {
+    /// Number of the run, from 1.
+    pub run: usize,
+    /// Index of the trajectory in the run, from 0, and the number of trajectories.
+    pub leg: (usize, usize),
+    /// Name of the controller.
+    pub controller: String,
+    /// Whether the controller has a model.
+    pub model_based: bool,
+    /// Length, s.
+    pub duration_s: f64,
+    /// Share of the trajectory's speed; below 1 only in slow runs before the first run.
+    pub speed: f64,
+    /// Purpose of the motion.
+    pub purpose: RunPurpose,
+    /// The largest velocity of each joint, by name, rad/s (m/s).
+    pub largest_speed: Vec<(String, f64)>,
+    /// Result of its rehearsal, if any.
+    pub rehearsal: Option<Rehearsal>,
+    /// The paths from and to home, if a home is set.
+    pub ways: Option<NextWays>,
+}
+
+/// The paths from and to home of a motion that is about to be commanded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NextWays {
+    /// Length of the approach, s.
+    pub approach_s: f64,
+    /// Length of the return, s.
+    pub return_s: f64,
+    /// The largest velocity of each joint on both paths, by name, rad/s (m/s).
+    pub largest_speed: Vec<(String, f64)>,
+    /// Number of via postures of each path; 0 for a direct path.
+    pub over_postures: [usize; 2],
+}
+
+/// Supervises an iteration.
+pub trait Supervisor {
+    /// The signal that stops the iteration.
+    fn stop(&self) -> Option<&StopSignal> {
+        None
+    }
+
+    /// Whether every motion needs the permission of a person.
+    fn asks(&self) -> bool {
+        false
+    }
+
+    /// Whether the motion may be commanded. If not, the iteration waits for the next call.
+    fn allows(&mut self, _motion: &NextMotion) -> bool {
+        true
+    }
+
+    /// Called after every new run.
+    fn made(&mut self, _record: &RunRecord, _runs: &[RobotRun]) {}
+}
+
+pub(crate) struct Watching<'a>(pub(crate) &'a mut dyn FnMut(&RunRecord, &[RobotRun]));
+
+impl Supervisor for Watching<'_> {
+    fn made(&mut self, record: &RunRecord, runs: &[RobotRun]) {
+        (self.0)(record, runs);
+    }
+}

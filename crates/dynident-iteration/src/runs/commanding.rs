@@ -1,0 +1,132 @@
+use crate::policy::next_step::RunPlan;
+use crate::policy::record::RunRecord;
+use crate::policy::supervision::Supervisor;
+use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
+use crate::runs::before_motion::{Commanded, next_motion, rehearsed, ways_of};
+use crate::runs::iteration::Iteration;
+use crate::setup::error::IterationError;
+use crate::setup::home::{FoundWays, HomeError};
+use crate::setup::leg::IterationTask;
+use crate::setup::rehearsal::{Rehearsal, RehearsalFailure};
+use crate::setup::status::IterationStatus;
+use crate::storage::cut_short::CutShort;
+use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
+use std::time::Instant;
+
+#[derive(Debug)]
+pub(crate) struct Prepared {
+    pub(crate) controller: ControllerSettings,
+    pub(crate) model: Option<ControllerModel>,
+    pub(crate) ways: Vec<Option<FoundWays>>,
+    pub(crate) rehearsal: Option<Rehearsal>,
+}
+
+pub(crate) enum MotionOutcome {
+    Run(RobotRun),
+    Stopped(IterationStatus),
+    /// The motion was interrupted or failed: its log if it had begun, and the reason.
+    CutShort(Option<RobotRun>, CutShort),
+}
+
+/// Number of a leg of a run, which seeds its noise and names its folder.
+pub(crate) fn folder_number(run: usize, place: usize, legs: usize) -> usize {
+    (run - 1) * legs + place + 1
+}
+
+impl Iteration {
+    /// Prepares controller, model, paths and rehearsal of a plan along the legs of `task`; or returns why it is not
+    /// commanded.
+    pub(crate) fn prepared(
+        &self,
+        task: &IterationTask,
+        plan: &RunPlan,
+        before: &[RunRecord],
+        stop: Option<&StopSignal>,
+    ) -> Result<Result<Prepared, IterationStatus>, IterationError> {
+        let settings = self.settings();
+        let controller = plan.controller(settings);
+        let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
+        let robot = self.robot(before)?;
+        let refused = |why: &dyn core::fmt::Display| {
+            let reason = format!("run {} is not commanded: {why}", plan.run);
+            Ok(Err(IterationStatus::Refused { reason }))
+        };
+        let interrupted = || {
+            let reason = format!("while run {} was prepared", plan.run);
+            Ok(Err(IterationStatus::Interrupted { reason }))
+        };
+        let stopped = || stop.is_some_and(StopSignal::is_requested);
+        let ways = match ways_of(task, settings, &stopped) {
+            Ok(ways) => ways,
+            Err(HomeError::Numbers(error)) => return Err(error.into()),
+            Err(HomeError::Interrupted) => return interrupted(),
+            Err(error) => return refused(&error),
+        };
+        let with = (plan, &controller, model.as_ref());
+        match rehearsed(task, settings, &robot, with, (&ways, &stopped), before)? {
+            Ok(rehearsal) => Ok(Ok(Prepared { controller, model, ways, rehearsal })),
+            Err(RehearsalFailure::Interrupted) => interrupted(),
+            Err(failure) => refused(&failure),
+        }
+    }
+
+    pub(crate) fn commanded(
+        &self,
+        robot: &mut dyn Robot,
+        (task, plan, prepared): (&IterationTask, &RunPlan, &Prepared),
+        motion: &Commanded<'_>,
+        supervisor: &mut dyn Supervisor,
+        last_motion: &mut Option<Instant>,
+    ) -> Result<MotionOutcome, IterationError> {
+        let Commanded { place, speed, purpose, .. } = *motion;
+        let Prepared { controller, model, ways, rehearsal } = prepared;
+        let run = folder_number(plan.run, place, task.legs.len());
+        let reference = &*motion.reference()?;
+        let found = ways[place].as_ref();
+        let own = found.map(|found| if speed < 1.0 { found.ways.slowed(speed) } else { Ok(found.ways.clone()) });
+        let own = own.transpose()?;
+        let stop = supervisor.stop().cloned();
+        let stop_requested = || stop.as_ref().is_some_and(StopSignal::is_requested);
+        if stop_requested() {
+            return Ok(MotionOutcome::CutShort(None, CutShort::Interrupted("between two runs".to_owned())));
+        }
+        let mut shown = next_motion(task, plan, controller, motion, reference, own.as_ref().zip(found));
+        shown.rehearsal.clone_from(rehearsal);
+        if !supervisor.allows(&shown) {
+            if stop_requested() {
+                return Ok(MotionOutcome::CutShort(None, CutShort::Interrupted("before a run".to_owned())));
+            }
+            let reason = format!("run {} was not allowed", plan.run);
+            return Ok(MotionOutcome::Stopped(IterationStatus::Waiting { reason }));
+        }
+        let robot_run = robot.run(&RunRequest {
+            model: model.as_ref(),
+            envelope: self.settings().safety.envelope.as_ref(),
+            oscillation: self.settings().safety.oscillation.limits(self.task().robot.model()),
+            stop: stop.as_ref(),
+            speed,
+            purpose,
+            ways: own.as_ref(),
+            ..RunRequest::new(run, reference, controller)
+        })?;
+        *last_motion = Some(Instant::now());
+        Ok(match &robot_run.status {
+            RobotStatus::Waiting { .. } => {
+                MotionOutcome::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() })
+            }
+            RobotStatus::Failed { .. } => {
+                let how = format!("run {}: {}", plan.run, robot_run.status);
+                MotionOutcome::CutShort(Some(robot_run), CutShort::Failed(how))
+            }
+            RobotStatus::Interrupted { .. } => {
+                let how = robot_run.status.to_string();
+                MotionOutcome::CutShort(Some(robot_run), CutShort::Interrupted(how))
+            }
+            RobotStatus::Done
+            | RobotStatus::Simulated { .. }
+            | RobotStatus::Stopped { .. }
+            | RobotStatus::Oscillated { .. }
+            | RobotStatus::LeftEnvelope { .. } => MotionOutcome::Run(robot_run),
+        })
+    }
+}

@@ -1,0 +1,92 @@
+//! Errors of an iteration. Its outcome is a status, not an error: see [`IterationStatus`](crate::IterationStatus).
+
+use dynident_dynamics::ParametricModelError;
+use dynident_estimation::EstimationError;
+use dynident_identification::estimators::EstimatorError;
+use dynident_identification::{IdentificationError, LogError};
+use dynident_recording::FilterError;
+use dynident_simulation::SimulationError;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why an iteration cannot be created or continued.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum IterationError {
+    /// Invalid robot, controller or setting.
+    #[error(transparent)]
+    Experiment(#[from] SimulationError),
+    /// Parts of the robot that do not fit together.
+    #[error(transparent)]
+    Model(#[from] ParametricModelError),
+    /// Stored friction of an earlier run that does not fit this robot.
+    #[error(
+        "the friction that run {run} selected does not fit this robot: {source}; start afresh, or use another folder"
+    )]
+    ChosenFriction {
+        /// The run.
+        run: usize,
+        /// The mismatch.
+        source: ParametricModelError,
+    },
+    /// Rows that are not sufficient for a model.
+    #[error(transparent)]
+    Identification(#[from] IdentificationError),
+    /// Invalid differentiator or filter.
+    #[error(transparent)]
+    Filter(#[from] FilterError),
+    /// Rows that are not sufficient for an estimate.
+    #[error(transparent)]
+    Estimation(#[from] EstimationError),
+    /// An unusable record.
+    #[error("record of joints {}: {problem}", joints.join(", "))]
+    Record {
+        /// Its joints.
+        joints: Vec<String>,
+        /// The problem and its fix.
+        problem: String,
+    },
+    /// A run whose motion cannot be planned.
+    #[error("run {run}: {problem}")]
+    Planning {
+        /// The run.
+        run: usize,
+        /// The problem and its fix.
+        problem: String,
+    },
+    /// A file of the iteration's folder that cannot be read or written; existing files are unchanged.
+    #[error("{}: {source}; existing files are unchanged", path.display())]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// A file of the iteration's folder with invalid content.
+    #[error("{}: {problem}", path.display())]
+    State {
+        /// The file.
+        path: PathBuf,
+        /// The problem and its fix.
+        problem: String,
+    },
+}
+
+impl From<LogError> for IterationError {
+    fn from(error: LogError) -> Self {
+        Self::Identification(error.into())
+    }
+}
+
+impl From<EstimatorError> for IterationError {
+    fn from(error: EstimatorError) -> Self {
+        Self::Identification(error.into())
+    }
+}
+
+impl IterationError {
+    pub(crate) fn file(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::File { path, source }
+    }
+}
