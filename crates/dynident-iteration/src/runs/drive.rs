@@ -77,7 +77,7 @@ impl Iteration {
     /// Returns a run for an additional motion, if the iteration has converged, motions are planned, and a run is left.
     pub(crate) fn further(&self, status: &IterationStatus, records: &[RunRecord]) -> Option<RunPlan> {
         let open = self.planner.is_some() && status.is_converged() && records.len() < self.settings.max_runs;
-        open.then(|| policy::further(records, &self.settings.settled.verdict)).flatten()
+        open.then(|| next_step::further(records, &self.settings.settled.verdict)).flatten()
     }
 
     pub(crate) fn made(
@@ -223,7 +223,7 @@ impl Iteration {
             self.task.robot.dof(),
             self.settings.settled.verdict.following_error_bounds,
         );
-        match policy::verdict(record, before, &self.settings, &following, &names) {
+        match next_step::verdict(record, before, &self.settings, &following, &names) {
             Ok(()) => record.accepted = true,
             Err(reason) => record.reason = Some(reason.to_string()),
         }

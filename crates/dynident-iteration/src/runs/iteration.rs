@@ -80,7 +80,7 @@ impl Iteration {
     /// Records of another robot.
     pub fn next(&self, records: &[RunRecord]) -> Result<Next, IterationError> {
         let robot = self.robot(records)?;
-        let next = policy::next(records, &self.settings, robot.nominal(), &self.names(&robot, records)?);
+        let next = next_step::next(records, &self.settings, robot.nominal(), &self.names(&robot, records)?);
         if let Next::Finished(IterationStatus::Converged | IterationStatus::Settled | IterationStatus::RunsUsedUp) =
             next
             && let Some(reason) = self.beyond_torque(records)?
