@@ -1,6 +1,6 @@
 //! Do a fit's own figures give reason to read its recordings otherwise?
 
-use crate::diagnosis::{has_jumps, is_beyond_limits};
+use crate::diagnosis::{MotionLimits, has_jumps, is_beyond_limits};
 use crate::training::Training;
 use dynident_model::Model;
 
@@ -16,9 +16,9 @@ pub(crate) fn have_jumps(training: &Training) -> bool {
 }
 
 /// Whether a training recording has a joint beyond its limits, or a rate that no recorder has.
-pub(crate) fn break_limits(training: &Training, model: &Model) -> bool {
+pub(crate) fn break_limits(training: &Training, model: &Model, limits: &MotionLimits) -> bool {
     let reports = training.logs.iter().filter_map(|log| log.statistics.report.as_ref());
-    reports.into_iter().any(|report| is_beyond_limits(model, report))
+    reports.into_iter().any(|report| is_beyond_limits(model, report, limits))
 }
 
 /// Whether a consistent robot with base parameters `consistent` leaves clearly more of the torque than parameters of

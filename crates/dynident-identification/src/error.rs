@@ -1,7 +1,7 @@
 //! Everything that can stop an identification, each with the log or the place and the fix in its message.
 
 use crate::consistent::ConsistencyError;
-use crate::diagnosis::DiagnosisError;
+use crate::diagnosis::{DiagnosisError, InvalidLimit};
 use crate::estimators::EstimatorError;
 use crate::payload::PayloadError;
 use dynident_dynamics::ParametricModelError;
@@ -40,6 +40,9 @@ pub enum IdentificationError {
     /// Intervals of parameters that cannot be had.
     #[error("estimator.intervals: {0}")]
     Intervals(ConsistencyError),
+    /// An invalid limit of diagnosis or examination.
+    #[error(transparent)]
+    Limit(#[from] InvalidLimit),
 }
 
 impl From<DiagnosisError> for IdentificationError {
@@ -48,6 +51,7 @@ impl From<DiagnosisError> for IdentificationError {
             DiagnosisError::Log(error) => Self::Log(error),
             DiagnosisError::Model(source) => Self::from(source),
             DiagnosisError::Estimation(error) => Self::Estimation(error),
+            DiagnosisError::Limit(error) => Self::Limit(error),
         }
     }
 }

@@ -1,7 +1,9 @@
 //! How a model is identified: filters, estimator, what is known of the bodies, whose friction is chosen.
 
 use crate::consistent::{ConsistencyError, ConsistencySettings};
+use crate::diagnosis::DiagnosisSettings;
 use crate::estimators::EstimationSettings;
+use crate::examination::ExaminationSettings;
 use crate::friction::{FrictionSearch, JointFriction};
 use crate::log_noise::LogNoise;
 use dynident_dynamics::ParametricModel;
@@ -98,6 +100,10 @@ pub struct IdentificationSettings {
     /// Whether other readings of the training logs are compared with the study's; where the fit gives reason to, by
     /// default.
     pub diagnosis: DiagnosisChoice,
+    /// Limits behind the verdicts of that comparison.
+    pub diagnosis_limits: DiagnosisSettings,
+    /// Limits of the examination that decide whether the fit is doubtful.
+    pub examination: ExaminationSettings,
 }
 
 impl Default for IdentificationSettings {
@@ -117,6 +123,8 @@ impl Default for IdentificationSettings {
             gains: GainChoice::default(),
             gain_std: 0.0,
             diagnosis: DiagnosisChoice::default(),
+            diagnosis_limits: DiagnosisSettings::default(),
+            examination: ExaminationSettings::default(),
         }
     }
 }

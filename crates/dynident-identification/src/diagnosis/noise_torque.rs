@@ -3,12 +3,12 @@
 use super::motion_rows::denser;
 use dynident_rows::{LogError, LogPass, Logs, RegressorModel, noise_factors};
 
-/// Root mean square, over the recordings `training`, of the torque that noise of the positions adds to what the base
-/// parameters `theta` predict of each joint at the instants of the comparison, Nm (N): `N θ` of
-/// [`noise_factors`]. Zero where no noise is known.
+/// Root mean square, over the recordings `training`, of the torque that noise of the positions adds to the prediction
+/// of each joint by base parameters `theta` at the compared instants, Nm (N): `N θ` of [`noise_factors`]. Zero if the
+/// noise is unknown.
 ///
 /// # Errors
-/// A recording that cannot be read again.
+/// An unreadable recording.
 pub(super) fn torque_of_noise(
     logs: &Logs<'_>,
     model: &RegressorModel,

@@ -1,4 +1,4 @@
-//! What the description's own bodies leave of the torque, with friction fitted joint by joint.
+//! Torque of the nominal bodies, and its residual with friction fitted joint by joint.
 
 use super::motion_rows::MotionRows;
 use crate::friction::step_of_joint;
@@ -13,13 +13,12 @@ pub(super) fn nominal_torque(robot: &ParametricModel, rows: &MotionRows) -> Opti
     Some(torque_of(robot, rows, |[q, dq, ddq]| [q, dq, ddq]))
 }
 
-/// The same from the regressor's columns of the rows, where these are known.
+/// The same from the regressor of the rows.
 pub(super) fn torque_of_bodies(robot: &ParametricModel, panels: &Panels) -> Option<Vec<Vec<f64>>> {
     robot.nominal_base()?;
     let mut parameters = robot.model().parameter_vector();
     parameters.resize(robot.nominal().len(), 0.0);
     let mut theta = robot.base().values(&parameters);
-    // Further columns are of terms.
     theta.resize(robot.layout().columns().len(), 0.0);
     let of_joint = |joint: usize| {
         let mut torque = Vec::new();
@@ -30,8 +29,7 @@ pub(super) fn torque_of_bodies(robot: &ParametricModel, panels: &Panels) -> Opti
     Some((0..robot.dof()).map(of_joint).collect())
 }
 
-/// The torque that holds the nominal bodies against gravity, one vector for each joint, Nm (N); zeros while a body's
-/// inertials are unknown.
+/// Gravity torque of the nominal bodies, one vector for each joint, Nm (N); zeros while a body's inertials are unknown.
 pub(super) fn gravity_torque(robot: &ParametricModel, rows: &MotionRows) -> Vec<Vec<f64>> {
     if robot.nominal_base().is_none() {
         return vec![vec![0.0; rows.len()]; robot.dof()];
@@ -55,8 +53,8 @@ fn torque_of(
     torque
 }
 
-/// Root mean square of what the torque `nominal` of the nominal bodies ([`nominal_torque`]) leaves of each joint's
-/// torque, Nm (N), beside viscous and Coulomb friction of at least zero and an offset that fit the rest best.
+/// Residual of each joint by the torque `nominal` of the nominal bodies ([`nominal_torque`]) with the best nonnegative
+/// viscous and Coulomb friction and the best offset, root mean square, Nm (N).
 pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nominal: &[Vec<f64>]) -> Vec<f64> {
     let left = |(joint, nominal): (usize, &Vec<f64>)| {
         let rest: Vec<f64> = rows.tau[joint].iter().zip(nominal).map(|(tau, nominal)| tau - nominal).collect();
@@ -65,7 +63,7 @@ pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nomina
     nominal.iter().enumerate().map(left).collect()
 }
 
-/// Root mean square of `tau` beside an offset and friction of at least zero.
+/// Residual of `tau` by an offset and nonnegative friction, root mean square.
 fn left_by_friction(dq: &[f64], step: CoulombShape, tau: &[f64]) -> f64 {
     let count = tau.len();
     let columns = [vec![1.0; count], dq.to_vec(), dq.iter().map(|&dq| step.step(dq)).collect()];
@@ -82,7 +80,6 @@ fn left_by_friction(dq: &[f64], step: CoulombShape, tau: &[f64]) -> f64 {
             }
             return (dot(tau, tau) / count.max(1) as f64).sqrt();
         };
-        // Friction that would drive the joint is none.
         let negative =
             (1..kept.len()).filter(|&k| solution[k] < 0.0).min_by(|&a, &b| solution[a].total_cmp(&solution[b]));
         if let Some(k) = negative {
