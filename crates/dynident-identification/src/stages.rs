@@ -297,7 +297,14 @@ fn examine_all_held_out(
             uncertainty: Some(&uncertainty),
             traced: true,
         };
-        Ok(tested_on(logs, &settings.estimation, &training.model, index, &tested, held_out.len() == 1)?)
+        Ok(tested_on(
+            logs,
+            (&settings.estimation, &settings.examination),
+            &training.model,
+            index,
+            &tested,
+            held_out.len() == 1,
+        )?)
     };
     if held_out.is_empty() {
         return Ok(Vec::new());

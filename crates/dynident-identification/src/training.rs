@@ -104,7 +104,8 @@ pub fn training_rows(
     // Torque in a unit that nobody knows says nothing about the description.
     if let Some(nominal) = fitted.model.parametric.nominal_base().filter(|_| settings.gains == GainChoice::Stated) {
         for log in &mut fitted.logs {
-            log.nominal_agreement = Some(PriorAgreement::of_factors(&fitted.model, &log.factors, nominal));
+            log.nominal_agreement =
+                Some(PriorAgreement::of_factors(&fitted.model, &log.factors, nominal, &settings.examination));
         }
     }
     Ok(fitted)

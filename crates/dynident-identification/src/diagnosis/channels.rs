@@ -1,5 +1,3 @@
-//! Columns of a log that a mistake concerns.
-
 /// Columns of a log that a mistake concerns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Channels {

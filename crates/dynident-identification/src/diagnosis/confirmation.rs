@@ -8,28 +8,26 @@ use super::mistakes::Mistake;
 use super::motion_rows::MotionRows;
 use super::nominal::{left_by_nominal, nominal_torque};
 use super::search::Search;
+use super::span::root_mean_square;
 use super::usual_errors::torques_of_likely_robots;
 use crate::consistent::ConsistencySettings;
 
 /// Replaces the result of a search by the study as `written`, with the friction steps that its rows need, if the
 /// hypothesis of the search is not confirmed, or if the search found no hypothesis and these steps differ from the
 /// study's. `None` if the search is confirmed. `believed` is the study of the search's best hypothesis.
-///
-/// # Errors
-/// Too few rows.
-pub(super) fn as_written_instead(
+pub(super) fn unless_confirmed(
     written: &CorrectedStudy,
     believed: &CorrectedStudy,
     search: &Search,
     consistency: &ConsistencySettings,
 ) -> Result<Option<(CorrectedStudy, Search)>, DiagnosisError> {
-    let own_steps = written.with_own_steps()?;
+    let own_steps = written.with_fitted_steps()?;
     if search.best.is_none() && own_steps.robot.terms() == written.robot.terms() {
         return Ok(None);
     }
     let as_written = own_steps.hypothesis(Some(consistency))?;
     if search.best.is_some() {
-        let best = believed.with_own_steps()?.hypothesis(Some(consistency))?;
+        let best = believed.with_fitted_steps()?.hypothesis(Some(consistency))?;
         if is_clear(&as_written, &best) && is_beyond_usual_errors(written, &as_written, &best) {
             return Ok(None);
         }
@@ -62,7 +60,7 @@ fn is_beyond_usual_errors(written: &CorrectedStudy, as_written: &Hypothesis, bes
         return true;
     };
     let of = |study: &CorrectedStudy, nominal: &[Vec<f64>], left: &[f64]| {
-        let torque: Vec<f64> = study.rows.tau.iter().map(|tau| rms(tau)).collect();
+        let torque: Vec<f64> = study.rows.tau.iter().map(|tau| root_mean_square(tau)).collect();
         let by_nominal = left_by_nominal(&study.robot, &study.rows, nominal);
         let noisy: Vec<f64> =
             by_nominal.iter().zip(&torque).zip(left).map(|((by, torque), left)| by.hypot(left * torque)).collect();
@@ -93,8 +91,4 @@ fn with_other_numbers(mistakes: &[Mistake]) -> Vec<Vec<Mistake>> {
         return vec![mistakes.to_vec()];
     }
     others.into_iter().map(|number| [before, &[last.with_number(number)]].concat()).collect()
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }

@@ -106,7 +106,6 @@ pub(super) fn description_fit(
     nominal.iter().flatten().any(|&tau| tau != 0.0).then_some(fit)
 }
 
-/// Fit of one joint.
 #[derive(Default)]
 struct JointFit {
     /// Unexplained share of the torque's sum of squares without friction.

@@ -3,6 +3,7 @@
 use super::channels::Channels;
 use super::motion_rows::MotionRows;
 use super::settings::ChannelSettings;
+use super::span::dot;
 
 /// Largest relative difference of duplicates: rounding of filters.
 const MAX_DIFFERENCE: f64 = 1.0e-6;
@@ -48,7 +49,6 @@ fn is_multiple(a: &[f64], b: &[f64], max_difference: f64) -> bool {
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
         values.iter().map(|value| value - mean).collect::<Vec<f64>>()
     });
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let [aa, ab, bb] = [dot(&a, &a), dot(&a, &b), dot(&b, &b)];
     // The square of the sine of their angle.
     aa > 0.0 && bb > 0.0 && aa * bb - ab * ab < max_difference * max_difference * aa * bb

@@ -32,9 +32,6 @@ pub(super) struct Explanation {
 
 impl Explanation {
     /// Fits the torque of `rows` by `robot`; also by a consistent robot if `consistency` is given.
-    ///
-    /// # Errors
-    /// Too few rows.
     pub(super) fn new(
         robot: &ParametricModel,
         rows: &MotionRows,
@@ -80,7 +77,6 @@ impl Explanation {
         residuals.map(|(left, ratio)| left / noise_share(ratio)).collect()
     }
 
-    /// Whether there are enough instants for separate parameters of each joint.
     pub(super) fn own_parameters_tell(&self, settings: &ScoreSettings) -> Vec<bool> {
         self.instants_per_parameter.iter().map(|ratio| *ratio >= settings.min_instants_per_parameter).collect()
     }

@@ -3,11 +3,11 @@
 
 use super::channels::Channels;
 use super::explanation::predicted;
+use super::lag_search::LagSearch;
 use super::mistakes::{Breadth, Mistake, Setup};
 use super::motion_rows::{INSTANTS, MotionRows};
 use super::plausibility::beyond_limits;
 use super::settings::DiagnosisSettings;
-use super::torque_clock::TorqueClock;
 use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
 
@@ -29,18 +29,15 @@ pub struct HeldOutHypothesis {
     pub left_without: f64,
 }
 
-/// A robot whose parameters are known from the training logs.
 #[derive(Clone, Copy)]
 pub(super) struct KnownRobot<'a> {
     pub(super) robot: &'a ParametricModel,
-    /// Its base parameters.
     pub(super) theta: &'a [f64],
     /// Unexplained share of each joint's torque in the training logs.
     pub(super) left: &'a [f64],
     pub(super) settings: &'a DiagnosisSettings,
 }
 
-/// Residuals of one hypothesis.
 struct Residual {
     /// `Σ_j ln(unexplained share of joint j)` and the cost of broken limits.
     score: f64,
@@ -77,7 +74,6 @@ impl Residual {
     }
 }
 
-/// A mistake of the log and the residual after its correction.
 struct Candidate {
     mistake: Mistake,
     rarity: f64,
@@ -100,11 +96,11 @@ impl Candidate {
 }
 
 /// Searches one mistake in recording number `log`, whose instants are `rows`, that explains its larger residual.
-/// `clock` gives its torque at other moments, if the log is long enough.
+/// `lag_search` gives its torque at other moments, if the log is long enough.
 pub(super) fn held_out_hypothesis(
     known: KnownRobot<'_>,
     rows: &MotionRows,
-    clock: Option<&TorqueClock<'_>>,
+    lag_search: Option<&LagSearch<'_>>,
     log: usize,
 ) -> Option<HeldOutHypothesis> {
     let settings = known.settings;
@@ -124,12 +120,12 @@ pub(super) fn held_out_hypothesis(
     let mut tried: Vec<Candidate> = all.into_par_iter().map(without).collect();
     tried.sort_by(|a, b| a.score().total_cmp(&b.score()));
     let least = tried.first().map_or(f64::INFINITY, Candidate::score);
-    let late = clock.and_then(|clock| late_torque(known, clock));
+    let late = lag_search.and_then(|lag_search| late_torque(known, lag_search));
     let late = late.filter(|late| late.score() < least && late.is_clear(&as_written, settings));
     let others = if late.is_some() { &tried[..] } else { tried.get(1..)? };
     let best = late.as_ref().or(tried.first()).filter(|best| best.is_clear(&as_written, settings))?;
     // Known parameters determine every number to within the noise.
-    let between = best.mistake.between(|mistake| without(mistake.clone()).residual.score).map(without);
+    let between = best.mistake.with_best_number(|mistake| without(mistake.clone()).residual.score).map(without);
     let limit = best.residual.score - settings.held_out.min_gain_of_number;
     let between = between.filter(|found| found.residual.score < limit);
     let max_score = best.score() + settings.score.max_indistinguishable;
@@ -141,13 +137,13 @@ pub(super) fn held_out_hypothesis(
 }
 
 /// The log with the lag of all torques that has the smallest residual; `None` for a lag that a fit compensates.
-fn late_torque(known: KnownRobot<'_>, clock: &TorqueClock<'_>) -> Option<Candidate> {
+fn late_torque(known: KnownRobot<'_>, lag_search: &LagSearch<'_>) -> Option<Candidate> {
     let joints: Vec<usize> = (0..known.robot.dof()).collect();
-    let at = |lag_s: f64| Residual::new(known, &clock.rows(&joints, Channels::Torque, lag_s, INSTANTS));
-    let tried: Vec<f64> = clock.lags_s().collect();
+    let at = |lag_s: f64| Residual::new(known, &lag_search.rows(&joints, Channels::Torque, lag_s, INSTANTS));
+    let tried: Vec<f64> = lag_search.lags_s().collect();
     let scores: Vec<f64> = tried.par_iter().map(|&lag_s| at(lag_s).score).collect();
     let best = (0..tried.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
-    let lag_s = clock.least_near(tried[best], |lag_s| at(lag_s).score);
-    let mistake = clock.mistake(&joints, Channels::Torque, lag_s)?;
+    let lag_s = lag_search.refined_lag_s(tried[best], |lag_s| at(lag_s).score);
+    let mistake = lag_search.mistake(&joints, Channels::Torque, lag_s)?;
     Some(Candidate { rarity: mistake.facts().rarity, mistake, residual: at(lag_s) })
 }

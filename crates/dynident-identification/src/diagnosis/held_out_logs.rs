@@ -4,26 +4,22 @@ use super::error::DiagnosisError;
 use super::explanation::{Explanation, predicted};
 use super::held_out_hypothesis::{HeldOutHypothesis, KnownRobot, held_out_hypothesis};
 use super::hypothesis::Hypothesis;
+use super::lag_search::LagSearch;
 use super::motion_rows::{INSTANTS, MotionRows, MotionSamples};
 use super::settings::DiagnosisSettings;
-use super::torque_clock::TorqueClock;
 use super::unmodelled_payload::{UnmodelledPayload, unmodelled_payload};
 use crate::consistent::ConsistencySettings;
 use dynident_rows::{Logs, RegressorModel, Role};
 
-/// Causes found in held-out logs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HeldOutLogs {
     pub(super) payloads: Vec<UnmodelledPayload>,
     pub(super) hypotheses: Vec<HeldOutHypothesis>,
 }
 
-/// The result of the training logs.
-pub(super) struct Trained<'a> {
+pub(super) struct TrainingResult<'a> {
     pub(super) model: &'a RegressorModel,
-    /// Their instants.
     pub(super) rows: &'a MotionRows,
-    /// The study as written, fitted to these instants.
     pub(super) as_written: &'a Hypothesis,
     /// Base parameters by least squares from all rows; `None` if the model differs from the study's.
     pub(super) theta: Option<&'a [f64]>,
@@ -37,22 +33,18 @@ pub(super) struct Trained<'a> {
 /// and than one robot for all logs. It is reported only if neither the parameters from all rows nor
 /// those of a consistent robot ([`Hypothesis::parameters`]) explain the log: free parameters that the training motion
 /// does not excite predict nothing.
-///
-/// # Errors
-/// Unreadable recordings, too few rows.
-pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &Trained<'_>) -> Result<HeldOutLogs, DiagnosisError> {
+pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &TrainingResult<'_>) -> Result<HeldOutLogs, DiagnosisError> {
     let (robot, settings) = (&trained.model.parametric, trained.settings);
     let mut found = HeldOutLogs::default();
     for log in logs.of_role(Role::Validate) {
         let samples = [MotionSamples::of_recording(logs, trained.model, log, settings.motion.max_interpolated)?];
         let rows = samples[0].instants(INSTANTS);
-        let clock = TorqueClock::new(robot, &samples, trained.compensated_s.to_vec(), settings);
+        let lag_search = LagSearch::new(robot, &samples, trained.compensated_s.to_vec(), settings);
         let (mut payload, mut hypothesis) = (None, None);
         for theta in trained.theta.into_iter().chain([&trained.as_written.parameters[..]]) {
             let known = KnownRobot { robot, theta, left: &trained.as_written.left, settings };
             payload = unmodelled_payload(robot, &rows, log, theta, &settings.held_out);
-            hypothesis = held_out_hypothesis(known, &rows, clock.as_ref(), log);
-            // The smaller residual decides.
+            hypothesis = held_out_hypothesis(known, &rows, lag_search.as_ref(), log);
             if let (Some(with), Some(without)) = (&payload, &hypothesis) {
                 if with.left_with < without.left_without { hypothesis = None } else { payload = None }
             }
@@ -73,7 +65,7 @@ pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &Trained<'_>) -> Result<He
 
 /// Residual of this log by the best robot for the training logs and this log together, root mean square of all joints,
 /// Nm.
-fn left_of_one_robot(rows: &MotionRows, trained: &Trained<'_>) -> Result<f64, DiagnosisError> {
+fn left_of_one_robot(rows: &MotionRows, trained: &TrainingResult<'_>) -> Result<f64, DiagnosisError> {
     let robot = &trained.model.parametric;
     let mut all = trained.rows.clone();
     all.append(rows);

@@ -6,7 +6,8 @@ use super::mistakes::{Mistake, Proof};
 use super::motion_rows::MotionRows;
 use super::plausibility::{BeyondLimit, beyond_limits, is_rate_of_a_recorder};
 use super::settings::{DiagnosisSettings, ScoreSettings};
-use super::step_width::with_steps_of;
+use super::span::norm;
+use super::step_width::with_fitted_steps;
 use crate::consistent::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
@@ -119,7 +120,6 @@ impl ScoreSettings {
     }
 }
 
-/// Robot and rows with some mistakes corrected.
 #[derive(Clone, Debug)]
 pub(super) struct CorrectedStudy {
     pub(super) robot: ParametricModel,
@@ -129,7 +129,6 @@ pub(super) struct CorrectedStudy {
     pub(super) settings: DiagnosisSettings,
 }
 
-/// A hypothesis with its robot and rows.
 #[derive(Clone, Debug)]
 pub(super) struct Explained {
     pub(super) study: CorrectedStudy,
@@ -162,15 +161,11 @@ impl CorrectedStudy {
     }
 
     /// The same with the friction steps that its rows need.
-    ///
-    /// # Errors
-    /// Too few rows.
-    pub(super) fn with_own_steps(&self) -> Result<Self, EstimationError> {
-        let robot = with_steps_of(&self.robot, &self.rows, self.settings.acceptance.max_ratio_of_step)?;
+    pub(super) fn with_fitted_steps(&self) -> Result<Self, EstimationError> {
+        let robot = with_fitted_steps(&self.robot, &self.rows, self.settings.acceptance.max_ratio_of_step)?;
         Ok(Self { robot, ..self.clone() })
     }
 
-    /// The same with these mistakes corrected as well, one after the other.
     pub(super) fn without_all(&self, mistakes: &[Mistake]) -> Self {
         mistakes.iter().fold(self.clone(), |study, mistake| study.without(mistake))
     }
@@ -255,8 +250,4 @@ impl CorrectedStudy {
 /// Leaves out joints without torque, whose share is zero.
 fn sum_of_logarithms(shares: &[f64]) -> f64 {
     shares.iter().filter(|share| **share > 0.0).map(|share| share.ln()).sum()
-}
-
-fn norm(values: &[f64]) -> f64 {
-    values.iter().map(|value| value * value).sum::<f64>().sqrt()
 }

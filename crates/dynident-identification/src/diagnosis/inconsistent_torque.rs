@@ -49,9 +49,6 @@ impl InconsistentTorque {
 /// The inconsistent torques of a hypothesis: those that are independent of the motion, or else the one with the largest
 /// ratio, since it spoils its neighbours. `robot` and `rows` are those of the hypothesis. `noise` computes the share of
 /// each joint's torque from noise of the positions; it is called only if needed.
-///
-/// # Errors
-/// Those of `noise`, too few rows.
 pub(super) fn inconsistent_torques(
     hypothesis: &Hypothesis,
     robot: &ParametricModel,

@@ -29,9 +29,6 @@ pub(super) struct SharedMotion {
 
 impl SharedMotion {
     /// The motion of `rows` with at least one of `torques` for each joint; the torques of `rows` are not used.
-    ///
-    /// # Errors
-    /// Too few rows.
     pub(super) fn new<'t>(
         robot: &ParametricModel,
         rows: &MotionRows,
@@ -70,8 +67,6 @@ pub(super) struct JointFits<'a> {
 }
 
 impl<'a> JointFits<'a> {
-    /// # Errors
-    /// Too few rows.
     pub(super) fn new(robot: &'a ParametricModel, rows: &'a MotionRows) -> Result<Self, EstimationError> {
         let mut panels = panels(robot, rows);
         let mut workspace = FactorWorkspace::default();
@@ -87,9 +82,6 @@ impl<'a> JointFits<'a> {
 
     /// The fits with a shared motion, where joint `j` has the torque number `chosen[j].0` of `motion` times
     /// `chosen[j].1`.
-    ///
-    /// # Errors
-    /// Missing torques.
     pub(super) fn of_shared(
         robot: &'a ParametricModel,
         rows: &'a MotionRows,
@@ -128,9 +120,6 @@ impl<'a> JointFits<'a> {
     /// Base parameters by weighted least squares, with the inverse residual variance of each joint as weight, and their
     /// residuals. It is faster than [`weighted_least_squares`](dynident_estimation::weighted_least_squares), since it
     /// computes neither covariance nor rank.
-    ///
-    /// # Errors
-    /// Rows of another robot.
     pub(super) fn one_set(&self) -> Result<(Vec<f64>, Vec<f64>), EstimationError> {
         let problem = &self.problem;
         let mut sigma = self.torque.clone();
@@ -180,9 +169,6 @@ impl<'a> JointFits<'a> {
     }
 
     /// Residual of each joint for base parameters `theta`.
-    ///
-    /// # Errors
-    /// Parameters of another robot.
     pub(super) fn left_by(&self, theta: &[f64]) -> Result<Vec<f64>, EstimationError> {
         residuals(&self.problem, theta, &self.torque)
     }

@@ -14,7 +14,7 @@
 //! | `step_width`, `friction_spans`, `further_friction`, `noise_torque`, `usual_errors`, `span` | other causes than mistakes: friction, noise, errors of descriptions |
 //! | `hypothesis`, `search`, `round`, `refinement` | the score, the best hypothesis, and its number |
 //! | `confirmation` | test whether correct logs would support the hypothesis too |
-//! | `torque_clock` | channels that were logged too late or too early |
+//! | `lag_search` | channels that were logged too late or too early |
 //! | `training` | the search in the training logs |
 //! | `description_fit`, `wrong_mass` | units of torque, another robot, one wrong mass |
 //! | `held_out_logs`, `held_out_hypothesis`, `unmodelled_payload` | payloads and mistakes of one held-out log |
@@ -33,6 +33,7 @@ mod held_out_logs;
 mod hypothesis;
 mod inconsistent_torque;
 mod joint_fits;
+mod lag_search;
 pub mod mistakes;
 mod motion_rows;
 mod noise_torque;
@@ -44,7 +45,6 @@ mod search;
 mod settings;
 mod span;
 mod step_width;
-mod torque_clock;
 mod training;
 mod unmodelled_payload;
 mod usual_errors;
@@ -76,7 +76,7 @@ use description_fit::description_fit;
 use duplicate_channels::{duplicate_channels, has_lost_signs};
 use dynident_rows::{Logs, RegressorModel};
 use explanation::Explanation;
-use held_out_logs::{HeldOutLogs, Trained, held_out_logs};
+use held_out_logs::{HeldOutLogs, TrainingResult, held_out_logs};
 use inconsistent_torque::inconsistent_torques;
 use noise_torque::torque_of_noise;
 use training::{SearchedLogs, searched_logs};
@@ -118,7 +118,7 @@ pub fn diagnose(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
     let DiagnosisTask { logs, settings, robot, training, .. } = task;
     settings.diagnosis_limits.validate()?;
     let limits = &settings.diagnosis_limits.score;
-    let found = diagnosed(task)?;
+    let found = diagnose_at_cutoff(task)?;
     let is_explained = found.search.best.is_some()
         || (found.search.believed().left_of_all <= limits.max_unexplained && !found.is_unexplained());
     let Some(cutoff_hz) = logs.motion.differentiator.cutoff_hz().filter(|_| !is_explained) else { return Ok(found) };
@@ -129,7 +129,7 @@ pub fn diagnose(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
         let (model, cutoff_hz) = (robot.model(), Some(share * cutoff_hz));
         let slower = Logs::new(model, logs.recordings, settings.row_settings(), training, cutoff_hz, logs.execution)?;
         let slower = slower.with_excerpts(logs.excerpts());
-        let again = diagnosed(DiagnosisTask { logs: &slower, theta: None, ..task })?;
+        let again = diagnose_at_cutoff(DiagnosisTask { logs: &slower, theta: None, ..task })?;
         let is_noise_alone = found.is_unexplained() && !again.is_unexplained();
         if again.search.best.is_some() || is_noise_alone {
             return Ok(again);
@@ -139,7 +139,7 @@ pub fn diagnose(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
 }
 
 /// [`diagnose`] at one cut-off.
-fn diagnosed(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
+fn diagnose_at_cutoff(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
     let SearchedLogs { search, study, consistency, compensated_s } = searched_logs(task)?;
     let DiagnosisTask { logs, training, theta, settings, .. } = task;
     let settings = &settings.diagnosis_limits;
@@ -154,7 +154,10 @@ fn diagnosed(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
             let theta = (robot.terms() == task.robot.terms()).then_some(theta);
             let (consistency, compensated_s) = (&consistency, &compensated_s[..]);
             let (model, rows) = (&model, &study.rows);
-            held_out_logs(logs, &Trained { model, rows, as_written, theta, consistency, compensated_s, settings })?
+            held_out_logs(
+                logs,
+                &TrainingResult { model, rows, as_written, theta, consistency, compensated_s, settings },
+            )?
         }
         None => HeldOutLogs::default(),
     };

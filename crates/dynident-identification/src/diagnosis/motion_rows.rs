@@ -50,9 +50,6 @@ pub(super) struct MotionSamples {
 impl MotionSamples {
     /// Reads recording number `index`, or the excerpt of a long recording. `max_interpolated` is
     /// [`MotionLimits::max_interpolated`](super::MotionLimits::max_interpolated).
-    ///
-    /// # Errors
-    /// An unreadable recording.
     pub(super) fn of_recording(
         logs: &Logs<'_>,
         model: &RegressorModel,
@@ -75,7 +72,7 @@ impl MotionSamples {
                 let factor_of =
                     |settings: &Option<DecimationSettings>| settings.as_ref().map_or(1, |s| s.factor) as f64;
                 let of_fit = logs.filter.decimation(block.rate_hz, motion_band_hz(&logs.motion));
-                let settings = denser(logs, block.rate_hz).decimation(block.rate_hz, None);
+                let settings = instant_filter(logs, block.rate_hz).decimation(block.rate_hz, None);
                 let settings = settings.filter(|settings| settings.factor > 1);
                 spacing_s *= factor_of(&settings);
                 rows_of_fit = factor_of(&of_fit) / factor_of(&settings);
@@ -94,22 +91,7 @@ impl MotionSamples {
             // Rows that depend on extrapolated samples are left out.
             let [begin, behind] = block.unsettled;
             let settled = begin..block.rows.saturating_sub(behind).max(begin);
-            panel.clear();
-            for values in [&block.q, &block.dq, &block.ddq] {
-                for &place in &places {
-                    panel.extend_from_slice(&block.joint(values, place)[settled.clone()]);
-                }
-            }
-            // Rejected samples of the torque are interpolated linearly and marked.
-            let mut marks = Vec::with_capacity(places.len() * settled.len());
-            for &place in &places {
-                let tau = &block.joint(&block.tau, place)[settled.clone()];
-                let marked = block.set_aside.get(place * block.rows..(place + 1) * block.rows).unwrap_or_default();
-                let marked = marked.get(settled.clone()).unwrap_or_default();
-                panel.extend(bridged(tau, marked));
-                marks.extend((0..tau.len()).map(|row| f64::from(u8::from(marked.get(row).copied().unwrap_or(false)))));
-            }
-            panel.extend_from_slice(&marks);
+            fill_panel(block, &places, &settled, &mut panel);
             let (count, filtered) = match &mut decimator {
                 Some(decimator) => {
                     let count = decimator.push(&panel, settled.len(), &mut out);
@@ -182,7 +164,6 @@ impl MotionSamples {
         MotionRows { q: take(q), dq: take(dq), ddq: take(ddq), tau: take(tau), rate_hz: *rate_hz, independent }
     }
 
-    /// Whether too much of a joint's torque in a row is interpolated.
     fn is_interpolated(&self, row: usize) -> bool {
         self.interpolated.get(row).is_some_and(|share| *share > self.max_interpolated)
     }
@@ -194,14 +175,34 @@ impl MotionSamples {
 }
 
 /// The parallel filter of instants, with four times the rows of a fit, since short logs would have too few.
-pub(super) fn denser(logs: &Logs<'_>, rate_hz: f64) -> ParallelFilterSettings {
+pub(super) fn instant_filter(logs: &Logs<'_>, rate_hz: f64) -> ParallelFilterSettings {
     let of_fit = logs.filter.decimation(rate_hz, motion_band_hz(&logs.motion));
     let factor = of_fit.map_or(1, |settings| settings.factor / 4).max(1);
     ParallelFilterSettings { factor: Some(factor), ..logs.filter.clone() }
 }
 
+/// Writes position, velocity, acceleration, torque and marks, one column for each joint. Rejected samples of the torque
+/// are interpolated linearly and have the mark 1.
+fn fill_panel(block: &MotionBlock, places: &[usize], settled: &Range<usize>, panel: &mut Vec<f64>) {
+    panel.clear();
+    for values in [&block.q, &block.dq, &block.ddq] {
+        for &place in places {
+            panel.extend_from_slice(&block.joint(values, place)[settled.clone()]);
+        }
+    }
+    let mut marks = Vec::with_capacity(places.len() * settled.len());
+    for &place in places {
+        let tau = &block.joint(&block.tau, place)[settled.clone()];
+        let marked = block.set_aside.get(place * block.rows..(place + 1) * block.rows).unwrap_or_default();
+        let marked = marked.get(settled.clone()).unwrap_or_default();
+        panel.extend(interpolated_torque(tau, marked));
+        marks.extend((0..tau.len()).map(|row| f64::from(u8::from(marked.get(row).copied().unwrap_or(false)))));
+    }
+    panel.extend_from_slice(&marks);
+}
+
 /// A torque with its `marked` samples interpolated linearly.
-fn bridged(tau: &[f64], marked: &[bool]) -> Vec<f64> {
+fn interpolated_torque(tau: &[f64], marked: &[bool]) -> Vec<f64> {
     let mut out = tau.to_vec();
     let is_marked = |row: usize| marked.get(row).copied().unwrap_or(false);
     let mut row = 0;
@@ -286,8 +287,8 @@ mod tests {
     fn rejected_samples_are_interpolated() {
         let tau = [9.0, 1.0, 50.0, 50.0, 4.0, 5.0, 80.0];
         let marked = [true, false, true, true, false, false, true];
-        assert_eq!(bridged(&tau, &marked), [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
-        assert_eq!(bridged(&tau, &[]), tau);
+        assert_eq!(interpolated_torque(&tau, &marked), [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
+        assert_eq!(interpolated_torque(&tau, &[]), tau);
     }
 
     #[test]

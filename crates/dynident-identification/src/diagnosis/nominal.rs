@@ -1,6 +1,7 @@
 //! Torque of the nominal bodies, and its residual with friction fitted joint by joint.
 
 use super::motion_rows::MotionRows;
+use super::span::{dot, root_mean_square};
 use crate::friction::step_of_joint;
 use dynident_dynamics::{Panels, ParametricModel, Workspace, inverse_dynamics};
 use dynident_model::terms::CoulombShape;
@@ -78,7 +79,7 @@ fn left_by_friction(dq: &[f64], step: CoulombShape, tau: &[f64]) -> f64 {
                 kept.pop();
                 continue;
             }
-            return (dot(tau, tau) / count.max(1) as f64).sqrt();
+            return root_mean_square(tau);
         };
         let negative =
             (1..kept.len()).filter(|&k| solution[k] < 0.0).min_by(|&a, &b| solution[a].total_cmp(&solution[b]));
@@ -90,10 +91,6 @@ fn left_by_friction(dq: &[f64], step: CoulombShape, tau: &[f64]) -> f64 {
         for (value, &column) in solution.iter().zip(&kept) {
             left.iter_mut().zip(&columns[column]).for_each(|(left, x)| *left -= value * x);
         }
-        return (dot(&left, &left) / count.max(1) as f64).sqrt();
+        return root_mean_square(&left);
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

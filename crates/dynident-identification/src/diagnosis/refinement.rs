@@ -27,7 +27,7 @@ pub(super) fn refined(at: &CorrectedStudy, first: &Explained, consistency: &Cons
         None => hypothesis.lower_bound(),
     };
     let free = |mistake: &Mistake| at.without(mistake).hypothesis(None).map_or(f64::INFINITY, |found| value(&found));
-    let found = at.without(&last.between(free)?).explained(consistency).ok()?;
+    let found = at.without(&last.with_best_number(free)?).explained(consistency).ok()?;
     // Free numbers fit the noise: a round number is kept unless the free one is clearly better.
     let is_better = if facts.number.is_none_or(|number| number.is_round) {
         found.hypothesis.score() < first.hypothesis.score() - at.settings.score.min_gain
@@ -45,16 +45,16 @@ fn refined_with_own_steps(
     consistency: &ConsistencySettings,
 ) -> Option<Explained> {
     let explained =
-        |mistake: &Mistake| at.without(mistake).with_own_steps().and_then(|study| study.explained(consistency)).ok();
+        |mistake: &Mistake| at.without(mistake).with_fitted_steps().and_then(|study| study.explained(consistency)).ok();
     let as_tried = explained(first)?;
     let number = first.facts().number?;
     let bound = |mistake: &Mistake| free_bound(at, &as_tried.study.robot, first, mistake);
-    // Inconsistent bodies also fit positions in a unit that is too small, so the consistent fit selects the valley.
+    // Inconsistent bodies also fit positions in a unit that is too small, so the consistent fit selects the minimum.
     let found: Vec<Mistake> = if number.is_round {
-        first.between(bound).into_iter().collect()
+        first.with_best_number(bound).into_iter().collect()
     } else {
-        let valleys = number.valleys(|factor| bound(&first.with_number(factor)));
-        valleys.take(MAX_FITTED_UNITS).map(|factor| first.with_number(factor)).collect()
+        let minima = number.local_minima(|factor| bound(&first.with_number(factor)));
+        minima.take(MAX_FITTED_UNITS).map(|factor| first.with_number(factor)).collect()
     };
     let best = found.iter().filter_map(explained);
     let best = best.min_by(|a, b| a.hypothesis.score().total_cmp(&b.hypothesis.score()));

@@ -9,17 +9,14 @@ use rayon::prelude::*;
 /// Number of candidates fitted in parallel; fixed, so that the result does not depend on the number of threads.
 const BATCH: usize = 4;
 
-/// A candidate with the lower bound of its score.
 #[derive(Clone)]
 struct Bounded {
     bound: f64,
     study: CorrectedStudy,
 }
 
-/// Hypotheses with one more mistake corrected.
 #[derive(Clone, Default)]
 pub(super) struct Round {
-    /// Number of candidates.
     pub(super) tried: usize,
     /// Candidates whose lower bound is good enough.
     bounded: Vec<Bounded>,
@@ -99,7 +96,7 @@ fn gains_of_torques(at: &CorrectedStudy, motion: &SharedMotion, tried: &[Bounded
         }
     }
     let nearest: Vec<&Mistake> = nearest.into_iter().flatten().map(|(_, mistake)| mistake).collect();
-    nearest.par_iter().filter_map(|mistake| mistake.between(free_score)).collect()
+    nearest.par_iter().filter_map(|mistake| mistake.with_best_number(free_score)).collect()
 }
 
 /// Moves the [likelier](Mistake::likelier) of two mistakes to the first place if the logs hardly distinguish them.

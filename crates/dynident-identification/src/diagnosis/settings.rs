@@ -190,8 +190,8 @@ impl Default for LateChannelSettings {
 /// Limits for the comparison with the robot description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DescriptionSettings {
-    /// Smallest share of a joint's torque, without friction, that the scaled nominal bodies explain; 0.5. Otherwise their
-    /// scale is not used.
+    /// Smallest share of a joint's torque, without friction, that the scaled nominal bodies explain; 0.5. With less,
+    /// their scale is ignored.
     pub min_explained: f64,
     /// Largest usual factor between torque and description; 3. A larger one, or one below the inverse, shows another
     /// unit or a motor constant.

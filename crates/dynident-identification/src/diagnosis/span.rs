@@ -1,4 +1,4 @@
-//! The column space of a matrix.
+//! The column space of a matrix, and norms.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -31,6 +31,18 @@ impl Span {
     pub(super) fn outside(&self, vector: &DVector<f64>) -> DVector<f64> {
         vector - &self.0 * self.0.tr_mul(vector)
     }
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+pub(super) fn norm(values: &[f64]) -> f64 {
+    dot(values, values).sqrt()
+}
+
+pub(super) fn root_mean_square(values: &[f64]) -> f64 {
+    (dot(values, values) / values.len().max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

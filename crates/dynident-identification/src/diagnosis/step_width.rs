@@ -17,10 +17,7 @@ const FINE_FACTORS: [[f64; 2]; 2] = [[0.77, 1.3], [0.88, 1.14]];
 /// The robot with the widths of smooth steps at which one set of parameters ([`JointFits::one_set`]) has the smallest
 /// residual of each joint; present widths if no other has at most `max_ratio` of their residual. Separate parameters of
 /// each joint would fit a wrong step.
-///
-/// # Errors
-/// Too few rows.
-pub(super) fn with_steps_of(
+pub(super) fn with_fitted_steps(
     robot: &ParametricModel,
     rows: &MotionRows,
     max_ratio: f64,

@@ -1,12 +1,12 @@
 //! The search for mistakes in the training recordings.
 
-use super::confirmation::as_written_instead;
+use super::confirmation::unless_confirmed;
 use super::description_fit::description_fit;
 use super::error::DiagnosisError;
 use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
+use super::lag_search::LagSearch;
 use super::motion_rows::{INSTANTS, MotionRows, MotionSamples, share_of_log};
 use super::search::{Search, searches};
-use super::torque_clock::TorqueClock;
 use crate::consistent::ConsistencySettings;
 use crate::left_to_the_logs::with_drives_left_to_the_logs;
 use crate::settings::IdentificationSettings;
@@ -28,21 +28,16 @@ pub struct DiagnosisTask<'a> {
     pub theta: Option<&'a [f64]>,
 }
 
-/// The training recordings after the search.
 pub(super) struct SearchedLogs {
     pub(super) search: Search,
     /// The study as written, except for a lag; its robot has friction steps and drive inertia from the logs.
     pub(super) study: CorrectedStudy,
-    /// Settings of the consistent fits.
     pub(super) consistency: ConsistencySettings,
     /// The compensated lag of each joint's torque, s.
     pub(super) compensated_s: Vec<f64>,
 }
 
 /// Searches the mistake that explains the training recordings best.
-///
-/// # Errors
-/// Unreadable recordings, too few rows.
 pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, DiagnosisError> {
     let DiagnosisTask { logs, settings, robot, training, .. } = task;
     let model = RegressorModel::from(robot.clone());
@@ -61,17 +56,16 @@ pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, Dia
     let consistency = ConsistencySettings { tolerance: 1e-2, max_iterations: 100, ..known };
     let compensated_s = |joint| logs.motion.torque_lag_s.as_ref().and_then(|lag_s| lag_s.at(joint)).unwrap_or(0.0);
     let compensated_s: Vec<f64> = (0..robot.dof()).map(compensated_s).collect();
-    let clock = TorqueClock::new(&robot, &samples, compensated_s.clone(), limits);
+    let lag_search = LagSearch::new(&robot, &samples, compensated_s.clone(), limits);
     let as_written = CorrectedStudy::new(robot, rows, Vec::new(), *limits).explained(&consistency)?;
-    let Found { searches, study, written } = with_clock(&as_written, clock.as_ref(), &consistency);
-    let search = likelier(searches, &study);
-    let again = as_written_instead(&written, &search.corrected(&study), &search, &consistency)?;
+    let SearchResults { searches, study, written } = search_with_lag(&as_written, lag_search.as_ref(), &consistency);
+    let search = select_search(searches, &study);
+    let again = unless_confirmed(&written, &search.corrected(&study), &search, &consistency)?;
     let (study, search) = again.unwrap_or((study, search));
     Ok(SearchedLogs { search, study, consistency, compensated_s })
 }
 
-/// The searches with their instants.
-struct Found {
+struct SearchResults {
     /// For common mistakes, and for common and rarer ones.
     searches: [Search; 2],
     /// The study with the instants of the searches.
@@ -81,15 +75,19 @@ struct Found {
 }
 
 /// Searches with the best lag of the torque: a lag hides every other mistake, and another mistake may look like a lag.
-fn with_clock(as_written: &Explained, clock: Option<&TorqueClock<'_>>, consistency: &ConsistencySettings) -> Found {
+fn search_with_lag(
+    as_written: &Explained,
+    lag_search: Option<&LagSearch<'_>>,
+    consistency: &ConsistencySettings,
+) -> SearchResults {
     let written = as_written.study.clone();
-    let late =
-        clock.and_then(|clock| clock.late_channel(&written.robot, &as_written.hypothesis, consistency, INSTANTS));
+    let late = lag_search
+        .and_then(|lag_search| lag_search.late_channel(&written.robot, &as_written.hypothesis, consistency, INSTANTS));
     // A fit compensates such a lag.
     if let Some(late) = late.as_ref().filter(|late| late.explained.study.mistakes.is_empty()) {
         let study = late.explained.study.clone();
         let searches = searches(&late.explained.hypothesis, &late.explained, consistency);
-        return Found { searches, study: study.clone(), written: study };
+        return SearchResults { searches, study: study.clone(), written: study };
     }
     let in_time = searches(&as_written.hypothesis, as_written, consistency);
     let believed = in_time[1].believed();
@@ -101,9 +99,9 @@ fn with_clock(as_written: &Explained, clock: Option<&TorqueClock<'_>>, consisten
         Some(late) => {
             let searches = searches(&as_written.hypothesis, &late.explained, consistency);
             let study = CorrectedStudy { mistakes: Vec::new(), ..late.explained.study };
-            Found { searches, study, written }
+            SearchResults { searches, study, written }
         }
-        None => Found { searches: in_time, study: written.clone(), written },
+        None => SearchResults { searches: in_time, study: written.clone(), written },
     }
 }
 
@@ -111,7 +109,7 @@ fn with_clock(as_written: &Explained, clock: Option<&TorqueClock<'_>>, consisten
 /// unit of one joint breaks fewer limits, and these limits may be wrong. A joint that travels far beyond its range is
 /// an exception. If most torques are still in another unit, the unit of one joint or another rate only compensates for
 /// that.
-fn likelier(searches: [Search; 2], study: &CorrectedStudy) -> Search {
+fn select_search(searches: [Search; 2], study: &CorrectedStudy) -> Search {
     let [usual, all] = searches;
     let (best, tried) = (all.believed(), all.tried);
     let gains = |of: fn(&Hypothesis) -> f64| of(best) < of(usual.believed()) - study.settings.score.min_gain;

@@ -1,8 +1,9 @@
 //! Test of a model on a recording that was not used for its fit.
 
 use super::motion_band::MotionBand;
-use super::nominal_agreement::{AgreementRows, PriorAgreement};
-use super::residuals::{JointResiduals, JointWatch, Uncertainty};
+use super::nominal_agreement::{AgreementAccumulator, PriorAgreement};
+use super::residuals::{JointResiduals, ResidualAccumulator, Uncertainty};
+use super::settings::ExaminationSettings;
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
 use crate::lag::{DelayCheck, TorqueLag, lags_after_pass};
@@ -53,32 +54,32 @@ pub struct HeldOutExamination {
     pub trace: Option<LogTrace>,
 }
 
-struct Test<'a> {
+struct HeldOutTest<'a> {
     rows_of: &'a RegressorModel,
     log: String,
     theta: &'a [f64],
-    watches: Vec<JointWatch>,
+    residuals: Vec<ResidualAccumulator>,
     model: Validation,
     physical: Option<(&'a [f64], Validation)>,
     raw: Validation,
     prior: Option<(&'a [f64], Validation)>,
     motion_band: Option<MotionBand<'a>>,
     /// One for each joint; `None` without nominal values.
-    agreement: Option<Vec<AgreementRows<'a>>>,
+    agreement: Option<Vec<AgreementAccumulator<'a>>>,
     delay: DelayCheck<'a>,
     trace: Option<TraceConsumer<'a>>,
     buffer: Vec<f64>,
     counted: Vec<f64>,
 }
 
-impl Test<'_> {
+impl HeldOutTest<'_> {
     /// Adds errors and residuals of used rows.
     fn add_errors(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         let columns = self.rows_of.layout().joint_columns(rows.joint);
         let measured = &rows.panel[columns.len() * rows.rows..];
         predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
         self.model.add_joint(rows.joint, measured, &self.buffer).map_err(|source| self.failed(source))?;
-        self.watches[rows.joint].add(rows.panel, rows.rows, &self.buffer);
+        self.residuals[rows.joint].add(rows.panel, rows.rows, &self.buffer);
         for (prior, validation) in [&mut self.prior, &mut self.physical].into_iter().flatten() {
             predicted_torque(rows.panel, rows.rows, columns, prior, &mut self.buffer);
             let added = validation.add_joint(rows.joint, measured, &self.buffer);
@@ -95,7 +96,7 @@ impl Test<'_> {
     }
 }
 
-impl RowConsumer for Test<'_> {
+impl RowConsumer for HeldOutTest<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         let mut counted = core::mem::take(&mut self.counted);
         let added = self.add_errors(&rows.counted(&mut counted));
@@ -158,15 +159,15 @@ pub fn examine_held_out(
     tested: &ModelUnderTest<'_>,
 ) -> Result<HeldOutExamination, LogError> {
     logs.begin(&format!("testing on {}", logs.recordings[index].name), &[index]);
-    let found = tested_on(logs, settings, model, index, tested, true);
+    let found = tested_on(logs, (settings, &ExaminationSettings::default()), model, index, tested, true);
     logs.end();
     found
 }
 
-/// [`examine_held_out`] as a part of a stage; `alone` lets a second thread read.
+/// [`examine_held_out`] as a part of a stage; `alone` allows a second thread for reading.
 pub(crate) fn tested_on(
     logs: &Logs<'_>,
-    settings: &EstimationSettings,
+    (settings, limits): (&EstimationSettings, &ExaminationSettings),
     model: &RegressorModel,
     index: usize,
     tested: &ModelUnderTest<'_>,
@@ -178,18 +179,18 @@ pub(crate) fn tested_on(
     // The motion band needs the samples of a log.
     let is_whole = matches!(recording.samples, Samples::Log(_));
     let sets = [Some(theta), physical, nominal].into_iter().flatten().collect();
-    let mut test = Test {
+    let mut test = HeldOutTest {
         motion_band: if is_whole { MotionBand::of(logs, model, sets) } else { None },
         rows_of: model,
         log: recording.label(),
         theta,
-        watches: (0..joints.len()).map(|joint| JointWatch::new(model, theta, joint, uncertainty)).collect(),
+        residuals: (0..joints.len()).map(|joint| ResidualAccumulator::new(model, theta, joint, uncertainty)).collect(),
         model: Validation::new(joints.clone()),
         physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         raw: Validation::new(joints.clone()),
         prior: nominal.map(|nominal| (nominal, Validation::new(joints.clone()))),
         agreement: nominal
-            .map(|nominal| (0..model.dof()).map(|joint| AgreementRows::new(model, joint, nominal)).collect()),
+            .map(|nominal| (0..model.dof()).map(|joint| AgreementAccumulator::new(model, joint, nominal)).collect()),
         delay: DelayCheck::new(model, theta),
         trace: traced.then(|| TraceConsumer::new(model, physical.unwrap_or(theta))),
         buffer: Vec::new(),
@@ -211,7 +212,8 @@ pub(crate) fn tested_on(
             }
         }
     }
-    let residuals = test.watches.iter().zip(&joints).map(|(watch, joint)| watch.report(name, joint)).collect();
+    let residuals =
+        test.residuals.iter().zip(&joints).map(|(residuals, joint)| residuals.report(name, joint)).collect();
     Ok(HeldOutExamination {
         index,
         validation: LogValidation {
@@ -223,7 +225,7 @@ pub(crate) fn tested_on(
             prior: tested_prior,
             residuals,
         },
-        nominal_agreement: test.agreement.map(|rows| PriorAgreement::of_rows(model, &rows)),
+        nominal_agreement: test.agreement.map(|rows| PriorAgreement::of_rows(model, &rows, limits)),
         delays: lags_after_pass(test.delay, (logs, settings), index)?,
         trace: test.trace.map(|trace| trace.finished(name.clone(), Role::Validate, statistics.filtered_rate_hz)),
         statistics,

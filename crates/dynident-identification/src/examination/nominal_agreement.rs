@@ -32,7 +32,7 @@ impl PriorAgreement {
         self.is_reversed_by(&ExaminationSettings::default())
     }
 
-    /// The same by other settings. `reversed_joints` has the default settings.
+    /// The same by other settings; `reversed_joints` has the settings of the examination.
     pub fn is_reversed_by(&self, settings: &ExaminationSettings) -> bool {
         self.is_whole_reversed(settings) || !self.reversed_joints.is_empty()
     }
@@ -113,7 +113,7 @@ impl OwnFriction {
 }
 
 /// Accumulates the rows of one joint for their agreement with nominal values.
-pub(crate) struct AgreementRows<'a> {
+pub(crate) struct AgreementAccumulator<'a> {
     columns: &'a [usize],
     nominal: &'a [f64],
     friction: OwnFriction,
@@ -124,7 +124,7 @@ pub(crate) struct AgreementRows<'a> {
     panel: Vec<f64>,
 }
 
-impl<'a> AgreementRows<'a> {
+impl<'a> AgreementAccumulator<'a> {
     /// `nominal` has the nominal values of all columns of the model.
     pub(crate) fn new(model: &'a RegressorModel, joint: usize, nominal: &'a [f64]) -> Self {
         let friction = OwnFriction::of(model, joint);
@@ -158,25 +158,38 @@ impl<'a> AgreementRows<'a> {
 
 impl PriorAgreement {
     /// For accumulated rows, one for each joint.
-    pub(crate) fn of_rows(model: &RegressorModel, joints: &[AgreementRows<'_>]) -> Self {
-        Self::of_joints(model, joints.iter().map(AgreementRows::agreement))
+    pub(crate) fn of_rows(
+        model: &RegressorModel,
+        joints: &[AgreementAccumulator<'_>],
+        settings: &ExaminationSettings,
+    ) -> Self {
+        Self::of_joints(model, joints.iter().map(AgreementAccumulator::agreement), settings)
     }
 
     /// For the factors of all columns, one for each joint, with the nominal values of the columns.
-    pub(crate) fn of_factors(model: &RegressorModel, factors: &[SegmentedFactor], nominal: &[f64]) -> Self {
+    pub(crate) fn of_factors(
+        model: &RegressorModel,
+        factors: &[SegmentedFactor],
+        nominal: &[f64],
+        settings: &ExaminationSettings,
+    ) -> Self {
         let of_joint = |(joint, factor): (usize, &SegmentedFactor)| {
             let own: Vec<f64> = model.layout().joint_columns(joint).iter().map(|&column| nominal[column]).collect();
             JointAgreement::of(factor.total(), &own, &OwnFriction::of(model, joint))
         };
-        Self::of_joints(model, factors.iter().enumerate().map(of_joint))
+        Self::of_joints(model, factors.iter().enumerate().map(of_joint), settings)
     }
 
-    fn of_joints(model: &RegressorModel, joints: impl Iterator<Item = JointAgreement>) -> Self {
+    fn of_joints(
+        model: &RegressorModel,
+        joints: impl Iterator<Item = JointAgreement>,
+        settings: &ExaminationSettings,
+    ) -> Self {
         let (mut torque, mut left, mut reversed_joints) = (0.0, [0.0; 2], Vec::new());
         for (name, joint) in model.joint_names().into_iter().zip(joints) {
             torque += joint.torque;
             left = [left[0] + joint.left[0], left[1] + joint.left[1]];
-            if joint.is_reversed(&ExaminationSettings::default()) {
+            if joint.is_reversed(settings) {
                 reversed_joints.push(name);
             }
         }

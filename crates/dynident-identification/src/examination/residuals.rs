@@ -71,7 +71,7 @@ impl Uncertainty {
 }
 
 /// Accumulates one joint's residuals.
-pub(crate) struct JointWatch {
+pub(crate) struct ResidualAccumulator {
     /// Root of the covariance of the joint's columns.
     own: DMatrix<f64>,
     /// Noise of the joint, and the factor `t κ`.
@@ -89,7 +89,7 @@ pub(crate) struct JointWatch {
     widths: f64,
 }
 
-impl JointWatch {
+impl ResidualAccumulator {
     pub(crate) fn new(model: &RegressorModel, theta: &[f64], joint: usize, uncertainty: Option<&Uncertainty>) -> Self {
         let layout = model.layout();
         let columns = layout.joint_columns(joint);

@@ -73,7 +73,7 @@ impl MistakeKind for Gravity {
     }
 
     /// Turns the vector about two perpendicular axes, first by up to 0.5 rad, then by up to 0.1 rad.
-    fn between(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
+    fn with_best_number(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
         let mut gravity = self.gravity_m_s2;
         if gravity == [0.0; 3] {
             return None;
@@ -82,7 +82,7 @@ impl MistakeKind for Gravity {
             for axis in perpendicular_axes(gravity) {
                 let start = gravity;
                 let with = |angle: f64| Self { gravity_m_s2: turned(start, axis, angle) };
-                gravity = turned(start, axis, Number::angle(0.0, reach).least(|angle| value(&with(angle).into())));
+                gravity = turned(start, axis, Number::angle(0.0, reach).minimum(|angle| value(&with(angle).into())));
             }
         }
         Some(Self { gravity_m_s2: gravity }.into())

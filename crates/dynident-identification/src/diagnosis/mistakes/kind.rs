@@ -20,7 +20,6 @@ pub(in crate::diagnosis) enum Breadth<'a> {
     KnownRobot(&'a [Vec<f64>]),
 }
 
-/// The study that may contain a mistake.
 #[derive(Clone, Copy)]
 pub(in crate::diagnosis) struct Setup<'a> {
     pub(in crate::diagnosis) robot: &'a ParametricModel,
@@ -42,7 +41,6 @@ impl Setup<'_> {
 /// The evidence that has to improve before a correction is accepted, in addition to the score of all joints.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::diagnosis) enum Proof {
-    /// No further evidence.
     #[default]
     Score,
     /// This joint must have a small residual: a dead or noisy channel fits equally well in any unit.
@@ -68,7 +66,6 @@ pub(in crate::diagnosis) struct TorqueSource {
     pub(in crate::diagnosis) factor: f64,
 }
 
-/// Properties of a mistake.
 #[derive(Clone, Debug, Default)]
 pub(in crate::diagnosis) struct Facts {
     /// `kind` of the finding in the JSON of `check`.
@@ -79,11 +76,9 @@ pub(in crate::diagnosis) struct Facts {
     pub(in crate::diagnosis) channels: Option<Channels>,
     /// The joints that it concerns; `None` for all.
     pub(in crate::diagnosis) joints: Option<Vec<usize>>,
-    /// Changed torque columns.
     pub(in crate::diagnosis) torques: Vec<TorqueSource>,
     /// Whether the correction adds to torques, which alone reduces unexplained shares.
     pub(in crate::diagnosis) adds_torques: bool,
-    /// The joint whose torque has another gain.
     pub(in crate::diagnosis) torque_gain: Option<usize>,
     /// The factor of the joints' positions. Another unit needs another width of the friction step.
     pub(in crate::diagnosis) position_factor: Option<f64>,
@@ -93,7 +88,6 @@ pub(in crate::diagnosis) struct Facts {
     pub(in crate::diagnosis) is_of_all_logs: bool,
     /// The channels that are reported first, if logs seldom distinguish the same mistake in other channels.
     pub(in crate::diagnosis) likelier_channels: Option<Channels>,
-    /// The evidence that has to improve.
     pub(in crate::diagnosis) proof: Proof,
     /// Its free number; `None` for a fixed unit or without a number.
     pub(in crate::diagnosis) number: Option<Number>,
@@ -108,7 +102,7 @@ impl Facts {
     }
 }
 
-/// A kind of mistake.
+/// A kind of mistake. [`Mistake`] describes the methods.
 pub(super) trait MistakeKind {
     /// Candidates of this kind, the likelier ones first.
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self>
@@ -117,28 +111,22 @@ pub(super) trait MistakeKind {
 
     fn facts(&self) -> Facts;
 
-    /// The mistake in a sentence with the names of the joints.
     fn sentence(&self, names: &[String]) -> String;
 
-    /// Keys that correct the study; empty if no key does.
     fn changes(&self, _keys: &StudyKeys) -> Vec<KeyChange> {
         Vec::new()
     }
 
-    /// The range of factors that the logs do not distinguish from its own, as the end of a sentence.
     fn other_factors(&self, _range: [f64; 2]) -> String {
         String::new()
     }
 
-    /// Corrects the motion and torque of `rows`.
     fn correct(&self, _robot: &ParametricModel, _rows: &mut MotionRows) {}
 
-    /// The corrected robot; `None` if the robot does not change.
     fn corrected_robot(&self, _robot: &ParametricModel) -> Option<ParametricModel> {
         None
     }
 
-    /// The same mistake with another number; `None` for a kind without a number.
     fn with_number(&self, _number: f64) -> Option<Mistake> {
         None
     }
@@ -153,10 +141,9 @@ pub(super) trait MistakeKind {
         None
     }
 
-    /// The same with the nearby number of the smallest `value`; `None` without a free number.
-    fn between(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
+    fn with_best_number(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
         let of_number = |number| self.with_number(number).map_or(f64::INFINITY, |mistake| value(&mistake));
-        self.with_number(self.facts().number?.least(of_number))
+        self.with_number(self.facts().number?.minimum(of_number))
     }
 }
 

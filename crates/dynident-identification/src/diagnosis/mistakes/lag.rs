@@ -5,7 +5,7 @@ use super::study_keys::{KeyChange, StudyKeys, at, list, number};
 use crate::diagnosis::channels::Channels;
 
 /// The torques of these joints, or a joint's position, were logged later (earlier, if negative) than the other
-/// channels, by more than the lag that a fit compensates. Each lag has different instants (`torque_clock`), so lags are
+/// channels, by more than the lag that a fit compensates. Each lag has different instants (`lag_search`), so lags are
 /// not among the candidates and rows are not corrected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lag {

@@ -20,7 +20,7 @@ pub mod torque_unit;
 pub use study_keys::{KeyChange, StudyKeys};
 
 pub(super) use kind::{Breadth, Proof, Setup, TorqueSource};
-pub(super) use numbers::least_by_thirds;
+pub(super) use numbers::ternary_search;
 
 use super::channels::Channels;
 use super::motion_rows::MotionRows;
@@ -127,11 +127,10 @@ impl Mistake {
     }
 
     /// The same with the nearby number of the smallest `value`; `None` without a free number.
-    pub(super) fn between(&self, value: impl Fn(&Self) -> f64) -> Option<Self> {
-        self.kind().between(&value)
+    pub(super) fn with_best_number(&self, value: impl Fn(&Self) -> f64) -> Option<Self> {
+        self.kind().with_best_number(&value)
     }
 
-    /// The torque columns, if nothing else changes.
     pub(super) fn torques_alone(&self) -> Option<Vec<TorqueSource>> {
         let Facts { channels, torques, .. } = self.facts();
         (channels == Some(Channels::Torque) && !torques.is_empty()).then_some(torques)

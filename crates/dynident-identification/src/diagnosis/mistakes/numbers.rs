@@ -20,39 +20,38 @@ impl Number {
         Self { at, reach, is_factor: false, is_round: false }
     }
 
-    /// A factor.
     pub(super) fn factor(at: f64, reach: f64) -> Self {
         Self { at, reach, is_factor: true, is_round: false }
     }
 
     /// The number with the smallest `value`.
-    pub(super) fn least(self, value: impl Fn(f64) -> f64) -> f64 {
-        self.valleys(value).next().unwrap_or(self.at)
+    pub(super) fn minimum(self, value: impl Fn(f64) -> f64) -> f64 {
+        self.local_minima(value).next().unwrap_or(self.at)
     }
 
     /// Local minima of `value`, the smallest first.
-    pub(in crate::diagnosis) fn valleys(self, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
+    pub(in crate::diagnosis) fn local_minima(self, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
         let Self { at, reach, is_factor, .. } = self;
         let number = move |place: f64| if is_factor { at * place.exp() } else { place };
-        valleys_in(if is_factor { 0.0 } else { at }, reach, move |place| value(number(place))).map(number)
+        local_minima(if is_factor { 0.0 } else { at }, reach, move |place| value(number(place))).map(number)
     }
 }
 
 /// Local minima of `value` within `reach` of `centre`, the smallest first: minima of a grid, refined by ternary search
 /// to an accuracy of 2 % of the reach.
-fn valleys_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
+fn local_minima(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
     let spacing = 2.0 * reach / (GRID_POINTS - 1) as f64;
     let place = move |k: usize| centre - reach + spacing * k as f64;
     let values: Vec<f64> = (0..GRID_POINTS).map(|k| value(place(k))).collect();
     let around = |k: usize| [k.saturating_sub(1), (k + 1).min(GRID_POINTS - 1)];
-    let is_valley = |k: &usize| around(*k).iter().all(|&other| values[*k] <= values[other]);
-    let mut deepest: Vec<usize> = (0..GRID_POINTS).filter(is_valley).collect();
-    deepest.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
-    deepest.into_iter().map(move |k| least_by_thirds(around(k).map(place), 0.02 * reach, &value))
+    let is_minimum = |k: &usize| around(*k).iter().all(|&other| values[*k] <= values[other]);
+    let mut minima: Vec<usize> = (0..GRID_POINTS).filter(is_minimum).collect();
+    minima.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    minima.into_iter().map(move |k| ternary_search(around(k).map(place), 0.02 * reach, &value))
 }
 
 /// The minimum of a unimodal `value` between two ends by ternary search, to an accuracy of `width`.
-pub(in crate::diagnosis) fn least_by_thirds(ends: [f64; 2], width: f64, value: impl Fn(f64) -> f64) -> f64 {
+pub(in crate::diagnosis) fn ternary_search(ends: [f64; 2], width: f64, value: impl Fn(f64) -> f64) -> f64 {
     let [mut low, mut high] = ends;
     while high - low > width {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);

@@ -132,9 +132,9 @@ impl MistakeKind for PositionUnit {
     }
 
     /// `None` for a factor too near to a unit.
-    fn between(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
+    fn with_best_number(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
         let with = |factor: f64| Self { factor, ..self.clone() }.into();
-        let found = self.number().least(|factor| value(&with(factor)));
+        let found = self.number().minimum(|factor| value(&with(factor)));
         let is_unit = self.number().is_round && (found / self.factor).ln().abs() < MIN_LOG_RATIO_TO_UNIT;
         (!is_unit).then(|| with(found))
     }

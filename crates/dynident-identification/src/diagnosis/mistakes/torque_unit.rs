@@ -6,6 +6,7 @@ use super::numbers::Number;
 use super::study_keys::{KeyChange, StudyKeys};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
+use crate::diagnosis::span::dot;
 use dynident_dynamics::ParametricModel;
 
 /// Tried factors: units, gear ratios, one motor of two. A search finds factors between these, such as motor constants.
@@ -30,7 +31,6 @@ impl MistakeKind for TorqueUnit {
         let min_gain = setup.settings.held_out.min_torque_gain;
         let known = |explained: &[f64], joint: usize| {
             let tau = &setup.rows.tau[joint];
-            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let factor = dot(explained, tau) / dot(tau, tau);
             let is_clear = factor > 0.0 && factor.ln().abs() > min_gain.ln();
             is_clear.then_some(Self { joint, factor })

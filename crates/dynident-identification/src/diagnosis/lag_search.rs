@@ -6,7 +6,7 @@ use super::explanation::Explanation;
 use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
 use super::joint_fits::{JointFits, SharedMotion};
 use super::mistakes::lag::Lag;
-use super::mistakes::{Mistake, least_by_thirds};
+use super::mistakes::{Mistake, ternary_search};
 use super::motion_rows::{MotionRows, MotionSamples, share_of_log};
 use super::settings::DiagnosisSettings;
 use crate::consistent::ConsistencySettings;
@@ -17,7 +17,6 @@ use rayon::prelude::*;
 /// Number of instants for the comparison of shifts.
 const INSTANTS: usize = 200;
 
-/// A hypothesis with a shifted channel.
 pub(super) struct LateChannel {
     pub(super) explained: Explained,
     /// Improvement of the score over the channel as logged, on the same instants.
@@ -25,7 +24,7 @@ pub(super) struct LateChannel {
 }
 
 /// Tries shifts of torque or motion in some recordings.
-pub(super) struct TorqueClock<'a> {
+pub(super) struct LagSearch<'a> {
     samples: &'a [MotionSamples],
     settings: &'a DiagnosisSettings,
     /// Compensated lag of each joint, s.
@@ -39,7 +38,7 @@ pub(super) struct TorqueClock<'a> {
     reach_of_joint_s: f64,
 }
 
-impl<'a> TorqueClock<'a> {
+impl<'a> LagSearch<'a> {
     /// For recordings with the compensated lags `compensated_s`, one for each joint; `None` if they are too short.
     pub(super) fn new(
         robot: &ParametricModel,
@@ -53,8 +52,9 @@ impl<'a> TorqueClock<'a> {
             [limits.max_lag_s, limits.lag_step_s, LONGEST_DELAY_S, limits.max_lag_of_joint_s]
                 .map(|usual_s| own.seconds(usual_s));
         let reach_s = reach_s.min(limits.max_share_of_motion * longest_s);
-        let clock = Self { samples, settings, compensated_s, reach_s, step_s, max_compensated_s, reach_of_joint_s };
-        (reach_s > step_s).then_some(clock)
+        let lag_search =
+            Self { samples, settings, compensated_s, reach_s, step_s, max_compensated_s, reach_of_joint_s };
+        (reach_s > step_s).then_some(lag_search)
     }
 
     /// Tried lags in addition to the compensated ones, s.
@@ -65,8 +65,8 @@ impl<'a> TorqueClock<'a> {
     }
 
     /// The lag near `lag_s` with the smallest `value`, s.
-    pub(super) fn least_near(&self, lag_s: f64, value: impl Fn(f64) -> f64) -> f64 {
-        least_by_thirds([lag_s - self.step_s, lag_s + self.step_s], 0.02 * self.step_s, value)
+    pub(super) fn refined_lag_s(&self, lag_s: f64, value: impl Fn(f64) -> f64) -> f64 {
+        ternary_search([lag_s - self.step_s, lag_s + self.step_s], 0.02 * self.step_s, value)
             .clamp(-self.reach_s, self.reach_s)
     }
 
@@ -126,7 +126,6 @@ impl<'a> TorqueClock<'a> {
         }
         let (joints, channels, lag_s) = self.best_lag(robot, &rows, &groups, here.free_score())?;
         let mistakes: Vec<Mistake> = self.mistake(joints, channels, lag_s).into_iter().collect();
-        // Both on the same instants.
         let explained = |lag_s: f64, mistakes: Vec<Mistake>| {
             let rows = self.rows(joints, channels, lag_s, instants);
             CorrectedStudy::new(robot.clone(), rows, mistakes, *self.settings).explained(consistency).ok()
@@ -175,6 +174,6 @@ impl<'a> TorqueClock<'a> {
         };
         let (joints, channels, lag_s, least) = groups.iter().filter_map(best_of).min_by(|a, b| a.3.total_cmp(&b.3))?;
         let is_clear = least <= unshifted - self.settings.score.min_gain;
-        is_clear.then(|| (joints, channels, self.least_near(lag_s, |lag_s| score(joints, channels, lag_s))))
+        is_clear.then(|| (joints, channels, self.refined_lag_s(lag_s, |lag_s| score(joints, channels, lag_s))))
     }
 }
