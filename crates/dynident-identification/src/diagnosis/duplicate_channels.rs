@@ -72,10 +72,8 @@ pub(super) fn has_lost_signs(rows: &MotionRows, left_of_all: f64, settings: &Cha
 mod tests {
     use super::*;
 
-    const SETTINGS: fn() -> ChannelSettings = ChannelSettings::default;
-
     fn duplicates(tau: &[&[f64]], left: &[f64]) -> Vec<DuplicateChannel> {
-        duplicate_channels(&rows(tau.iter().map(|tau| tau.to_vec()).collect()), left, &SETTINGS())
+        duplicate_channels(&rows(tau.iter().map(|tau| tau.to_vec()).collect()), left, &ChannelSettings::default())
     }
 
     fn rows(tau: Vec<Vec<f64>>) -> MotionRows {
@@ -96,7 +94,7 @@ mod tests {
         assert_eq!(duplicates(&[&torque, &other], &[0.5, 0.5]), []);
         let mut spoilt = rows(vec![torque.clone(), torque.iter().map(|tau| tau * tau).collect()]);
         spoilt.q[1] = torque.iter().map(|tau| 0.1 * tau - 2.0).collect();
-        let found = duplicate_channels(&spoilt, &[0.5, 0.5], &SETTINGS());
+        let found = duplicate_channels(&spoilt, &[0.5, 0.5], &ChannelSettings::default());
         assert_eq!(found, [DuplicateChannel { channels: Channels::Both, joints: [1, 0] }]);
     }
 
@@ -104,7 +102,7 @@ mod tests {
     fn magnitudes_have_lost_their_signs() {
         let torque = |shift: f64| (0..50).map(|k| (0.2 * f64::from(k)).cos() + shift).collect::<Vec<f64>>();
         let magnitude = |values: Vec<f64>| values.into_iter().map(f64::abs).collect::<Vec<f64>>();
-        let is_lost = |tau: Vec<Vec<f64>>, left: f64| has_lost_signs(&rows(tau), left, &SETTINGS());
+        let is_lost = |tau: Vec<Vec<f64>>, left: f64| has_lost_signs(&rows(tau), left, &ChannelSettings::default());
         assert!(is_lost(vec![magnitude(torque(0.0)), magnitude(torque(0.1))], 0.4));
         assert!(!is_lost(vec![torque(0.0), magnitude(torque(0.1))], 0.4));
         // Gravity may hold a joint on one side all the time.
