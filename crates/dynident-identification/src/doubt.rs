@@ -1,6 +1,6 @@
 //! Signs in a fit that the study may contain a mistake.
 
-use crate::diagnosis::{has_jumps, is_beyond_limits};
+use crate::diagnosis::{MotionLimits, has_jumps, is_beyond_limits};
 use crate::thresholds::DoubtThresholds;
 use crate::training::Training;
 use dynident_model::Model;
@@ -11,9 +11,9 @@ pub(crate) fn have_jumps(training: &Training) -> bool {
 }
 
 /// Whether a training recording has a joint beyond its limits or an impossible rate.
-pub(crate) fn break_limits(training: &Training, model: &Model) -> bool {
+pub(crate) fn break_limits(training: &Training, model: &Model, limits: &MotionLimits) -> bool {
     let reports = training.logs.iter().filter_map(|log| log.statistics.report.as_ref());
-    reports.into_iter().any(|report| is_beyond_limits(model, report))
+    reports.into_iter().any(|report| is_beyond_limits(model, report, limits))
 }
 
 /// Whether the residual of a consistent robot with base parameters `consistent` is clearly larger than that of separate

@@ -1,7 +1,7 @@
 //! Errors of an identification; each message names the log or the place, and the fix.
 
 use crate::consistent::ConsistencyError;
-use crate::diagnosis::DiagnosisError;
+use crate::diagnosis::{DiagnosisError, InvalidLimit};
 use crate::estimators::EstimatorError;
 use crate::payload::PayloadError;
 use crate::thresholds::ThresholdError;
@@ -44,6 +44,9 @@ pub enum IdentificationError {
     /// The intervals cannot be computed.
     #[error("estimator.intervals: {0}")]
     Intervals(ConsistencyError),
+    /// An invalid limit of diagnosis or examination.
+    #[error(transparent)]
+    Limit(#[from] InvalidLimit),
 }
 
 impl From<DiagnosisError> for IdentificationError {
@@ -52,6 +55,7 @@ impl From<DiagnosisError> for IdentificationError {
             DiagnosisError::Log(error) => Self::Log(error),
             DiagnosisError::Model(source) => Self::from(source),
             DiagnosisError::Estimation(error) => Self::Estimation(error),
+            DiagnosisError::Limit(error) => Self::Limit(error),
         }
     }
 }

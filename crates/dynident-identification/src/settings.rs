@@ -1,7 +1,9 @@
 //! Settings of an identification: filters, estimator, prior knowledge of bodies, selection of friction.
 
 use crate::consistent::{ConsistencyError, ConsistencySettings};
+use crate::diagnosis::DiagnosisSettings;
 use crate::estimators::EstimationSettings;
+use crate::examination::ExaminationSettings;
 use crate::friction::{FrictionSearch, JointFriction};
 use crate::log_noise::LogNoise;
 use crate::thresholds::DecisionThresholds;
@@ -98,6 +100,10 @@ pub struct IdentificationSettings {
     pub diagnosis: DiagnosisChoice,
     /// Thresholds of decisions and of the doubt about a study.
     pub thresholds: DecisionThresholds,
+    /// Limits behind the verdicts of that comparison.
+    pub diagnosis_limits: DiagnosisSettings,
+    /// Limits of the examination that decide whether the fit is doubtful.
+    pub examination: ExaminationSettings,
 }
 
 impl Default for IdentificationSettings {
@@ -118,6 +124,8 @@ impl Default for IdentificationSettings {
             gain_std: 0.0,
             diagnosis: DiagnosisChoice::default(),
             thresholds: DecisionThresholds::default(),
+            diagnosis_limits: DiagnosisSettings::default(),
+            examination: ExaminationSettings::default(),
         }
     }
 }

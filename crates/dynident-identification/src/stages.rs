@@ -8,8 +8,8 @@ use crate::diagnosis::{Diagnosis, DiagnosisTask, diagnose};
 use crate::doubt::{break_limits, have_jumps, is_doubtful};
 use crate::error::IdentificationError;
 use crate::examination::{
-    FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, PriorAgreement, TorqueLag,
-    TorqueSignCheck, Uncertainty, examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
+    FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty,
+    examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
 };
 use crate::settings::{DiagnosisChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
@@ -119,6 +119,7 @@ impl Stage<'_> {
     ) -> Result<Option<Diagnosis>, IdentificationError> {
         let Self { logs, settings, training, estimate, .. } = *self;
         let plain = training.columns.is_plain().then(|| &estimate.values[..training.columns.base()]);
+        settings.examination.validate()?;
         let own_terms = training.friction_choice.is_empty();
         match settings.diagnosis {
             DiagnosisChoice::Never => Ok(None),
@@ -133,16 +134,15 @@ impl Stage<'_> {
 
     fn is_doubted(&self, examined: &Examined, robot: &ParametricModel) -> bool {
         let Examined { consistent, held_out, examination, .. } = examined;
-        let training = self.training;
+        let (training, limits) = (self.training, &self.settings.examination);
         let theta = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
         let agreements = || training.logs.iter().filter_map(|log| log.nominal_agreement.as_ref());
         let doubt = &self.settings.thresholds.doubt;
         is_doubtful(training, theta, doubt)
-            || examination.friction_signs.iter().any(FrictionSign::is_reversed)
-            || agreements().any(PriorAgreement::is_reversed)
-            || agreements().any(PriorAgreement::is_poor)
-            || examination.sign.as_ref().is_some_and(TorqueSignCheck::is_reversed)
-            || break_limits(training, robot.model())
+            || examination.friction_signs.iter().any(|sign| sign.is_reversed_by(limits))
+            || agreements().any(|log| log.is_reversed_by(limits) || log.is_poor_by(limits))
+            || examination.sign.as_ref().is_some_and(|sign| sign.is_reversed_by(limits))
+            || break_limits(training, robot.model(), &self.settings.diagnosis_limits.motion)
             || held_out
                 .iter()
                 .any(|log| is_far_worse(&log.validation, &self.estimate.joint_sigma, doubt.max_held_out_ratio))
@@ -288,7 +288,14 @@ fn examine_all_held_out(
             uncertainty: Some(&uncertainty),
             traced: true,
         };
-        Ok(tested_on(logs, &settings.estimation, &training.model, index, &tested, held_out.len() == 1)?)
+        Ok(tested_on(
+            logs,
+            (&settings.estimation, &settings.examination),
+            &training.model,
+            index,
+            &tested,
+            held_out.len() == 1,
+        )?)
     };
     if held_out.is_empty() {
         return Ok(Vec::new());

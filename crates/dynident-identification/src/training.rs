@@ -90,7 +90,8 @@ pub fn training_rows(
     // The nominal model cannot be compared with torque in an unknown unit.
     if let Some(nominal) = fitted.model.parametric.nominal_base().filter(|_| settings.gains == GainChoice::Stated) {
         for log in &mut fitted.logs {
-            log.nominal_agreement = Some(PriorAgreement::of_factors(&fitted.model, &log.factors, nominal));
+            log.nominal_agreement =
+                Some(PriorAgreement::of_factors(&fitted.model, &log.factors, nominal, &settings.examination));
         }
     }
     Ok(fitted)

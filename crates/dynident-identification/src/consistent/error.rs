@@ -1,43 +1,41 @@
-//! Why no physically consistent parameters could be found.
+//! Errors of the physically consistent fit.
 
 use dynident_estimation::EstimationError;
 use dynident_estimation::consistent::PhysicalError;
 use thiserror::Error;
 
-/// Why there are no physically consistent parameters for an estimate.
+/// An error of the physically consistent fit.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ConsistencyError {
-    /// Knowledge of a link that moves as one with another.
-    #[error(
-        "bodies.{link}: this link moves as one with {body}; what is known must hold for both together: write bodies.{body}"
-    )]
+    /// Knowledge of a link that is fixed to another link.
+    #[error("bodies.{link}: this link is fixed to {body}: write bodies.{body} with the values of both links together")]
     MergedLink {
         /// The link.
         link: String,
-        /// The body that it belongs to.
+        /// The body that contains it.
         body: String,
     },
-    /// Knowledge of a body that is not there.
-    #[error("bodies.{name}: there is no such moving link; there are {}", known.join(", "))]
+    /// Knowledge of an unknown body.
+    #[error("bodies.{name}: unknown moving link; use one of {}", known.join(", "))]
     UnknownBody {
         /// The name.
         name: String,
-        /// The bodies that are there.
+        /// The robot's bodies.
         known: Vec<String>,
     },
-    /// Limits of a torque term that is not there.
-    #[error("laws.{symbol}: [drive] has no such law; it has {}", known.join(", "))]
+    /// Limits of an unknown torque term.
+    #[error("laws.{symbol}: unknown law; [drive] has {}", known.join(", "))]
     UnknownTerm {
         /// The symbol.
         symbol: String,
-        /// The terms that are there.
+        /// The robot's terms.
         known: Vec<String>,
     },
-    /// Limits that exclude each other, a reference that is no body, numbers that are not finite.
+    /// Contradictory limits, an inconsistent prior body, values that are not finite.
     #[error(transparent)]
     Physical(#[from] PhysicalError),
-    /// Factors that do not belong to the robot.
+    /// Factors of another robot.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
 }

@@ -1,4 +1,4 @@
-//! How far each parameter of a body or term could go: intervals that respect what is physically consistent.
+//! Intervals of the parameters of bodies and terms over all physically consistent robots.
 
 use super::error::ConsistencyError;
 use super::problem::consistency_problem;
@@ -17,25 +17,25 @@ use serde::{Deserialize, Serialize};
 pub struct ParameterInterval {
     /// Symbol of the parameter: `m3`, `mx3`, `Ixx3` (about the body frame's origin), `fv3`.
     pub symbol: String,
-    /// The body's or the joint's name; none for a term of several joints.
+    /// Name of the body or joint; `None` for a term of several joints.
     pub of: Option<String>,
     /// Its unit at a revolute joint.
     pub unit: String,
-    /// Of the consistent set that fits best.
+    /// Value in the best consistent fit.
     pub value: f64,
-    /// Lower end; none where it is open.
+    /// Lower end; `None` if unbounded.
     pub lower: Option<f64>,
-    /// Upper end; none where it is open.
+    /// Upper end; `None` if unbounded.
     pub upper: Option<f64>,
-    /// What holds the two ends: data, a constraint, nothing.
+    /// The bound at the lower and the upper end: data, a constraint, or nothing.
     pub held_by: [IntervalEnd; 2],
 }
 
 /// The 95 % intervals of all parameters, over all consistent sets that the data do not reject; `plain` if the estimate
-/// is least squares on these very rows.
+/// is the least-squares solution of these rows.
 ///
 /// # Errors
-/// Numbers that are not finite, bodies whose limits exclude each other.
+/// Values that are not finite, contradictory limits of bodies.
 pub fn consistent_intervals(
     robot: &ParametricModel,
     problem: &LinearProblem,
@@ -50,8 +50,7 @@ pub fn consistent_intervals(
     }
     let own = IntervalSettings::default();
     let physical = PhysicalSettings { prior_weight: own.physical.prior_weight, ..settings.fit() };
-    // Each base parameter's variance has its own degrees of freedom; a sum of several has about the middle
-    // one's.
+    // Each base parameter has its own degrees of freedom. For sums of base parameters the median is used.
     let mut degrees_of_freedom: Vec<f64> = estimate
         .std_degrees_of_freedom
         .iter()

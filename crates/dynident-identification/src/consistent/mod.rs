@@ -1,8 +1,8 @@
-//! Physically consistent parameters: the bodies and friction that a robot can have (positive masses, pseudo-inertias
-//! positive definite, friction that takes energy out) and that explain the data best.
+//! Physically consistent parameters: the best fit with positive masses, positive definite pseudo-inertias and
+//! dissipative friction.
 //!
-//! [`consistent_parameters`] goes from the factors of an estimate to all parameters, [`nearest_consistent_parameters`]
-//! from an estimate of another kind; [`ConsistencySettings`] says what is known of the bodies beforehand.
+//! [`consistent_parameters`] computes all parameters from the factors of an estimate, [`nearest_consistent_parameters`]
+//! from an estimate by another method. [`ConsistencySettings`] contains prior knowledge of the bodies.
 
 mod error;
 mod intervals;

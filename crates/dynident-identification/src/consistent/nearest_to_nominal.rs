@@ -1,16 +1,15 @@
-//! From base parameters back to a full set: one of the many that give the same torque, as near to the prior as can be.
+//! The full parameter set that is nearest to the nominal values and has given base parameters.
 
 use super::problem::typical_length_m;
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_model::{InertialParameters, Model};
 use nalgebra::{DMatrix, DVector};
 
-/// All parameters `π` with `B π = θ` (B takes parameters to base parameters) whose weighted distance to `prior` is
-/// least: `π = π₀ + S Bᵀ (B S Bᵀ)⁻¹ (θ - B π₀)`.
+/// The parameters `π` with `B π = θ` (B maps parameters to base parameters) and the smallest weighted distance to the
+/// nominal values: `π = π₀ + S Bᵀ (B S Bᵀ)⁻¹ (θ - B π₀)`.
 ///
-/// The weights S say how far each parameter may move: masses by kilograms, first moments and inertias by what such a
-/// mass does at the robot's size. Torques depend on θ alone, so every choice predicts the same; masses and inertias of
-/// single bodies are **not** measured values.
+/// The variances S are those of a mass of 1 kg at the robot's typical length. Torques depend on θ alone, so all such
+/// sets predict the same torque. Masses and inertias of single bodies are **not** measured values.
 pub fn nearest_to_nominal(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
     let (model, base, prior) = (robot.model(), robot.base(), robot.nominal());
     let columns = base.all_columns();
@@ -36,13 +35,13 @@ pub fn nearest_to_nominal(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
     let weighted = DMatrix::from_fn(columns.len(), count, |c, b| weight(c) * matrix[(b, c)]);
     let gram = &matrix * &weighted;
     let gap = DVector::from_column_slice(theta) - DVector::from_vec(base.values(prior));
-    // B has full row rank (its independent columns are the identity), so the Gram matrix is positive definite.
+    // B has full row rank: its independent columns are the identity.
     let multipliers = gram.cholesky().map_or_else(|| gap.clone(), |factor| factor.solve(&gap));
     let change = weighted * multipliers;
     prior.iter().zip(change.iter()).map(|(prior, change)| prior + change).collect()
 }
 
-/// The bodies' share of a full parameter vector.
+/// The bodies of a full parameter vector.
 pub fn inertials(model: &Model, parameters: &[f64]) -> Vec<InertialParameters> {
     let own = |body: usize| InertialParameters(core::array::from_fn(|k| parameters[10 * body + k]));
     (0..model.body_count()).map(own).collect()

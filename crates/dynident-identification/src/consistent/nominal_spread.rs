@@ -1,23 +1,21 @@
-//! How far a description's values may be from the truth, where it does not say.
+//! Assumed uncertainty of the values of a robot description.
 
-use super::problem::{MASS_SHARE, reference_bodies, term_sizes};
+use super::problem::{MASS_STD_RATIO, reference_bodies, term_sizes};
 use super::settings::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::LinearProblem;
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
 use nalgebra::{DMatrix, Matrix4};
 
-/// Standard deviation of a term of which nothing is known, as a share of the value with which it alone would make the
-/// torque of its joint.
-const TERM_SHARE: f64 = 0.5;
+/// Standard deviation of a term, relative to the value for which the term alone explains the torque of its joint.
+const TERM_STD_RATIO: f64 = 0.5;
 
-/// Covariance of the description's base parameters, (base, base): what is to be expected of a value that the data do
-/// not tell and that stays at nominal.
+/// Covariance of the nominal base parameters, (base, base), for values that the data do not determine.
 ///
-/// A body's pseudo-inertia J is `J_0 + ρ J_0^½ X J_0^½` with X symmetric and Gaussian of unit variance (half that off
-/// the diagonal) and ρ the 0.3 that masses have: the mass is right within 30 %, the centre of mass and the inertia
-/// within 30 % of the body's extent and of its inertia, in whatever frame and units. Torque terms are right within 30 %
-/// of their value and half of what the torque of their joint allows for: little is known of friction beforehand.
+/// A body's pseudo-inertia J is `J_0 + ρ J_0^½ X J_0^½` with X symmetric and Gaussian of unit variance (half of it off
+/// the diagonal) and ρ = 0.3: standard deviations are 30 % of the mass, of the body's extent for the centre of mass,
+/// and of its inertia, in any frame and units. The standard deviation of a torque term combines 30 % of its value and
+/// half of the value for which it alone explains the torque of its joint, since friction is hardly known in advance.
 pub fn nominal_covariance(
     robot: &ParametricModel,
     problem: &LinearProblem,
@@ -32,11 +30,11 @@ pub fn nominal_covariance(
     &spread * spread.transpose()
 }
 
-/// The base parameters that independent errors of one standard deviation make, ten of each body that is not known:
-/// those of [`nominal_covariance`] without terms.
+/// The changes of the base parameters for independent errors of one standard deviation, ten for each body that is not
+/// known: those of [`nominal_covariance`] without terms.
 ///
-/// Each body is taken for this share of its extent `thicker` than described, in all directions: those of rods and
-/// plates err across them as well.
+/// `thicker` is an added thickness of each body relative to its extent, in all directions, since rods and plates of a
+/// description also have errors across their thin directions.
 pub fn usual_errors_of_bodies(robot: &ParametricModel, settings: &ConsistencySettings, thicker: f64) -> Vec<Vec<f64>> {
     let references = reference_bodies(robot, settings);
     let mut directions: Vec<Vec<f64>> = Vec::new();
@@ -54,22 +52,21 @@ pub fn usual_errors_of_bodies(robot: &ParametricModel, settings: &ConsistencySet
     directions
 }
 
-/// The base parameters that one parameter of a body or of a term makes.
+/// The base parameters for a unit value of one parameter.
 fn of_column(robot: &ParametricModel, column: usize) -> Vec<f64> {
     let mut values = vec![0.0; robot.model().inertial_count() + robot.terms().len()];
     values[column] = 1.0;
     robot.base().values(&values)
 }
 
-/// How far the nominal value of each torque term may be wrong: 30 % of it, and half of what its joint's torque allows.
+/// Standard deviation of the nominal value of each torque term.
 pub(super) fn term_spreads(robot: &ParametricModel, problem: &LinearProblem) -> Vec<f64> {
     let values = &robot.nominal()[robot.model().inertial_count()..];
     let sizes = term_sizes(robot, problem, 1.0);
-    values.iter().zip(sizes).map(|(value, size)| (MASS_SHARE * value).hypot(TERM_SHARE * size)).collect()
+    values.iter().zip(sizes).map(|(value, size)| (MASS_STD_RATIO * value).hypot(TERM_STD_RATIO * size)).collect()
 }
 
-/// ρ J^½ S J^½ as ten parameters, for the ten symmetric S of unit norm, of a body that is by a share of its extent
-/// thicker.
+/// ρ J^½ S J^½ as ten parameters, for the ten symmetric S of unit norm, of a body with added thickness.
 fn body_directions(body: &[f64; 10], thicker: f64) -> Vec<[f64; 10]> {
     let mut pseudo = InertialParameters(*body).pseudo_inertia();
     let of_point = InertialParameters(*body).com_m().map_or(0.0, |com| body[0] * com.dot(com));
@@ -83,14 +80,14 @@ fn body_directions(body: &[f64; 10], thicker: f64) -> Vec<[f64; 10]> {
     pairs
         .map(|(a, b)| {
             let mut symmetric = Matrix4::zeros();
-            let entry = if a == b { MASS_SHARE } else { MASS_SHARE * core::f64::consts::FRAC_1_SQRT_2 };
+            let entry = if a == b { MASS_STD_RATIO } else { MASS_STD_RATIO * core::f64::consts::FRAC_1_SQRT_2 };
             (symmetric[(a, b)], symmetric[(b, a)]) = (entry, entry);
             parameters_of(&(root * symmetric * root))
         })
         .collect()
 }
 
-/// The ten parameters whose pseudo-inertia this is.
+/// The ten parameters of a pseudo-inertia.
 fn parameters_of(pseudo: &Matrix4<f64>) -> [f64; 10] {
     let trace = pseudo[(0, 0)] + pseudo[(1, 1)] + pseudo[(2, 2)];
     let axes = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];

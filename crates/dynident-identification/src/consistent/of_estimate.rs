@@ -1,4 +1,4 @@
-//! From any estimate to consistent parameters.
+//! Consistent parameters for any estimate.
 
 use super::error::ConsistencyError;
 use super::problem::{consistent_parameters, nearest_consistent_parameters};
@@ -7,9 +7,8 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::consistent::PhysicalFit;
 use dynident_estimation::{Estimate, LinearProblem};
 
-/// The consistent parameters that fit the logs best, from the factors that the estimate was made from; or, where it is
-/// not the least squares of these factors (`plain` is false), those nearest to the estimate in the metric of the
-/// factors.
+/// The best consistent fit to the factors of the estimate; if the estimate is not their least-squares solution (`plain`
+/// is false), the consistent parameters that are nearest to it in the metric of the factors.
 ///
 /// # Errors
 /// As [`consistent_parameters`].

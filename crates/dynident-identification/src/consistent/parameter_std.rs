@@ -1,20 +1,19 @@
-//! Error bars of all parameters of the consistent set, by data and description together.
+//! Error bars of all parameters of the consistent set, from data and robot description.
 
 use super::error::ConsistencyError;
 use super::nominal_spread::term_spreads;
-use super::problem::{MASS_SHARE, consistent_body, described_problem};
+use super::problem::{MASS_STD_RATIO, consistent_body, described_problem};
 use super::settings::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::consistent::{Belief, expected_error};
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_model::Body;
 
-/// Standard deviation of every parameter of the consistent set, ten for each body and one for each term: how far it is
-/// to be expected from the truth if the description is right within 30 %
-/// ([`nominal_covariance`](super::nominal_covariance)) and the estimate as its covariance says ([`expected_error`]).
-/// What torque tells by itself has the bar of the data, a mass that is in no torque 30 % of itself. None for the values
-/// of a body of which the description says nothing, or something impossible: there a rough body stands for it, and only
-/// the base parameters mean anything.
+/// Standard deviation of every parameter of the consistent set, ten for each body and one for each term: the
+/// [`expected_error`] with the covariance of the estimate and that of the description
+/// ([`nominal_covariance`](super::nominal_covariance)). Identifiable values get the error bar of the data, an
+/// unidentifiable mass gets 30 %. `None` for bodies with a missing or inconsistent description: their prior is a rough
+/// body, so only their base parameters are meaningful.
 ///
 /// # Errors
 /// As [`consistent_parameters`](super::consistent_parameters).
@@ -25,7 +24,7 @@ pub fn parameter_std(
     settings: &ConsistencySettings,
 ) -> Result<Vec<Option<f64>>, ConsistencyError> {
     let physical = described_problem(robot, problem, &estimate.joint_sigma, settings)?;
-    let belief = Belief { body_share: MASS_SHARE, scalar_std: term_spreads(robot, problem) };
+    let belief = Belief { body_share: MASS_STD_RATIO, scalar_std: term_spreads(robot, problem) };
     let count = robot.base().count();
     let covariance = estimate.covariance.view((0, 0), (count, count)).into_owned();
     let std = expected_error(&physical, &settings.fit(), &covariance, &belief)?;

@@ -1,4 +1,4 @@
-//! From the factors of an estimate to physically consistent parameters of all bodies and terms.
+//! The physically consistent fit of all bodies and terms to the factors of an estimate.
 
 use super::error::ConsistencyError;
 use super::settings::{ConsistencySettings, EllipsoidSettings};
@@ -10,27 +10,25 @@ use dynident_estimation::{LinearProblem, RankSettings};
 use dynident_model::terms::TorqueTerm;
 use dynident_model::{Body, InertialParameters, Model};
 
-/// A joint's noise counts as at least this share of its torque's root mean square: no model is better, and with
-/// noise-free (simulated) torque the prior would otherwise vanish beside the data in double precision.
-const LEAST_RELATIVE_SIGMA: f64 = 1.0e-4;
+/// Smallest noise of a joint relative to the root mean square of its torque. In noise-free (simulated) torque the prior
+/// would otherwise be lost in double precision.
+const MIN_RELATIVE_NOISE: f64 = 1.0e-4;
 
-/// Standard deviation of a description's masses, as a share of each.
-pub(super) const MASS_SHARE: f64 = 0.3;
+/// Standard deviation of a described mass, relative to the mass.
+pub(super) const MASS_STD_RATIO: f64 = 0.3;
 
-/// Size of a term of which only noise speaks, as a share of its joint's torque: so small that the barrier of an
-/// interior-point method does not move it.
-const SILENT_SHARE: f64 = 1.0e-4;
+/// Size of an unexcited term relative to its joint's torque: so small that the barrier of an interior-point method does
+/// not move it.
+const UNEXCITED_SIZE_RATIO: f64 = 1.0e-4;
 
-/// Share of a rough body that is mixed into a description's: bodies drawn as rods or plates have no extent at all in
-/// some direction.
-const ROUGH_SHARE: f64 = 1.0e-2;
+/// Share of a rough body that is added to each nominal body, since rods and plates have zero extent in some direction.
+const ROUGH_BODY_SHARE: f64 = 1.0e-2;
 
-/// The consistent set of parameters that fits the data best, from the factors that an estimate was made from and the
-/// noise of its joints (standard deviations, Nm); otherwise the reason why there is none. See [`physical_fit`].
+/// The best consistent fit to the factors of an estimate, with the noise of its joints (standard deviations, Nm). See
+/// [`physical_fit`].
 ///
 /// # Errors
-/// In words: limits that exclude each other, a prior that is no consistent body, names that are not there, numbers that
-/// are not finite.
+/// Contradictory limits, an inconsistent prior body, unknown names, values that are not finite.
 pub fn consistent_parameters(
     robot: &ParametricModel,
     problem: &LinearProblem,
@@ -40,7 +38,7 @@ pub fn consistent_parameters(
     Ok(physical_fit(&described_problem(robot, problem, joint_sigma, settings)?, &settings.fit())?)
 }
 
-/// [`consistency_problem`] with what the description says of the masses.
+/// [`consistency_problem`] with the masses of the description as priors.
 pub(super) fn described_problem(
     robot: &ParametricModel,
     problem: &LinearProblem,
@@ -51,8 +49,8 @@ pub(super) fn described_problem(
     Ok(problem.with_mass_beliefs(mass_beliefs(robot, settings))?)
 }
 
-/// The consistent set of parameters whose base parameters are nearest to `theta` in the data's own metric: for
-/// estimates that are not those of least squares on the same factors.
+/// The consistent parameters whose base parameters are nearest to `theta` in the metric of the factors, for estimates
+/// that are not the least-squares solution of these factors.
 ///
 /// # Errors
 /// As [`consistent_parameters`].
@@ -67,18 +65,18 @@ pub fn nearest_consistent_parameters(
     Ok(physical_fit(&around, &settings.fit())?)
 }
 
-/// The masses of bodies that the description gives, each with its standard deviation; none where the settings say more.
+/// The described masses, kg, with their standard deviations; `None` for bodies that the settings define.
 fn mass_beliefs(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<Option<[f64; 2]>> {
     let belief = |(index, body): (usize, &Body)| {
         let own = &robot.nominal()[10 * index..10 * index + 10];
         let is_stated = settings.bodies.get(body.name()).is_some_and(|own| own.prior.is_some() || own.known.is_some());
-        (body.prior().is_some() && !is_stated && consistent_body(own).0).then(|| [own[0], MASS_SHARE * own[0]])
+        (body.prior().is_some() && !is_stated && consistent_body(own).0).then(|| [own[0], MASS_STD_RATIO * own[0]])
     };
     robot.model().bodies().iter().enumerate().map(belief).collect()
 }
 
-/// Bodies that the description says are impossible: a rough body stands in for each as a prior unless the settings name
-/// another. Names with the least eigenvalue of the pseudo-inertia, kg m².
+/// Bodies whose nominal inertia is not physically consistent, unless the settings define them: names with the smallest
+/// eigenvalue of the pseudo-inertia, kg m². Their prior is a rough body.
 pub fn inconsistent_nominal_bodies(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<(String, f64)> {
     let bodies = robot.model().bodies().iter().enumerate();
     let stated = bodies.filter(|(_, body)| {
@@ -93,18 +91,17 @@ pub fn inconsistent_nominal_bodies(robot: &ParametricModel, settings: &Consisten
         .collect()
 }
 
-/// Whether ten parameters are those of a consistent body, or of one that is as thin as a plate; and the least
-/// eigenvalue of their pseudo-inertia.
+/// Whether ten parameters are physically consistent (thin plates are allowed), and the smallest eigenvalue of their
+/// pseudo-inertia.
 pub(super) fn consistent_body(own: &[f64]) -> (bool, f64) {
     let stated = InertialParameters(core::array::from_fn(|k| own[k]));
     let least = stated.pseudo_inertia().symmetric_eigenvalues().min();
-    // Rounding of the moments, and of the mass beside them.
     let moments = stated.inertia_at_origin();
     let rounding = 1.0e-9 * (0..3).map(|k| moments.0[k][k].abs()).sum::<f64>() + 1.0e-15 * stated.mass_kg();
     (stated.mass_kg() > 0.0 && least >= -rounding, least)
 }
 
-/// What is asked of the robot's bodies and terms: what [`consistent_parameters`] solves.
+/// The problem that [`consistent_parameters`] solves, without the masses of the description.
 ///
 /// # Errors
 /// As [`consistent_parameters`].
@@ -125,7 +122,7 @@ pub fn consistency_problem(
         .iter()
         .zip(squares.iter().zip(&rows))
         .map(|(sigma, (square, &rows))| {
-            let least = LEAST_RELATIVE_SIGMA * (square / rows.max(1) as f64).sqrt();
+            let least = MIN_RELATIVE_NOISE * (square / rows.max(1) as f64).sqrt();
             let sigma = sigma.max(least);
             if sigma > 0.0 { 1.0 / sigma } else { 1.0 }
         })
@@ -149,7 +146,7 @@ pub fn consistency_problem(
             inside: knowledge.inside.map(inside),
         }
     });
-    let sizes = term_sizes(robot, problem, SILENT_SHARE);
+    let sizes = term_sizes(robot, problem, UNEXCITED_SIZE_RATIO);
     let scalars = terms.iter().zip(&prior[model.inertial_count()..]).zip(sizes).map(|((term, &value), size)| {
         let bounded = term.is_nonnegative();
         let own = settings.terms.get(&term.symbol());
@@ -170,8 +167,7 @@ pub fn consistency_problem(
     }
 }
 
-/// The body that stands for what is known of each before the data: the settings' prior, the description's with a little
-/// of a rough body in it, or a rough body.
+/// The prior body of each: that of the settings, the nominal body with a small share of a rough body, or a rough body.
 pub(super) fn reference_bodies(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<[f64; 10]> {
     let (length, mean_mass) = (typical_length_m(robot.model()), mean_mass(robot));
     let reference = |(index, body): (usize, &Body)| {
@@ -179,7 +175,7 @@ pub(super) fn reference_bodies(robot: &ParametricModel, settings: &ConsistencySe
         settings.bodies.get(body.name()).and_then(|knowledge| knowledge.prior).unwrap_or_else(|| {
             if consistent_body(own).0 {
                 let rough = rough_body(own[0], length);
-                core::array::from_fn(|k| own[k] + ROUGH_SHARE * rough[k])
+                core::array::from_fn(|k| own[k] + ROUGH_BODY_SHARE * rough[k])
             } else {
                 rough_body(mean_mass, length)
             }
@@ -188,17 +184,16 @@ pub(super) fn reference_bodies(robot: &ParametricModel, settings: &ConsistencySe
     robot.model().bodies().iter().enumerate().map(reference).collect()
 }
 
-/// The mean of the described masses; a kilogram where there are none.
+/// The mean of the described masses, kg; 1 without any.
 fn mean_mass(robot: &ParametricModel) -> f64 {
     let masses = (0..robot.model().body_count()).map(|body| robot.nominal()[10 * body]).filter(|&mass| mass > 0.0);
     let masses: Vec<f64> = masses.collect();
     if masses.is_empty() { 1.0 } else { masses.iter().sum::<f64>() / masses.len() as f64 }
 }
 
-/// How large the parameter of each torque term can be at all: what it would be if it alone made the torque of its
-/// joint, `‖τ_j‖ / ‖w‖` over all rows of the joint. So the prior weighs as much for a watch as for a crane, in
-/// any units. 1 where the data do not see the term: there it stays where it is. What only noise lets them see has a
-/// column of any size: there it is `silent` times the root mean square of the joint's torque.
+/// The value for which each torque term alone explains the torque of its joint, `‖τ_j‖ / ‖w‖` over all rows of the
+/// joint: a scale that suits any size of robot and any units. It is 1 for a term without a column in the data. For an
+/// unexcited term, whose column contains only noise, it is `silent` times the root mean square of the joint's torque.
 pub(super) fn term_sizes(robot: &ParametricModel, problem: &LinearProblem, silent: f64) -> Vec<f64> {
     let first = robot.model().inertial_count();
     let size = |(index, _): (usize, &TorqueTerm)| {
@@ -220,8 +215,8 @@ pub(super) fn term_sizes(robot: &ParametricModel, problem: &LinearProblem, silen
     robot.terms().iter().enumerate().map(|term| size(term).unwrap_or(1.0)).collect()
 }
 
-/// A length that the robot's links have: the mean distance between successive joints; where all axes meet in one point,
-/// of the described centres of mass from their joints, and a metre where there are none.
+/// Typical length of the robot's links, m: the mean distance between successive joints. If all axes meet in one point,
+/// the mean distance of the nominal centres of mass from their joints, or 1 without any.
 pub fn typical_length_m(model: &Model) -> f64 {
     let mean = |lengths: Vec<f64>| {
         let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;

@@ -1,5 +1,4 @@
-//! What is known of a robot's bodies and terms before the data: settings of the physically consistent set that fits
-//! best.
+//! Settings of the physically consistent fit, and prior knowledge of bodies and terms.
 
 use super::error::ConsistencyError;
 use dynident_estimation::consistent::{PhysicalError, PhysicalPrior, PhysicalRoute, PhysicalSettings};
@@ -21,29 +20,29 @@ pub struct EllipsoidSettings {
     pub semi_axes_m: [f64; 3],
 }
 
-/// What is known of one body; nothing by default.
+/// Prior knowledge of one body; empty by default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct BodyKnowledge {
-    /// Least and greatest mass, kg.
-    #[serde(deserialize_with = "perhaps")]
+    /// Minimum and maximum mass, kg.
+    #[serde(deserialize_with = "optional")]
     pub mass_kg: Option<[f64; 2]>,
-    /// Corners of a box (axes of the link frame, m) that holds the centre of mass.
+    /// Corners of a box that contains the centre of mass, in the link frame, m.
     #[serde(deserialize_with = "corners")]
     pub com_box_m: Option<[[f64; 3]; 2]>,
-    /// An ellipsoid that holds all of the mass.
+    /// An ellipsoid that contains all of the mass.
     pub inside: Option<EllipsoidSettings>,
-    /// The prior body in place of the description's: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the link
-    /// frame's origin.
-    #[serde(deserialize_with = "perhaps")]
+    /// The prior body instead of the nominal one: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the origin of
+    /// the link frame.
+    #[serde(deserialize_with = "optional")]
     pub prior: Option<[f64; 10]>,
-    /// The same ten, if they are known and not to be fitted.
-    #[serde(deserialize_with = "perhaps")]
+    /// The same ten parameters if they are known; they are not fitted.
+    #[serde(deserialize_with = "optional")]
     pub known: Option<[f64; 10]>,
 }
 
-/// How the physically consistent set that fits best is found, and what is known of it. See [`PhysicalSettings`] and
+/// Settings of the physically consistent fit, and prior knowledge. See [`PhysicalSettings`] and
 /// [`PhysicalBody`](dynident_estimation::consistent::PhysicalBody).
 ///
 /// ```
@@ -60,23 +59,23 @@ pub struct BodyKnowledge {
 pub struct ConsistencySettings {
     /// Distance from the prior bodies; entropic by default.
     pub prior: PhysicalPrior,
-    /// What one unit of that distance costs against half a squared standard deviation of the data; 0.01 by default.
+    /// Weight of that distance against half of the squared residual in standard deviations; 0.01 by default.
     pub prior_weight: f64,
-    /// Least whitened eigenvalue of every pseudo-inertia; 1e-4 by default.
+    /// Smallest whitened eigenvalue of every pseudo-inertia; 1e-4 by default.
     pub margin: f64,
     /// The solver; interior point by default.
     pub route: PhysicalRoute,
-    /// Largest certificate at which the fit counts as solved; 5e-8 by default.
+    /// Largest certificate of a solved fit; 5e-8 by default.
     pub tolerance: f64,
-    /// Most iterations; 2000 by default.
+    /// Largest number of iterations; 2000 by default.
     pub max_iterations: usize,
-    /// Least and greatest sum of all moving bodies' masses, kg.
-    #[serde(deserialize_with = "perhaps")]
+    /// Minimum and maximum total mass of all moving bodies, kg.
+    #[serde(deserialize_with = "optional")]
     pub total_mass_kg: Option<[f64; 2]>,
-    /// What is known of single bodies, by the name of their link.
+    /// Prior knowledge of single bodies, by the name of their link.
     pub bodies: BTreeMap<String, BodyKnowledge>,
-    /// Least and greatest parameter of a term, by its symbol (`fv1 = [0.0, 5.0]`); friction and drive inertia stay at
-    /// zero or more.
+    /// Minimum and maximum parameter of a term, by its symbol (`fv1 = [0.0, 5.0]`). Friction and drive inertia are
+    /// never negative.
     #[serde(deserialize_with = "intervals")]
     #[serde(rename = "laws")]
     pub terms: BTreeMap<String, [f64; 2]>,
@@ -107,7 +106,7 @@ impl ConsistencySettings {
         PhysicalSettings { route, prior, prior_weight, margin, tolerance, max_iterations }
     }
 
-    /// Checks the solver's numbers. Limits are checked where the bodies are at hand.
+    /// Checks the settings of the solver. Limits are checked later, with the bodies.
     ///
     /// # Errors
     /// As [`PhysicalSettings::validate`].
@@ -115,10 +114,10 @@ impl ConsistencySettings {
         self.fit().validate()
     }
 
-    /// Checks that all bodies and terms named are there.
+    /// Checks the names of all bodies and terms.
     ///
     /// # Errors
-    /// The name, with those that there are.
+    /// An unknown name.
     pub fn check_names(&self, model: &Model, terms: &[TorqueTerm]) -> Result<(), ConsistencyError> {
         for name in self.bodies.keys() {
             if model.bodies().iter().any(|body| body.name() == name) {
@@ -138,28 +137,28 @@ impl ConsistencySettings {
     }
 }
 
-/// An array of `N` values and no more: serde by itself ignores what follows.
-fn counted<T, const N: usize, E: serde::de::Error>(values: Vec<T>) -> Result<[T; N], E> {
+/// An array of exactly `N` values; serde alone ignores further values.
+fn array<T, const N: usize, E: serde::de::Error>(values: Vec<T>) -> Result<[T; N], E> {
     let found = values.len();
     values.try_into().map_err(|_| E::custom(format!("{found} values where {N} are expected")))
 }
 
 fn exactly<'de, const N: usize, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; N], D::Error> {
-    counted(Vec::deserialize(deserializer)?)
+    array(Vec::deserialize(deserializer)?)
 }
 
-fn perhaps<'de, const N: usize, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; N]>, D::Error> {
-    Option::<Vec<f64>>::deserialize(deserializer)?.map(counted).transpose()
+fn optional<'de, const N: usize, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; N]>, D::Error> {
+    Option::<Vec<f64>>::deserialize(deserializer)?.map(array).transpose()
 }
 
 fn corners<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[[f64; 3]; 2]>, D::Error> {
     let Some(corners) = Option::<Vec<Vec<f64>>>::deserialize(deserializer)? else { return Ok(None) };
-    counted(corners.into_iter().map(counted).collect::<Result<Vec<_>, _>>()?).map(Some)
+    array(corners.into_iter().map(array).collect::<Result<Vec<_>, _>>()?).map(Some)
 }
 
 fn intervals<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, [f64; 2]>, D::Error> {
     BTreeMap::<String, Vec<f64>>::deserialize(deserializer)?
         .into_iter()
-        .map(|(name, values)| Ok((name, counted(values)?)))
+        .map(|(name, values)| Ok((name, array(values)?)))
         .collect()
 }

@@ -1,6 +1,4 @@
-//! Columns of a log that a mistake concerns.
-
-/// Which columns of a log a mistake is about.
+/// Columns of a log that a mistake concerns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Channels {
     /// Positions alone.
@@ -12,12 +10,11 @@ pub enum Channels {
 }
 
 impl Channels {
-    /// Position and torque, where each is included.
     pub(super) fn each(self) -> impl Iterator<Item = Self> {
         [Self::Position, Self::Torque].into_iter().filter(move |one| self == Self::Both || self == *one)
     }
 
-    /// The other one of position and torque; none of both.
+    /// Torque for position and the reverse; `None` for both.
     pub(super) fn other(self) -> Option<Self> {
         match self {
             Self::Position => Some(Self::Torque),

@@ -1,38 +1,33 @@
 //! Confirmation of a hypothesis against three causes that look like a mistake: another step of dry friction, a
-//! description with usual errors, and placeholders for bodies, for which another rate compensates.
+//! description with usual errors, and placeholder bodies, for which another rate compensates.
 
 use super::error::DiagnosisError;
-use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Hypothesis, INDISTINGUISHABLE, NOMINAL_WEIGHT};
+use super::hypothesis::{CorrectedStudy, Hypothesis};
 use super::joint_fits::score;
 use super::mistakes::Mistake;
 use super::motion_rows::MotionRows;
 use super::nominal::{left_by_nominal, nominal_torque};
 use super::search::Search;
+use super::span::root_mean_square;
 use super::usual_errors::torques_of_likely_robots;
 use crate::consistent::ConsistencySettings;
 
-/// Improvement that another rate needs: rates of correct logs gain 1.1, other rates 2.0 and more.
-const CLEARLY_ANOTHER_RATE: f64 = 2.0 * CLEARLY_BETTER;
-
 /// Replaces the result of a search by the study as `written`, with the friction steps that its rows need, if the
 /// hypothesis of the search is not confirmed, or if the search found no hypothesis and these steps differ from the
-/// study's. `None` if the search stays as it is. `believed` is the study of the search's best hypothesis.
-///
-/// # Errors
-/// Too few rows.
-pub(super) fn as_written_instead(
+/// study's. `None` if the search is confirmed. `believed` is the study of the search's best hypothesis.
+pub(super) fn unless_confirmed(
     written: &CorrectedStudy,
     believed: &CorrectedStudy,
     search: &Search,
     consistency: &ConsistencySettings,
 ) -> Result<Option<(CorrectedStudy, Search)>, DiagnosisError> {
-    let own_steps = written.with_own_steps()?;
+    let own_steps = written.with_fitted_steps()?;
     if search.best.is_none() && own_steps.robot.terms() == written.robot.terms() {
         return Ok(None);
     }
     let as_written = own_steps.hypothesis(Some(consistency))?;
     if search.best.is_some() {
-        let best = believed.with_own_steps()?.hypothesis(Some(consistency))?;
+        let best = believed.with_fitted_steps()?.hypothesis(Some(consistency))?;
         if is_clear(&as_written, &best) && is_beyond_usual_errors(written, &as_written, &best) {
             return Ok(None);
         }
@@ -40,22 +35,24 @@ pub(super) fn as_written_instead(
     Ok(Some((own_steps, Search { as_written, best: None, alike: Vec::new(), tried: search.tried })))
 }
 
-/// Whether a hypothesis is better where each has its own steps. Placeholders support another rate as much as described
-/// bodies do, so the consistent fit has to improve.
+/// Whether a hypothesis is better where each has its own steps. Placeholder bodies support another rate as much as
+/// described bodies do, so the consistent fit has to improve.
 fn is_clear(as_written: &Hypothesis, best: &Hypothesis) -> bool {
-    let gain = as_written.score() - best.score();
+    let (gain, limits) = (as_written.score() - best.score(), &best.settings.score);
     if best.mistakes.iter().all(|mistake| mistake.facts().is_other_rate) {
-        gain >= CLEARLY_ANOTHER_RATE && as_written.consistent_score() - best.consistent_score() >= INDISTINGUISHABLE
+        gain >= limits.min_gain_of_rate
+            && as_written.consistent_score() - best.consistent_score() >= limits.max_indistinguishable
     } else {
-        gain >= CLEARLY_BETTER
+        gain >= limits.min_gain
     }
 }
 
-/// Whether a hypothesis that only the described bodies support gains clearly more than with any robot that is described
-/// with usual errors, moved as in the study as `written` and without any mistake.
+/// Whether a hypothesis that only the nominal bodies support gains clearly more than with any robot whose description
+/// has usual errors, in the motion of the study as `written` and without any mistake.
 fn is_beyond_usual_errors(written: &CorrectedStudy, as_written: &Hypothesis, best: &Hypothesis) -> bool {
+    let limits = &written.settings.score;
     let by_bodies = as_written.nominal_score() - best.nominal_score();
-    if as_written.score() - best.score() - NOMINAL_WEIGHT * by_bodies >= CLEARLY_BETTER {
+    if as_written.score() - best.score() - limits.nominal_weight * by_bodies >= limits.min_gain {
         return true;
     }
     let CorrectedStudy { robot, rows, .. } = written;
@@ -63,7 +60,7 @@ fn is_beyond_usual_errors(written: &CorrectedStudy, as_written: &Hypothesis, bes
         return true;
     };
     let of = |study: &CorrectedStudy, nominal: &[Vec<f64>], left: &[f64]| {
-        let torque: Vec<f64> = study.rows.tau.iter().map(|tau| rms(tau)).collect();
+        let torque: Vec<f64> = study.rows.tau.iter().map(|tau| root_mean_square(tau)).collect();
         let by_nominal = left_by_nominal(&study.robot, &study.rows, nominal);
         let noisy: Vec<f64> =
             by_nominal.iter().zip(&torque).zip(left).map(|((by, torque), left)| by.hypot(left * torque)).collect();
@@ -83,10 +80,10 @@ fn is_beyond_usual_errors(written: &CorrectedStudy, as_written: &Hypothesis, bes
         };
         tried.iter().map(gain).fold(f64::NEG_INFINITY, f64::max)
     };
-    by_bodies >= torques.map(gain).fold(0.0, f64::max) + CLEARLY_BETTER
+    by_bodies >= torques.map(gain).fold(0.0, f64::max) + limits.min_gain
 }
 
-/// The same mistakes with the numbers of the last one that may be found of other robots.
+/// The same mistakes, the last one with each number that a search could find for another robot.
 fn with_other_numbers(mistakes: &[Mistake]) -> Vec<Vec<Mistake>> {
     let Some((last, before)) = mistakes.split_last() else { return vec![Vec::new()] };
     let others = last.facts().other_numbers;
@@ -94,8 +91,4 @@ fn with_other_numbers(mistakes: &[Mistake]) -> Vec<Vec<Mistake>> {
         return vec![mistakes.to_vec()];
     }
     others.into_iter().map(|number| [before, &[last.with_number(number)]].concat()).collect()
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }

@@ -1,21 +1,40 @@
-//! Why a diagnosis could not be made.
+//! Errors of the diagnosis.
 
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
 use dynident_rows::LogError;
 use thiserror::Error;
 
-/// Why a diagnosis could not be made.
+/// An error of the diagnosis.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DiagnosisError {
-    /// A recording that cannot be read.
+    /// An unreadable recording.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// Rows that carry no estimate.
+    /// Too few rows.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
-    /// Drive inertia that the robot cannot have.
+    /// Drive inertia that does not suit the robot.
     #[error(transparent)]
     Model(#[from] ParametricModelError),
+    /// An invalid limit.
+    #[error(transparent)]
+    Limit(#[from] InvalidLimit),
+}
+
+/// A limit that is not a finite value above zero.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[error("invalid {name}: {value}; use a finite value above zero")]
+pub struct InvalidLimit {
+    /// The field of the settings.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+}
+
+/// Checks that all limits are finite and above zero.
+pub(crate) fn check_limits(limits: &[(&'static str, f64)]) -> Result<(), InvalidLimit> {
+    let invalid = limits.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0));
+    invalid.map_or(Ok(()), |&(name, value)| Err(InvalidLimit { name, value }))
 }

@@ -1,18 +1,13 @@
-//! How well robots explain the torque of some instants: each joint alone, one robot for all joints, a consistent one.
+//! Residuals of several fits to the torque of some instants: separate parameters of each joint, one set of base
+//! parameters, a consistent robot, the nominal bodies.
 
 use super::joint_fits::{JointFits, panels, score};
 use super::motion_rows::MotionRows;
+use super::settings::ScoreSettings;
 use crate::consistent::{ConsistencySettings, consistent_parameters};
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::EstimationError;
 use dynident_rows::predicted_torque;
-
-/// Number of independent instants for each of a joint's own parameters, below which these follow the noise, and
-/// friction and elasticity without a term in the model.
-const MIN_INSTANTS: f64 = 2.0;
-/// Largest factor on the needed improvement: the best wrong hypothesis gains 0.83 in parts of correct logs, and a
-/// reversed joint of a short log 1.3.
-const MAX_MARGIN: f64 = 1.5;
 
 /// Residuals of each joint's torque, root mean squares, Nm (N), at least a hundredth of the torque.
 #[derive(Clone, Debug)]
@@ -21,25 +16,22 @@ pub(super) struct Explanation {
     pub(super) torque: Vec<f64>,
     /// By separate parameters of each joint.
     pub(super) alone: Vec<f64>,
-    /// Number of independent instants for each of a joint's own parameters, `n/p`.
-    independent_of_own: Vec<f64>,
+    /// Number of independent instants per parameter of a joint, `n/p`.
+    instants_per_parameter: Vec<f64>,
     /// By one set of base parameters, consistent or not.
     pub(super) free: Vec<f64>,
     /// That set.
     pub(super) free_parameters: Vec<f64>,
-    /// By the best physically consistent set; empty where there is none.
+    /// By the best physically consistent set; empty without a fit.
     pub(super) consistent: Vec<f64>,
-    /// That set; empty where there is none.
+    /// That set; empty without a fit.
     consistent_parameters: Vec<f64>,
-    /// By the description's own bodies with friction fitted joint by joint; empty where it has none.
+    /// By the nominal bodies with friction fitted joint by joint; empty if a body is unknown.
     pub(super) nominal: Vec<f64>,
 }
 
 impl Explanation {
-    /// Explains the torque of `rows` by `robot`; with a consistent set where `consistency` is given.
-    ///
-    /// # Errors
-    /// Too few rows.
+    /// Fits the torque of `rows` by `robot`; also by a consistent robot if `consistency` is given.
     pub(super) fn new(
         robot: &ParametricModel,
         rows: &MotionRows,
@@ -52,13 +44,13 @@ impl Explanation {
         let consistent =
             if consistent_parameters.is_empty() { Vec::new() } else { fits.left_by(&consistent_parameters)? };
         let nominal = fits.left_by_nominal();
-        let of_own = |joint: usize| rows.independent / robot.layout().joint_columns(joint).len().max(1) as f64;
-        let independent_of_own = (0..robot.dof()).map(of_own).collect();
+        let ratio = |joint: usize| rows.independent / robot.layout().joint_columns(joint).len().max(1) as f64;
+        let instants_per_parameter = (0..robot.dof()).map(ratio).collect();
         let JointFits { torque, alone, .. } = fits;
         Ok(Self {
             torque,
             alone,
-            independent_of_own,
+            instants_per_parameter,
             free,
             free_parameters,
             consistent,
@@ -67,36 +59,37 @@ impl Explanation {
         })
     }
 
-    /// The best physically consistent set; the one that need not be where there is none.
+    /// The best physically consistent set; without one, the free set.
     pub(super) fn parameters(&self) -> &[f64] {
         if self.consistent_parameters.is_empty() { &self.free_parameters } else { &self.consistent_parameters }
     }
 
-    /// Sum over all joints of the logarithm of what is left beside the torque, by one set of base parameters.
+    /// `Σ_j ln(unexplained share of joint j)` for one set of base parameters.
     pub(super) fn free_score(&self) -> f64 {
         score(&self.free, &self.torque)
     }
 
-    /// Residuals of separate parameters of each joint if these did not follow its noise, of which `√(1 − p/n)` remains.
+    /// Residuals of separate parameters of each joint, corrected for overfitting: they contain only `√(1 − p/n)` of the
+    /// noise.
     pub(super) fn alone_of_noise_free(&self) -> Vec<f64> {
-        let seen = |of_own: &f64| (1.0 - of_own.max(1.0).recip()).max(0.1).sqrt();
-        self.alone.iter().zip(&self.independent_of_own).map(|(left, of_own)| left / seen(of_own)).collect()
+        let noise_share = |ratio: &f64| (1.0 - ratio.max(1.0).recip()).max(0.1).sqrt();
+        let residuals = self.alone.iter().zip(&self.instants_per_parameter);
+        residuals.map(|(left, ratio)| left / noise_share(ratio)).collect()
     }
 
-    /// Whether there are enough instants for separate parameters of each joint.
-    pub(super) fn own_parameters_tell(&self) -> Vec<bool> {
-        self.independent_of_own.iter().map(|of_own| *of_own >= MIN_INSTANTS).collect()
+    pub(super) fn own_parameters_tell(&self, settings: &ScoreSettings) -> Vec<bool> {
+        self.instants_per_parameter.iter().map(|ratio| *ratio >= settings.min_instants_per_parameter).collect()
     }
 
-    /// Factor on the needed improvement: the logarithm of a residual varies by `√(p/2n)` from log to log, more with few
-    /// independent instants.
-    pub(super) fn margin(&self) -> f64 {
-        let least = self.independent_of_own.iter().copied().fold(f64::INFINITY, f64::min);
-        (MIN_INSTANTS / least).clamp(1.0, MAX_MARGIN)
+    /// Factor on the required improvement: the logarithm of a residual varies by `√(p/2n)` from log to log, more with
+    /// few independent instants.
+    pub(super) fn margin(&self, settings: &ScoreSettings) -> f64 {
+        let least = self.instants_per_parameter.iter().copied().fold(f64::INFINITY, f64::min);
+        (settings.min_instants_per_parameter / least).clamp(1.0, settings.max_margin)
     }
 }
 
-/// The torque that base parameters `theta` predict, one vector for each joint.
+/// The torque that base parameters `theta` predict, Nm (N), one vector for each joint.
 pub(super) fn predicted(robot: &ParametricModel, rows: &MotionRows, theta: &[f64]) -> Vec<Vec<f64>> {
     let panels = panels(robot, rows);
     let one = |joint: usize| {
@@ -108,7 +101,7 @@ pub(super) fn predicted(robot: &ParametricModel, rows: &MotionRows, theta: &[f64
     (0..robot.dof()).map(one).collect()
 }
 
-/// Base parameters without those of torque terms: what the bodies alone have.
+/// Base parameters with zero torque terms.
 pub(super) fn without_terms(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
     let of_body = |column: &Column| matches!(column, Column::Body { .. });
     robot

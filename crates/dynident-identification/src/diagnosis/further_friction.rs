@@ -1,4 +1,4 @@
-//! What laws of friction that the study does not have leave of a torque: identification chooses among these by itself.
+//! Residual with further friction laws, among which identification selects automatically.
 
 use super::explanation::{predicted, without_terms};
 use super::motion_rows::MotionRows;
@@ -7,13 +7,14 @@ use crate::friction::step_of_joint;
 use dynident_dynamics::ParametricModel;
 use nalgebra::{DMatrix, DVector};
 
-/// Velocities from which friction rises toward rest, rad/s of a usual arm
+/// Stribeck velocities, rad/s for an arm of usual size
 /// ([`OwnScale::velocity`](dynident_model::OwnScale::velocity)).
-const STRIBECK: [f64; 3] = [0.03, 0.1, 0.3];
-/// Times what base parameters `theta` leave of a joint's torque that is left beside friction by the joint's load,
-/// `|τ_bodies| s(q̇)`, friction that rises toward rest, `s(q̇) e^(−(q̇/v)²)`, that differs with the direction,
-/// `|s(q̇)|` and `|q̇|`, and that grows less than the velocity, `s(q̇) √|q̇|`; at most one.
-pub(super) fn left_beside_further_friction(
+const STRIBECK_RAD_S: [f64; 3] = [0.03, 0.1, 0.3];
+
+/// Ratio of a joint's residual with further friction laws to its residual by base parameters `theta`, at most 1: load
+/// dependence `|τ_bodies| s(q̇)`, Stribeck `s(q̇) e^(−(q̇/v)²)`, asymmetry `|s(q̇)|` and `|q̇|`, square root
+/// `s(q̇) √|q̇|`.
+pub(super) fn ratio_with_further_friction(
     robot: &ParametricModel,
     rows: &MotionRows,
     joint: usize,
@@ -33,10 +34,10 @@ pub(super) fn left_beside_further_friction(
             1 => step.abs(),
             2 => dq.abs(),
             3 => step * dq.abs().sqrt(),
-            _ => step * (-(dq / own_velocity(STRIBECK[k - 4])).powi(2)).exp(),
+            _ => step * (-(dq / own_velocity(STRIBECK_RAD_S[k - 4])).powi(2)).exp(),
         }
     };
-    let Some(laws) = Span::new(DMatrix::from_fn(rows.len(), 4 + STRIBECK.len(), column)) else { return 1.0 };
+    let Some(laws) = Span::new(DMatrix::from_fn(rows.len(), 4 + STRIBECK_RAD_S.len(), column)) else { return 1.0 };
     let all = left.norm();
     if all > 0.0 { laws.outside(&left).norm() / all } else { 1.0 }
 }

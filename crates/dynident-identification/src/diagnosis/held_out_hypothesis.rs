@@ -1,65 +1,58 @@
-//! Mistakes that only a held-out log has: a different format, or cables that were exchanged on another day. The base
-//! parameters of the training logs are known, so the residual alone is the evidence of a hypothesis.
+//! Mistakes of one held-out log, such as another format or exchanged cables. The base parameters of the training logs
+//! are known, so the residual is the only evidence.
 
 use super::channels::Channels;
 use super::explanation::predicted;
-use super::hypothesis::{CLEARLY_BETTER, INDISTINGUISHABLE, LIMIT_COST};
+use super::lag_search::LagSearch;
 use super::mistakes::{Breadth, Mistake, Setup};
 use super::motion_rows::{INSTANTS, MotionRows};
 use super::plausibility::beyond_limits;
-use super::torque_clock::TorqueClock;
+use super::settings::DiagnosisSettings;
 use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
 
-/// Ratio of a joint's unexplained share to that in the training logs from which a held-out log is not explained; real
-/// sets reach 2.4 for all joints together.
-const MIN_UNEXPLAINED_RATIO: f64 = 3.0;
 /// Smallest unexplained share of a joint's torque that is compared.
-const FLOOR: f64 = 1.0e-2;
-/// Improvement of the score from which a number between the candidates replaces the nearest of these.
-const MIN_IMPROVEMENT: f64 = 0.05;
+const MIN_RESIDUAL_SHARE: f64 = 1.0e-2;
 
-/// A mistake of a held-out log: without it the parameters of the training logs explain the log.
+/// A mistake of a held-out log. Corrected, the parameters of the training logs explain the log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldOutHypothesis {
     /// Number of the recording.
     pub log: usize,
     /// The mistake.
     pub mistake: Mistake,
-    /// Others that explain the log as well.
+    /// Other mistakes that explain the log equally well.
     pub alike: Vec<Mistake>,
-    /// Root mean square of the unexplained torque as the study is written, joints stacked, Nm.
+    /// Residual of the study as written, root mean square of all joints, Nm.
     pub left_as_written: f64,
     /// The same without the mistake.
     pub left_without: f64,
 }
 
-/// A robot that the training logs determine.
 #[derive(Clone, Copy)]
 pub(super) struct KnownRobot<'a> {
     pub(super) robot: &'a ParametricModel,
-    /// Its base parameters.
     pub(super) theta: &'a [f64],
-    /// Share of each joint's torque in the training logs that it does not explain.
+    /// Unexplained share of each joint's torque in the training logs.
     pub(super) left: &'a [f64],
+    pub(super) settings: &'a DiagnosisSettings,
 }
 
-/// Residuals of one hypothesis.
 struct Residual {
-    /// `Σ_j ln(unexplained share of joint j's torque)`, at least that of the training logs, and limits.
+    /// `Σ_j ln(unexplained share of joint j)` and the cost of broken limits.
     score: f64,
     /// Root mean square of all joints, Nm.
     rms: f64,
-    /// Unexplained share of each joint's torque; one for a joint without torque.
+    /// Unexplained share of each joint's torque, at least that of the training logs; 1 for a joint without torque.
     left: Vec<f64>,
-    /// The same in the training logs, at least the floor.
+    /// Unexplained shares in the training logs, at least [`MIN_RESIDUAL_SHARE`].
     trained: Vec<f64>,
 }
 
 impl Residual {
     fn new(known: KnownRobot<'_>, rows: &MotionRows) -> Self {
         let explained = predicted(known.robot, rows, known.theta);
-        let trained: Vec<f64> = known.left.iter().map(|left| left.max(FLOOR)).collect();
+        let trained: Vec<f64> = known.left.iter().map(|left| left.max(MIN_RESIDUAL_SHARE)).collect();
         let (mut shares, mut sum) = (Vec::with_capacity(trained.len()), 0.0);
         for ((explained, tau), least) in explained.iter().zip(&rows.tau).zip(&trained) {
             let left = tau.iter().zip(explained).map(|(tau, explained)| tau - explained);
@@ -69,18 +62,18 @@ impl Residual {
             shares.push(if torque > 0.0 { (left / torque).sqrt().max(*least) } else { 1.0 });
         }
         let count = (rows.len() * explained.len()).max(1) as f64;
-        let broken = beyond_limits(known.robot.model(), rows).len() as f64;
-        let score = shares.iter().map(|left| left.ln()).sum::<f64>() + LIMIT_COST * broken;
+        let broken = beyond_limits(known.robot.model(), rows, &known.settings.motion).len() as f64;
+        let score = shares.iter().map(|left| left.ln()).sum::<f64>() + known.settings.score.limit_cost * broken;
         Self { score, rms: (sum / count).sqrt(), left: shares, trained }
     }
 
     /// Whether the torque of every joint is explained about as well as in the training logs.
-    fn is_explained(&self) -> bool {
-        self.left.iter().zip(&self.trained).all(|(left, trained)| *left < MIN_UNEXPLAINED_RATIO * trained)
+    fn is_explained(&self, settings: &DiagnosisSettings) -> bool {
+        let max_ratio = settings.held_out.min_unexplained_ratio;
+        self.left.iter().zip(&self.trained).all(|(left, trained)| *left < max_ratio * trained)
     }
 }
 
-/// A mistake of the log and what is unexplained without it.
 struct Candidate {
     mistake: Mistake,
     rarity: f64,
@@ -93,29 +86,29 @@ impl Candidate {
     }
 
     /// Whether it is clearly better than the log `as_written`, and closes half of the gap to the training logs or
-    /// explains every joint; otherwise the cause is another one.
-    fn is_clear(&self, as_written: &Residual) -> bool {
+    /// explains every joint. Otherwise another cause is likelier.
+    fn is_clear(&self, as_written: &Residual, settings: &DiagnosisSettings) -> bool {
         let trained: f64 = as_written.trained.iter().map(|left| left.ln()).sum();
-        (self.score() < 0.5 * (as_written.score + trained) || self.residual.is_explained())
-            && self.score() <= as_written.score - CLEARLY_BETTER
+        (self.score() < 0.5 * (as_written.score + trained) || self.residual.is_explained(settings))
+            && self.score() <= as_written.score - settings.score.min_gain
             && self.residual.rms < as_written.rms
     }
 }
 
-/// Searches one mistake in recording number `log`, whose instants are `rows`, that explains why the robot of the
-/// training logs leaves clearly more of its torque unexplained. `clock` has its torque at other moments, where the log
-/// is long enough.
+/// Searches one mistake in recording number `log`, whose instants are `rows`, that explains its larger residual.
+/// `lag_search` gives its torque at other moments, if the log is long enough.
 pub(super) fn held_out_hypothesis(
     known: KnownRobot<'_>,
     rows: &MotionRows,
-    clock: Option<&TorqueClock<'_>>,
+    lag_search: Option<&LagSearch<'_>>,
     log: usize,
 ) -> Option<HeldOutHypothesis> {
+    let settings = known.settings;
     let as_written = Residual::new(known, rows);
-    if as_written.is_explained() {
+    if as_written.is_explained(settings) {
         return None;
     }
-    let setup = Setup { robot: known.robot, rows };
+    let setup = Setup { robot: known.robot, rows, settings };
     let explained = predicted(known.robot, rows, known.theta);
     let breadths = [Breadth::Usual, Breadth::Rare, Breadth::KnownRobot(&explained)];
     let all = breadths.iter().flat_map(|breadth| Mistake::candidates(setup, *breadth));
@@ -127,29 +120,30 @@ pub(super) fn held_out_hypothesis(
     let mut tried: Vec<Candidate> = all.into_par_iter().map(without).collect();
     tried.sort_by(|a, b| a.score().total_cmp(&b.score()));
     let least = tried.first().map_or(f64::INFINITY, Candidate::score);
-    let late = clock.and_then(|clock| late_torque(known, clock));
-    let late = late.filter(|late| late.score() < least && late.is_clear(&as_written));
+    let late = lag_search.and_then(|lag_search| late_torque(known, lag_search));
+    let late = late.filter(|late| late.score() < least && late.is_clear(&as_written, settings));
     let others = if late.is_some() { &tried[..] } else { tried.get(1..)? };
-    let best = late.as_ref().or(tried.first()).filter(|best| best.is_clear(&as_written))?;
+    let best = late.as_ref().or(tried.first()).filter(|best| best.is_clear(&as_written, settings))?;
     // Known parameters determine every number to within the noise.
-    let between = best.mistake.between(|mistake| without(mistake.clone()).residual.score).map(without);
-    let between = between.filter(|found| found.residual.score < best.residual.score - MIN_IMPROVEMENT);
-    let alike = others.iter().take_while(|other| other.score() < best.score() + INDISTINGUISHABLE);
+    let between = best.mistake.with_best_number(|mistake| without(mistake.clone()).residual.score).map(without);
+    let limit = best.residual.score - settings.held_out.min_gain_of_number;
+    let between = between.filter(|found| found.residual.score < limit);
+    let max_score = best.score() + settings.score.max_indistinguishable;
+    let alike = others.iter().take_while(|other| other.score() < max_score);
     let alike = alike.map(|other| other.mistake.clone()).collect();
     let Candidate { mistake, residual, .. } = between.as_ref().unwrap_or(best);
     let mistake = mistake.clone();
     Some(HeldOutHypothesis { log, mistake, alike, left_as_written: as_written.rms, left_without: residual.rms })
 }
 
-/// The log with the torque of all joints at the moment that the parameters explain best; none where that is a lag that
-/// a fit compensates.
-fn late_torque(known: KnownRobot<'_>, clock: &TorqueClock<'_>) -> Option<Candidate> {
+/// The log with the lag of all torques that has the smallest residual; `None` for a lag that a fit compensates.
+fn late_torque(known: KnownRobot<'_>, lag_search: &LagSearch<'_>) -> Option<Candidate> {
     let joints: Vec<usize> = (0..known.robot.dof()).collect();
-    let at = |lag_s: f64| Residual::new(known, &clock.rows(&joints, Channels::Torque, lag_s, INSTANTS));
-    let tried: Vec<f64> = clock.lags_s().collect();
+    let at = |lag_s: f64| Residual::new(known, &lag_search.rows(&joints, Channels::Torque, lag_s, INSTANTS));
+    let tried: Vec<f64> = lag_search.lags_s().collect();
     let scores: Vec<f64> = tried.par_iter().map(|&lag_s| at(lag_s).score).collect();
     let best = (0..tried.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
-    let lag_s = clock.least_near(tried[best], |lag_s| at(lag_s).score);
-    let mistake = clock.mistake(&joints, Channels::Torque, lag_s)?;
+    let lag_s = lag_search.refined_lag_s(tried[best], |lag_s| at(lag_s).score);
+    let mistake = lag_search.mistake(&joints, Channels::Torque, lag_s)?;
     Some(Candidate { rarity: mistake.facts().rarity, mistake, residual: at(lag_s) })
 }

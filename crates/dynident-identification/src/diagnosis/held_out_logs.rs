@@ -1,58 +1,50 @@
-//! Payloads and mistakes that held-out logs alone have.
+//! Payloads and mistakes of single held-out logs.
 
 use super::error::DiagnosisError;
 use super::explanation::{Explanation, predicted};
 use super::held_out_hypothesis::{HeldOutHypothesis, KnownRobot, held_out_hypothesis};
 use super::hypothesis::Hypothesis;
+use super::lag_search::LagSearch;
 use super::motion_rows::{INSTANTS, MotionRows, MotionSamples};
-use super::torque_clock::TorqueClock;
+use super::settings::DiagnosisSettings;
 use super::unmodelled_payload::{UnmodelledPayload, unmodelled_payload};
 use crate::consistent::ConsistencySettings;
 use dynident_rows::{Logs, RegressorModel, Role};
 
-/// Ratio of the residual of one robot for all logs to that with a payload or a mistake, up to which there is neither.
-const MAX_RATIO_OF_ONE_ROBOT: f64 = 1.3;
-
-/// Causes found in held-out logs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HeldOutLogs {
     pub(super) payloads: Vec<UnmodelledPayload>,
     pub(super) hypotheses: Vec<HeldOutHypothesis>,
 }
 
-/// The result of the training logs.
-pub(super) struct Trained<'a> {
+pub(super) struct TrainingResult<'a> {
     pub(super) model: &'a RegressorModel,
-    /// Their instants.
     pub(super) rows: &'a MotionRows,
-    /// The study as written, on these.
     pub(super) as_written: &'a Hypothesis,
-    /// Base parameters by least squares from all their rows; none where the model is not the study's.
+    /// Base parameters by least squares from all rows; `None` if the model differs from the study's.
     pub(super) theta: Option<&'a [f64]>,
     pub(super) consistency: &'a ConsistencySettings,
-    /// The lag that was compensated in each joint's torque, s.
+    /// The compensated lag of each joint's torque, s.
     pub(super) compensated_s: &'a [f64],
+    pub(super) settings: &'a DiagnosisSettings,
 }
 
-/// The payload or the mistake of each held-out log that explains it clearly better than the training logs' robot does,
-/// and than one robot for all logs. Neither the parameters from all rows may explain it, nor those of a consistent
-/// robot ([`Hypothesis::parameters`]): others predict nothing where the training did not move.
-///
-/// # Errors
-/// Recordings that cannot be read, too few rows.
-pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &Trained<'_>) -> Result<HeldOutLogs, DiagnosisError> {
-    let robot = &trained.model.parametric;
+/// The payload or the mistake of each held-out log that explains it clearly better than the robot of the training logs
+/// and than one robot for all logs. It is reported only if neither the parameters from all rows nor
+/// those of a consistent robot ([`Hypothesis::parameters`]) explain the log: free parameters that the training motion
+/// does not excite predict nothing.
+pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &TrainingResult<'_>) -> Result<HeldOutLogs, DiagnosisError> {
+    let (robot, settings) = (&trained.model.parametric, trained.settings);
     let mut found = HeldOutLogs::default();
     for log in logs.of_role(Role::Validate) {
-        let samples = [MotionSamples::of_recording(logs, trained.model, log)?];
+        let samples = [MotionSamples::of_recording(logs, trained.model, log, settings.motion.max_interpolated)?];
         let rows = samples[0].instants(INSTANTS);
-        let clock = TorqueClock::new(robot, &samples, trained.compensated_s.to_vec());
+        let lag_search = LagSearch::new(robot, &samples, trained.compensated_s.to_vec(), settings);
         let (mut payload, mut hypothesis) = (None, None);
         for theta in trained.theta.into_iter().chain([&trained.as_written.parameters[..]]) {
-            let known = KnownRobot { robot, theta, left: &trained.as_written.left };
-            payload = unmodelled_payload(robot, &rows, log, theta);
-            hypothesis = held_out_hypothesis(known, &rows, clock.as_ref(), log);
-            // A payload has four free numbers, a mistake hardly any: the smaller residual decides.
+            let known = KnownRobot { robot, theta, left: &trained.as_written.left, settings };
+            payload = unmodelled_payload(robot, &rows, log, theta, &settings.held_out);
+            hypothesis = held_out_hypothesis(known, &rows, lag_search.as_ref(), log);
             if let (Some(with), Some(without)) = (&payload, &hypothesis) {
                 if with.left_with < without.left_without { hypothesis = None } else { payload = None }
             }
@@ -63,7 +55,7 @@ pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &Trained<'_>) -> Result<He
         let left = payload.as_ref().map(|payload| payload.left_with);
         let left = left.or(hypothesis.as_ref().map(|hypothesis| hypothesis.left_without));
         let Some(left) = left else { continue };
-        if left_of_one_robot(&rows, trained)? > MAX_RATIO_OF_ONE_ROBOT * left {
+        if left_of_one_robot(&rows, trained)? > settings.held_out.max_ratio_of_one_robot * left {
             found.payloads.extend(payload);
             found.hypotheses.extend(hypothesis);
         }
@@ -71,9 +63,9 @@ pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &Trained<'_>) -> Result<He
     Ok(found)
 }
 
-/// Root mean square of this log's torque, joints stacked, that the best robot for the training logs and this one does
-/// not explain, Nm.
-fn left_of_one_robot(rows: &MotionRows, trained: &Trained<'_>) -> Result<f64, DiagnosisError> {
+/// Residual of this log by the best robot for the training logs and this log together, root mean square of all joints,
+/// Nm.
+fn left_of_one_robot(rows: &MotionRows, trained: &TrainingResult<'_>) -> Result<f64, DiagnosisError> {
     let robot = &trained.model.parametric;
     let mut all = trained.rows.clone();
     all.append(rows);

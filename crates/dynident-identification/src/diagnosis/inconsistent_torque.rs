@@ -3,64 +3,52 @@
 
 use super::error::DiagnosisError;
 use super::explanation::Explanation;
-use super::further_friction::left_beside_further_friction;
+use super::further_friction::ratio_with_further_friction;
 use super::hypothesis::Hypothesis;
 use super::motion_rows::MotionRows;
+use super::settings::ChannelSettings;
 use dynident_dynamics::ParametricModel;
 
-/// Ratio of a joint's unexplained share by one robot to that by its own parameters, from which the torque is doubted,
-/// and from which it is not this robot's. Seven sets of real logs reach 1.8, single logs of these 2.3.
-const DOUBTED_RATIO: f64 = 2.4;
-const FOREIGN_RATIO: f64 = 2.6;
-/// Smallest unexplained share of a joint's torque that is doubted.
-const MIN_UNEXPLAINED: f64 = 0.03;
-/// Unexplained shares of a torque that is independent of the motion: by the joint's own parameters, and by one robot,
-/// which predicts another torque from the other joints.
-const INDEPENDENT: [f64; 2] = [0.75, 1.0];
-
-/// A joint's torque that the robot of the other joints does not explain.
+/// A torque that is inconsistent with the robot of the other joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InconsistentTorque {
     /// The joint's number.
     pub joint: usize,
-    /// Share of its torque that one set of base parameters for all joints does not explain, with other laws of friction
-    /// than the study's where these explain more.
+    /// Unexplained share of its torque by one set of base parameters for all joints, with further friction laws where
+    /// these explain more.
     pub left: f64,
-    /// The same for its own parameters.
+    /// The same for separate parameters of the joint.
     pub alone: f64,
     /// Share of its torque from noise of the positions.
     pub noise: f64,
+    settings: ChannelSettings,
 }
 
 impl InconsistentTorque {
     /// Whether it is independent of the motion.
     pub fn is_motionless(&self) -> bool {
-        let [alone, left] = INDEPENDENT;
-        self.alone > alone && self.left > left
+        self.alone > self.settings.min_independent_alone && self.left > self.settings.min_independent
     }
 
-    /// Whether it is so inconsistent that it is not this robot's.
+    /// Whether it is so inconsistent that it does not belong to this robot.
     pub fn is_foreign(&self) -> bool {
-        self.times() > FOREIGN_RATIO
+        self.times() > self.settings.min_foreign_ratio
     }
 
-    /// Ratio of its unexplained share by one robot to that by its own parameters and the noise of the positions: own
-    /// parameters follow such noise, those of all joints do not.
+    /// Ratio of its unexplained share by one robot to that by separate parameters and the noise of the positions.
+    /// Separate parameters fit such noise, parameters of all joints do not.
     pub fn times(&self) -> f64 {
         self.left / self.alone.hypot(self.noise).max(f64::MIN_POSITIVE)
     }
 
     fn is_inconsistent(&self) -> bool {
-        self.left > MIN_UNEXPLAINED && self.times() > DOUBTED_RATIO
+        self.left > self.settings.min_doubted_unexplained && self.times() > self.settings.min_doubted_ratio
     }
 }
 
 /// The inconsistent torques of a hypothesis: those that are independent of the motion, or else the one with the largest
 /// ratio, since it spoils its neighbours. `robot` and `rows` are those of the hypothesis. `noise` computes the share of
-/// each joint's torque from noise of the positions, only where that is needed.
-///
-/// # Errors
-/// Those of `noise`, too few rows.
+/// each joint's torque from noise of the positions; it is called only if needed.
 pub(super) fn inconsistent_torques(
     hypothesis: &Hypothesis,
     robot: &ParametricModel,
@@ -72,6 +60,7 @@ pub(super) fn inconsistent_torques(
         left: hypothesis.free[joint],
         alone: hypothesis.alone[joint],
         noise: 0.0,
+        settings: hypothesis.settings.channels,
     };
     let mut all: Vec<InconsistentTorque> =
         (0..hypothesis.free.len()).filter(|&joint| hypothesis.own_parameters_tell[joint]).map(of).collect();
@@ -86,7 +75,7 @@ pub(super) fn inconsistent_torques(
             torque.noise = noise[torque.joint];
             if torque.is_inconsistent() {
                 let theta = &explained.free_parameters;
-                torque.left *= left_beside_further_friction(robot, rows, torque.joint, theta);
+                torque.left *= ratio_with_further_friction(robot, rows, torque.joint, theta);
             }
         }
     }

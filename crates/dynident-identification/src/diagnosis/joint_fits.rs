@@ -11,16 +11,16 @@ use dynident_model::terms::JointMotion;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
-/// Rounds of weighting; the third one changes scores by less than a hundredth.
-const ROUNDS: usize = 3;
-/// Added to columns of unit length: parameters that are not excited stay at zero.
+/// Rounds of weighting; the third one changes scores by less than 0.01.
+const WEIGHTING_ROUNDS: usize = 3;
+/// Added to the squares of columns of unit length: unexcited parameters stay at zero.
 const RIDGE: f64 = 1.0e-10;
 
 /// Smallest residual as a share of the torque: otherwise rounding would decide in noise-free simulations.
-const FLOOR: f64 = 1.0e-2;
+const MIN_RESIDUAL_SHARE: f64 = 1.0e-2;
 
-/// A motion with several torques of each joint, for hypotheses that differ in torque alone: one pass over the rows
-/// serves all of them.
+/// A motion with several torques of each joint. One pass over the rows serves all hypotheses that differ in torque
+/// alone.
 pub(super) struct SharedMotion {
     panels: Arc<Panels>,
     /// For each joint its columns, then its torques.
@@ -28,10 +28,7 @@ pub(super) struct SharedMotion {
 }
 
 impl SharedMotion {
-    /// The motion of `rows` with the `torques` that each joint may have, at least one; those of `rows` aside.
-    ///
-    /// # Errors
-    /// Too few rows.
+    /// The motion of `rows` with at least one of `torques` for each joint; the torques of `rows` are not used.
     pub(super) fn new<'t>(
         robot: &ParametricModel,
         rows: &MotionRows,
@@ -65,15 +62,11 @@ pub(super) struct JointFits<'a> {
     pub(super) problem: LinearProblem,
     /// Of the torque itself.
     pub(super) torque: Vec<f64>,
-    /// What parameters of each joint's own leave, which no other joint shares: the least that any robot leaves.
+    /// Residual of separate parameters of each joint: a lower bound for any robot.
     pub(super) alone: Vec<f64>,
 }
 
 impl<'a> JointFits<'a> {
-    /// The torque of `rows` as `robot` would make it.
-    ///
-    /// # Errors
-    /// Too few rows.
     pub(super) fn new(robot: &'a ParametricModel, rows: &'a MotionRows) -> Result<Self, EstimationError> {
         let mut panels = panels(robot, rows);
         let mut workspace = FactorWorkspace::default();
@@ -87,11 +80,8 @@ impl<'a> JointFits<'a> {
         Self::of_factors(robot, rows, Arc::new(panels), factors)
     }
 
-    /// The same for `rows` with the shared motion, where joint `j` has the torque number `chosen[j].0` of those that it
-    /// may have, times `chosen[j].1`.
-    ///
-    /// # Errors
-    /// Torques that are not there.
+    /// The fits with a shared motion, where joint `j` has the torque number `chosen[j].0` of `motion` times
+    /// `chosen[j].1`.
     pub(super) fn of_shared(
         robot: &'a ParametricModel,
         rows: &'a MotionRows,
@@ -123,26 +113,23 @@ impl<'a> JointFits<'a> {
             problem.add("rows", joint, columns, SegmentedFactor::of_factor(factor))?;
         }
         let torque = residuals(&problem, &vec![0.0; problem.columns().len()], &[])?;
-        let alone = alone.iter().zip(&torque).map(|(left, torque)| left.max(FLOOR * torque)).collect();
+        let alone = alone.iter().zip(&torque).map(|(left, torque)| left.max(MIN_RESIDUAL_SHARE * torque)).collect();
         Ok(Self { robot, rows, panels, problem, torque, alone })
     }
 
-    /// Base parameters by weighted least squares, joints weighted by what is left of their torque, and what these
-    /// leave: what [`weighted_least_squares`](dynident_estimation::weighted_least_squares) finds, without its
-    /// covariance and its account of what is excited, which a comparison of hypotheses does not need.
-    ///
-    /// # Errors
-    /// Rows of another robot.
+    /// Base parameters by weighted least squares, with the inverse residual variance of each joint as weight, and their
+    /// residuals. It is faster than [`weighted_least_squares`](dynident_estimation::weighted_least_squares), since it
+    /// computes neither covariance nor rank.
     pub(super) fn one_set(&self) -> Result<(Vec<f64>, Vec<f64>), EstimationError> {
         let problem = &self.problem;
         let mut sigma = self.torque.clone();
         let count = problem.columns().len();
         let mut theta = DVector::zeros(count);
-        // What stands in the normal equations of each joint: weighted anew in every round, where triangles would have
-        // to be merged anew. The ridge is far above their rounding.
+        // New weights only scale the normal equations of a joint, while triangles would have to be merged again. The
+        // ridge is far above the rounding of the normal equations.
         let squares: Vec<_> = problem.equations().iter().map(squares).collect();
-        for _ in 0..ROUNDS {
-            // On and below the diagonal, which is all that is read of it.
+        for _ in 0..WEIGHTING_ROUNDS {
+            // The Cholesky factorisation reads only the lower triangle.
             let (mut gram, mut right) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
             for (equation, (own_gram, own_right)) in problem.equations().iter().zip(&squares) {
                 let sigma = sigma[equation.joint];
@@ -158,7 +145,7 @@ impl<'a> JointFits<'a> {
             for k in 0..count {
                 right[k] /= norms[k];
                 for (entry, norm) in gram.as_mut_slice()[k * count..][k..count].iter_mut().zip(&norms[k..]) {
-                    // One by one: the product of two that are not excited would be zero.
+                    // Two divisions: the product of two tiny norms would be zero.
                     *entry = *entry / norm / norms[k];
                 }
             }
@@ -175,32 +162,26 @@ impl<'a> JointFits<'a> {
         Ok((theta.as_slice().to_vec(), sigma))
     }
 
-    /// Sum over all joints of the logarithm of what that set leaves beside the torque.
-    ///
-    /// # Errors
-    /// Rows of another robot.
+    /// `Σ_j ln(unexplained share of joint j)` for that set.
     pub(super) fn free_score(&self) -> Result<f64, EstimationError> {
         let (_, free) = self.one_set()?;
         Ok(score(&free, &self.torque))
     }
 
-    /// What base parameters `theta` leave of each joint's torque.
-    ///
-    /// # Errors
-    /// Parameters of another robot.
+    /// Residual of each joint for base parameters `theta`.
     pub(super) fn left_by(&self, theta: &[f64]) -> Result<Vec<f64>, EstimationError> {
         residuals(&self.problem, theta, &self.torque)
     }
 
-    /// What the description's own bodies leave with friction fitted joint by joint; empty where it has none.
+    /// Residual of the nominal bodies with friction fitted joint by joint; empty if a body is unknown.
     pub(super) fn left_by_nominal(&self) -> Vec<f64> {
         let Some(nominal) = torque_of_bodies(self.robot, &self.panels) else { return Vec::new() };
         let left = left_by_nominal(self.robot, self.rows, &nominal);
-        left.iter().zip(&self.torque).map(|(left, torque)| left.max(FLOOR * torque)).collect()
+        left.iter().zip(&self.torque).map(|(left, torque)| left.max(MIN_RESIDUAL_SHARE * torque)).collect()
     }
 }
 
-/// The regressor's columns of some rows; torques are left out.
+/// The regressor of some rows, without torques.
 pub(super) fn panels(robot: &ParametricModel, rows: &MotionRows) -> Panels {
     let (model, layout) = (robot.model(), robot.layout());
     let (q, dq, ddq) = (rows.q.concat(), rows.dq.concat(), rows.ddq.concat());
@@ -210,12 +191,12 @@ pub(super) fn panels(robot: &ParametricModel, rows: &MotionRows) -> Panels {
     panels
 }
 
-/// `Σ_j ln(left of joint j / torque of joint j)`, joints without torque aside.
+/// `Σ_j ln(residual of joint j / torque of joint j)` without joints that have no torque.
 pub(super) fn score(left: &[f64], torque: &[f64]) -> f64 {
     left.iter().zip(torque).filter(|(_, torque)| **torque > 0.0).map(|(left, torque)| (left / torque).ln()).sum()
 }
 
-/// Of one joint's rows the columns of `WᵀW` from the diagonal on, and `Wᵀτ`.
+/// The columns of `WᵀW` from the diagonal down, and `Wᵀτ`, of one joint.
 fn squares(equation: &JointRows) -> (Vec<Vec<f64>>, DVector<f64>) {
     let total = equation.factor.total();
     let triangle = total.regressor_triangle();
@@ -232,13 +213,13 @@ fn squares(equation: &JointRows) -> (Vec<Vec<f64>>, DVector<f64>) {
     (gram, triangle.tr_mul(&total.rotated_torque()))
 }
 
-/// Root mean square of `τ - W θ` joint by joint, at least the floor beside `torque` where that is given.
+/// Root mean square of `τ - W θ` of each joint, at least [`MIN_RESIDUAL_SHARE`] of `torque` if that is not empty.
 fn residuals(problem: &LinearProblem, theta: &[f64], torque: &[f64]) -> Result<Vec<f64>, EstimationError> {
     let one = |equation: &JointRows| {
         let own: Vec<f64> = equation.columns.iter().map(|&column| theta[column]).collect();
         let factor = equation.factor.total();
         let left = (factor.residual_sum_of_squares(&own)? / factor.rows().max(1) as f64).sqrt();
-        Ok(left.max(torque.get(equation.joint).map_or(0.0, |torque| FLOOR * torque)))
+        Ok(left.max(torque.get(equation.joint).map_or(0.0, |torque| MIN_RESIDUAL_SHARE * torque)))
     };
     problem.equations().iter().map(one).collect()
 }

@@ -1,37 +1,39 @@
-//! Do study, robot and logs fit together, and if not, which mistake explains it?
+//! Tests for mistakes in study, robot description and logs.
 //!
 //! A fit of base parameters explains many wrong studies: its parameters compensate signs, orders and units. The
-//! diagnosis therefore corrects one possible mistake after the other in the same samples, and scores each of these
-//! hypotheses by the best physically consistent fit: positive masses, dissipative friction, joints within their limits,
-//! bodies not too far from the description. The study is doubted only if another hypothesis is clearly better.
+//! diagnosis therefore corrects one possible mistake after the other in the same samples. It scores each of these
+//! hypotheses by the best physically consistent fit (positive masses, dissipative friction), by joint limits, and by
+//! the distance of the bodies from the description. The study is doubted only if another hypothesis is clearly better.
 //!
 //! | file | content |
 //! | --- | --- |
 //! | `mistakes` | the kinds of mistakes, one file each |
 //! | `motion_rows` | a few hundred instants of a recording |
-//! | `joint_fits`, `explanation`, `nominal`, `plausibility` | the evidence: best robots, the description, limits |
-//! | `step_width`, `beside_friction`, `further_friction`, `noise_torque`, `usual_errors`, `span` | other causes than mistakes: friction, noise, errors of descriptions |
+//! | `settings` | the limits behind all verdicts |
+//! | `joint_fits`, `explanation`, `nominal`, `plausibility` | the evidence: residuals of several fits, limits |
+//! | `step_width`, `friction_spans`, `further_friction`, `noise_torque`, `usual_errors`, `span` | other causes than mistakes: friction, noise, errors of descriptions |
 //! | `hypothesis`, `search`, `round`, `refinement` | the score, the best hypothesis, and its number |
-//! | `confirmation` | whether correct logs would support the hypothesis as well |
-//! | `torque_clock` | torque of another moment |
+//! | `confirmation` | test whether correct logs would support the hypothesis too |
+//! | `lag_search` | channels that were logged too late or too early |
 //! | `training` | the search in the training logs |
 //! | `description_fit`, `wrong_mass` | units of torque, another robot, one wrong mass |
-//! | `held_out_logs`, `held_out_hypothesis`, `unmodelled_payload` | payloads and mistakes that a held-out log alone has |
+//! | `held_out_logs`, `held_out_hypothesis`, `unmodelled_payload` | payloads and mistakes of one held-out log |
 //! | `duplicate_channels`, `inconsistent_torque` | columns that no correction repairs |
 
-mod beside_friction;
 mod channels;
 mod confirmation;
 mod description_fit;
 mod duplicate_channels;
 mod error;
 mod explanation;
+mod friction_spans;
 mod further_friction;
 mod held_out_hypothesis;
 mod held_out_logs;
 mod hypothesis;
 mod inconsistent_torque;
 mod joint_fits;
+mod lag_search;
 pub mod mistakes;
 mod motion_rows;
 mod noise_torque;
@@ -40,9 +42,9 @@ mod plausibility;
 mod refinement;
 mod round;
 mod search;
+mod settings;
 mod span;
 mod step_width;
-mod torque_clock;
 mod training;
 mod unmodelled_payload;
 mod usual_errors;
@@ -51,7 +53,7 @@ mod wrong_mass;
 pub use channels::Channels;
 pub use description_fit::DescriptionFit;
 pub use duplicate_channels::DuplicateChannel;
-pub use error::DiagnosisError;
+pub use error::{DiagnosisError, InvalidLimit};
 pub use held_out_hypothesis::HeldOutHypothesis;
 pub use hypothesis::Hypothesis;
 pub use inconsistent_torque::InconsistentTorque;
@@ -59,47 +61,47 @@ pub use mistakes::{KeyChange, Mistake, StudyKeys};
 pub use motion_rows::MotionRows;
 pub use plausibility::BeyondLimit;
 pub use search::Search;
+pub use settings::{
+    AcceptanceSettings, ChannelSettings, DescriptionSettings, DiagnosisSettings, HeldOutSettings, LateChannelSettings,
+    MotionLimits, ScoreSettings,
+};
 pub use training::DiagnosisTask;
 pub use unmodelled_payload::UnmodelledPayload;
 pub use wrong_mass::WrongMass;
 
+pub(crate) use error::check_limits;
 pub(crate) use plausibility::{has_jumps, is_beyond_limits};
 
 use description_fit::description_fit;
 use duplicate_channels::{duplicate_channels, has_lost_signs};
 use dynident_rows::{Logs, RegressorModel};
 use explanation::Explanation;
-use held_out_logs::{HeldOutLogs, Trained, held_out_logs};
+use held_out_logs::{HeldOutLogs, TrainingResult, held_out_logs};
 use inconsistent_torque::inconsistent_torques;
 use noise_torque::torque_of_noise;
 use training::{SearchedLogs, searched_logs};
 
-/// Unexplained share of the torque from which positions may be mostly noise, even for the believed hypothesis.
-const MOSTLY_NOISE: f64 = 0.5;
-/// Parts of the cut-off that are tried then, if the cut-off was chosen from the data.
-const LOWER_CUTOFFS: [f64; 2] = [0.5, 0.25];
-
 /// Findings about study, robot and logs.
 #[derive(Clone, Debug)]
 pub struct Diagnosis {
-    /// The hypotheses that were compared.
+    /// The compared hypotheses.
     pub search: Search,
-    /// The torque of the described bodies, with the best hypothesis; none if a body is unknown.
+    /// The nominal bodies compared with the torque of the best hypothesis; `None` if a body is unknown.
     pub description_fit: Option<DescriptionFit>,
-    /// Payloads in held-out logs and not in training logs, or the other way round.
+    /// Payloads in held-out logs and not in training logs, or the reverse.
     pub unmodelled_payloads: Vec<UnmodelledPayload>,
-    /// Mistakes of held-out logs alone.
+    /// Mistakes of single held-out logs.
     pub held_out: Vec<HeldOutHypothesis>,
-    /// Columns that are used for two joints; then no hypothesis means much.
+    /// Columns that are used for two joints; then no hypothesis is reliable.
     pub duplicate_channels: Vec<DuplicateChannel>,
-    /// Whether the torques are magnitudes, whose signs are lost.
+    /// Whether the torques are magnitudes without signs.
     pub lost_signs: bool,
-    /// Torques that are inconsistent with the others, with the believed hypothesis.
+    /// Torques that are inconsistent with the others under the best hypothesis.
     pub inconsistent_torques: Vec<InconsistentTorque>,
 }
 
 impl Diagnosis {
-    /// Whether even the best hypothesis leaves far more unexplained than separate parameters of each joint: the
+    /// Whether even the best hypothesis has a far larger residual than separate parameters of each joint: the
     /// description is of another robot, or the study has several mistakes.
     pub fn is_unexplained(&self) -> bool {
         self.search.believed().is_unexplained()
@@ -107,25 +109,27 @@ impl Diagnosis {
 }
 
 /// Searches the mistake that explains the recordings best, and causes in held-out recordings. If no hypothesis explains
-/// half of the torque, or none is a robot of the description, and the cut-off was chosen from the data, lower cut-offs
-/// are tried: noise of the positions, which grows with frequency as no mistake does, may cover the differences.
+/// the torque, and the cut-off was chosen from the data, lower cut-offs are tried: noise of the positions, which grows
+/// with frequency, may hide the mistake.
 ///
 /// # Errors
-/// Recordings that cannot be read, too few rows.
+/// Unreadable recordings, too few rows, invalid limits in the settings.
 pub fn diagnose(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
     let DiagnosisTask { logs, settings, robot, training, .. } = task;
-    let found = diagnosed(task)?;
-    let is_explained =
-        found.search.best.is_some() || (found.search.believed().left_of_all <= MOSTLY_NOISE && !found.is_unexplained());
+    settings.diagnosis_limits.validate()?;
+    let limits = &settings.diagnosis_limits.score;
+    let found = diagnose_at_cutoff(task)?;
+    let is_explained = found.search.best.is_some()
+        || (found.search.believed().left_of_all <= limits.max_unexplained && !found.is_unexplained());
     let Some(cutoff_hz) = logs.motion.differentiator.cutoff_hz().filter(|_| !is_explained) else { return Ok(found) };
     if !settings.motion.differentiator.wants_cutoff() {
         return Ok(found);
     }
-    for share in LOWER_CUTOFFS {
+    for share in limits.lower_cutoffs {
         let (model, cutoff_hz) = (robot.model(), Some(share * cutoff_hz));
         let slower = Logs::new(model, logs.recordings, settings.row_settings(), training, cutoff_hz, logs.execution)?;
         let slower = slower.with_excerpts(logs.excerpts());
-        let again = diagnosed(DiagnosisTask { logs: &slower, theta: None, ..task })?;
+        let again = diagnose_at_cutoff(DiagnosisTask { logs: &slower, theta: None, ..task })?;
         let is_noise_alone = found.is_unexplained() && !again.is_unexplained();
         if again.search.best.is_some() || is_noise_alone {
             return Ok(again);
@@ -135,27 +139,31 @@ pub fn diagnose(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
 }
 
 /// [`diagnose`] at one cut-off.
-fn diagnosed(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
+fn diagnose_at_cutoff(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
     let SearchedLogs { search, study, consistency, compensated_s } = searched_logs(task)?;
-    let DiagnosisTask { logs, training, theta, .. } = task;
+    let DiagnosisTask { logs, training, theta, settings, .. } = task;
+    let settings = &settings.diagnosis_limits;
     let (robot, model) = (&study.robot, RegressorModel::from(study.robot.clone()));
-    // Units of torque are compared with the best hypothesis, payloads only where the study is believed.
+    // Units of torque are compared with the best hypothesis, payloads only without a mistake.
     let best = search.corrected(&study);
-    let description_fit = description_fit(&best.robot, &best.rows, &search.believed().left);
+    let description_fit = description_fit(&best.robot, &best.rows, &search.believed().left, settings.description);
     let as_written = &search.as_written;
-    let is_explained = search.best.is_none() && as_written.left_of_all < MOSTLY_NOISE;
+    let is_explained = search.best.is_none() && as_written.left_of_all < settings.score.max_unexplained;
     let HeldOutLogs { payloads, hypotheses } = match theta.filter(|_| is_explained) {
         Some(theta) => {
             let theta = (robot.terms() == task.robot.terms()).then_some(theta);
             let (consistency, compensated_s) = (&consistency, &compensated_s[..]);
-            let trained = Trained { model: &model, rows: &study.rows, as_written, theta, consistency, compensated_s };
-            held_out_logs(logs, &trained)?
+            let (model, rows) = (&model, &study.rows);
+            held_out_logs(
+                logs,
+                &TrainingResult { model, rows, as_written, theta, consistency, compensated_s, settings },
+            )?
         }
         None => HeldOutLogs::default(),
     };
-    let duplicate_channels = duplicate_channels(&study.rows, &as_written.left);
-    let lost_signs = has_lost_signs(&study.rows, as_written.left_of_all);
-    // A corrected hypothesis has other columns, whose noise is not known.
+    let duplicate_channels = duplicate_channels(&study.rows, &as_written.left, &settings.channels);
+    let lost_signs = has_lost_signs(&study.rows, as_written.left_of_all, &settings.channels);
+    // The noise of corrected columns is unknown.
     let noise = |explained: &Explanation| {
         if search.best.is_some() {
             return Ok(vec![0.0; robot.dof()]);

@@ -1,20 +1,20 @@
-//! A few hundred instants of a recording, on which hypotheses are compared.
+//! A few hundred instants of a recording, for the comparison of hypotheses.
 
 use super::channels::Channels;
 use core::ops::Range;
 use dynident_recording::{DecimationSettings, Decimator, MotionBlock};
 use dynident_rows::{LogError, Logs, ParallelFilterSettings, RegressorModel, motion_band_hz};
 
-/// Number of instants; more are slower and not more accurate.
+/// Number of instants; more do not improve the accuracy.
 pub(super) const INSTANTS: usize = 300;
 
-/// Number of instants, of `most`, from log number `place` of `logs`: the same from every log, or one from evenly chosen
-/// logs if there are more logs than instants.
+/// Number of the `most` instants that are taken from log number `place` of `logs`: equal for all logs, or one from
+/// evenly chosen logs if there are more logs than instants.
 pub(super) fn share_of_log(most: usize, place: usize, logs: usize) -> usize {
     if logs <= most { most / logs.max(1) } else { (place + 1) * most / logs - place * most / logs }
 }
 
-/// Instants of a motion with its torques, all in SI and in the model's order of joints.
+/// Instants of a motion with its torques, in SI units and in the model's order of joints.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionRows {
     /// Positions (rad, m), one vector for each joint.
@@ -25,45 +25,44 @@ pub struct MotionRows {
     pub ddq: Vec<Vec<f64>>,
     /// Torques (N m, N).
     pub tau: Vec<Vec<f64>>,
-    /// Instants per second, before thinning.
+    /// Rate of the recording, Hz.
     pub rate_hz: f64,
-    /// Number of independent instants: as far from each other as the rows of a fit.
+    /// Number of independent instants, whose distance is that of the rows of a fit.
     pub independent: f64,
 }
 
-/// A recording's motion and torque, filtered alike and decimated: what instants are taken from, each with its own
-/// torque or with that of another moment.
+/// Motion and torque of a recording with the same filter, decimated. Instants are taken from these samples, each with
+/// its own torque or with a shifted torque.
 #[derive(Clone, Debug)]
 pub(super) struct MotionSamples {
     rows: MotionRows,
     /// The first row of each uninterrupted piece.
     pieces: Vec<usize>,
-    /// From row to row, seconds.
+    /// Time between rows, s.
     spacing_s: f64,
-    /// Rows to one of a fit.
+    /// Number of rows for each row of a fit.
     rows_of_fit: f64,
-    /// For each row the largest share of a joint's torque that is rejected (held, saturated, outliers); empty if no
-    /// sample is rejected.
-    invented: Vec<f64>,
+    /// Largest interpolated share of a joint's torque, for each row; empty if no sample was rejected.
+    interpolated: Vec<f64>,
+    max_interpolated: f64,
 }
 
-/// Largest interpolated share of a row's torque.
-const MAX_INVENTED: f64 = 0.3;
-
 impl MotionSamples {
-    /// Recording number `index`, of a long one its excerpt.
-    ///
-    /// # Errors
-    /// A recording that cannot be read.
-    pub(super) fn of_recording(logs: &Logs<'_>, model: &RegressorModel, index: usize) -> Result<Self, LogError> {
+    /// Reads recording number `index`, or the excerpt of a long recording. `max_interpolated` is
+    /// [`MotionLimits::max_interpolated`](super::MotionLimits::max_interpolated).
+    pub(super) fn of_recording(
+        logs: &Logs<'_>,
+        model: &RegressorModel,
+        index: usize,
+        max_interpolated: f64,
+    ) -> Result<Self, LogError> {
         let pass = logs.pass_for_instants(model, index);
         let recording = pass.recording;
         let places = recording.places(model.model())?;
         let joints = places.len();
         let mut rows = MotionRows::empty(joints);
-        let (mut pieces, mut spacing_s, mut invented) = (vec![0], 0.0, Vec::new());
+        let (mut pieces, mut spacing_s, mut interpolated) = (vec![0], 0.0, Vec::new());
         let mut rows_of_fit = 1.0;
-        // Made with the first block.
         let mut decimator: Option<Decimator> = None;
         let (mut segment, mut panel, mut out) = (0, Vec::new(), Vec::new());
         let mut take = |block: &MotionBlock| {
@@ -73,7 +72,7 @@ impl MotionSamples {
                 let factor_of =
                     |settings: &Option<DecimationSettings>| settings.as_ref().map_or(1, |s| s.factor) as f64;
                 let of_fit = logs.filter.decimation(block.rate_hz, motion_band_hz(&logs.motion));
-                let settings = denser(logs, block.rate_hz).decimation(block.rate_hz, None);
+                let settings = instant_filter(logs, block.rate_hz).decimation(block.rate_hz, None);
                 let settings = settings.filter(|settings| settings.factor > 1);
                 spacing_s *= factor_of(&settings);
                 rows_of_fit = factor_of(&of_fit) / factor_of(&settings);
@@ -89,25 +88,10 @@ impl MotionSamples {
                     decimator.finish();
                 }
             }
-            // Rows that depend on extrapolated samples beyond the ends of a piece are left out.
+            // Rows that depend on extrapolated samples are left out.
             let [begin, behind] = block.unsettled;
             let settled = begin..block.rows.saturating_sub(behind).max(begin);
-            panel.clear();
-            for values in [&block.q, &block.dq, &block.ddq] {
-                for &place in &places {
-                    panel.extend_from_slice(&block.joint(values, place)[settled.clone()]);
-                }
-            }
-            // Rejected samples of the torque are interpolated linearly and marked.
-            let mut marks = Vec::with_capacity(places.len() * settled.len());
-            for &place in &places {
-                let tau = &block.joint(&block.tau, place)[settled.clone()];
-                let marked = block.set_aside.get(place * block.rows..(place + 1) * block.rows).unwrap_or_default();
-                let marked = marked.get(settled.clone()).unwrap_or_default();
-                panel.extend(bridged(tau, marked));
-                marks.extend((0..tau.len()).map(|row| f64::from(u8::from(marked.get(row).copied().unwrap_or(false)))));
-            }
-            panel.extend_from_slice(&marks);
+            fill_panel(block, &places, &settled, &mut panel);
             let (count, filtered) = match &mut decimator {
                 Some(decimator) => {
                     let count = decimator.push(&panel, settled.len(), &mut out);
@@ -117,7 +101,7 @@ impl MotionSamples {
             };
             let share =
                 |row: usize| (0..joints).map(|joint| filtered[(4 * joints + joint) * count + row]).fold(0.0, f64::max);
-            invented.extend((0..count).map(share));
+            interpolated.extend((0..count).map(share));
             for (quantity, to) in rows.quantities_mut().into_iter().enumerate() {
                 for (joint, to) in to.iter_mut().enumerate() {
                     to.extend_from_slice(&filtered[(quantity * joints + joint) * count..][..count]);
@@ -126,31 +110,31 @@ impl MotionSamples {
             Ok(())
         };
         pass.each_block(&mut take)?;
-        Ok(Self { rows, pieces, spacing_s, rows_of_fit, invented })
+        Ok(Self { rows, pieces, spacing_s, rows_of_fit, interpolated, max_interpolated })
     }
 
     /// At most `most` of its instants, evenly chosen.
     pub(super) fn instants(&self, most: usize) -> MotionRows {
-        let all: Vec<usize> = (0..self.rows.len()).filter(|&row| !self.is_invented(row)).collect();
+        let all: Vec<usize> = (0..self.rows.len()).filter(|&row| !self.is_interpolated(row)).collect();
         let count = all.len();
         let chosen: Vec<usize> = if count > most { (0..most).map(|k| all[k * count / most]).collect() } else { all };
-        self.some(&chosen, count)
+        self.selected(&chosen, count)
     }
 
-    /// The longest of its pieces, seconds.
+    /// Duration of the longest uninterrupted piece, s.
     pub(super) fn longest_s(&self) -> f64 {
         self.each_piece().map(|piece| piece.len()).max().unwrap_or(0) as f64 * self.spacing_s
     }
 
-    /// At most `most` of the instants that have samples up to `reach_s` before and after them, each with the torque (or
-    /// the motion, by `channels`) of `lag_s` later, joint by joint, interpolated linearly; the same instants for all
-    /// lags.
+    /// At most `most` instants that have samples up to `reach_s` before and after them, each with the torque (or the
+    /// motion, by `channels`) `lag_s` later, one lag for each joint, interpolated linearly. All lags have the same
+    /// instants.
     pub(super) fn shifted(&self, channels: Channels, lag_s: &[f64], reach_s: f64, most: usize) -> MotionRows {
         let reach = (reach_s / self.spacing_s).ceil() as usize + 1;
         let inside = |piece: Range<usize>| piece.start + reach..piece.end.saturating_sub(reach);
-        let all: Vec<usize> = self.each_piece().flat_map(inside).filter(|&row| !self.is_invented(row)).collect();
+        let all: Vec<usize> = self.each_piece().flat_map(inside).filter(|&row| !self.is_interpolated(row)).collect();
         let chosen: Vec<usize> = (0..most.min(all.len())).map(|k| all[k * all.len() / most.min(all.len())]).collect();
-        let mut rows = self.some(&chosen, all.len());
+        let mut rows = self.selected(&chosen, all.len());
         let shift = |to: &mut [Vec<f64>], from: &[Vec<f64>]| {
             for ((to, from), lag_s) in to.iter_mut().zip(from).zip(lag_s).filter(|(_, lag_s)| **lag_s != 0.0) {
                 let shift = lag_s / self.spacing_s;
@@ -172,17 +156,16 @@ impl MotionSamples {
         rows
     }
 
-    /// The instants with the numbers `chosen`, of `all` that there are.
-    fn some(&self, chosen: &[usize], all: usize) -> MotionRows {
+    /// The instants with the numbers `chosen`; `all` is the number of usable instants.
+    fn selected(&self, chosen: &[usize], all: usize) -> MotionRows {
         let independent = (all as f64 / self.rows_of_fit).min(chosen.len() as f64);
         let MotionRows { q, dq, ddq, tau, rate_hz, .. } = &self.rows;
         let take = |of: &[Vec<f64>]| of.iter().map(|values| chosen.iter().map(|&row| values[row]).collect()).collect();
         MotionRows { q: take(q), dq: take(dq), ddq: take(ddq), tau: take(tau), rate_hz: *rate_hz, independent }
     }
 
-    /// Whether a large part of a joint's torque in a row was not measured.
-    fn is_invented(&self, row: usize) -> bool {
-        self.invented.get(row).is_some_and(|share| *share > MAX_INVENTED)
+    fn is_interpolated(&self, row: usize) -> bool {
+        self.interpolated.get(row).is_some_and(|share| *share > self.max_interpolated)
     }
 
     fn each_piece(&self) -> impl Iterator<Item = Range<usize>> {
@@ -191,15 +174,35 @@ impl MotionSamples {
     }
 }
 
-/// The parallel filter of instants, with four times as many rows as that of a fit: short logs would have too few.
-pub(super) fn denser(logs: &Logs<'_>, rate_hz: f64) -> ParallelFilterSettings {
+/// The parallel filter of instants, with four times the rows of a fit, since short logs would have too few.
+pub(super) fn instant_filter(logs: &Logs<'_>, rate_hz: f64) -> ParallelFilterSettings {
     let of_fit = logs.filter.decimation(rate_hz, motion_band_hz(&logs.motion));
     let factor = of_fit.map_or(1, |settings| settings.factor / 4).max(1);
     ParallelFilterSettings { factor: Some(factor), ..logs.filter.clone() }
 }
 
+/// Writes position, velocity, acceleration, torque and marks, one column for each joint. Rejected samples of the torque
+/// are interpolated linearly and have the mark 1.
+fn fill_panel(block: &MotionBlock, places: &[usize], settled: &Range<usize>, panel: &mut Vec<f64>) {
+    panel.clear();
+    for values in [&block.q, &block.dq, &block.ddq] {
+        for &place in places {
+            panel.extend_from_slice(&block.joint(values, place)[settled.clone()]);
+        }
+    }
+    let mut marks = Vec::with_capacity(places.len() * settled.len());
+    for &place in places {
+        let tau = &block.joint(&block.tau, place)[settled.clone()];
+        let marked = block.set_aside.get(place * block.rows..(place + 1) * block.rows).unwrap_or_default();
+        let marked = marked.get(settled.clone()).unwrap_or_default();
+        panel.extend(interpolated_torque(tau, marked));
+        marks.extend((0..tau.len()).map(|row| f64::from(u8::from(marked.get(row).copied().unwrap_or(false)))));
+    }
+    panel.extend_from_slice(&marks);
+}
+
 /// A torque with its `marked` samples interpolated linearly.
-fn bridged(tau: &[f64], marked: &[bool]) -> Vec<f64> {
+fn interpolated_torque(tau: &[f64], marked: &[bool]) -> Vec<f64> {
     let mut out = tau.to_vec();
     let is_marked = |row: usize| marked.get(row).copied().unwrap_or(false);
     let mut row = 0;
@@ -220,7 +223,7 @@ fn bridged(tau: &[f64], marked: &[bool]) -> Vec<f64> {
 }
 
 impl MotionRows {
-    /// No instants of `joints` joints.
+    /// Empty rows of `joints` joints.
     pub fn empty(joints: usize) -> Self {
         let none = || vec![Vec::new(); joints];
         Self { q: none(), dq: none(), ddq: none(), tau: none(), rate_hz: 0.0, independent: 0.0 }
@@ -253,7 +256,7 @@ impl MotionRows {
         }
     }
 
-    /// The columns of these channels: position, velocity and acceleration, or torque, or all.
+    /// The columns of these channels; position includes velocity and acceleration.
     pub(super) fn of_mut(&mut self, channels: Channels) -> impl Iterator<Item = &mut Vec<Vec<f64>>> {
         let is_of = move |k: usize| channels == Channels::Both || (k == 3) == (channels == Channels::Torque);
         self.quantities_mut().into_iter().enumerate().filter(move |(k, _)| is_of(*k)).map(|(_, columns)| columns)
@@ -284,12 +287,12 @@ mod tests {
     fn rejected_samples_are_interpolated() {
         let tau = [9.0, 1.0, 50.0, 50.0, 4.0, 5.0, 80.0];
         let marked = [true, false, true, true, false, false, true];
-        assert_eq!(bridged(&tau, &marked), [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
-        assert_eq!(bridged(&tau, &[]), tau);
+        assert_eq!(interpolated_torque(&tau, &marked), [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
+        assert_eq!(interpolated_torque(&tau, &[]), tau);
     }
 
     #[test]
-    fn a_torque_of_another_moment_is_that_of_another_row_of_the_same_piece() {
+    fn a_shifted_torque_is_taken_from_the_same_piece() {
         let line = |from: f64| (0..40).map(|row| from + f64::from(row)).collect::<Vec<f64>>();
         let rows = MotionRows {
             q: vec![line(0.0)],
@@ -299,11 +302,12 @@ mod tests {
             rate_hz: 10.0,
             independent: 40.0,
         };
+        let (pieces, interpolated) = (vec![0, 20], Vec::new());
         let samples =
-            MotionSamples { rows, pieces: vec![0, 20], spacing_s: 0.1, rows_of_fit: 4.0, invented: Vec::new() };
+            MotionSamples { rows, pieces, spacing_s: 0.1, rows_of_fit: 4.0, interpolated, max_interpolated: 0.3 };
         assert!((samples.longest_s() - 2.0).abs() < 1e-12);
         let late = samples.shifted(Channels::Torque, &[0.25], 0.3, 100);
-        // Four rows from each end of both pieces.
+        // Both pieces lose four rows at each end.
         assert_eq!((late.len(), late.independent), (2 * 12, 6.0));
         for row in 0..late.len() {
             assert!((late.tau[0][row] - late.q[0][row] - 302.5).abs() < 1e-9);

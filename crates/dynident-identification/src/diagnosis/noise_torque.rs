@@ -1,14 +1,11 @@
 //! Torque from noise of the positions.
 
-use super::motion_rows::denser;
+use super::motion_rows::instant_filter;
 use dynident_rows::{LogError, LogPass, Logs, RegressorModel, noise_factors};
 
-/// Root mean square, over the recordings `training`, of the torque that noise of the positions adds to what the base
-/// parameters `theta` predict of each joint at the instants of the comparison, Nm (N): `N θ` of
-/// [`noise_factors`]. Zero where no noise is known.
-///
-/// # Errors
-/// A recording that cannot be read again.
+/// Root mean square, over the recordings `training`, of the torque that noise of the positions adds to the prediction
+/// of each joint by base parameters `theta` at the compared instants, Nm (N): `N θ` of [`noise_factors`]. Zero if the
+/// noise is unknown.
 pub(super) fn torque_of_noise(
     logs: &Logs<'_>,
     model: &RegressorModel,
@@ -19,7 +16,7 @@ pub(super) fn torque_of_noise(
     for &index in training {
         let pass = logs.pass_for_instants(model, index);
         let Some(report) = pass.each_block(&mut |_| Ok(()))? else { continue };
-        let filter = denser(logs, report.rate_hz);
+        let filter = instant_filter(logs, report.rate_hz);
         let pass = LogPass { filter: &filter, ..pass };
         // Weighted to be one row.
         let Some(factors) = noise_factors(&pass, model, Some(&report), 1)? else { continue };

@@ -1,6 +1,7 @@
-//! What the description's own bodies leave of the torque, with friction fitted joint by joint.
+//! Torque of the nominal bodies, and its residual with friction fitted joint by joint.
 
 use super::motion_rows::MotionRows;
+use super::span::{dot, root_mean_square};
 use crate::friction::step_of_joint;
 use dynident_dynamics::{Panels, ParametricModel, Workspace, inverse_dynamics};
 use dynident_model::terms::CoulombShape;
@@ -13,13 +14,12 @@ pub(super) fn nominal_torque(robot: &ParametricModel, rows: &MotionRows) -> Opti
     Some(torque_of(robot, rows, |[q, dq, ddq]| [q, dq, ddq]))
 }
 
-/// The same from the regressor's columns of the rows, where these are known.
+/// The same from the regressor of the rows.
 pub(super) fn torque_of_bodies(robot: &ParametricModel, panels: &Panels) -> Option<Vec<Vec<f64>>> {
     robot.nominal_base()?;
     let mut parameters = robot.model().parameter_vector();
     parameters.resize(robot.nominal().len(), 0.0);
     let mut theta = robot.base().values(&parameters);
-    // Further columns are of terms.
     theta.resize(robot.layout().columns().len(), 0.0);
     let of_joint = |joint: usize| {
         let mut torque = Vec::new();
@@ -30,8 +30,7 @@ pub(super) fn torque_of_bodies(robot: &ParametricModel, panels: &Panels) -> Opti
     Some((0..robot.dof()).map(of_joint).collect())
 }
 
-/// The torque that holds the nominal bodies against gravity, one vector for each joint, Nm (N); zeros while a body's
-/// inertials are unknown.
+/// Gravity torque of the nominal bodies, one vector for each joint, Nm (N); zeros while a body's inertials are unknown.
 pub(super) fn gravity_torque(robot: &ParametricModel, rows: &MotionRows) -> Vec<Vec<f64>> {
     if robot.nominal_base().is_none() {
         return vec![vec![0.0; rows.len()]; robot.dof()];
@@ -55,8 +54,8 @@ fn torque_of(
     torque
 }
 
-/// Root mean square of what the torque `nominal` of the nominal bodies ([`nominal_torque`]) leaves of each joint's
-/// torque, Nm (N), beside viscous and Coulomb friction of at least zero and an offset that fit the rest best.
+/// Residual of each joint by the torque `nominal` of the nominal bodies ([`nominal_torque`]) with the best nonnegative
+/// viscous and Coulomb friction and the best offset, root mean square, Nm (N).
 pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nominal: &[Vec<f64>]) -> Vec<f64> {
     let left = |(joint, nominal): (usize, &Vec<f64>)| {
         let rest: Vec<f64> = rows.tau[joint].iter().zip(nominal).map(|(tau, nominal)| tau - nominal).collect();
@@ -65,7 +64,7 @@ pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nomina
     nominal.iter().enumerate().map(left).collect()
 }
 
-/// Root mean square of `tau` beside an offset and friction of at least zero.
+/// Residual of `tau` by an offset and nonnegative friction, root mean square.
 fn left_by_friction(dq: &[f64], step: CoulombShape, tau: &[f64]) -> f64 {
     let count = tau.len();
     let columns = [vec![1.0; count], dq.to_vec(), dq.iter().map(|&dq| step.step(dq)).collect()];
@@ -80,9 +79,8 @@ fn left_by_friction(dq: &[f64], step: CoulombShape, tau: &[f64]) -> f64 {
                 kept.pop();
                 continue;
             }
-            return (dot(tau, tau) / count.max(1) as f64).sqrt();
+            return root_mean_square(tau);
         };
-        // Friction that would drive the joint is none.
         let negative =
             (1..kept.len()).filter(|&k| solution[k] < 0.0).min_by(|&a, &b| solution[a].total_cmp(&solution[b]));
         if let Some(k) = negative {
@@ -93,10 +91,6 @@ fn left_by_friction(dq: &[f64], step: CoulombShape, tau: &[f64]) -> f64 {
         for (value, &column) in solution.iter().zip(&kept) {
             left.iter_mut().zip(&columns[column]).for_each(|(left, x)| *left -= value * x);
         }
-        return (dot(&left, &left) / count.max(1) as f64).sqrt();
+        return root_mean_square(&left);
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

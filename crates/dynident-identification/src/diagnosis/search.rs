@@ -1,37 +1,32 @@
 //! The search for the hypothesis that explains the samples best.
 //!
-//! The fit without physical limits, which is ten times cheaper, bounds the score of every candidate from below: a
-//! candidate that cannot win is never fitted with limits. A hypothesis is better only by a clear margin, and those that
-//! come close to the best are named with it.
+//! The fit without physical limits is ten times cheaper and gives a lower bound of the score. Only candidates whose
+//! bound is good enough get a consistent fit. Hypotheses with almost the same score as the best are reported with it.
 
-use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Explained, Hypothesis, INDISTINGUISHABLE};
+use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
 use super::mistakes::{Breadth, Mistake};
 use super::refinement::refined;
 use super::round::Round;
 use crate::consistent::ConsistencySettings;
 
-/// Number of other hypotheses from which a second mistake is searched, once the best one has a second mistake.
+/// Number of other first mistakes that are paired with a second mistake, once the best one has a second mistake.
 const MAX_RUNNERS_UP: usize = 8;
-/// Mistakes of one study.
-const MAX_MISTAKES: usize = 3;
-/// Other hypotheses that are named.
-const MAX_NAMED: usize = 4;
 
 /// Result of the search.
 #[derive(Clone, Debug)]
 pub struct Search {
-    /// The study as it is.
+    /// The study as written.
     pub as_written: Hypothesis,
     /// The hypothesis that explains the samples clearly better, if one was found.
     pub best: Option<Hypothesis>,
     /// Hypotheses that the logs do not distinguish from the best.
     pub alike: Vec<Hypothesis>,
-    /// Candidates tried.
+    /// Number of tried candidates.
     pub tried: usize,
 }
 
 impl Search {
-    /// The better hypothesis, if there is one, or the study as it is.
+    /// The better hypothesis, or the study as written.
     pub fn believed(&self) -> &Hypothesis {
         self.best.as_ref().unwrap_or(&self.as_written)
     }
@@ -53,8 +48,8 @@ pub(super) fn searches(as_written: &Hypothesis, start: &Explained, consistency: 
     })
 }
 
-/// Corrects up to [`MAX_MISTAKES`] mistakes one after the other, beginning with the round `first` of candidates behind
-/// `start`; `next` tries the candidates behind another hypothesis.
+/// Corrects several mistakes one after the other, starting with the round `first` of candidates after `start`; `next`
+/// tries the candidates after another hypothesis.
 fn search(
     as_written: &Hypothesis,
     start: &Explained,
@@ -62,22 +57,22 @@ fn search(
     next: impl Fn(&Explained) -> Round,
     consistency: &ConsistencySettings,
 ) -> Search {
-    let made = start.study.mistakes.len();
+    let limits = &start.study.settings.score;
+    let corrected = start.study.mistakes.len();
     let mut at = start.clone();
     let (mut alike, mut tried): (Vec<Hypothesis>, usize) = (Vec::new(), 0);
     let mut runners_up: Vec<Explained> = Vec::new();
     let mut known = Some(first);
-    for number in 0..MAX_MISTAKES {
+    for number in 0..limits.max_mistakes {
         let round = known.take().unwrap_or_else(|| next(&at));
         tried += round.tried;
         let winners = round.winners(&at, consistency);
         let Some((first, rest)) = winners.split_first() else { break };
         // A second mistake is rarer than the first.
-        if first.hypothesis.score() > at.hypothesis.score() - CLEARLY_BETTER * (made + number + 1) as f64 {
+        if first.hypothesis.score() > at.hypothesis.score() - limits.min_gain * (corrected + number + 1) as f64 {
             break;
         }
-        // Runners-up may have the same second mistake behind them: the first one was chosen with the second still made,
-        // so the best pair counts.
+        // The first mistake was selected while the second was uncorrected, so the best pair is searched.
         let mut first = first.clone();
         if number == 1 {
             for start in &runners_up {
@@ -89,14 +84,14 @@ fn search(
         } else {
             runners_up = different_from(&first, rest);
         }
-        let from = before_last(&first, &at.study, &runners_up);
+        let from = study_before_last_mistake(&first, &at.study, &runners_up);
         let best = refined(from, &first, consistency).unwrap_or(first);
         alike = indistinguishable(&best.hypothesis, rest);
         at = best;
     }
     // With few instants a small improvement is not significant.
     let best = at.hypothesis;
-    let needed = as_written.margin * CLEARLY_BETTER * best.mistakes.len() as f64;
+    let needed = as_written.margin * limits.min_gain * best.mistakes.len() as f64;
     let is_enough = as_written.margin <= 1.0 || best.score() <= as_written.score() - needed;
     let found = !best.mistakes.is_empty() && is_enough;
     Search { as_written: as_written.clone(), best: found.then_some(best), alike, tried }
@@ -105,34 +100,37 @@ fn search(
 /// Hypotheses with the same first mistakes as `best` that the logs do not distinguish from it.
 fn indistinguishable(best: &Hypothesis, others: &[Explained]) -> Vec<Hypothesis> {
     let Some((last, before)) = best.mistakes.split_last() else { return Vec::new() };
+    let limits = &best.settings.score;
     let is_close = |other: &&Hypothesis| {
         let of_other = other.mistakes.last();
         let is_twin = of_other.and_then(Mistake::twin).as_ref() == Some(last);
-        let margin = if is_twin { CLEARLY_BETTER } else { INDISTINGUISHABLE };
-        // The same with another number is no other explanation.
-        let is_same = of_other.is_some_and(|other| other.is_alike(last));
+        let margin = if is_twin { limits.min_gain } else { limits.max_indistinguishable };
+        let is_same = of_other.is_some_and(|other| other.differs_only_in_number(last));
         other.mistakes[..before.len()] == *before && !is_same && other.score() < best.score() + margin
     };
-    others.iter().map(|other| &other.hypothesis).filter(is_close).take(MAX_NAMED).cloned().collect()
+    others.iter().map(|other| &other.hypothesis).filter(is_close).take(limits.max_reported).cloned().collect()
 }
 
-/// The best hypotheses beside `first`, one for each mistake without its number.
+/// The best hypotheses in addition to `first`, one for each mistake without its number.
 fn different_from(first: &Explained, others: &[Explained]) -> Vec<Explained> {
     let mut kept: Vec<Explained> = Vec::new();
     for other in others {
-        let is_alike = |one: &Explained| {
+        let is_same = |one: &Explained| {
             let last = one.study.mistakes.last().zip(other.study.mistakes.last());
-            last.is_some_and(|(one, other)| one.is_alike(other))
+            last.is_some_and(|(one, other)| one.differs_only_in_number(other))
         };
-        if kept.len() < MAX_RUNNERS_UP && !is_alike(first) && !kept.iter().any(is_alike) {
+        if kept.len() < MAX_RUNNERS_UP && !is_same(first) && !kept.iter().any(is_same) {
             kept.push(other.clone());
         }
     }
     kept
 }
 
-/// The study before the correction of the last mistake.
-fn before_last<'a>(reached: &Explained, at: &'a CorrectedStudy, others: &'a [Explained]) -> &'a CorrectedStudy {
+fn study_before_last_mistake<'a>(
+    reached: &Explained,
+    at: &'a CorrectedStudy,
+    others: &'a [Explained],
+) -> &'a CorrectedStudy {
     let before = &reached.study.mistakes[..reached.study.mistakes.len().saturating_sub(1)];
     let other = others.iter().find(|other| other.study.mistakes == before && at.mistakes != before);
     other.map_or(at, |other| &other.study)

@@ -1,17 +1,16 @@
-//! The space that some columns span, and what of a vector lies outside.
+//! The column space of a matrix, and norms.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Share of the largest singular value below which a direction is none.
-const SINGULAR: f64 = 1.0e-9;
+/// Smallest singular value of a basis, relative to the largest.
+const MIN_SINGULAR_RATIO: f64 = 1.0e-9;
 
-/// An orthonormal basis of the columns of a matrix, whatever their units; dependent ones are no harm.
+/// An orthonormal basis of the column space of a matrix. Columns may have different units and may be dependent.
 pub(super) struct Span(DMatrix<f64>);
 
 impl Span {
-    /// Of these columns; none where there are no rows.
+    /// `None` for an empty matrix.
     pub(super) fn new(mut columns: DMatrix<f64>) -> Option<Self> {
-        // Of nothing there is no decomposition.
         if columns.is_empty() {
             return None;
         }
@@ -23,15 +22,27 @@ impl Span {
         }
         let decomposition = columns.svd(true, false);
         let (basis, sizes) = (decomposition.u?, decomposition.singular_values);
-        let least = SINGULAR * sizes.max();
+        let least = MIN_SINGULAR_RATIO * sizes.max();
         let kept: Vec<usize> = (0..basis.ncols()).filter(|&k| sizes[k] > least).collect();
         Some(Self(basis.select_columns(&kept)))
     }
 
-    /// What of a vector lies outside.
+    /// The component of a vector orthogonal to the space.
     pub(super) fn outside(&self, vector: &DVector<f64>) -> DVector<f64> {
         vector - &self.0 * self.0.tr_mul(vector)
     }
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+pub(super) fn norm(values: &[f64]) -> f64 {
+    dot(values, values).sqrt()
+}
+
+pub(super) fn root_mean_square(values: &[f64]) -> f64 {
+    (dot(values, values) / values.len().max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
-//! How wide the step of dry friction is in some rows.
+//! The width of the dry friction step in some rows.
 //!
-//! A motion that is read slower than it was has its steps nearer to zero velocity, so another rate would get the credit
-//! for a step that is only wider than the study's. The width is no mistake of a study: identification chooses it.
+//! A motion at a lower rate has its friction steps nearer to zero velocity, so a wider step would look like another
+//! rate. The width is not a mistake of the study, since identification selects it.
 
 use super::joint_fits::JointFits;
 use super::motion_rows::MotionRows;
@@ -10,27 +10,26 @@ use dynident_estimation::EstimationError;
 use dynident_model::terms::{CoulombShape, TorqueTerm};
 use rayon::prelude::*;
 
-/// Times the width in force that are tried first, narrower and wider, then times the best of these.
-const TIMES: [f64; 7] = [0.4, 1.6, 2.5, 4.0, 6.0, 10.0, 15.0];
-const NEAR: [[f64; 2]; 2] = [[0.77, 1.3], [0.88, 1.14]];
-/// Share of what is left of a joint's torque that another width leaves at most: less is its noise.
-const CLEARLY_LESS: f64 = 0.9;
+/// Factors on the present width that are tried first, then factors on the best of these widths.
+const WIDTH_FACTORS: [f64; 7] = [0.4, 1.6, 2.5, 4.0, 6.0, 10.0, 15.0];
+const FINE_FACTORS: [[f64; 2]; 2] = [[0.77, 1.3], [0.88, 1.14]];
 
-/// The robot with the widths of smooth steps at which one set of parameters ([`JointFits::one_set`]) leaves least of
-/// each joint's torque; those in force where no other leaves clearly less. Parameters of each joint's own would follow
-/// a wrong step.
-///
-/// # Errors
-/// Too few rows.
-pub(super) fn with_steps_of(robot: &ParametricModel, rows: &MotionRows) -> Result<ParametricModel, EstimationError> {
-    let mut least: Vec<f64> = left_by_one_set(robot, rows)?.iter().map(|left| CLEARLY_LESS * left).collect();
+/// The robot with the widths of smooth steps at which one set of parameters ([`JointFits::one_set`]) has the smallest
+/// residual of each joint; present widths if no other has at most `max_ratio` of their residual. Separate parameters of
+/// each joint would fit a wrong step.
+pub(super) fn with_fitted_steps(
+    robot: &ParametricModel,
+    rows: &MotionRows,
+    max_ratio: f64,
+) -> Result<ParametricModel, EstimationError> {
+    let mut least: Vec<f64> = left_by_one_set(robot, rows)?.iter().map(|left| max_ratio * left).collect();
     let mut times = vec![1.0; robot.dof()];
-    let first: Vec<Vec<f64>> = TIMES.iter().map(|factor| vec![*factor; robot.dof()]).collect();
+    let first: Vec<Vec<f64>> = WIDTH_FACTORS.iter().map(|factor| vec![*factor; robot.dof()]).collect();
     narrow_down(robot, rows, &first, &mut least, &mut times)?;
     if times.iter().all(|times| *times == 1.0) {
         return Ok(robot.clone());
     }
-    for factors in NEAR {
+    for factors in FINE_FACTORS {
         let near = |factor: f64| times.iter().map(|best| if *best == 1.0 { 1.0 } else { factor * best }).collect();
         let near: [Vec<f64>; 2] = factors.map(near);
         narrow_down(robot, rows, &near, &mut least, &mut times)?;
@@ -43,7 +42,7 @@ fn left_by_one_set(robot: &ParametricModel, rows: &MotionRows) -> Result<Vec<f64
     Ok(left)
 }
 
-/// Takes for each joint whose torque some of these widths leave less of than any before its own.
+/// Updates for each joint the smallest residual and its width by the `tried` widths.
 fn narrow_down(
     robot: &ParametricModel,
     rows: &MotionRows,
@@ -63,7 +62,7 @@ fn narrow_down(
     Ok(())
 }
 
-/// The robot with each joint's smooth steps so many times as wide; none where it has none.
+/// The robot with the width of each joint's smooth steps times a factor; `None` if nothing changes.
 pub(super) fn with_widths(robot: &ParametricModel, times: &[f64]) -> Option<ParametricModel> {
     let widened = |term: &TorqueTerm| match term.joints()[..] {
         [joint] => term.clone().with_step(|step| match step {

@@ -1,22 +1,19 @@
 //! The search for mistakes in the training recordings.
 
-use super::confirmation::as_written_instead;
+use super::confirmation::unless_confirmed;
 use super::description_fit::description_fit;
 use super::error::DiagnosisError;
-use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Explained, Hypothesis};
+use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
+use super::lag_search::LagSearch;
 use super::motion_rows::{INSTANTS, MotionRows, MotionSamples, share_of_log};
 use super::search::{Search, searches};
-use super::torque_clock::TorqueClock;
 use crate::consistent::ConsistencySettings;
 use crate::left_to_the_logs::with_drives_left_to_the_logs;
 use crate::settings::IdentificationSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_rows::{Logs, RegressorModel};
 
-/// Largest ratio of the unexplained torque with a late channel to that of the best hypothesis without.
-const MAX_RATIO_OF_LATE: f64 = 0.8;
-
-/// What is diagnosed.
+/// The input of the diagnosis.
 #[derive(Clone, Copy)]
 pub struct DiagnosisTask<'a> {
     /// The recordings.
@@ -27,53 +24,49 @@ pub struct DiagnosisTask<'a> {
     pub robot: &'a ParametricModel,
     /// Numbers of the training recordings.
     pub training: &'a [usize],
-    /// Base parameters of the training recordings, by which held-out ones are examined; none if these are not.
+    /// Base parameters of the training recordings; `None` skips held-out recordings.
     pub theta: Option<&'a [f64]>,
 }
 
-/// The training recordings after the search.
 pub(super) struct SearchedLogs {
     pub(super) search: Search,
-    /// The study as written, except for a lag: its robot has the friction steps and drives that the logs determine.
+    /// The study as written, except for a lag; its robot has friction steps and drive inertia from the logs.
     pub(super) study: CorrectedStudy,
-    /// Settings of the consistent fits.
     pub(super) consistency: ConsistencySettings,
-    /// The lag that is compensated in each joint's torque, s.
+    /// The compensated lag of each joint's torque, s.
     pub(super) compensated_s: Vec<f64>,
 }
 
 /// Searches the mistake that explains the training recordings best.
-///
-/// # Errors
-/// Recordings that cannot be read, too few rows.
 pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, DiagnosisError> {
     let DiagnosisTask { logs, settings, robot, training, .. } = task;
     let model = RegressorModel::from(robot.clone());
-    let of_recording = |&index: &usize| MotionSamples::of_recording(logs, &model, index);
+    let limits = &settings.diagnosis_limits;
+    let of_recording =
+        |&index: &usize| MotionSamples::of_recording(logs, &model, index, limits.motion.max_interpolated);
     let samples: Vec<MotionSamples> = training.iter().map(of_recording).collect::<Result<_, _>>()?;
     let mut rows = MotionRows::empty(robot.dof());
     for (place, one) in samples.iter().enumerate() {
         rows.append(&one.instants(share_of_log(INSTANTS, place, samples.len())));
     }
-    // Identification estimates from the logs what the study does not state; no mistake has to explain it.
+    // Identification estimates unstated drive inertia; without it a mistake would have to explain this torque.
     let robot = with_drives_left_to_the_logs(robot, settings)?;
-    // A hundredth of a score is accurate enough.
+    // Scores need an accuracy of 0.01.
     let known = settings.consistency.clone().unwrap_or_default();
     let consistency = ConsistencySettings { tolerance: 1e-2, max_iterations: 100, ..known };
     let compensated_s = |joint| logs.motion.torque_lag_s.as_ref().and_then(|lag_s| lag_s.at(joint)).unwrap_or(0.0);
     let compensated_s: Vec<f64> = (0..robot.dof()).map(compensated_s).collect();
-    let clock = TorqueClock::new(&robot, &samples, compensated_s.clone());
-    let as_written = CorrectedStudy::new(robot, rows, Vec::new()).explained(&consistency)?;
-    let Found { searches, study, written } = with_clock(&as_written, clock.as_ref(), &consistency);
-    let search = likelier(searches, &study);
-    let again = as_written_instead(&written, &search.corrected(&study), &search, &consistency)?;
+    let lag_search = LagSearch::new(&robot, &samples, compensated_s.clone(), limits);
+    let as_written = CorrectedStudy::new(robot, rows, Vec::new(), *limits).explained(&consistency)?;
+    let SearchResults { searches, study, written } = search_with_lag(&as_written, lag_search.as_ref(), &consistency);
+    let search = select_search(searches, &study);
+    let again = unless_confirmed(&written, &search.corrected(&study), &search, &consistency)?;
     let (study, search) = again.unwrap_or((study, search));
     Ok(SearchedLogs { search, study, consistency, compensated_s })
 }
 
-/// The searches with the instants that they were made on.
-struct Found {
-    /// For common mistakes, and for rarer ones as well.
+struct SearchResults {
+    /// For common mistakes, and for common and rarer ones.
     searches: [Search; 2],
     /// The study with the instants of the searches.
     study: CorrectedStudy,
@@ -81,50 +74,54 @@ struct Found {
     written: CorrectedStudy,
 }
 
-/// Searches with the torque at the moment that explains the logs best: a torque of another moment hides every other
-/// mistake, and another mistake may look like one.
-fn with_clock(as_written: &Explained, clock: Option<&TorqueClock<'_>>, consistency: &ConsistencySettings) -> Found {
+/// Searches with the best lag of the torque: a lag hides every other mistake, and another mistake may look like a lag.
+fn search_with_lag(
+    as_written: &Explained,
+    lag_search: Option<&LagSearch<'_>>,
+    consistency: &ConsistencySettings,
+) -> SearchResults {
     let written = as_written.study.clone();
-    let late =
-        clock.and_then(|clock| clock.late_channel(&written.robot, &as_written.hypothesis, consistency, INSTANTS));
+    let late = lag_search
+        .and_then(|lag_search| lag_search.late_channel(&written.robot, &as_written.hypothesis, consistency, INSTANTS));
     // A fit compensates such a lag.
     if let Some(late) = late.as_ref().filter(|late| late.explained.study.mistakes.is_empty()) {
         let study = late.explained.study.clone();
         let searches = searches(&late.explained.hypothesis, &late.explained, consistency);
-        return Found { searches, study: study.clone(), written: study };
+        return SearchResults { searches, study: study.clone(), written: study };
     }
     let in_time = searches(&as_written.hypothesis, as_written, consistency);
     let believed = in_time[1].believed();
-    // Half a period of a motion that repeats looks like another sign: the lag has to explain clearly more.
+    // A lag of half a period looks like another sign, so it has to explain clearly more.
     let gain = as_written.hypothesis.score() - believed.score();
-    let explains_more = |late: &Explained| late.hypothesis.left_of_all < MAX_RATIO_OF_LATE * believed.left_of_all;
-    match late.filter(|late| explains_more(&late.explained) && late.gain > gain + CLEARLY_BETTER) {
+    let (max_ratio, min_gain) = (written.settings.late_channel.max_ratio_of_all, written.settings.score.min_gain);
+    let explains_more = |late: &Explained| late.hypothesis.left_of_all < max_ratio * believed.left_of_all;
+    match late.filter(|late| explains_more(&late.explained) && late.gain > gain + min_gain) {
         Some(late) => {
             let searches = searches(&as_written.hypothesis, &late.explained, consistency);
             let study = CorrectedStudy { mistakes: Vec::new(), ..late.explained.study };
-            Found { searches, study, written }
+            SearchResults { searches, study, written }
         }
-        None => Found { searches: in_time, study: written.clone(), written },
+        None => SearchResults { searches: in_time, study: written.clone(), written },
     }
 }
 
-/// Selects one of the searches for common mistakes and for all. The latter needs clearly less unexplained torque than
-/// the former: a smaller unit of one joint breaks fewer limits, and these limits may be wrong. A joint that travels far
-/// beyond its range is an exception. Where most torques are still in another unit, the unit of one joint or another
-/// rate only compensates for that.
-fn likelier(searches: [Search; 2], study: &CorrectedStudy) -> Search {
+/// Selects the search for common mistakes or the search for all. The latter needs a clearly smaller residual: a smaller
+/// unit of one joint breaks fewer limits, and these limits may be wrong. A joint that travels far beyond its range is
+/// an exception. If most torques are still in another unit, the unit of one joint or another rate only compensates for
+/// that.
+fn select_search(searches: [Search; 2], study: &CorrectedStudy) -> Search {
     let [usual, all] = searches;
     let (best, tried) = (all.believed(), all.tried);
-    let gains = |of: fn(&Hypothesis) -> f64| of(best) < of(usual.believed()) - CLEARLY_BETTER;
+    let gains = |of: fn(&Hypothesis) -> f64| of(best) < of(usual.believed()) - study.settings.score.min_gain;
     let is_shown_by_torque = gains(Hypothesis::torque_score) || best.is_shown_by_travel();
-    // Its factor moves torque against motion, as the bodies of another robot do.
+    // Such a factor scales torque against motion, as the bodies of another robot do.
     let has_free_factor = best.mistakes.iter().any(|mistake| {
         let facts = mistake.facts();
         facts.torque_gain.is_some() || facts.is_other_rate
     });
     let is_in_another_unit = || {
         let study = all.corrected(study);
-        let fit = description_fit(&study.robot, &study.rows, &best.left);
+        let fit = description_fit(&study.robot, &study.rows, &best.left, study.settings.description);
         fit.is_some_and(|fit| !fit.joints_in_another_unit().is_empty())
     };
     let is_likelier = gains(Hypothesis::score) && is_shown_by_torque && !(has_free_factor && is_in_another_unit());

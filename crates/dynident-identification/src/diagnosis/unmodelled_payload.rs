@@ -1,31 +1,30 @@
-//! A payload that one log carries and the other logs do not.
+//! A payload in one log that is not in the other logs.
 
 use super::explanation::predicted;
 use super::motion_rows::MotionRows;
+use super::settings::HeldOutSettings;
 use dynident_dynamics::{ParametricModel, Workspace, torque_regressor};
 use nalgebra::{DMatrix, DVector};
 
-/// Largest ratio of the residual with a payload to that without.
-const MAX_RATIO: f64 = 0.6;
-/// Added to the squares of the columns, as a share of the largest.
+/// Added to the squares of the columns, relative to the largest.
 const RIDGE: f64 = 1.0e-9;
-/// Smallest mass in standard deviations.
-const MIN_DEVIATIONS: f64 = 5.0;
+/// Ratio of residuals to independent residuals: neighbours are correlated.
+const CORRELATED_RESIDUALS: f64 = 10.0;
 
 /// A payload at the last body in one log that is not in the model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnmodelledPayload {
     /// Number of the recording.
     pub log: usize,
-    /// Its mass, kg, with its standard deviation; negative where it is the training logs that carry it.
+    /// Its mass, kg; negative if the training logs have the payload.
     pub mass_kg: f64,
-    /// Standard deviation of the mass.
+    /// Standard deviation of the mass, kg.
     pub mass_std_kg: f64,
-    /// The first moment over the mass, m, in the frame of the last body.
+    /// Its centre of mass in the frame of the last body, m.
     pub com_m: [f64; 3],
-    /// Root mean square of the residual without it, Nm, joints stacked.
+    /// Residual without the payload, root mean square of all joints, Nm.
     pub left_without: f64,
-    /// The same with it.
+    /// The same with the payload.
     pub left_with: f64,
 }
 
@@ -36,10 +35,11 @@ pub(super) fn unmodelled_payload(
     rows: &MotionRows,
     log: usize,
     theta: &[f64],
+    settings: &HeldOutSettings,
 ) -> Option<UnmodelledPayload> {
     let model = robot.model();
     let (dof, count) = (model.dof(), rows.len());
-    // Mass and first moment alone: the inertia of a small payload has little influence.
+    // The inertia of a small payload has little influence, so only mass and first moment are estimated.
     let (last, columns) = (model.body_count().checked_sub(1)?, model.inertial_count());
     let mut workspace = Workspace::new(model);
     let mut matrix = DMatrix::zeros(dof * count, 4);
@@ -57,7 +57,6 @@ pub(super) fn unmodelled_payload(
         }
     }
     let mut gram = matrix.transpose() * &matrix;
-    // Moments without influence stay zero.
     let ridge = RIDGE * gram.diagonal().max();
     (0..4).for_each(|k| gram[(k, k)] += ridge);
     let factor = gram.cholesky()?;
@@ -65,10 +64,10 @@ pub(super) fn unmodelled_payload(
     let left = &rest - &matrix * &solution;
     let rms = |v: &DVector<f64>| v.norm() / ((dof * count).max(1) as f64).sqrt();
     let (left_without, left_with) = (rms(&rest), rms(&left));
-    // Neighbouring residuals are correlated: a tenth of them is independent.
-    let std = left_with * (10.0 * factor.inverse()[(0, 0)]).sqrt();
+    let std = left_with * (CORRELATED_RESIDUALS * factor.inverse()[(0, 0)]).sqrt();
     let mass = solution[0];
-    (left_with < MAX_RATIO * left_without && mass.abs() > MIN_DEVIATIONS * std).then(|| UnmodelledPayload {
+    let is_better = left_with < settings.max_ratio_with_payload * left_without;
+    (is_better && mass.abs() > settings.min_payload_deviations * std).then(|| UnmodelledPayload {
         log,
         mass_kg: mass,
         mass_std_kg: std,

@@ -1,38 +1,35 @@
-//! One body whose mass the description has wrong: one number, in place of another unit of every joint's torque.
+//! One wrong mass in the description, as an alternative to another unit of every torque.
 
-use super::beside_friction::BesideFriction;
+use super::friction_spans::FrictionSpans;
 use super::motion_rows::MotionRows;
 use super::nominal::nominal_torque;
 use dynident_dynamics::ParametricModel;
 use dynident_model::InertialParameters;
 
-/// Factors within which descriptions err.
-const USUAL: [f64; 2] = [0.5, 2.0];
-
-/// A body whose inertials, times a factor, explain what else asks for another unit of every torque.
+/// A body with a wrong mass that explains the torques better than another unit of each torque.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WrongMass {
     /// The body's number.
     pub body: usize,
-    /// What its mass and inertia have to be multiplied by.
+    /// Factor on its mass and inertia.
     pub factor: f64,
-    /// Share of the joints' torques, friction aside, that the description so corrected leaves (root mean squares).
+    /// Unexplained share of the torques without friction after the correction (root mean squares).
     pub left: f64,
 }
 
-/// The body whose factor leaves less of the torques than a factor of every joint's own leaves, `left_by_scales` (the
-/// sum over joints of squares, each joint in units of what friction leaves of its torque); none where no body does.
+/// The body whose factor has a smaller residual than a separate factor for every joint, `left_by_scales` (the sum over
+/// joints of squared residuals relative to the torque without friction), and is outside of `usual_ratios`.
 ///
-/// With friction, drive inertia and an offset taken off joint by joint, `τ - τ_others = s τ_body` has one unknown for
-/// all joints.
+/// Without friction, drive inertia and offset, `τ - τ_others = s τ_body` has one unknown for all joints.
 pub(super) fn wrong_mass(
     robot: &ParametricModel,
     rows: &MotionRows,
-    beside: &BesideFriction,
+    friction: &FrictionSpans,
     left_by_scales: f64,
+    usual_ratios: [f64; 2],
 ) -> Option<WrongMass> {
     let all = nominal_torque(robot, rows)?;
-    let torque = beside.of_all(&rows.tau);
+    let torque = friction.remove_all(&rows.tau);
     let inertials = robot.model().inertials();
     let of_body = |body: usize| {
         let own: Vec<InertialParameters> = (0..inertials.len())
@@ -42,8 +39,8 @@ pub(super) fn wrong_mass(
         let alone = nominal_torque(&alone, rows)?;
         let (mut product, mut square, mut left) = (0.0, 0.0, 0.0);
         for (joint, torque) in torque.iter().enumerate().filter(|(_, torque)| torque.norm_squared() > 0.0) {
-            let own = beside.of(joint, &alone[joint]);
-            let rest = torque - (beside.of(joint, &all[joint]) - &own);
+            let own = friction.remove(joint, &alone[joint]);
+            let rest = torque - (friction.remove(joint, &all[joint]) - &own);
             let weight = torque.norm_squared().recip();
             product += weight * own.dot(&rest);
             square += weight * own.norm_squared();
@@ -51,7 +48,8 @@ pub(super) fn wrong_mass(
         }
         let factor = product / square;
         let left = left - product * factor;
-        let is_wrong = factor.is_finite() && factor > 0.0 && !(USUAL[0]..=USUAL[1]).contains(&factor);
+        let [lightest, heaviest] = usual_ratios;
+        let is_wrong = factor.is_finite() && factor > 0.0 && !(lightest..=heaviest).contains(&factor);
         let share = (left.max(0.0) / torque.len() as f64).sqrt();
         (is_wrong && left < left_by_scales).then_some(WrongMass { body, factor, left: share })
     };

@@ -1,43 +1,45 @@
-//! Friction that drives its joint: the sign of that joint's torque, or of its motion, is reversed.
+//! Negative friction: the sign of a joint's torque, or of its motion, is reversed.
 //!
-//! Least squares follows a reversed joint: its friction comes out negative, which no robot has. The check of the torque
-//! as a whole, [`sign_evidence`](super::sign_evidence), asks the same of all joints at once and does not see one alone.
+//! The least-squares estimate of the friction of a reversed joint is negative. [`sign_evidence`](super::sign_evidence)
+//! tests all joints together and does not detect a single joint.
 
+use super::settings::ExaminationSettings;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_recording::{Finding, Level};
 use dynident_rows::RegressorModel;
-
-/// Standard deviations below zero from which friction counts as negative. On the real logs that this was first tried
-/// on, honest joints stay above −2.5 and dead ones lie below −8.
-const CLEARLY_NEGATIVE: f64 = 5.0;
-/// The same as a share of what is left of the joint's torque: less may be the work of what the model has no term for,
-/// as at a wrist whose torque is measured behind the gear and is mostly noise.
-const SHARE_OF_LEFT: f64 = 0.5;
 
 /// The mean friction of a joint by the estimate, each term at the root mean square of its column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionSign {
     /// The joint.
     pub joint: String,
-    /// `Σ_k θ_k ‖w_k‖ / √N` over the joint's own friction terms, whose columns w_k oppose the motion: Nm (N), negative
-    /// where friction would drive the joint.
+    /// `Σ_k θ_k ‖w_k‖ / √N` over the joint's own friction terms, whose columns w_k oppose the motion, Nm (N). It is
+    /// negative if friction would drive the joint.
     pub torque: f64,
-    /// Its standard deviation by the estimate's covariance.
+    /// Its standard deviation by the covariance of the estimate.
     pub std: f64,
-    /// What the estimate leaves of the joint's torque, Nm (N), root mean square.
+    /// Residual of the joint, root mean square, Nm (N).
     pub left: f64,
 }
 
 impl FrictionSign {
-    /// Whether friction is negative beyond doubt.
+    /// Whether friction is significantly negative by the default [`ExaminationSettings`].
     pub fn is_reversed(&self) -> bool {
-        self.std > 0.0 && self.torque < -CLEARLY_NEGATIVE * self.std && self.torque < -SHARE_OF_LEFT * self.left
+        self.is_reversed_by(&ExaminationSettings::default())
+    }
+
+    /// The same by other settings.
+    pub fn is_reversed_by(&self, settings: &ExaminationSettings) -> bool {
+        let ExaminationSettings { min_friction_deviations, min_friction_ratio, .. } = *settings;
+        self.std > 0.0
+            && self.torque < -min_friction_deviations * self.std
+            && self.torque < -min_friction_ratio * self.left
     }
 }
 
-/// The mean friction of every joint that has friction terms of its own, no load-dependent ones among them: these need a
-/// load that is right.
+/// The mean friction of every joint that has own friction terms, without load-dependent terms, which need a correct
+/// load.
 pub fn friction_signs(model: &RegressorModel, problem: &LinearProblem, estimate: &Estimate) -> Vec<FrictionSign> {
     let (norms, rows, names) = (problem.column_norms(), problem.joint_rows(), model.joint_names());
     let columns = model.layout().columns();
@@ -64,14 +66,14 @@ pub fn friction_signs(model: &RegressorModel, problem: &LinearProblem, estimate:
     (0..model.dof()).filter_map(of_joint).collect()
 }
 
-/// A sentence for each joint whose friction is negative; a warning where other readings of the logs were tried and none
-/// is better (`no_other_reading`): then it is the work of what the model has no term for.
+/// A sentence for each joint with negative friction; only a warning if no other hypothesis about the logs is better
+/// (`no_other_reading`): then an unmodelled effect is the likelier cause.
 pub fn friction_sign_findings(signs: &[FrictionSign], no_other_reading: bool) -> impl Iterator<Item = Finding> {
     signs.iter().filter(|sign| sign.is_reversed()).map(move |sign| Finding {
         level: if no_other_reading { Level::Warning } else { Level::Problem },
         channel: format!("torque {}", sign.joint),
         message: format!(
-            "its friction comes out as {:.3} ± {:.3} Nm (N) and would drive the joint: its torque, or its position, has the opposite sign, or its torque is another joint's; \
+            "negative friction of {:.3} ± {:.3} Nm (N): its torque or its position has the opposite sign, or its torque belongs to another joint; \
              compare `sign` and the order of columns under torque and position",
             sign.torque, sign.std
         ),

@@ -1,8 +1,9 @@
-//! A model against a recording that was not used for its fit.
+//! Test of a model on a recording that was not used for its fit.
 
 use super::motion_band::MotionBand;
-use super::nominal_agreement::{AgreementRows, PriorAgreement};
-use super::residuals::{JointResiduals, JointWatch, Uncertainty};
+use super::nominal_agreement::{AgreementAccumulator, PriorAgreement};
+use super::residuals::{JointResiduals, ResidualAccumulator, Uncertainty};
+use super::settings::ExaminationSettings;
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
 use crate::lag::{DelayCheck, TorqueLag, lags_after_pass};
@@ -19,20 +20,20 @@ use serde::{Deserialize, Serialize};
 pub struct LogValidation {
     /// The log.
     pub log: String,
-    /// On the torque in the motion's own band, which does not depend on the cut-off of the fit; as filtered for the
-    /// estimation where the study states its cut-off.
+    /// For the torque in the band of the motion, which does not depend on the cut-off of the fit; in the band of the
+    /// fit if the study states the cut-off.
     #[serde(flatten)]
     pub model: ValidationReport,
-    /// On the torque as filtered for the estimation, where that is another band.
+    /// For the torque in the band of the fit, if that is another band.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub in_fit_band: Option<ValidationReport>,
-    /// On the torque as logged.
+    /// For the torque as logged.
     pub raw: ValidationReport,
-    /// The physically consistent set on the same torque as `model`.
+    /// The physically consistent set for the same torque as `model`.
     pub physical: Option<ValidationReport>,
-    /// The description's own model on the same torque.
+    /// The nominal model for the same torque.
     pub prior: Option<ValidationReport>,
-    /// What the residuals look like, joint by joint.
+    /// Residual diagnostics of each joint.
     pub residuals: Vec<JointResiduals>,
 }
 
@@ -43,42 +44,42 @@ pub struct HeldOutExamination {
     pub index: usize,
     /// Errors of the predicted torque.
     pub validation: LogValidation,
-    /// How the recording was read.
+    /// Statistics of reading the recording.
     pub statistics: LogStatistics,
-    /// How well the nominal values explain it, where they are known.
+    /// Agreement with the nominal values; `None` without any.
     pub nominal_agreement: Option<PriorAgreement>,
-    /// Delays of the torque, joint by joint; none where the log does not determine one.
+    /// Lag of the torque of each joint; `None` if the log does not determine it.
     pub delays: Vec<Option<TorqueLag>>,
-    /// Measured and predicted torque over time, if asked for.
+    /// Measured and predicted torque over time, if requested.
     pub trace: Option<LogTrace>,
 }
 
-struct Test<'a> {
+struct HeldOutTest<'a> {
     rows_of: &'a RegressorModel,
     log: String,
     theta: &'a [f64],
-    watches: Vec<JointWatch>,
+    residuals: Vec<ResidualAccumulator>,
     model: Validation,
     physical: Option<(&'a [f64], Validation)>,
     raw: Validation,
     prior: Option<(&'a [f64], Validation)>,
     motion_band: Option<MotionBand<'a>>,
-    /// Joint by joint; none without nominal values.
-    agreement: Option<Vec<AgreementRows<'a>>>,
+    /// One for each joint; `None` without nominal values.
+    agreement: Option<Vec<AgreementAccumulator<'a>>>,
     delay: DelayCheck<'a>,
     trace: Option<TraceConsumer<'a>>,
     buffer: Vec<f64>,
     counted: Vec<f64>,
 }
 
-impl Test<'_> {
-    /// Errors and residuals of rows that count.
-    fn judge(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+impl HeldOutTest<'_> {
+    /// Adds errors and residuals of used rows.
+    fn add_errors(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         let columns = self.rows_of.layout().joint_columns(rows.joint);
         let measured = &rows.panel[columns.len() * rows.rows..];
         predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
         self.model.add_joint(rows.joint, measured, &self.buffer).map_err(|source| self.failed(source))?;
-        self.watches[rows.joint].add(rows.panel, rows.rows, &self.buffer);
+        self.residuals[rows.joint].add(rows.panel, rows.rows, &self.buffer);
         for (prior, validation) in [&mut self.prior, &mut self.physical].into_iter().flatten() {
             predicted_torque(rows.panel, rows.rows, columns, prior, &mut self.buffer);
             let added = validation.add_joint(rows.joint, measured, &self.buffer);
@@ -95,13 +96,13 @@ impl Test<'_> {
     }
 }
 
-impl RowConsumer for Test<'_> {
+impl RowConsumer for HeldOutTest<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         let mut counted = core::mem::take(&mut self.counted);
-        let judged = self.judge(&rows.counted(&mut counted));
+        let added = self.add_errors(&rows.counted(&mut counted));
         self.counted = counted;
-        judged?;
-        // Over time every row has its place.
+        added?;
+        // The trace also needs the unused rows.
         if let Some(trace) = &mut self.trace {
             trace.filtered(rows);
         }
@@ -114,7 +115,7 @@ impl RowConsumer for Test<'_> {
             let columns = self.rows_of.layout().joint_columns(joint);
             let panel = samples.panels.joint(joint);
             predicted_torque(panel, rows, columns, self.theta, &mut self.buffer);
-            // Neither where the motion is made of invented samples nor where the torque is none.
+            // Rows with extrapolated motion or rejected torque are left out.
             let measured = &panel[columns.len() * rows..];
             let set_aside = samples.set_aside.get(joint);
             let counts = |row: &usize| set_aside.is_none_or(|set_aside| !set_aside[*row]);
@@ -133,24 +134,23 @@ impl RowConsumer for Test<'_> {
     }
 }
 
-/// What is tested on a recording.
+/// The model that is tested on a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct ModelUnderTest<'a> {
     /// Base parameters.
     pub theta: &'a [f64],
-    /// Those of the physically consistent set.
+    /// Base parameters of the physically consistent set.
     pub physical: Option<&'a [f64]>,
-    /// What the band of the predicted torque is made from.
+    /// Uncertainty for the band of the predicted torque.
     pub uncertainty: Option<&'a Uncertainty>,
-    /// Whether the torque over time is kept: of the physically consistent set where there is one.
+    /// Whether to keep the torque over time, predicted by the physically consistent set if given.
     pub traced: bool,
 }
 
-/// Tests base parameters on recording number `index`, those of the consistent set beside them; with their uncertainty
-/// also the band of the predicted torque, and the torque over time if asked for.
+/// Tests base parameters, and those of the consistent set, on recording number `index`.
 ///
 /// # Errors
-/// What reading it can give.
+/// An unreadable recording.
 pub fn examine_held_out(
     logs: &Logs<'_>,
     settings: &EstimationSettings,
@@ -159,15 +159,15 @@ pub fn examine_held_out(
     tested: &ModelUnderTest<'_>,
 ) -> Result<HeldOutExamination, LogError> {
     logs.begin(&format!("testing on {}", logs.recordings[index].name), &[index]);
-    let found = tested_on(logs, settings, model, index, tested, true);
+    let found = tested_on(logs, (settings, &ExaminationSettings::default()), model, index, tested, true);
     logs.end();
     found
 }
 
-/// [`examine_held_out`] as a part of a stage; `alone` lets a second thread read.
+/// [`examine_held_out`] as a part of a stage; `alone` allows a second thread for reading.
 pub(crate) fn tested_on(
     logs: &Logs<'_>,
-    settings: &EstimationSettings,
+    (settings, limits): (&EstimationSettings, &ExaminationSettings),
     model: &RegressorModel,
     index: usize,
     tested: &ModelUnderTest<'_>,
@@ -176,21 +176,21 @@ pub(crate) fn tested_on(
     let ModelUnderTest { theta, physical, uncertainty, traced } = *tested;
     let (recording, joints) = (&logs.recordings[index], model.joint_names());
     let nominal = model.parametric.nominal_base();
-    // Where samples or times are left out the rows of the fit alone know it.
+    // The motion band needs the samples of a log.
     let is_whole = matches!(recording.samples, Samples::Log(_));
     let sets = [Some(theta), physical, nominal].into_iter().flatten().collect();
-    let mut test = Test {
+    let mut test = HeldOutTest {
         motion_band: if is_whole { MotionBand::of(logs, model, sets) } else { None },
         rows_of: model,
         log: recording.label(),
         theta,
-        watches: (0..joints.len()).map(|joint| JointWatch::new(model, theta, joint, uncertainty)).collect(),
+        residuals: (0..joints.len()).map(|joint| ResidualAccumulator::new(model, theta, joint, uncertainty)).collect(),
         model: Validation::new(joints.clone()),
         physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         raw: Validation::new(joints.clone()),
         prior: nominal.map(|nominal| (nominal, Validation::new(joints.clone()))),
         agreement: nominal
-            .map(|nominal| (0..model.dof()).map(|joint| AgreementRows::new(model, joint, nominal)).collect()),
+            .map(|nominal| (0..model.dof()).map(|joint| AgreementAccumulator::new(model, joint, nominal)).collect()),
         delay: DelayCheck::new(model, theta),
         trace: traced.then(|| TraceConsumer::new(model, physical.unwrap_or(theta))),
         buffer: Vec::new(),
@@ -212,7 +212,8 @@ pub(crate) fn tested_on(
             }
         }
     }
-    let residuals = test.watches.iter().zip(&joints).map(|(watch, joint)| watch.report(name, joint)).collect();
+    let residuals =
+        test.residuals.iter().zip(&joints).map(|(residuals, joint)| residuals.report(name, joint)).collect();
     Ok(HeldOutExamination {
         index,
         validation: LogValidation {
@@ -224,7 +225,7 @@ pub(crate) fn tested_on(
             prior: tested_prior,
             residuals,
         },
-        nominal_agreement: test.agreement.map(|rows| PriorAgreement::of_rows(model, &rows)),
+        nominal_agreement: test.agreement.map(|rows| PriorAgreement::of_rows(model, &rows, limits)),
         delays: lags_after_pass(test.delay, (logs, settings), index)?,
         trace: test.trace.map(|trace| trace.finished(name.clone(), Role::Validate, statistics.filtered_rate_hz)),
         statistics,

@@ -1,11 +1,11 @@
-//! What the logs say of an estimate: delays of the torque, its sign, residuals, and how well it predicts what it was
-//! not fitted to.
+//! Tests of an estimate on the logs: lags and sign of the torque, residuals, prediction errors on held-out logs.
 
 mod friction_sign;
 mod held_out;
 mod motion_band;
 mod nominal_agreement;
 mod residuals;
+mod settings;
 mod stiction;
 mod torque_sign;
 mod torque_trace;
@@ -19,6 +19,7 @@ pub use friction_sign::{FrictionSign, friction_sign_findings, friction_signs};
 pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, examine_held_out};
 pub use nominal_agreement::{PriorAgreement, agreement_findings};
 pub use residuals::{JointResiduals, TorqueBand, Uncertainty};
+pub use settings::ExaminationSettings;
 pub use stiction::Stiction;
 pub use torque_sign::{TorqueSignCheck, sign_evidence, sign_findings};
 pub use torque_trace::{JointTrace, LogTrace};

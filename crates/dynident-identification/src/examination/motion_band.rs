@@ -1,4 +1,4 @@
-//! Torque in the motion's own band: figures that do not depend on the cut-off of the fit.
+//! Prediction errors in the band of the motion, which do not depend on the cut-off of the fit.
 
 use dynident_estimation::{Validation, ValidationReport};
 use dynident_recording::{DecimationSettings, FilterError};
@@ -6,8 +6,8 @@ use dynident_rows::{
     JointFilters, LogError, Logs, ParallelFilterSettings, RawSamples, RegressorModel, predicted_torque,
 };
 
-/// Measured torque and that of several sets of base parameters, all through the low-pass that the motion's spectrum
-/// alone asks for: a fit with a lower cut-off leaves less torque to explain, and looks better for it.
+/// Measured torque and the torque of several sets of base parameters after a low-pass for the band of the motion. In
+/// the band of the fit, a lower cut-off would reduce the errors.
 pub(crate) struct MotionBand<'a> {
     model: &'a RegressorModel,
     sets: Vec<&'a [f64]>,
@@ -20,7 +20,7 @@ pub(crate) struct MotionBand<'a> {
 }
 
 impl<'a> MotionBand<'a> {
-    /// For these sets of base parameters; none where the fit's own band is the motion's.
+    /// For these sets of base parameters; `None` if the fit has the band of the motion.
     pub(crate) fn of(logs: &Logs<'_>, model: &'a RegressorModel, sets: Vec<&'a [f64]>) -> Option<Self> {
         let motion_hz = logs.motion_hz()?;
         let validations = sets.iter().map(|_| Validation::new(model.joint_names())).collect();
@@ -51,7 +51,6 @@ impl<'a> MotionBand<'a> {
                 predicted_torque(panel, rows, columns, set, &mut self.predicted);
                 self.panel.extend_from_slice(&self.predicted);
             }
-            // Measured and predicted torque leave out what does not count alike: neither is judged where one is not.
             let left_out = samples.set_aside.get(joint).map_or(&[][..], Vec::as_slice);
             let left = filters.push(joint, &self.panel, rows, left_out).counted(&mut self.counted);
             if left.rows == 0 {
@@ -75,7 +74,7 @@ impl<'a> MotionBand<'a> {
         JointFilters::new(&vec![1 + self.sets.len(); self.model.dof()], rate_hz, Some(&filter))
     }
 
-    /// Set by set; none where no row was left.
+    /// One report for each set; `None` without rows.
     pub(crate) fn reports(self) -> Option<Vec<ValidationReport>> {
         let reports: Vec<ValidationReport> = self.validations.iter().map(Validation::report).collect();
         reports.iter().all(|report| report.samples > 0).then_some(reports)

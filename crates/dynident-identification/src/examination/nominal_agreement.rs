@@ -1,7 +1,8 @@
-//! What the description's own inertials say about a log: is the torque's sign right?
+//! Agreement of a log with the nominal model: residual and sign of the torque.
 //!
-//! Least squares fits either sign equally well (all parameters change sign), so only a nominal model can decide.
+//! Least squares fits either sign equally well, since all parameters change sign; a nominal model determines the sign.
 
+use super::settings::ExaminationSettings;
 use dynident_dynamics::Column;
 use dynident_estimation::{
     EstimationError, FactorWorkspace, SegmentedFactor, TriangularFactor, nonnegative_least_squares,
@@ -12,13 +13,7 @@ use dynident_rows::{JointRows, RegressorModel, predicted_torque};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// The other sign counts as right when it leaves less than this share of what the given sign leaves.
-const CLEARLY_BETTER: f64 = 0.5;
-
-/// Percent of the torque that a description of the robot at hand hardly ever leaves; torque without friction is less.
-const POOR_PERCENT: f64 = 50.0;
-
-/// How well the prior model explains the torque as given and with the opposite sign.
+/// Residual of the nominal model for the torque as given and with the opposite sign.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PriorAgreement {
@@ -26,34 +21,50 @@ pub struct PriorAgreement {
     pub residual_percent: Option<f64>,
     /// `100 ‖-τ - τ_prior‖ / ‖τ‖`, all joints stacked.
     pub residual_percent_if_reversed: Option<f64>,
-    /// Joints whose torque fits far better with the opposite sign, each with friction and offset that suit it.
+    /// Joints whose torque fits far better with the opposite sign, each with fitted friction and offset.
     pub reversed_joints: Vec<String>,
 }
 
 impl PriorAgreement {
-    /// Whether the torque as a whole, or that of some joint, fits far better with the opposite sign.
+    /// Whether the torque of all joints, or of one joint, fits far better with the opposite sign, by the default
+    /// [`ExaminationSettings`].
     pub fn is_reversed(&self) -> bool {
-        let whole = self.residual_percent.zip(self.residual_percent_if_reversed);
-        whole.is_some_and(|(given, other)| other < CLEARLY_BETTER * given) || !self.reversed_joints.is_empty()
+        self.is_reversed_by(&ExaminationSettings::default())
     }
 
-    /// Whether the prior model leaves so much of the torque that its bodies may be another robot's.
+    /// The same by other settings; `reversed_joints` has the settings of the examination.
+    pub fn is_reversed_by(&self, settings: &ExaminationSettings) -> bool {
+        self.is_whole_reversed(settings) || !self.reversed_joints.is_empty()
+    }
+
+    fn is_whole_reversed(&self, settings: &ExaminationSettings) -> bool {
+        let whole = self.residual_percent.zip(self.residual_percent_if_reversed);
+        whole.is_some_and(|(given, other)| other < settings.max_reversed_ratio * given)
+    }
+
+    /// Whether the residual is so large that the nominal bodies may belong to another robot, by the default
+    /// [`ExaminationSettings`].
     pub fn is_poor(&self) -> bool {
-        self.residual_percent.is_some_and(|left| left > POOR_PERCENT)
+        self.is_poor_by(&ExaminationSettings::default())
+    }
+
+    /// The same by other settings.
+    pub fn is_poor_by(&self, settings: &ExaminationSettings) -> bool {
+        self.residual_percent.is_some_and(|left| left > settings.max_nominal_residual_percent)
     }
 }
 
-/// Squares of one joint's torque and of what the nominal values leave of it, with the given sign and with the other.
+/// Squares of one joint's torque and of its residuals by the nominal values, for the given and the opposite sign.
 #[derive(Clone, Copy, Default)]
 struct JointAgreement {
     torque: f64,
     left: [f64; 2],
-    /// What is left beside friction that suits the torque best.
-    left_beside_friction: [f64; 2],
+    /// Residuals with fitted friction.
+    left_with_friction: [f64; 2],
 }
 
 impl JointAgreement {
-    /// Of the rows behind a factor, with the nominal values of its columns; those in `friction` may have other ones.
+    /// For the rows of a factor, with the nominal values of its columns; those in `friction` are also fitted.
     fn of(factor: &TriangularFactor, nominal: &[f64], friction: &OwnFriction) -> Self {
         let size = factor.columns() + 1;
         let column = |column: usize| DVector::from_fn(size, |row, _| factor.entry(row, column));
@@ -65,27 +76,26 @@ impl JointAgreement {
         let left = [&torque - &predicted, -&torque - &predicted];
         let columns = DMatrix::from_fn(size, friction.columns.len(), |row, k| factor.entry(row, friction.columns[k]));
         let gram = columns.tr_mul(&columns);
-        let beside_friction = |left: &DVector<f64>| {
+        let with_friction = |left: &DVector<f64>| {
             let values = nonnegative_least_squares(&gram, &columns.tr_mul(left), &friction.is_nonnegative);
             (left - &columns * values).norm_squared()
         };
-        let left_beside_friction = left.each_ref().map(beside_friction);
+        let left_with_friction = left.each_ref().map(with_friction);
         let squares = left.each_ref().map(DVector::norm_squared);
-        Self { torque: torque.norm_squared(), left: squares, left_beside_friction }
+        Self { torque: torque.norm_squared(), left: squares, left_with_friction }
     }
 
-    /// Whether the torque fits far better with the opposite sign beside friction that suits either: in seconds of one
-    /// phase of a motion friction may stand against the bodies, but never drives.
-    fn is_reversed(&self) -> bool {
-        let [given, other] = self.left_beside_friction;
-        other < CLEARLY_BETTER * CLEARLY_BETTER * given
+    /// Whether the torque fits far better with the opposite sign, with fitted friction for both signs: in a few seconds
+    /// of one direction friction may compensate the bodies, but it never drives the joint.
+    fn is_reversed(&self, settings: &ExaminationSettings) -> bool {
+        let [given, other] = self.left_with_friction;
+        other < settings.max_reversed_ratio * settings.max_reversed_ratio * given
     }
 }
 
-/// Which of the columns of a joint are its own friction and offset.
+/// The columns of a joint's own friction and offset.
 struct OwnFriction {
     columns: Vec<usize>,
-    /// Those whose parameters are never negative.
     is_nonnegative: Vec<bool>,
 }
 
@@ -102,20 +112,20 @@ impl OwnFriction {
     }
 }
 
-/// Rows of one joint for their agreement with nominal values, while they pass.
-pub(crate) struct AgreementRows<'a> {
+/// Accumulates the rows of one joint for their agreement with nominal values.
+pub(crate) struct AgreementAccumulator<'a> {
     columns: &'a [usize],
     nominal: &'a [f64],
     friction: OwnFriction,
-    /// Of the columns of friction, the predicted torque and the torque.
+    /// The columns are friction, predicted torque, measured torque.
     factor: TriangularFactor,
     workspace: FactorWorkspace,
     predicted: Vec<f64>,
     panel: Vec<f64>,
 }
 
-impl<'a> AgreementRows<'a> {
-    /// For rows of a joint of the model, with the nominal values of all its columns.
+impl<'a> AgreementAccumulator<'a> {
+    /// `nominal` has the nominal values of all columns of the model.
     pub(crate) fn new(model: &'a RegressorModel, joint: usize, nominal: &'a [f64]) -> Self {
         let friction = OwnFriction::of(model, joint);
         let factor = TriangularFactor::new(friction.columns.len() + 1);
@@ -147,26 +157,39 @@ impl<'a> AgreementRows<'a> {
 }
 
 impl PriorAgreement {
-    /// Of rows that have passed, joint by joint.
-    pub(crate) fn of_rows(model: &RegressorModel, joints: &[AgreementRows<'_>]) -> Self {
-        Self::of_joints(model, joints.iter().map(AgreementRows::agreement))
+    /// For accumulated rows, one for each joint.
+    pub(crate) fn of_rows(
+        model: &RegressorModel,
+        joints: &[AgreementAccumulator<'_>],
+        settings: &ExaminationSettings,
+    ) -> Self {
+        Self::of_joints(model, joints.iter().map(AgreementAccumulator::agreement), settings)
     }
 
-    /// Of the rows behind factors of all columns, joint by joint, with the nominal values of the columns.
-    pub(crate) fn of_factors(model: &RegressorModel, factors: &[SegmentedFactor], nominal: &[f64]) -> Self {
+    /// For the factors of all columns, one for each joint, with the nominal values of the columns.
+    pub(crate) fn of_factors(
+        model: &RegressorModel,
+        factors: &[SegmentedFactor],
+        nominal: &[f64],
+        settings: &ExaminationSettings,
+    ) -> Self {
         let of_joint = |(joint, factor): (usize, &SegmentedFactor)| {
             let own: Vec<f64> = model.layout().joint_columns(joint).iter().map(|&column| nominal[column]).collect();
             JointAgreement::of(factor.total(), &own, &OwnFriction::of(model, joint))
         };
-        Self::of_joints(model, factors.iter().enumerate().map(of_joint))
+        Self::of_joints(model, factors.iter().enumerate().map(of_joint), settings)
     }
 
-    fn of_joints(model: &RegressorModel, joints: impl Iterator<Item = JointAgreement>) -> Self {
+    fn of_joints(
+        model: &RegressorModel,
+        joints: impl Iterator<Item = JointAgreement>,
+        settings: &ExaminationSettings,
+    ) -> Self {
         let (mut torque, mut left, mut reversed_joints) = (0.0, [0.0; 2], Vec::new());
         for (name, joint) in model.joint_names().into_iter().zip(joints) {
             torque += joint.torque;
             left = [left[0] + joint.left[0], left[1] + joint.left[1]];
-            if joint.is_reversed() {
+            if joint.is_reversed(settings) {
                 reversed_joints.push(name);
             }
         }
@@ -176,25 +199,24 @@ impl PriorAgreement {
     }
 }
 
-/// The agreement as sentences, where they matter.
+/// The agreement as sentences.
 pub fn agreement_findings(agreement: &PriorAgreement) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut add = |level, channel: String, message| findings.push(Finding { level, channel, message });
     if let (Some(given), Some(other)) = (agreement.residual_percent, agreement.residual_percent_if_reversed) {
-        if other < CLEARLY_BETTER * given {
+        if agreement.is_whole_reversed(&ExaminationSettings::default()) {
             let message = format!(
-                "the torque has the opposite sign of the model: the description's own inertials leave {given:.0} % of the torque as given and \
-                 {other:.0} % of its negative; write `sign = -1` under torque"
+                "the torque has the opposite sign of the model: with the robot description {given:.0} % of the torque are unexplained as given and \
+                 {other:.0} % with the opposite sign; write `sign = -1` under torque"
             );
             add(Level::Problem, "torque".to_owned(), message);
         } else {
             let message = format!(
-                "the description's own inertials leave {given:.1} % of the torque ({other:.0} % of its negative)"
+                "with the robot description {given:.1} % of the torque are unexplained ({other:.0} % with the opposite sign)"
             );
             add(Level::Info, "torque".to_owned(), message);
             for joint in &agreement.reversed_joints {
-                let message =
-                    "fits far better with the opposite sign: check the sign of position and torque".to_owned();
+                let message = "the opposite sign fits far better: check the sign of position and torque".to_owned();
                 add(Level::Problem, format!("torque {joint}"), message);
             }
         }
@@ -206,7 +228,7 @@ pub fn agreement_findings(agreement: &PriorAgreement) -> Vec<Finding> {
 mod tests {
     use super::*;
 
-    /// Columns: a body's, friction, an offset; rows of a joint that goes one way only.
+    /// Columns of a body, friction and an offset, for a joint that moves in one direction.
     fn columns() -> [Vec<f64>; 3] {
         let body = |k: u32| 1.0 + 0.3 * (0.7 * f64::from(k)).sin();
         let velocity = |k: u32| -0.5 - 0.1 * (0.2 * f64::from(k)).cos();
@@ -214,7 +236,7 @@ mod tests {
         [of(&body), of(&velocity), of(&|_| 1.0)]
     }
 
-    /// Nominally the body's column counts 1 and nothing is known of the others; the joint's parameters are `truth`.
+    /// The nominal values are 1 for the body and 0 for the others; the true values are `truth`.
     fn agreement(truth: [f64; 3], sign: f64) -> JointAgreement {
         let columns = columns();
         let torque = (0..40).map(|k| sign * truth.iter().zip(&columns).map(|(value, own)| value * own[k]).sum::<f64>());
@@ -228,19 +250,20 @@ mod tests {
     }
 
     #[test]
-    fn friction_that_stands_against_the_bodies_is_no_other_sign() {
-        let honest = agreement([1.0, 2.0, -0.8], 1.0);
-        // By the bodies alone it is the other sign that fits far better.
-        assert!(honest.left[1] < CLEARLY_BETTER * CLEARLY_BETTER * honest.left[0], "{:?}", honest.left);
-        assert!(honest.left_beside_friction[0] < 1e-12 * honest.torque);
-        assert!(!honest.is_reversed());
+    fn friction_against_the_bodies_is_not_a_reversed_sign() {
+        let correct = agreement([1.0, 2.0, -0.8], 1.0);
+        // Without friction the opposite sign fits far better.
+        assert!(correct.left[1] < 0.25 * correct.left[0], "{:?}", correct.left);
+        assert!(correct.left_with_friction[0] < 1e-12 * correct.torque);
+        assert!(!correct.is_reversed(&ExaminationSettings::default()));
     }
 
     #[test]
-    fn the_other_sign_is_seen_beside_friction() {
+    fn detects_a_reversed_sign_with_friction() {
+        let is_reversed = |truth, sign| agreement(truth, sign).is_reversed(&ExaminationSettings::default());
         for truth in [[1.0, 0.3, 0.1], [1.2, 0.3, 0.0], [0.8, 0.0, -0.1], [0.3, 5.0, 0.1]] {
-            assert!(agreement(truth, -1.0).is_reversed(), "{truth:?}");
-            assert!(!agreement(truth, 1.0).is_reversed(), "{truth:?}");
+            assert!(is_reversed(truth, -1.0), "{truth:?}");
+            assert!(!is_reversed(truth, 1.0), "{truth:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Residual diagnostics and the 95 % band of a held-out log, joint by joint, in the pass that validates.
+//! Residual diagnostics and the 95 % band of each joint on a held-out log.
 
 use super::stiction::Stiction;
 use dynident_dynamics::Column;
@@ -11,28 +11,27 @@ use dynident_rows::RegressorModel;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// What the filtered residual of one joint looks like on a log.
+/// Diagnostics of one joint's filtered residual on a log.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointResiduals {
     /// The joint.
     pub name: String,
-    /// Ljung and Box's test; none for a short log.
+    /// Ljung-Box test; `None` for a short log.
     pub whiteness: Option<WhitenessReport>,
-    /// Jarque and Bera's test; none for a short log.
+    /// Jarque-Bera test; `None` for a short log.
     pub normality: Option<NormalityReport>,
-    /// Residual by velocity; none where the velocity is not among the model's columns (no viscous friction, nor both
-    /// directions of it).
+    /// Residual by velocity; `None` if the model has no viscous friction, so that the rows do not contain the velocity.
     pub regimes: Option<SpeedRangesReport>,
-    /// The predicted torque's 95 % band; none where the covariance is not at hand. Written as `torque_band` of a
-    /// result, for a finished model's test has none.
+    /// The 95 % band of the predicted torque; `None` without a covariance. Written as `torque_band` of a result, since
+    /// the test of an existing model has no band.
     #[serde(skip)]
     pub band: Option<TorqueBand>,
 }
 
-/// How well the predicted 95 % band `τ̂ ± (t κ √(w V wᵀ + σ²) + F)` holds the torque of one joint on a held-out log. F
-/// is what dry friction may hold while the joint rests (|q̇| below 0.005 rad/s of a usual arm), the largest friction
-/// that the model has near rest, and zero in motion.
+/// Coverage of the predicted 95 % band `τ̂ ± (t κ √(w V wᵀ + σ²) + F)` for the torque of one joint on a held-out log. F
+/// is the largest dry friction of the model near rest while the joint rests (|q̇| below 0.005 rad/s for an arm of usual
+/// size), and zero in motion.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueBand {
@@ -46,7 +45,7 @@ pub struct TorqueBand {
     pub half_width_nm: f64,
 }
 
-/// What the band needs of an estimate.
+/// Uncertainty of an estimate, for the band.
 #[derive(Clone, Debug)]
 pub struct Uncertainty {
     covariance: DMatrix<f64>,
@@ -57,9 +56,9 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// Of base parameters with the given covariance; `ratios` says for every joint how much further than that and its
-    /// noise blocks of the training logs were from the fit to all others
-    /// ([`left_out_ratios`](dynident_estimation::left_out_ratios); ones where nothing says so).
+    /// For base parameters with the given covariance. `ratios` are factors κ on the band of each joint, from blocks of
+    /// the training logs that were left out of the fit ([`left_out_ratios`](dynident_estimation::left_out_ratios)), or
+    /// ones.
     pub fn of(estimate: &Estimate, covariance: DMatrix<f64>, ratios: &[f64]) -> Self {
         let degrees_of_freedom = estimate.degrees_of_freedom as f64;
         Self {
@@ -72,16 +71,15 @@ impl Uncertainty {
 }
 
 /// Accumulates one joint's residuals.
-pub(crate) struct JointWatch {
-    /// The joint's columns among all.
+pub(crate) struct ResidualAccumulator {
+    /// Root of the covariance of the joint's columns.
     own: DMatrix<f64>,
+    /// Noise of the joint, and the factor `t κ`.
     sigma: Option<(f64, f64)>,
-    /// What may hold the joint at rest.
     stiction: Stiction,
-    /// Places among the panel's columns whose sum is the velocity: viscous friction, or its two directions. None where
-    /// there are no such columns.
+    /// Columns of the panel whose sum is the velocity: viscous friction, or its two directions.
     speed: Vec<usize>,
-    /// What a rad/s (m/s) of a usual arm is to the joint.
+    /// Velocity of the joint that corresponds to 1 rad/s (m/s) of an arm of usual size.
     usual_speed: f64,
     whiteness: Whiteness,
     normality: Normality,
@@ -91,7 +89,7 @@ pub(crate) struct JointWatch {
     widths: f64,
 }
 
-impl JointWatch {
+impl ResidualAccumulator {
     pub(crate) fn new(model: &RegressorModel, theta: &[f64], joint: usize, uncertainty: Option<&Uncertainty>) -> Self {
         let layout = model.layout();
         let columns = layout.joint_columns(joint);
@@ -113,8 +111,8 @@ impl JointWatch {
         });
         let directions = halves.map_or_else(Vec::new, |halves| places(&|term| halves.contains(term)));
         let speed = if viscous.is_empty() && directions.len() == 2 { directions } else { viscous };
-        // V = L Lᵀ of the joint's columns: the variance of a prediction w is ‖Lᵀ w‖². Covariances from few segments are
-        // singular, so by eigenvalues.
+        // With V = L Lᵀ the variance of a prediction w is ‖Lᵀ w‖². L is computed by eigenvalues, since covariances from
+        // few segments are singular.
         let own = uncertainty.map_or_else(
             || DMatrix::zeros(0, columns.len()),
             |uncertainty| {
@@ -142,7 +140,7 @@ impl JointWatch {
         }
     }
 
-    /// Rows of the joint: its panel (columns, then torque) and the predicted torque.
+    /// Adds rows of the joint: its panel (columns, then torque) and the predicted torque.
     pub(crate) fn add(&mut self, panel: &[f64], rows: usize, predicted: &[f64]) {
         let columns = self.own.ncols();
         for row in 0..rows {

@@ -1,37 +1,39 @@
-//! Which sign of the torque can a robot have at all?
+//! The sign of the torque by physical consistency.
 //!
-//! Least squares fits either sign equally well: all parameters change sign. A physically consistent set has positive
-//! masses and inertias and friction that takes energy out, so it fits one of the two only.
+//! Least squares fits either sign equally well, since all parameters change sign. A physically consistent set has
+//! positive masses and inertias and dissipative friction, so it fits only one sign.
 
+use super::settings::ExaminationSettings;
 use crate::consistent::{ConsistencySettings, nearest_consistent_parameters};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_recording::{Finding, Level};
 use serde::{Deserialize, Serialize};
 
-/// The other sign counts as right when a physically consistent set leaves less than this share of what it leaves with
-/// the given sign.
-const CLEARLY_BETTER: f64 = 0.5;
-
-/// How well physically consistent robots explain the torque with either sign, by no prior knowledge of the bodies.
+/// Residuals of physically consistent robots for both signs of the torque, without prior knowledge of the bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueSignCheck {
-    /// `100 ‖τ − W θ‖ / ‖τ‖` of the physically consistent set that fits best, rows in units of their joint's noise.
+    /// `100 ‖τ − W θ‖ / ‖τ‖` of the best physically consistent fit, rows in units of their joint's noise.
     pub residual_percent: f64,
     /// The same for the torque with the opposite sign.
     pub residual_percent_if_reversed: f64,
 }
 
 impl TorqueSignCheck {
-    /// Whether only the opposite sign is one that a robot can have.
+    /// Whether only the opposite sign is physically consistent, by the default [`ExaminationSettings`].
     pub fn is_reversed(&self) -> bool {
-        self.residual_percent_if_reversed < CLEARLY_BETTER * self.residual_percent
+        self.is_reversed_by(&ExaminationSettings::default())
+    }
+
+    /// The same by other settings.
+    pub fn is_reversed_by(&self, settings: &ExaminationSettings) -> bool {
+        self.residual_percent_if_reversed < settings.max_reversed_ratio * self.residual_percent
     }
 }
 
-/// Fits a physically consistent set to the torque and to its negative. The description's own inertials are not looked
-/// at: rough bodies of 1 kg are the prior, and no friction. None where a fit fails.
+/// Fits a physically consistent set to the torque and to its negative. The prior is rough bodies of 1 kg without
+/// friction, not the nominal bodies. `None` if a fit fails.
 pub fn sign_evidence(
     nominal: &ParametricModel,
     problem: &LinearProblem,
@@ -61,13 +63,13 @@ pub fn sign_evidence(
     Some(TorqueSignCheck { residual_percent: percent(1.0)?, residual_percent_if_reversed: percent(-1.0)? })
 }
 
-/// The evidence as a sentence, where it speaks against the log.
+/// The finding of a reversed sign.
 pub fn sign_findings(evidence: &TorqueSignCheck) -> Option<Finding> {
     evidence.is_reversed().then(|| Finding {
         level: Level::Problem,
         channel: "torque".to_owned(),
         message: format!(
-            "the torque has the opposite sign of any physically consistent robot: positive masses, inertias and friction leave {:.0} % of it as given and {:.0} % of its negative; \
+            "the torque has the opposite sign of any physically consistent robot: the best consistent fit has a residual of {:.0} % as given and {:.0} % with the opposite sign; \
              write `sign = -1` under torque",
             evidence.residual_percent, evidence.residual_percent_if_reversed
         ),

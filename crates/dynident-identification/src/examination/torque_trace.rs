@@ -2,15 +2,15 @@
 
 use dynident_rows::{JointRows, RawSamples, RegressorModel, Role, predicted_torque};
 
-/// Rows of one joint that are kept at most: pictures need no more, and memory stays bounded.
-const MOST_ROWS: usize = 100_000;
+/// Largest number of rows of one joint: enough for a plot, and bounds the memory.
+const MAX_ROWS: usize = 100_000;
 
 /// Torque of one joint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointTrace {
-    /// As measured, filtered as for the fit, Nm (N); NaN where the log has a gap or a row does not count.
+    /// Measured torque with the filter of the fit, Nm (N); NaN in gaps and for unused rows.
     pub measured_nm: Vec<f64>,
-    /// By the estimated base parameters; NaN in gaps.
+    /// Predicted torque of the base parameters, Nm (N); NaN in gaps and for unused rows.
     pub predicted_nm: Vec<f64>,
 }
 
@@ -19,17 +19,17 @@ pub struct JointTrace {
 pub struct LogTrace {
     /// The log.
     pub log: String,
-    /// What the log is for.
+    /// Role of the log.
     pub role: Role,
-    /// Rows a second.
+    /// Rate of the rows, Hz.
     pub rate_hz: f64,
-    /// Whether the log goes on after what is kept.
+    /// Whether later rows of the log are left out.
     pub cut: bool,
-    /// One for each joint, in the model's order.
+    /// Torque of each joint, in the model's order.
     pub joints: Vec<JointTrace>,
 }
 
-/// Gathers a [`LogTrace`] while rows pass.
+/// Collects a [`LogTrace`].
 #[derive(Debug)]
 pub(crate) struct TraceConsumer<'a> {
     model: &'a RegressorModel,
@@ -49,7 +49,6 @@ impl<'a> TraceConsumer<'a> {
         if *self.segment.get_or_insert(samples.segment) != samples.segment {
             self.segment = Some(samples.segment);
             for JointTrace { measured_nm, predicted_nm } in &mut self.trace.joints {
-                // One gap, however many pieces gave no row.
                 if measured_nm.last().is_some_and(|value| !value.is_nan()) {
                     measured_nm.push(f64::NAN);
                     predicted_nm.push(f64::NAN);
@@ -61,7 +60,7 @@ impl<'a> TraceConsumer<'a> {
     pub(crate) fn filtered(&mut self, rows: &JointRows<'_>) {
         let columns = self.model.layout().joint_columns(rows.joint);
         let JointTrace { measured_nm, predicted_nm } = &mut self.trace.joints[rows.joint];
-        let kept = rows.rows.min(MOST_ROWS.saturating_sub(measured_nm.len()));
+        let kept = rows.rows.min(MAX_ROWS.saturating_sub(measured_nm.len()));
         self.trace.cut |= kept < rows.rows;
         if kept > 0 {
             predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);

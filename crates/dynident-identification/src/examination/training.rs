@@ -1,11 +1,10 @@
-//! A second pass over the first samples of a training log, now that there is a model to predict them with.
+//! A second pass over the first samples of a training log, with the estimated model.
 
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
 use crate::lag::{DELAY_SAMPLES, DelayCheck, TorqueLag, lags_after_pass};
 use dynident_rows::{JointRows, LogError, LogPass, Logs, RawSamples, RegressorModel, Role, RowConsumer, Silent};
 
-/// What the second pass gathers.
 struct SecondPass<'a> {
     delay: DelayCheck<'a>,
     trace: TraceConsumer<'a>,
@@ -23,11 +22,11 @@ impl RowConsumer for SecondPass<'_> {
     }
 }
 
-/// The delays of the torque of recording number `index` (none where rows inside of a motion are left out), and its
-/// torque over time, with the base parameters `theta`.
+/// Lags of the torque in recording number `index` (none if rows within a motion are left out), and its torque over
+/// time, with base parameters `theta`.
 ///
 /// # Errors
-/// What reading it can give.
+/// An unreadable recording.
 pub fn examine_training(
     logs: &Logs<'_>,
     settings: &EstimationSettings,

@@ -1,12 +1,12 @@
-//! Torque without the gravity of the described bodies.
+//! Torque without the gravity torque of the nominal bodies.
 
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup};
 use crate::diagnosis::motion_rows::MotionRows;
 use crate::diagnosis::nominal::gravity_torque;
 use dynident_dynamics::ParametricModel;
 
-/// The torques lack the gravity of the description's bodies: a controller that compensates it logs what it adds to
-/// that.
+/// The torques lack the gravity torque of the nominal bodies: the controller logs only the torque in addition to its
+/// gravity compensation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compensated;
 
@@ -34,8 +34,8 @@ impl MistakeKind for Compensated {
     }
 
     fn sentence(&self, _: &[String]) -> String {
-        "the torque is without gravity: the controller took off that of the description's bodies; log \
-         the torque with gravity, or add to the columns what the controller takes off"
+        "the torque is without gravity: the controller subtracts the gravity torque of the robot description; log the \
+         torque with gravity, or add the subtracted torque to the columns"
             .to_owned()
     }
 }

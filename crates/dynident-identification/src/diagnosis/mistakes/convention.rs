@@ -4,10 +4,10 @@ use super::kind::{Breadth, Facts, MistakeKind, Setup};
 use dynident_dynamics::ParametricModel;
 use dynident_model::DhConvention;
 
-/// The description is a Denavit-Hartenberg table in the other convention than the one that it states.
+/// The description is a Denavit-Hartenberg table that states the wrong convention.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Convention {
-    /// The one that it is in.
+    /// The correct convention.
     pub convention: DhConvention,
 }
 
@@ -17,7 +17,7 @@ impl MistakeKind for Convention {
         setup.model().other_convention().map(|(convention, _)| Self { convention }).into_iter().collect()
     }
 
-    /// The bodies of the table are described in their own frames, so nominal values are those of the model.
+    /// The table gives each body in its own frame, so the nominal values are those of the corrected model.
     fn corrected_robot(&self, robot: &ParametricModel) -> Option<ParametricModel> {
         let (_, meant) = robot.model().other_convention().filter(|(other, _)| *other == self.convention)?;
         ParametricModel::new(meant.clone(), robot.terms().to_vec()).ok()

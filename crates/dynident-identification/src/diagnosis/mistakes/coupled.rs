@@ -6,17 +6,17 @@ use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
 use dynident_dynamics::ParametricModel;
 
-/// The column of a joint moves with another joint as well: it holds `q_joint + sign q_with`, as the motor of a
-/// parallelogram's arm or of a coupled wrist does; where torque is the motor's, `τ_with` lacks `sign τ_joint`.
+/// The column of a joint also moves with another joint: it contains `q_joint + sign q_with`, as for the motor of a
+/// parallelogram or of a coupled wrist. For torques of the motor, `τ_with` lacks `sign τ_joint`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coupled {
     /// The joint.
     pub joint: usize,
-    /// The one that its column moves with.
+    /// The joint that its column also moves with.
     pub with: usize,
     /// 1 or -1.
     pub sign: f64,
-    /// Positions alone, or torques as well.
+    /// Positions, or positions and torques.
     pub channels: Channels,
 }
 
@@ -58,16 +58,16 @@ impl MistakeKind for Coupled {
 
     fn sentence(&self, names: &[String]) -> String {
         format!(
-            "{channels} of joint `{joint}` {are} of a motor that turns with joint `{with}` as well: its column is `{joint}` {sign} `{with}`",
+            "{channels} of joint `{joint}` {belong} to a motor that also turns with joint `{with}`: its column is `{joint}` {sign} `{with}`",
             channels = self.channels.text(),
             joint = names[self.joint],
-            are = if self.channels == Channels::Both { "are those" } else { "is that" },
+            belong = if self.channels == Channels::Both { "belong" } else { "belongs" },
             with = names[self.with],
             sign = if self.sign > 0.0 { "+" } else { "-" },
         )
     }
 
-    /// The matrix that takes a neighbour's share out of a joint's position, or adds a joint's torque to a neighbour's.
+    /// The matrix that removes the other joint from the position, or adds the torque to that of the other joint.
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
         let [joint, with] = [self.joint, self.with].map(|joint| keys.places[joint]);
         let of = |channels: Channels| {

@@ -1,4 +1,4 @@
-//! Another gravity: mounting, unit, compensation.
+//! A wrong gravity vector: mounting, unit, compensation.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, with_model};
@@ -7,12 +7,12 @@ use super::study_keys::{KeyChange, StudyKeys, list, number};
 use dynident_dynamics::ParametricModel;
 use dynident_model::Vec3;
 
-/// Gravity on earth as studies have it by default, m/s².
+/// Default gravity of a study, m/s².
 const EARTH_M_S2: f64 = 9.81;
-/// Share by which gravity differs over the earth, and with how many digits people write it.
-const NEAR_EARTH: f64 = 0.03;
+/// Largest relative difference from earth's gravity by place and by rounding.
+const MAX_EARTH_DIFFERENCE: f64 = 0.03;
 
-/// Gravity is another: the base is mounted otherwise, or the torque is without gravity (zero).
+/// Another gravity vector: the base is mounted in another orientation, or the torque is without gravity (zero).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gravity {
     /// Acceleration in the frame of the base, m/s².
@@ -20,8 +20,8 @@ pub struct Gravity {
 }
 
 impl MistakeKind for Gravity {
-    /// The same gravity in other directions; rarer: gravity in another unit, none (torques from which a controller took
-    /// it off), and some where the study has none.
+    /// The same gravity in other directions. Rarer: another unit, no gravity (compensated by the controller), and
+    /// earth's gravity for a study without gravity.
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
         let gravity = setup.model().gravity();
         let size = gravity.norm();
@@ -35,9 +35,9 @@ impl MistakeKind for Gravity {
                 directions().filter(is_other).map(|direction| times(direction, size)).collect()
             }
             Breadth::Rare if size > 0.0 => {
-                let is_in_a_unit = (size / EARTH_M_S2 - 1.0).abs() > NEAR_EARTH;
+                let is_other_unit = (size / EARTH_M_S2 - 1.0).abs() > MAX_EARTH_DIFFERENCE;
                 let on_earth = || Self { gravity_m_s2: gravity.0.map(|g| g * EARTH_M_S2 / size) };
-                [Self { gravity_m_s2: [0.0; 3] }].into_iter().chain(is_in_a_unit.then(on_earth)).collect()
+                [Self { gravity_m_s2: [0.0; 3] }].into_iter().chain(is_other_unit.then(on_earth)).collect()
             }
             Breadth::Rare => directions().map(|direction| times(direction, EARTH_M_S2)).collect(),
             Breadth::Usual | Breadth::KnownRobot(_) => Vec::new(),
@@ -55,10 +55,10 @@ impl MistakeKind for Gravity {
     fn sentence(&self, _: &[String]) -> String {
         let [x, y, z] = self.gravity_m_s2;
         if self.gravity_m_s2 == [0.0; 3] {
-            return "the torque is without gravity: the controller took it off, or nothing pulls at this robot"
+            return "the torque is without gravity: the controller compensated gravity, or this robot has no gravity"
                 .to_owned();
         }
-        format!("the base is mounted otherwise: gravity is [{x:.2}, {y:.2}, {z:.2}] m/s² in its frame")
+        format!("the base is mounted in another orientation: gravity is [{x:.2}, {y:.2}, {z:.2}] m/s² in its frame")
     }
 
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
@@ -72,24 +72,24 @@ impl MistakeKind for Gravity {
         Some(Self { gravity_m_s2: [0.0; 3] }.into())
     }
 
-    /// Turned about two axes across it, twice over.
-    fn between(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
+    /// Turns the vector about two perpendicular axes, first by up to 0.5 rad, then by up to 0.1 rad.
+    fn with_best_number(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
         let mut gravity = self.gravity_m_s2;
         if gravity == [0.0; 3] {
             return None;
         }
         for reach in [0.5, 0.1] {
-            for axis in across(gravity) {
+            for axis in perpendicular_axes(gravity) {
                 let start = gravity;
                 let with = |angle: f64| Self { gravity_m_s2: turned(start, axis, angle) };
-                gravity = turned(start, axis, Number::angle(0.0, reach).least(|angle| value(&with(angle).into())));
+                gravity = turned(start, axis, Number::angle(0.0, reach).minimum(|angle| value(&with(angle).into())));
             }
         }
         Some(Self { gravity_m_s2: gravity }.into())
     }
 }
 
-/// 26 directions: along axes, and between two or three of them.
+/// 26 directions: along the axes, and halfway between two or three of them.
 fn directions() -> impl Iterator<Item = [f64; 3]> {
     let steps = |k: i32| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1].map(f64::from);
     (0..27).filter(|&k| k != 13).map(move |k| {
@@ -99,8 +99,8 @@ fn directions() -> impl Iterator<Item = [f64; 3]> {
     })
 }
 
-/// Two unit vectors across `v`.
-fn across(v: [f64; 3]) -> [[f64; 3]; 2] {
+/// Two unit vectors perpendicular to `v` and to each other.
+fn perpendicular_axes(v: [f64; 3]) -> [[f64; 3]; 2] {
     let least = (0..3).min_by(|&a, &b| v[a].abs().total_cmp(&v[b].abs())).unwrap_or(0);
     let mut other = [0.0; 3];
     other[least] = 1.0;
@@ -108,7 +108,7 @@ fn across(v: [f64; 3]) -> [[f64; 3]; 2] {
     [first, unit(cross(v, first))]
 }
 
-/// `v` turned about the unit vector `axis`, across it, by `angle` rad.
+/// `v` turned by `angle` rad about the perpendicular unit vector `axis`.
 fn turned(v: [f64; 3], axis: [f64; 3], angle: f64) -> [f64; 3] {
     let side = cross(axis, v);
     core::array::from_fn(|k| v[k] * angle.cos() + side[k] * angle.sin())

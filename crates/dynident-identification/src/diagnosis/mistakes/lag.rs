@@ -1,19 +1,19 @@
-//! A channel that was logged at another moment.
+//! A channel that was logged too late or too early.
 
 use super::kind::{Breadth, Facts, MistakeKind, Setup, joint_list};
 use super::study_keys::{KeyChange, StudyKeys, at, list, number};
 use crate::diagnosis::channels::Channels;
 
-/// The torques of these joints, or a joint's position, were logged later (earlier, if negative) than all else, by more
-/// than the lag of the torque that a fit compensates. Instants are chosen anew for each lag (`torque_clock`), so no
-/// lag is among the candidates and rows are not corrected.
+/// The torques of these joints, or a joint's position, were logged later (earlier, if negative) than the other
+/// channels, by more than the lag that a fit compensates. Each lag has different instants (`lag_search`), so lags are
+/// not among the candidates and rows are not corrected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lag {
-    /// Which joints.
+    /// The joints.
     pub joints: Vec<usize>,
-    /// Torques or positions; never both, which would be another recorder's clock.
+    /// Torques or positions, never both.
     pub channels: Channels,
-    /// The whole lag, of torques with what the study states or a fit compensated, seconds.
+    /// The total lag, s; for torques it includes a stated or compensated lag.
     pub lag_s: f64,
 }
 
@@ -28,16 +28,16 @@ impl MistakeKind for Lag {
 
     fn sentence(&self, names: &[String]) -> String {
         format!(
-            "{} of {} is logged {:.3} s {} than {}: two clocks, or a buffer",
+            "{} of {} is logged {:.3} s {} than {}: there are two clocks, or a buffer",
             self.channels.text(),
             joint_list(&self.joints, names),
             self.lag_s.abs(),
             if self.lag_s > 0.0 { "later" } else { "earlier" },
-            if self.channels == Channels::Torque { "the motion" } else { "all else" }
+            if self.channels == Channels::Torque { "the motion" } else { "all other channels" }
         )
     }
 
-    /// The key is that of all logs, and positions have none.
+    /// The key applies to all logs and only to torques.
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
         if self.channels != Channels::Torque || !keys.is_common() {
             return Vec::new();

@@ -1,25 +1,24 @@
-//! A joint at another distance from the one before it.
+//! A wrong distance between a joint and the joint before it.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, with_model};
 use super::numbers::Number;
 use dynident_dynamics::ParametricModel;
 
-/// Factors that are tried: halves, a diameter for a radius, the other side. Those between are found from these.
-const FACTORS: [f64; 3] = [0.5, 2.0, -1.0];
+/// Tried factors: a radius for a diameter and the reverse, the other side. A search finds factors between these.
+const LENGTH_FACTORS: [f64; 3] = [0.5, 2.0, -1.0];
 
-/// The description has a joint at another distance from the one before it.
+/// A wrong distance between a joint and the joint before it in the description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Length {
     /// The joint.
     pub joint: usize,
-    /// What to multiply the distance by; negative: the other side.
+    /// Factor on the distance; negative for the other side.
     pub factor: f64,
 }
 
 impl MistakeKind for Length {
-    /// Where joints follow others the tree has more joints than the log. The place of the first joint in the base has
-    /// no influence on torque.
+    /// The place of the first joint has no influence on torque. A coupled tree has more joints than the log.
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
         let model = setup.model();
         if !matches!(breadth, Breadth::Rare) || model.coupling().is_some() {
@@ -30,7 +29,7 @@ impl MistakeKind for Length {
             description.parent.is_some() && description.placement.translation.norm() > 0.0
         };
         let joints = (0..model.dof()).filter(is_apart);
-        joints.flat_map(|joint| FACTORS.map(|factor| Self { joint, factor })).collect()
+        joints.flat_map(|joint| LENGTH_FACTORS.map(|factor| Self { joint, factor })).collect()
     }
 
     fn corrected_robot(&self, robot: &ParametricModel) -> Option<ParametricModel> {
@@ -39,7 +38,7 @@ impl MistakeKind for Length {
 
     fn facts(&self) -> Facts {
         Facts {
-            // Descriptions are wrong in their bodies far more often than in their joints.
+            // Descriptions have far more errors in their bodies than in their joints.
             rarity: 0.3,
             joints: Some(vec![self.joint]),
             is_of_all_logs: true,
@@ -56,7 +55,7 @@ impl MistakeKind for Length {
             _ => "too far from",
         };
         format!(
-            "the description has joint `{}` {place} the joint before it: `xyz` of its origin has to be times {:.3}",
+            "the description has joint `{}` {place} the joint before it: multiply `xyz` of its origin by {:.3}",
             names[self.joint], self.factor
         )
     }

@@ -1,4 +1,4 @@
-//! A zero of a position that is elsewhere.
+//! A wrong zero of a position.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup};
@@ -9,19 +9,19 @@ use crate::diagnosis::motion_rows::MotionRows;
 use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 use dynident_dynamics::ParametricModel;
 
-/// Offsets that are tried, rad: a quarter or half a turn, or near zero. Those between are found from these.
+/// Tried offsets, rad: a quarter or half a turn, or near zero. A search finds offsets between these.
 const OFFSETS_RAD: [f64; 7] = [-FRAC_PI_2, FRAC_PI_2, PI, -FRAC_PI_6, FRAC_PI_6, -FRAC_PI_6 / 3.0, FRAC_PI_6 / 3.0];
-/// Smaller offsets, rad, which are significant where base parameters are known.
+/// Smaller offsets, rad, which are significant if base parameters are known.
 const SMALL_OFFSETS_RAD: [f64; 6] = [-0.3, -0.15, -0.07, 0.07, 0.15, 0.3];
-/// Factors of an offset at which other robots are tried.
+/// Factors on an offset that are tried for other robots.
 const OTHER_OFFSETS: [f64; 6] = [-1.0, -0.5, -0.25, 0.25, 0.5, 1.0];
 
-/// The zero of a joint's position is elsewhere: `offset_rad` has to be added.
+/// A wrong zero of a joint's position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Offset {
     /// The joint.
     pub joint: usize,
-    /// What to add, rad.
+    /// Offset to add to the position, rad.
     pub offset_rad: f64,
 }
 
@@ -41,7 +41,6 @@ impl MistakeKind for Offset {
     }
 
     fn facts(&self) -> Facts {
-        // People mistake zeros by quarters of a turn, or by any angle.
         let is_round = (self.offset_rad / FRAC_PI_2).fract() == 0.0;
         Facts {
             rarity: 0.15,
@@ -55,7 +54,7 @@ impl MistakeKind for Offset {
 
     fn sentence(&self, names: &[String]) -> String {
         format!(
-            "the zero of joint `{}` lies {:.1} degrees away from the description's",
+            "the zero of joint `{}` differs by {:.1} degrees from the description's",
             names[self.joint],
             self.offset_rad * 180.0 / PI
         )

@@ -9,17 +9,17 @@ use dynident_dynamics::ParametricModel;
 use dynident_recording::log::ColumnRef;
 use dynident_text::quoted;
 
-/// The columns are in another order: joint `j` should have what joint `order[j]` has.
+/// The columns are in another order: joint `j` needs the columns of joint `order[j]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Order {
-    /// For each joint the one whose columns belong to it.
+    /// The joint with the correct columns, for each joint.
     pub order: Vec<usize>,
-    /// Which columns.
+    /// Positions, torques, or both.
     pub channels: Channels,
 }
 
 impl MistakeKind for Order {
-    /// Exchanged joints, columns counted from the wrong end or one off.
+    /// Two exchanged joints, the reverse order, or a shift by one joint.
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
         let Breadth::Usual = breadth else { return Vec::new() };
         let dof = setup.robot.dof();
@@ -63,7 +63,7 @@ impl MistakeKind for Order {
         }
         let from: Vec<String> = self.order.iter().map(|&joint| format!("`{}`", names[joint])).collect();
         format!(
-            "the columns of {channels} stand in another order: where the study has {} they are of {}",
+            "the columns of {channels} are in another order: the study has {}, the correct order is {}",
             names.join(", "),
             from.join(", ")
         )

@@ -9,42 +9,44 @@ use crate::diagnosis::motion_rows::MotionRows;
 use core::f64::consts::{PI, TAU};
 use dynident_dynamics::ParametricModel;
 
-/// Factors of positions in other units: degrees, revolutions and what somebody converted twice, half revolutions, gears
-/// of about a hundred, milliradians, counts of encoders. Gears and counts between these are found from the nearest.
+/// Tried factors: degrees, revolutions, the same converted twice, half revolutions, gear ratios of about 100,
+/// milliradians, encoder counts. A search finds gear ratios and encoder counts between these.
 const UNITS: [f64; 10] = [PI / 180.0, TAU, 180.0 / PI, 1.0 / TAU, PI, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
-/// The same of one joint, which may also be counted twice or by halves.
+/// The same for one joint, with factors of two.
 const UNITS_OF_ONE: [f64; 8] = [PI / 180.0, TAU, 180.0 / PI, 1.0 / TAU, 0.5, 2.0, 1e-3, 1e-4];
-/// The same of one prismatic joint.
+/// The same for one prismatic joint.
 const UNITS_OF_ONE_LENGTH: [f64; 4] = [1e-3, 1e3, 0.5, 2.0];
-/// Factors that are exactly a unit's; others are those of gears or encoders.
+/// Exact factors of units; others belong to gears or encoders.
 const EXACT_UNITS: [f64; 8] = [PI / 180.0, TAU, 180.0 / PI, 1.0 / TAU, PI, 0.5, 2.0, 1e-3];
 
-/// Travel beyond which a joint's unit is far too small, in ranges of the joint.
-const MAX_TRAVEL: f64 = 2.0;
-/// Reach of the logarithm of a factor in which gears and counts of encoders are searched.
-const REACH: f64 = 2.0;
-/// Ratio of two factors from which they are different in words.
-const SAME_FACTOR: f64 = 1.1;
+/// Largest travel of a joint in its ranges; more shows a unit that is far too small.
+const MAX_TRAVEL_RANGES: f64 = 2.0;
+/// Half width of the search for gear ratios and encoder counts, of the factor's logarithm.
+const SEARCH_REACH: f64 = 2.0;
+/// Largest ratio of two factors that are reported as one.
+const MAX_RATIO_OF_ONE_FACTOR: f64 = 1.1;
+/// Largest logarithm of the ratio of a free factor to a unit that it may not replace.
+const MIN_LOG_RATIO_TO_UNIT: f64 = 0.1;
 
-/// The positions of these joints are in another unit, or those of the motors' side.
+/// The positions of these joints are in another unit, or on the motor side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PositionUnit {
-    /// Which joints.
+    /// The joints.
     pub joints: Vec<usize>,
-    /// What to multiply positions by.
+    /// Factor on positions.
     pub factor: f64,
 }
 
 impl PositionUnit {
     fn number(&self) -> Number {
-        Number { is_round: EXACT_UNITS.contains(&self.factor), ..Number::factor(self.factor, REACH) }
+        Number { is_round: EXACT_UNITS.contains(&self.factor), ..Number::factor(self.factor, SEARCH_REACH) }
     }
 
     fn is_shown_by_travel(&self) -> bool {
-        self.joints.len() == 1 && self.factor < MAX_TRAVEL.recip()
+        self.joints.len() == 1 && self.factor < MAX_TRAVEL_RANGES.recip()
     }
 
-    /// Units of the position of one joint. Units that are far too small are tried where the travel shows them.
+    /// Units of the position of one joint. Units that are far too small are tried only if the joint travels too far.
     fn of_one(setup: Setup<'_>, joint: usize) -> impl Iterator<Item = Self> {
         let description = &setup.model().joints()[joint];
         let units: &[f64] = if description.turns() { &UNITS_OF_ONE } else { &UNITS_OF_ONE_LENGTH };
@@ -53,7 +55,7 @@ impl PositionUnit {
         let q = setup.rows.q[joint].iter().copied();
         let travel = q.clone().fold(f64::NEG_INFINITY, f64::max) - q.fold(f64::INFINITY, f64::min);
         let all = units.iter().map(move |&factor| Self { joints: vec![joint], factor });
-        all.filter(move |unit| !unit.is_shown_by_travel() || travel > MAX_TRAVEL * range)
+        all.filter(move |unit| !unit.is_shown_by_travel() || travel > MAX_TRAVEL_RANGES * range)
     }
 }
 
@@ -77,7 +79,6 @@ impl MistakeKind for PositionUnit {
 
     fn facts(&self) -> Facts {
         Facts {
-            // A unit of one joint alone is rarer than one of all, or than another rate.
             rarity: if self.joints.len() == 1 { 0.15 } else { 0.0 },
             joints: Some(self.joints.clone()),
             position_factor: Some(self.factor),
@@ -94,10 +95,12 @@ impl MistakeKind for PositionUnit {
     fn sentence(&self, names: &[String]) -> String {
         let factor = self.factor;
         if self.joints.len() == names.len() {
-            return format!("the positions are in another unit or of the motor side: times {factor:.6} they are rad");
+            return format!(
+                "the positions are in another unit or on the motor side: multiply them by {factor:.6} to get rad"
+            );
         }
         format!(
-            "the position of {} is in another unit than the others, or of the motor side: times {factor:.6} it is rad (m)",
+            "the position of {} has a different unit, or is on the motor side: multiply it by {factor:.6} to get rad (m)",
             joint_list(&self.joints, names)
         )
     }
@@ -115,12 +118,12 @@ impl MistakeKind for PositionUnit {
 
     fn other_factors(&self, range: [f64; 2]) -> String {
         let [least, greatest] = range;
-        if greatest <= SAME_FACTOR * least {
+        if greatest <= MAX_RATIO_OF_ONE_FACTOR * least {
             return String::new();
         }
         let [least, greatest] = range.map(significant);
         format!(
-            "; these logs cannot tell it from any between {least} and {greatest}: take gear ratios, or counts of encoders, from the data sheet"
+            "; these logs do not distinguish factors between {least} and {greatest}: use the gear ratio, or the counts of the encoder, from the data sheet"
         )
     }
 
@@ -128,11 +131,11 @@ impl MistakeKind for PositionUnit {
         Some(Self { factor, ..self.clone() }.into())
     }
 
-    /// A gear ratio may be near a unit.
-    fn between(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
+    /// `None` for a factor too near to a unit.
+    fn with_best_number(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
         let with = |factor: f64| Self { factor, ..self.clone() }.into();
-        let found = self.number().least(|factor| value(&with(factor)));
-        let is_unit = self.number().is_round && (found / self.factor).ln().abs() < 0.1;
+        let found = self.number().minimum(|factor| value(&with(factor)));
+        let is_unit = self.number().is_round && (found / self.factor).ln().abs() < MIN_LOG_RATIO_TO_UNIT;
         (!is_unit).then(|| with(found))
     }
 }

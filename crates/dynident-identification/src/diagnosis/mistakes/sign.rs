@@ -7,12 +7,12 @@ use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
 use dynident_dynamics::ParametricModel;
 
-/// The signs of these joints are reversed; of position and torque alike: the joint's axis.
+/// The signs of these joints are reversed. Position and torque together mean a reversed axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sign {
-    /// Which joints.
+    /// The joints.
     pub joints: Vec<usize>,
-    /// Which of their columns.
+    /// Positions, torques, or both.
     pub channels: Channels,
 }
 
@@ -40,8 +40,8 @@ impl MistakeKind for Sign {
             channels: Some(self.channels),
             joints: Some(self.joints.clone()),
             torques: self.joints.iter().map(|&joint| TorqueSource { joint, from: joint, factor: -1.0 }).collect(),
-            // A negative torque and a negative position are one robot and its mirror image. No description fixes the
-            // sign of a torque.
+            // A negative torque of a robot equals a negative position of its mirror image. Descriptions do not define
+            // the sign of a torque.
             likelier_channels: Some(Channels::Torque),
             ..Facts::of("sign")
         }
@@ -57,7 +57,6 @@ impl MistakeKind for Sign {
         let of = |channels: Channels| {
             let (group, table) = keys.group(channels);
             if group.matrix.is_some() || group.inverse_matrix.is_some() {
-                // A sign belongs to a column, and a joint to a row.
                 let (key, what) = if group.matrix.is_some() { ("matrix", "row") } else { ("inverse_matrix", "column") };
                 let numbers: Vec<String> = places.iter().map(|place| (place + 1).to_string()).collect();
                 return KeyChange { table, line: format!("# {key}: the negative of {what} {}", numbers.join(", ")) };

@@ -14,14 +14,14 @@ pub struct KeyChange {
     pub line: String,
 }
 
-/// The keys that a study has now, as far as corrections change them.
+/// The present keys of a study that corrections may change.
 #[derive(Clone, Debug)]
 pub struct StudyKeys {
     /// The format of the log.
     pub format: LogFormat,
     /// The table of the format: `format`, or that of one log.
     pub table: String,
-    /// For each joint of the model its place among the joints of the log.
+    /// Number of the log's joint, for each joint of the model.
     pub places: Vec<usize>,
     /// Number of the log's joints.
     pub columns: usize,
@@ -41,18 +41,18 @@ impl StudyKeys {
         (group, format!("{}.{name}", self.table))
     }
 
-    /// Whether the format is that of all logs.
+    /// Whether the format applies to all logs.
     pub(super) fn is_common(&self) -> bool {
         self.table == "format"
     }
 
-    /// `key` of positions or torques with one value for each joint of the log, where `value` is given its place.
+    /// `key` of positions or torques with one value for each joint of the log, computed by `value`.
     pub(super) fn per_column(&self, channels: Channels, key: &str, value: impl Fn(usize) -> String) -> KeyChange {
         let (_, table) = self.group(channels);
         KeyChange { table, line: format!("{key} = {}", list((0..self.columns).map(value))) }
     }
 
-    /// `scale` with the values of these joints times `factor`.
+    /// `scale` with the values of `joints` times `factor`.
     pub(super) fn scales(&self, channels: Channels, joints: &[usize], factor: f64) -> KeyChange {
         let (group, _) = self.group(channels);
         let places: Vec<usize> = joints.iter().map(|&joint| self.places[joint]).collect();
@@ -91,12 +91,10 @@ impl StudyKeys {
     }
 }
 
-/// The value for one place.
 pub(super) fn at(values: Option<&OneOrMany<f64>>, place: usize, default: f64) -> f64 {
     values.and_then(|values| values.at(place)).unwrap_or(default)
 }
 
-/// A list in TOML.
 pub(super) fn list(values: impl IntoIterator<Item = String>) -> String {
     format!("[{}]", values.into_iter().collect::<Vec<_>>().join(", "))
 }
@@ -110,7 +108,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     if text == "-0.0" { "0.0".to_owned() } else { text }
 }
 
-/// Three significant digits; nine of a unit's factor, which is known and not estimated.
+/// Three significant digits; nine for the exact factor of a unit.
 pub(super) fn significant(value: f64) -> String {
     let units = [PI / 180.0, 180.0 / PI, TAU, TAU.recip(), PI, PI.recip()];
     let places = if units.iter().any(|unit| (value / unit - 1.0).abs() < 1e-9) { 8.0 } else { 2.0 };

@@ -1,4 +1,4 @@
-//! Time stamps in another unit, or another rate.
+//! Another unit of time, or another rate.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, scale};
@@ -9,25 +9,25 @@ use crate::diagnosis::plausibility::{beyond_limits, is_rate_of_a_recorder};
 use dynident_dynamics::ParametricModel;
 use dynident_recording::log::TimeUnit as LogUnit;
 
-/// Units of time.
+/// Tried units of time.
 const UNITS: [f64; 8] = [1e-3, 1e-6, 1e-9, 1e-2, 1e3, 1e6, 1e9, 1e2];
-/// Rates that are mistaken for one another: every second sample, a decimal place, minutes.
+/// Tried factors on the rate: every second sample, a decimal place, minutes.
 const OTHER_RATES: [f64; 5] = [0.5, 2.0, 0.1, 10.0, 60.0];
 
 /// The time stamps have another unit, or the recorder another rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeUnit {
-    /// What to multiply times by.
+    /// Factor on times.
     pub factor: f64,
 }
 
 impl MistakeKind for TimeUnit {
-    /// Units where the rate is implausible or the robot would be too fast. Stamps that are a factor too large make a
-    /// rate that is as much too low.
+    /// Units are tried only if the rate is implausible or the robot would be too fast.
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
-        let is_plausible = |rate_hz: f64| is_rate_of_a_recorder(setup.model(), rate_hz);
+        let limits = &setup.settings.motion;
+        let is_plausible = |rate_hz: f64| is_rate_of_a_recorder(setup.model(), rate_hz, limits);
         let is_too_fast =
-            || beyond_limits(setup.model(), setup.rows).iter().any(|beyond| beyond.quantity == "velocity");
+            || beyond_limits(setup.model(), setup.rows, limits).iter().any(|beyond| beyond.quantity == "velocity");
         let rate_hz = setup.rows.rate_hz;
         let factors: &[f64] = match breadth {
             Breadth::Usual if !is_plausible(rate_hz) || is_too_fast() => &UNITS,
@@ -55,9 +55,9 @@ impl MistakeKind for TimeUnit {
         let factor = self.factor;
         let power = factor.log10() / 3.0;
         if (power - power.round()).abs() < 1e-9 {
-            return format!("time is in another unit: times {factor:e} it is in seconds");
+            return format!("time is in another unit: multiply it by {factor:e} to get seconds");
         }
-        format!("the recorder had another rate: times {factor:.3} the stamps are seconds")
+        format!("the recorder had another rate: multiply the time stamps by {factor:.3} to get seconds")
     }
 
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {

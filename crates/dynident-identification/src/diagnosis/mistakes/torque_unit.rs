@@ -6,35 +6,33 @@ use super::numbers::Number;
 use super::study_keys::{KeyChange, StudyKeys};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
+use crate::diagnosis::span::dot;
 use dynident_dynamics::ParametricModel;
 
-/// Factors that are tried: the other units of a table, a gear, a motor of two. Those between, such as the motor
-/// constant of another drive, are found from these.
+/// Tried factors: units, gear ratios, one motor of two. A search finds factors between these, such as motor constants.
 const UNITS: [f64; 16] = [0.77, 1.3, 0.6, 1.6, 0.5, 2.0, 0.2, 5.0, 0.1, 10.0, 0.03, 30.0, 0.01, 100.0, 1e-3, 1e3];
-/// Factors of a unit or of a pair of motors; others are those of gears or motor constants.
+/// Exact factors of units and pairs of motors; others belong to gears or motor constants.
 const EXACT_UNITS: [f64; 8] = [0.5, 2.0, 0.1, 10.0, 0.01, 100.0, 1e-3, 1e3];
-/// Factors that are no unit's.
-const GAINS: core::ops::RangeInclusive<f64> = 0.4..=2.5;
-/// A gain that differs from one by less is a drive's own.
-const MIN_GAIN: f64 = 1.15;
+/// Factors that are reported as a gain, not as a unit.
+const GAIN_FACTORS: core::ops::RangeInclusive<f64> = 0.4..=2.5;
 
-/// The torque of one joint has another unit than that of the others.
+/// The torque of one joint has a different unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TorqueUnit {
     /// The joint.
     pub joint: usize,
-    /// What to multiply its torque by.
+    /// Factor on its torque.
     pub factor: f64,
 }
 
 impl MistakeKind for TorqueUnit {
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
         let dof = setup.robot.dof();
+        let min_gain = setup.settings.held_out.min_torque_gain;
         let known = |explained: &[f64], joint: usize| {
             let tau = &setup.rows.tau[joint];
-            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let factor = dot(explained, tau) / dot(tau, tau);
-            let is_clear = factor > 0.0 && factor.ln().abs() > MIN_GAIN.ln();
+            let is_clear = factor > 0.0 && factor.ln().abs() > min_gain.ln();
             is_clear.then_some(Self { joint, factor })
         };
         match breadth {
@@ -64,13 +62,13 @@ impl MistakeKind for TorqueUnit {
 
     fn sentence(&self, names: &[String]) -> String {
         let (name, factor) = (&names[self.joint], self.factor);
-        if GAINS.contains(&factor) {
+        if GAIN_FACTORS.contains(&factor) {
             return format!(
-                "the torque of joint `{name}` has another gain (motor constant, gear ratio) than the study says: times {factor:.3} it is Nm (N)"
+                "the torque of joint `{name}` has another gain (motor constant, gear ratio) than in the study: multiply it by {factor:.3} to get Nm (N)"
             );
         }
         format!(
-            "the torque of joint `{name}` is in another unit than the others, or of the motor side: times {factor:.3} it is Nm (N)"
+            "the torque of joint `{name}` has a different unit, or is on the motor side: multiply it by {factor:.3} to get Nm (N)"
         )
     }
 

@@ -1,83 +1,79 @@
-//! Is the torque of another moment than the motion? Two recorders that were started by hand, a buffer, a network:
-//! shifts of tenths of seconds, which the lag that a fit takes off by itself does not reach.
+//! Channels that were logged too late or too early: two recorders that were started by hand, a buffer, a network. Such
+//! shifts of tenths of seconds exceed the lag that a fit compensates.
 
 use super::channels::Channels;
 use super::explanation::Explanation;
-use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Explained, Hypothesis};
+use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
 use super::joint_fits::{JointFits, SharedMotion};
 use super::mistakes::lag::Lag;
-use super::mistakes::{Mistake, least_by_thirds};
+use super::mistakes::{Mistake, ternary_search};
 use super::motion_rows::{MotionRows, MotionSamples, share_of_log};
+use super::settings::DiagnosisSettings;
 use crate::consistent::ConsistencySettings;
 use crate::lag::LONGEST_DELAY_S;
 use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
 
-/// Longest shift that is looked for, seconds of a usual arm, and how finely: arms move at a hertz or so.
-const REACH_S: f64 = 2.0;
-const STEP_S: f64 = 0.1;
-/// The same of one joint's channel alone: more of it is half a turn of its motion, which looks like another sign.
-const REACH_ALONE_S: f64 = 0.5;
-/// Share of a piece of motion that instants keep away from its ends for that: torque is known on both sides of them.
-const SHARE_OF_PIECE: f64 = 1.0 / 6.0;
-/// Instants that shifts are compared on.
+/// Number of instants for the comparison of shifts.
 const INSTANTS: usize = 200;
-/// Times what parameters of its own leave of a joint's torque that one robot leaves, from which its torque is shifted
-/// by itself.
-const DOUBTFUL: f64 = 1.5;
-/// Share of all torque below which nothing is left that a shift would explain.
-const EXPLAINED: f64 = 0.02;
 
-/// Instants for each column of a joint below which shifts are not compared: parameters would follow them.
-const ROWS_PER_COLUMN: usize = 2;
-
-/// A hypothesis with a channel at another moment.
 pub(super) struct LateChannel {
     pub(super) explained: Explained,
-    /// Improvement of the score over the channel as it was logged, on the same instants.
+    /// Improvement of the score over the channel as logged, on the same instants.
     pub(super) gain: f64,
 }
 
-/// Shifts of the torque that are looked for in some recordings.
-pub(super) struct TorqueClock<'a> {
+/// Tries shifts of torque or motion in some recordings.
+pub(super) struct LagSearch<'a> {
     samples: &'a [MotionSamples],
-    /// What is taken off already, joint by joint.
-    taken_off_s: Vec<f64>,
-    /// Seconds.
+    settings: &'a DiagnosisSettings,
+    /// Compensated lag of each joint, s.
+    compensated_s: Vec<f64>,
+    /// Longest shift, s.
     reach_s: f64,
     step_s: f64,
-    least_s: f64,
-    alone_s: f64,
+    /// Longest lag that a fit compensates, s.
+    max_compensated_s: f64,
+    /// Longest shift of one joint's channel, s.
+    reach_of_joint_s: f64,
 }
 
-impl<'a> TorqueClock<'a> {
-    /// For recordings of a robot with the lags `taken_off_s` taken off, joint by joint; none where they are too short.
-    pub(super) fn new(robot: &ParametricModel, samples: &'a [MotionSamples], taken_off_s: Vec<f64>) -> Option<Self> {
-        let own = robot.model().own_scale();
+impl<'a> LagSearch<'a> {
+    /// For recordings with the compensated lags `compensated_s`, one for each joint; `None` if they are too short.
+    pub(super) fn new(
+        robot: &ParametricModel,
+        samples: &'a [MotionSamples],
+        compensated_s: Vec<f64>,
+        settings: &'a DiagnosisSettings,
+    ) -> Option<Self> {
+        let (own, limits) = (robot.model().own_scale(), &settings.late_channel);
         let longest_s = samples.iter().map(MotionSamples::longest_s).fold(0.0, f64::max);
-        let [reach_s, step_s, least_s, alone_s] =
-            [REACH_S, STEP_S, LONGEST_DELAY_S, REACH_ALONE_S].map(|usual_s| own.seconds(usual_s));
-        let reach_s = reach_s.min(SHARE_OF_PIECE * longest_s);
-        (reach_s > step_s).then_some(Self { samples, taken_off_s, reach_s, step_s, least_s, alone_s })
+        let [reach_s, step_s, max_compensated_s, reach_of_joint_s] =
+            [limits.max_lag_s, limits.lag_step_s, LONGEST_DELAY_S, limits.max_lag_of_joint_s]
+                .map(|usual_s| own.seconds(usual_s));
+        let reach_s = reach_s.min(limits.max_share_of_motion * longest_s);
+        let lag_search =
+            Self { samples, settings, compensated_s, reach_s, step_s, max_compensated_s, reach_of_joint_s };
+        (reach_s > step_s).then_some(lag_search)
     }
 
-    /// Lags that are tried beside what is taken off.
+    /// Tried lags in addition to the compensated ones, s.
     pub(super) fn lags_s(&self) -> impl Iterator<Item = f64> {
         let most = (self.reach_s / self.step_s) as i32;
         let step_s = self.step_s;
         (-most..=most).filter(|k| *k != 0).map(move |k| f64::from(k) * step_s)
     }
 
-    /// The lag near `lag_s` of which `value` is least.
-    pub(super) fn least_near(&self, lag_s: f64, value: impl Fn(f64) -> f64) -> f64 {
-        least_by_thirds([lag_s - self.step_s, lag_s + self.step_s], 0.02 * self.step_s, value)
+    /// The lag near `lag_s` with the smallest `value`, s.
+    pub(super) fn refined_lag_s(&self, lag_s: f64, value: impl Fn(f64) -> f64) -> f64 {
+        ternary_search([lag_s - self.step_s, lag_s + self.step_s], 0.02 * self.step_s, value)
             .clamp(-self.reach_s, self.reach_s)
     }
 
     /// At most `most` instants with the torque, or the motion, of `joints` taken `lag_s` later.
     pub(super) fn rows(&self, joints: &[usize], channels: Channels, lag_s: f64, most: usize) -> MotionRows {
-        let lags: Vec<f64> =
-            (0..self.taken_off_s.len()).map(|joint| if joints.contains(&joint) { lag_s } else { 0.0 }).collect();
+        let dof = self.compensated_s.len();
+        let lags: Vec<f64> = (0..dof).map(|joint| if joints.contains(&joint) { lag_s } else { 0.0 }).collect();
         let mut rows = MotionRows::empty(lags.len());
         for (place, samples) in self.samples.iter().enumerate() {
             let share = share_of_log(most, place, self.samples.len());
@@ -86,21 +82,23 @@ impl<'a> TorqueClock<'a> {
         rows
     }
 
-    /// The mistake of a lag in addition to the compensated one; none where a fit compensates the whole lag.
+    /// The mistake of a lag in addition to the compensated one; `None` if a fit compensates the whole lag.
     pub(super) fn mistake(&self, joints: &[usize], channels: Channels, lag_s: f64) -> Option<Mistake> {
-        let taken_off_s = match channels {
-            Channels::Torque => joints.iter().map(|&joint| self.taken_off_s[joint]).sum::<f64>(),
+        let compensated_s = match channels {
+            Channels::Torque => joints.iter().map(|&joint| self.compensated_s[joint]).sum::<f64>(),
             Channels::Position | Channels::Both => 0.0,
         };
-        let whole_s = taken_off_s / joints.len().max(1) as f64 + lag_s;
+        let whole_s = compensated_s / joints.len().max(1) as f64 + lag_s;
         // A fit compensates no lag of positions.
-        let is_long = channels == Channels::Position || whole_s.abs() > self.least_s || lag_s.abs() > self.least_s;
+        let is_long = channels == Channels::Position
+            || whole_s.abs() > self.max_compensated_s
+            || lag_s.abs() > self.max_compensated_s;
         is_long.then(|| Lag { joints: joints.to_vec(), channels, lag_s: whole_s }.into())
     }
 
-    /// The hypothesis that the torque of all joints was logged at another moment, or, where a torque is inconsistent
-    /// with the others, torque or position of one joint, if it is clearly better than the study `as_written`. It has
-    /// no mistake where a fit compensates the lag.
+    /// The hypothesis with a lag of all torques, or, if a torque is inconsistent with the others, of torque or position
+    /// of one joint; `None` unless it is clearly better than the study `as_written`. It has no mistake if a fit
+    /// compensates the lag.
     pub(super) fn late_channel(
         &self,
         robot: &ParametricModel,
@@ -108,38 +106,38 @@ impl<'a> TorqueClock<'a> {
         consistency: &ConsistencySettings,
         instants: usize,
     ) -> Option<LateChannel> {
-        if as_written.left_of_all < EXPLAINED {
+        let limits = &self.settings.late_channel;
+        if as_written.left_of_all < limits.min_unexplained {
             return None;
         }
         let all: Vec<usize> = (0..robot.dof()).collect();
         let rows = self.rows(&all, Channels::Torque, 0.0, INSTANTS);
         let most_columns = all.iter().map(|&joint| robot.layout().joint_columns(joint).len()).max()?;
-        if rows.len() < ROWS_PER_COLUMN * most_columns {
+        if rows.len() < limits.min_instants_per_column * most_columns {
             return None;
         }
         let here = Explanation::new(robot, &rows, None).ok()?;
         let alone = here.alone_of_noise_free();
         let mut groups = vec![(all.clone(), Channels::Torque)];
-        if all.iter().any(|&joint| here.free[joint] > DOUBTFUL * alone[joint]) {
+        if all.iter().any(|&joint| here.free[joint] > limits.min_ratio_of_joint * alone[joint]) {
             let of_one =
                 |&joint: &usize| [Channels::Torque, Channels::Position].map(|channels| (vec![joint], channels));
             groups.extend(all.iter().flat_map(of_one));
         }
         let (joints, channels, lag_s) = self.best_lag(robot, &rows, &groups, here.free_score())?;
         let mistakes: Vec<Mistake> = self.mistake(joints, channels, lag_s).into_iter().collect();
-        // Both on the same instants, which keep away from the ends.
         let explained = |lag_s: f64, mistakes: Vec<Mistake>| {
             let rows = self.rows(joints, channels, lag_s, instants);
-            CorrectedStudy::new(robot.clone(), rows, mistakes).explained(consistency).ok()
+            CorrectedStudy::new(robot.clone(), rows, mistakes, *self.settings).explained(consistency).ok()
         };
         let (late, unshifted) = (explained(lag_s, mistakes)?, explained(0.0, Vec::new())?.hypothesis);
         let gain = unshifted.score() - late.hypothesis.score();
-        let is_better = late.hypothesis.score() < unshifted.score() - CLEARLY_BETTER
+        let is_better = late.hypothesis.score() < unshifted.score() - self.settings.score.min_gain
             && late.hypothesis.left_of_all < unshifted.left_of_all;
         is_better.then_some(LateChannel { explained: late, gain })
     }
 
-    /// The channels and the lag of the best fit without physical limits, which is cheap, if it is clearly better than
+    /// The channels and the lag of the best fit without physical limits; `None` unless its score is clearly better than
     /// `unshifted`.
     fn best_lag<'g>(
         &self,
@@ -156,7 +154,6 @@ impl<'a> TorqueClock<'a> {
         let lags_s: Vec<f64> = self.lags_s().collect();
         let late: Vec<MotionRows> =
             lags_s.iter().map(|&lag_s| self.rows(&all, Channels::Torque, lag_s, INSTANTS)).collect();
-        // Torques of other moments are torques of one motion.
         let torques = |joint: usize| [rows].into_iter().chain(&late).map(|rows| &rows.tau[joint][..]).collect();
         let motion = SharedMotion::new(robot, rows, torques).ok()?;
         let score_of_tried = |joints: &[usize], channels: Channels, lag: usize| {
@@ -169,14 +166,14 @@ impl<'a> TorqueClock<'a> {
             fits.and_then(|fits| fits.free_score()).unwrap_or(f64::INFINITY)
         };
         let best_of = |(joints, channels): &'g (Vec<usize>, Channels)| {
-            let is_near = |lag: &usize| joints.len() > 1 || lags_s[*lag].abs() <= self.alone_s;
+            let is_near = |lag: &usize| joints.len() > 1 || lags_s[*lag].abs() <= self.reach_of_joint_s;
             let tried: Vec<usize> = (0..lags_s.len()).filter(is_near).collect();
             let scores: Vec<f64> = tried.par_iter().map(|&lag| score_of_tried(joints, *channels, lag)).collect();
             let best = (0..tried.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
             Some((&joints[..], *channels, lags_s[tried[best]], scores[best]))
         };
         let (joints, channels, lag_s, least) = groups.iter().filter_map(best_of).min_by(|a, b| a.3.total_cmp(&b.3))?;
-        let is_clear = least <= unshifted - CLEARLY_BETTER;
-        is_clear.then(|| (joints, channels, self.least_near(lag_s, |lag_s| score(joints, channels, lag_s))))
+        let is_clear = least <= unshifted - self.settings.score.min_gain;
+        is_clear.then(|| (joints, channels, self.refined_lag_s(lag_s, |lag_s| score(joints, channels, lag_s))))
     }
 }

@@ -1,0 +1,45 @@
+//! Limits behind the findings of the examination.
+
+use crate::diagnosis::{InvalidLimit, check_limits};
+
+/// Limits behind the findings of the examination.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExaminationSettings {
+    /// Largest ratio of the residual with the opposite sign of the torque to that as given, for a reversed sign; 0.5.
+    pub max_reversed_ratio: f64,
+    /// Residual of the nominal bodies from which they may belong to another robot, percent of the torque; 50. Friction,
+    /// which they do not include, is usually less.
+    pub max_nominal_residual_percent: f64,
+    /// Smallest negative friction in standard deviations; 5. On the first real logs correct joints stayed above −2.5,
+    /// dead channels were below −8.
+    pub min_friction_deviations: f64,
+    /// Smallest negative friction relative to the residual of the joint; 0.5. Less may be an unmodelled effect, as for
+    /// a wrist whose torque is measured behind the gear and is mostly noise.
+    pub min_friction_ratio: f64,
+}
+
+impl Default for ExaminationSettings {
+    fn default() -> Self {
+        Self {
+            max_reversed_ratio: 0.5,
+            max_nominal_residual_percent: 50.0,
+            min_friction_deviations: 5.0,
+            min_friction_ratio: 0.5,
+        }
+    }
+}
+
+impl ExaminationSettings {
+    /// Checks that all limits are finite and positive.
+    ///
+    /// # Errors
+    /// The first invalid limit.
+    pub fn validate(&self) -> Result<(), InvalidLimit> {
+        check_limits(&[
+            ("max_reversed_ratio", self.max_reversed_ratio),
+            ("max_nominal_residual_percent", self.max_nominal_residual_percent),
+            ("min_friction_deviations", self.min_friction_deviations),
+            ("min_friction_ratio", self.min_friction_ratio),
+        ])
+    }
+}
