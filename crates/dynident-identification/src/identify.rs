@@ -61,7 +61,7 @@ pub struct Identification {
     pub held_out: Vec<HeldOutExamination>,
     /// Alternative hypotheses about the recordings; `None` if the fit gave no reason to test them, and for payloads.
     pub diagnosis: Option<Diagnosis>,
-    /// The model with the torque terms of each class of forms; empty for payloads on a known arm and with unknown gains.
+    /// The model in each class of forms; empty for payloads on a known arm and with unknown gains.
     pub forms: Vec<FormFit>,
     /// The compensated lag of the torque and its remaining uncertainty.
     pub torque_lag: LagChoice,

@@ -1,4 +1,4 @@
-//! Settings of an iteration, and the parts of a run that do not depend on any data: legs, posture, envelope, home, warm-up.
+//! Settings of an iteration, and the parts of a run that do not depend on data: legs, posture, home, warm-up.
 
 pub(crate) mod error;
 pub(crate) mod gains;

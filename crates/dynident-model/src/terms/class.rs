@@ -21,8 +21,8 @@ impl TermClass {
     /// All classes.
     pub const ALL: [Self; 3] = [Self::DampingAndFriction, Self::DampingFrictionAndInertia, Self::FunctionsOfMotion];
 
-    /// The terms of joint `joint`, without its spring, in a form of this class, for a robot with the terms `terms`. Several lists are
-    /// alternatives: the one with the smallest residual should be taken.
+    /// The terms of joint `joint`, without its spring, in a form of this class, for a robot with the terms `terms`.
+    /// Several lists are alternatives: the one with the smallest residual should be taken.
     pub fn terms_of_joint(self, model: &Model, terms: &[TorqueTerm], joint: usize) -> Vec<Vec<TorqueTerm>> {
         let is_own = move |term: &&TorqueTerm| {
             term.own_joint() == Some(joint) && term.property() != Some(JointProperty::Stiffness)
@@ -72,5 +72,5 @@ impl TermClass {
     }
 }
 
-/// Widths of the smooth step in place of friction with memory or under load that are tried, rad/s or m/s of a usual arm.
+/// Candidate widths of the smooth step that replaces friction with memory or under load, rad/s or m/s of a usual arm.
 const STEP_WIDTHS: [f64; 4] = [0.005, 0.02, 0.05, 0.1];
