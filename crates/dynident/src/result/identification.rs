@@ -88,8 +88,8 @@ pub struct ResultFile {
     /// Selection of friction, for the joints where it applies.
     #[serde(default)]
     pub friction_choice: Vec<JointFrictionResult>,
-    /// The complete identified robot, for `dynident export`; `None` for payloads on a known arm, for bodies with unknown
-    /// parameters, and in results of older versions.
+    /// The complete identified robot, for `dynident export`; `None` for payloads on a known arm, for bodies with
+    /// unknown parameters, and in results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<StoredModel>,
     /// The model in each class of forms that `dynident export` writes, with its own held-out error; empty for payloads
