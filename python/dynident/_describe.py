@@ -131,8 +131,8 @@ def new(
     written, and paths are relative to the working folder. ``rate_hz`` is for recordings without times. ``stated`` lists
     lines that replace uncertain ones, as proposed by ``unsure``:
     ``[line for one in found.unsure for line in one["proposed"]]``. A robot file with xacro macros needs
-    ``allow_command=True``. ``xacro`` contains arguments for the program ``xacro``, such as ``{"ur_type": "ur5e"}``; they
-    are written into the study.
+    ``allow_command=True``. ``xacro`` contains arguments for the program ``xacro``, such as ``{"ur_type": "ur5e"}``;
+    they are written into the study.
 
     >>> import dynident
     >>> logs = ["examples/ur10_simulated/train.csv", "examples/ur10_simulated/test.csv"]

@@ -63,9 +63,9 @@ def iterate(
 
     ``robot`` is a function that runs a robot with the controller of the given ``Run``; ``dynident.mujoco`` contains one
     for MuJoCo models. Without it the study defines the robot: a simulation, a program or a folder. Programs that the
-    files name or need are started only with ``allow_command``. All runs are stored in ``out``. A repeated call continues
-    there, unless ``resume`` is False. ``heard(run, largest tracking error)`` is called after every run. A function as
-    robot needs confirmed gains or ``iteration={"bandwidth_hz": 2.0, ...}``, like every external robot.
+    files name or need are started only with ``allow_command``. All runs are stored in ``out``. A repeated call
+    continues there, unless ``resume`` is False. ``heard(run, largest tracking error)`` is called after every run. A
+    function as robot needs confirmed gains or ``iteration={"bandwidth_hz": 2.0, ...}``, like every external robot.
 
     Ctrl-C stops the robot and keeps the recorded samples. An exception of the function ends the iteration and is raised
     again.

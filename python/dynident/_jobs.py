@@ -71,9 +71,9 @@ def identify(
 ) -> Model:
     """Fits a dynamic model to recordings and tests it on the held-out recordings.
 
-    ``study`` is a ``Study``, the path of one, or a robot (a ``Robot`` or the path of a robot description). A robot needs
-    ``logs`` and sections, see ``dynident.study``. The result is bit-identical to that of ``dynident identify`` for the
-    same study, for any number of threads. Problems of the model are issued as ``ProblemWarning`` and listed in
+    ``study`` is a ``Study``, the path of one, or a robot (a ``Robot`` or the path of a robot description). A robot
+    needs ``logs`` and sections, see ``dynident.study``. The result is bit-identical to that of ``dynident identify``
+    for the same study, for any number of threads. Problems of the model are issued as ``ProblemWarning`` and listed in
     ``Model.problems``. ``progress`` enables the progress display; by default it is enabled on a terminal and in a
     notebook. A callable receives ``(stage, rows done, total rows or None)``. A robot file with xacro macros needs
     ``allow_command=True``: the program ``xacro`` expands them, and runs Python code of the file.
@@ -108,8 +108,8 @@ def validate(
     threads: int | None = None,
     progress: bool | Progress | None = None,
 ) -> dict[str, Any]:
-    """Tests an identified model on logs (or the logs of a study) that were not used for the fit. By default these are the
-    held-out logs of its study. Returns ``dynident validate --json`` as a dictionary, with the error of every joint.
+    """Tests an identified model on logs (or the logs of a study) that were not used for the fit. By default these are
+    the held-out logs of its study. Returns ``dynident validate --json`` as a dictionary, with the error of every joint.
     """
     if logs is None:
         whole = model.study
@@ -182,8 +182,8 @@ def design(
     threads: int | None = None,
     **sections: Any,
 ) -> Design:
-    """Computes an optimal excitation trajectory within all limits. ``study`` is a ``Study``, the path of one, or a robot
-    with sections (``design={...}``). ``rate_hz`` is the sample rate of the arrays.
+    """Computes an optimal excitation trajectory within all limits. ``study`` is a ``Study``, the path of one, or a
+    robot with sections (``design={...}``). ``rate_hz`` is the sample rate of the arrays.
     """
     whole = _study_of(study, None, sections, allow_command)
     text, csv, svg, time_s, (q, dq, ddq) = _native._design(whole, rate_hz, threads)

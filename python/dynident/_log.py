@@ -117,8 +117,8 @@ class Log:
         """Creates a log from a data frame. ``position`` and ``torque`` name its columns: a list, a pattern such as
         ``"q{1..6}"``, or a mapping with units as in ``[format]``: ``{"columns": "q{1..6}_deg", "unit": "deg"}``.
 
-        ``time`` names the column with seconds, or is ``{"column": "t", "unit": "ms"}``. Without it the index is the time
-        if it is numeric or a date; otherwise give ``rate_hz``. Further keyword arguments are keys of ``[format]``.
+        ``time`` names the column with seconds, or is ``{"column": "t", "unit": "ms"}``. Without it the index is the
+        time if it is numeric or a date; otherwise give ``rate_hz``. Further keyword arguments are keys of ``[format]``.
         """
         channels = _channels(position, torque, time, format)
         columns: dict[str, npt.NDArray[np.float64]] = {}
@@ -151,8 +151,9 @@ class Log:
         payload: str | None = None,
         **format: Any,
     ) -> Log:
-        """Creates a log from a file in any supported format (CSV, Parquet, MCAP, rosbag2, MAT, HDF5, npy, ...). The content
-        determines the format; ``dynident.log_contents(file)`` lists the channels. Columns as in ``from_pandas``.
+        """Creates a log from a file in any supported format (CSV, Parquet, MCAP, rosbag2, MAT, HDF5, npy, ...). The
+        content determines the format; ``dynident.log_contents(file)`` lists the channels. Columns as in
+        ``from_pandas``.
         """
         path = fspath(file)
         stem = path.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1].rsplit(".", 1)[0]

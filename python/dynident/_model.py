@@ -128,7 +128,9 @@ class Model:
     def predict(
         self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None, ddq: npt.ArrayLike | None = None
     ) -> npt.NDArray[np.float64]:
-        """Computes the torques of a motion including friction, Nm (N). Shapes ``(..., n)``, samples in chronological order."""
+        """Computes the torques of a motion including friction, Nm (N). Shapes ``(..., n)``, samples in chronological
+        order.
+        """
         return self._native.predict(q, dq, ddq)[0]
 
     def predict_with_band(
@@ -175,8 +177,8 @@ class Model:
         return Robot.from_urdf(self.to_urdf())
 
     def export(self, form: str) -> str:
-        """Exports the model as ``c``, ``cpp``, ``rust``, ``python``, ``matlab``, ``mjcf``, ``urdf``, ``sdf``, ``ros2-yaml``
-        or ``json``. A comment lists the parts that the format cannot represent.
+        """Exports the model as ``c``, ``cpp``, ``rust``, ``python``, ``matlab``, ``mjcf``, ``urdf``, ``sdf``,
+        ``ros2-yaml`` or ``json``. A comment lists the parts that the format cannot represent.
         """
         return self._native.export(form)[0]
 
@@ -197,8 +199,8 @@ class Model:
         return self.export("c")
 
     def to_simulator(self) -> dict[str, Any]:
-        """Armature, damping, frictionloss, delay and actuator gain of every joint with error bars, as defined by MuJoCo and
-        similar simulators: ``dynident export --to simulator`` as a dictionary.
+        """Armature, damping, frictionloss, delay and actuator gain of every joint with error bars, as defined by MuJoCo
+        and similar simulators: ``dynident export --to simulator`` as a dictionary.
         """
         found: dict[str, Any] = json.loads(self._native.simulator()[0])
         return found
@@ -208,8 +210,8 @@ class Model:
         return self._native.simulator()[1]
 
     def to_payload(self, controller: str, name: str | None = None) -> str:
-        """An estimated payload in the format of a controller: ``"ur"`` (a line of URScript), ``"franka"`` (JSON), ``"kuka"``
-        (LOAD_DATA) or ``"abb"`` (loaddata). ``name`` selects one of several payloads.
+        """An estimated payload in the format of a controller: ``"ur"`` (a line of URScript), ``"franka"`` (JSON),
+        ``"kuka"`` (LOAD_DATA) or ``"abb"`` (loaddata). ``name`` selects one of several payloads.
         """
         return self._native.payload(controller, name)[0]
 

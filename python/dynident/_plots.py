@@ -28,7 +28,7 @@ def parameters(model: Model) -> Figure:
     axes.errorbar(values / size, places, xerr=bars / size, fmt="o", markersize=3, capsize=2, label="estimate, 95 %")
     prior = np.array([np.nan if one["prior"] is None else one["prior"] for one in entries], dtype=np.float64)
     if np.isfinite(prior).any():
-        axes.plot(np.clip(prior / size, -3.0, 3.0), places, "x", markersize=4, label="description")
+        axes.plot(np.clip(prior / size, -3.0, 3.0), places, "x", markersize=4, label="nominal value")
     axes.set_yticks(places, [one["expression"] if len(one["expression"]) < 50 else one["symbol"] for one in entries])
     axes.invert_yaxis()
     axes.set_xlabel("value / magnitude")

@@ -41,7 +41,8 @@ def study(
       the torque per unit of the coefficient, ``(samples,)``;
     - ``motion={"differentiator": f}``: ``f(q, rate_hz)`` with the positions of one joint, ``(samples,)``, gives
       ``q, dq, ddq``, each ``(samples,)``; a mapping may also hold ``context_samples`` (the number of
-      neighbouring samples that affect a sample; by default the whole log), ``minimum_samples`` (5) and ``smooth(signal, rate_hz)`` for the torque;
+      neighbouring samples that affect a sample; by default the whole log), ``minimum_samples`` (5) and the filter
+      ``smooth(signal, rate_hz)`` for the torque;
     - ``estimator=f``: ``f(rows)`` with ``EstimatorRows`` gives the values, ``(columns,)``, or a pair of values
       and covariance;
     - ``design={"family": {"function": f, "parameters": k, "linear": True}}``: ``f(parameters, time_s)`` with ``(n, k)``

@@ -89,10 +89,10 @@ def reduce(
     of the length of the log.
 
     All logs need the same settings. State cut-off and friction, or give ``like``, a model identified from a few of the
-    logs; its cut-off, friction and lag are then used. ``arm`` and ``recorded_at`` (UTC if without a time zone, or seconds
-    since 1970) identify the log. ``segments`` is the number of segments per log: error bars from few logs need many
-    segments, with hundreds of logs one is enough. For other arguments, see ``dynident.identify``. The default is one
-    thread, because a fleet job uses one worker per processor.
+    logs; its cut-off, friction and lag are then used. ``arm`` and ``recorded_at`` (UTC if without a time zone, or
+    seconds since 1970) identify the log. ``segments`` is the number of segments per log: error bars from few logs need
+    many segments, with hundreds of logs one is enough. For other arguments, see ``dynident.identify``. The default is
+    one thread, because a fleet job uses one worker per processor.
     """
     whole = _study_of(study, logs, sections, allow_command)
     seconds = _seconds(recorded_at)
@@ -145,7 +145,8 @@ def by_arm(factors: Factors) -> dict[str, Factors]:
 
 
 def windows(factors: Factors, days: float = 7.0) -> dict[datetime, Factors]:
-    """Splits factors into successive time windows, keyed by the mean time of the logs. Logs without a time are omitted."""
+    """Splits factors into successive time windows, keyed by the mean time of the logs. Logs without a time are omitted.
+    """
     if not days > 0.0:
         raise ValueError(f"days = {days}: give a positive length")
     known = [(at, place) for place, (_, _, at, *_) in enumerate(factors._logs) if at is not None]
@@ -165,8 +166,8 @@ def windows(factors: Factors, days: float = 7.0) -> dict[datetime, Factors]:
 def identify(
     factors: Factors, *, threads: int | None = None, progress: bool | Progress | None = None, warn: bool = True
 ) -> Model:
-    """Identifies one model from all logs of ``factors``, as ``dynident.identify`` does with stated cut-off, friction and
-    lag. Results that need samples are missing: delays, torque over time and held-out errors (see ``errors``).
+    """Identifies one model from all logs of ``factors``, as ``dynident.identify`` does with stated cut-off, friction
+    and lag. Results that need samples are missing: delays, torque over time and held-out errors (see ``errors``).
     """
     model = Model(_watched(progress, lambda hear: _native._identify_factors(factors, threads, hear)))
     return _warned(model) if warn else model
@@ -211,9 +212,9 @@ def each(function: Callable[[Item], Found], items: Iterable[Item], *, on: object
 def merged(
     function: Callable[[Item], Factors], items: Iterable[Item], *, on: object = None, batch: int = 16
 ) -> Factors:
-    """Computes ``merge(each(function, items, on=on))``. A worker takes ``batch`` items at a time and merges their factors.
-    This sends fewer and larger messages, for logs that are reduced in a few milliseconds. If a worker is lost, its whole
-    batch is repeated.
+    """Computes ``merge(each(function, items, on=on))``. A worker takes ``batch`` items at a time and merges their
+    factors. This sends fewer and larger messages, for logs that are reduced in a few milliseconds. If a worker is lost,
+    its whole batch is repeated.
     """
     if batch < 1:
         raise ValueError(f"batch = {batch}: give at least 1")
@@ -283,9 +284,9 @@ class Spread:
     names: list[str]
     """The base parameters."""
     result: dict[str, Any]
-    """For each parameter ``mean``, ``mean_std``, ``between_std`` (standard deviation between robots, without the estimation
-    error), ``tail`` and ``differs``. For each robot ``deviation`` (of every parameter, in standard deviations expected for
-    a robot like the others), ``worst``, ``tail`` and ``is_unlike``.
+    """For each parameter ``mean``, ``mean_std``, ``between_std`` (standard deviation between robots, without the
+    estimation error), ``tail`` and ``differs``. For each robot ``deviation`` (of every parameter, in standard
+    deviations expected for a robot like the others), ``worst``, ``tail`` and ``is_unlike``.
     """
 
     @property
@@ -328,7 +329,7 @@ class Drift:
 
 
 def _table(models: Mapping[Any, Model]) -> tuple[list[str], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Names of the parameters, values and standard deviations; the standard deviation of a fixed value is zero."""
+    """Names, values and standard deviations of the parameters; zero in place of values that are not finite."""
     if not models:
         raise ValueError("no models: give at least three")
     names = next(iter(models.values())).names
@@ -341,8 +342,8 @@ def _table(models: Mapping[Any, Model]) -> tuple[list[str], npt.NDArray[np.float
 
 def spread(models: Mapping[str, Model], *, false_alarm: float = 0.01) -> Spread:
     """Compares the models of at least three robots. Finds parameters that differ by more than their error bars, and
-    outlier robots. ``false_alarm`` is the probability that any robot, or any parameter, of identical robots is reported.
-    Equations and sources: ``dynident-estimation``, ``fleet``.
+    outlier robots. ``false_alarm`` is the probability that any robot, or any parameter, of identical robots is
+    reported. Equations and sources: ``dynident-estimation``, ``fleet``.
     """
     names, values, std = _table(models)
     found = json.loads(_native._spread([str(name) for name in models], values, std, false_alarm))

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 class MujocoRobot:
     """Runs a MuJoCo model with the torques of a ``Run``, applied at the joints (``qfrc_applied``).
 
-    ``joints`` are the model's joints in the order of the run, by default the joints with the same names. ``noise`` is the
-    standard deviation of the measured positions, rad. The controller's period must be a multiple of
+    ``joints`` are the model's joints in the order of the run, by default the joints with the same names. ``noise`` is
+    the standard deviation of the measured positions, rad. The controller's period must be a multiple of
     ``model.opt.timestep``.
 
     MuJoCo's dry friction (``dof_frictionloss``) is a soft constraint that acts with a delay by default. It is as stiff
