@@ -1,4 +1,5 @@
-//! Mutated inputs for every parser and for the small commands: no input may cause a panic, a hang or a number that is not finite.
+//! Mutated inputs for every parser and for the small commands. No input may cause a panic, a hang or a number that is
+//! not finite.
 //!
 //! Runs on stable Rust in one process. Mutates bytes, words and numbers of the seeds in `corpus/`, in rounds over all
 //! targets, until the time limit. The inputs depend only on the seed, not on the number of threads.

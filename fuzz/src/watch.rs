@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
-/// Limit of the processor time per input, s; ten times that of the slowest input in the corpus.
+/// Limit of the processor time per input, s. Every input of the corpus takes less than a tenth of it.
 const HANG_S: f64 = 60.0;
 /// Clock ticks per second of the times in `/proc`, the same on every Linux.
 const TICKS_PER_S: f64 = 100.0;

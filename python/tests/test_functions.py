@@ -107,8 +107,8 @@ def test_differences_as_code_are_the_differences(planar: dynident.Robot) -> None
     in_pieces = {"function": differences, "context_samples": 2, "minimum_samples": 3}
     pieces = dynident.identify(planar, log, motion={"differentiator": in_pieces}, **STATED)
     for own in (whole, pieces):
-        # Differences of differences and weights of points: rounding of positions times the rate squared, 4e-12 of
-        # accelerations of some rad/s².
+        # The derivatives differ by the rounding of positions times the squared rate: 4e-12 for accelerations of a few
+        # rad/s².
         np.testing.assert_allclose(own.values, built_in.values, rtol=1e-8, atol=1e-9)
         assert own.functions == ["motion.differentiator: differences"]
         assert own.result["method"]["motion"]["differentiator"] == {"method": "function", "function": "differences"}
