@@ -1,10 +1,10 @@
-"""Markdown tables from the JSON lines in a folder (see compare.sh): minimum (median) in ns, rivals beside Dynident; what the machine
-can do at best; and how much of that each of Dynident's figures is.
+"""Writes Markdown tables from the JSON lines in a folder (see compare.sh): minimum (median) in ns of Dynident and the rivals, the limits
+of the machine, and the share of these limits that Dynident reaches.
 
     table.py FOLDER
 
-Several rounds of one program are merged: least of the minima, median of the medians. Pinocchio's two conventions of one
-algorithm (world, local) count as its better one, by minimum.
+Several rounds of one program are merged: least of the minima, median of the medians. If Pinocchio has two conventions of an
+algorithm (world, local), the faster one is used, by minimum.
 """
 import json
 import re
@@ -24,13 +24,13 @@ NAMES = {
     ("mujoco", "wheel"): "MuJoCo",
     ("pandas", "wheel"): "pandas",
 }
-# Dynident's batched kernels have no counterpart in Pinocchio: the same quantity one call at a time stands beside them.
+# Dynident's batched kernels have no counterpart in Pinocchio; they are compared with single calls for the same quantity.
 SAME_QUANTITY = {"regressor_batch": "joint_torque_regressor", "rnea_batch": "rnea", "crba_batch": "crba",
                  "rnea_derivatives_batch": "rnea_derivatives", "aba_batch": "aba"}
 VARIANT = re.compile(r"_(world|local)$")
 
 
-# Rivals of which the last column speaks, the first one that has a figure.
+# Rivals for the last column; the first one with a result is used.
 ANCHORS = ("Pinocchio C++ native", "Pinocchio Python", "MuJoCo", "pandas")
 
 
@@ -82,7 +82,7 @@ def compiler(command):
 
 
 def comparison(table, ours, rivals):
-    """One table of these rows, with the columns that have a figure."""
+    """One table of these rows, with the columns that have results."""
     present = {c for cells in table.values() for c in cells}
     ours, rivals = ([c for c in columns if c in present] for columns in (ours, rivals))
     heads = ["robot", "quantity", *ours, *rivals, *(["times as fast"] if ours else [])]
@@ -100,7 +100,7 @@ def comparison(table, ours, rivals):
 
 
 def limits(folder):
-    """{(limit, column): (most per second, what it is)}"""
+    """{(limit, column): (maximum rate per second, description)}"""
     found = {}
     for d in lines(folder):
         if d.get("job") == "limit":
