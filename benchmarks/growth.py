@@ -139,7 +139,7 @@ def study(path, robot, joints, logs):
 
 
 def chain(path, joints):
-    """A serial arm: axes alternate between z, y and x; links of 0.1 m with decreasing mass from 1 kg."""
+    """A serial arm: axes alternate between z, y and x; links of 0.1 m, mass decreasing from 1.5 to 0.5 kg."""
     links, joint_texts = ['<link name="base"/>'], []
     for k in range(joints):
         mass, axis = 0.5 + 1.0 / (1 + k), ["0 0 1", "0 1 0", "1 0 0"][k % 3]

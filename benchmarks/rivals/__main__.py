@@ -228,7 +228,7 @@ def arm(seeds, rounds, quick):
 
 
 def number(value, digits=2):
-    """Formats a number for a table: the given significant digits, at least all digits before the decimal point; above 1000 an integer."""
+    """Formats a number for a table: the given significant digits, at least all digits before the decimal point; "> 1000" for larger values."""
     if value is None:
         return ""
     return "> 1000" if value > 1000 else f"{value:.{digits}g}" if value < 10**digits else f"{value:.0f}"
