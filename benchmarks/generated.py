@@ -105,7 +105,7 @@ def main():
                     quantity, nanoseconds = line.split()
                     take(robot, quantity, name, float(nanoseconds))
     columns = ["Dynident", *dict.fromkeys(name for own in programs.values() for name in own)]
-    print("| robot | quantity |", " | ".join(columns), "| best C beside Dynident |")
+    print("| robot | quantity |", " | ".join(columns), "| best C / Dynident |")
     print("| --- | --- |", " | ".join("---:" for _ in columns), "| ---: |")
     for robot in programs:
         for quantity in QUANTITIES:

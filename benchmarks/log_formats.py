@@ -173,7 +173,7 @@ def size(path):
     return sum(file.stat().st_size for file in path.rglob("*")) if path.is_dir() else path.stat().st_size
 
 
-# A process begins with the memory of the one that made it, so a small one makes it.
+# Peak memory includes that of the parent process at the start, so a small process starts the command.
 HELPER = """
 import json, resource, subprocess, sys, time
 start = time.perf_counter()

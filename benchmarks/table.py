@@ -144,9 +144,9 @@ def main():
     rounds = max(cell[2] for cells in table.values() for cell in cells.values())
     print(f"{m['date']}, {m['cpu']} ({m['simd']}, {m['cores']} cores; one used; load {m['load']}), {compiler('g++')}, {compiler('rustc')},")
     packages = ", ".join(f"{name} {version(package)}" for name, package in PACKAGES.items())
-    print(f"{packages}. ns a call, a sample, a row or a command of one thread's CPU time:")
-    print(f"minimum (median), up to {rounds} runs each, alternating. Last column: best Dynident against the first of")
-    print(f"{', '.join(ANCHORS)} that has a figure, by minima.\n")
+    print(f"{packages}. CPU time of one thread in ns per call, sample, row or command:")
+    print(f"minimum (median), up to {rounds} runs each, alternating. Last column: best Dynident compared with the first of")
+    print(f"{', '.join(ANCHORS)} with a result, by minima.\n")
     of_pinocchio = {key: cells for key, cells in table.items() if any(c.startswith("Pinocchio") for c in cells)} or table
     comparison(of_pinocchio, ours, rivals)
     others = {key: cells for key, cells in table.items() if key not in of_pinocchio}
@@ -155,16 +155,16 @@ def main():
         comparison(others, ours, rivals)
     limit = limits(sys.argv[1])
     if limit:
-        print("\nThe machine at its best, one core, measured in the same run:\n")
-        print("| limit | | a second | what |\n| --- | --- | ---: | --- |")
+        print("\nLimits of the machine, one core, measured in the same run:\n")
+        print("| limit | | per second | description |\n| --- | --- | ---: | --- |")
         for (name, column), (rate, what) in limit.items():
             unit = "GFLOP" if name == "peak_flops" else "GB"
             print(f"| {name.replace('_', ' ')} | {column.removeprefix('Dynident ')} | {rate / 1e9:.3g} {unit} | {what} |")
     rows = shares(sys.argv[1], table, limit)
     if rows:
-        print("\nShare of that: operations as counted in the program by scalars that count (a multiply-add is two; plain arithmetic outside of the")
-        print("kernels is not counted), over the least time. The peak is that of all lanes full and nothing but multiply-adds.\n")
-        print("| robot | quantity | | a call | reached | share |\n| --- | --- | --- | ---: | ---: | --- |")
+        print("\nShare of these limits: operations counted by the program with counting scalars (a multiply-add is two operations; plain arithmetic outside of the")
+        print("kernels is not counted), divided by the minimum time. The peak is the rate of multiply-adds in all lanes.\n")
+        print("| robot | quantity | | per call | reached | share |\n| --- | --- | --- | ---: | ---: | --- |")
         for row in rows:
             print("| " + " | ".join(row) + " |")
 
