@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# archive.sh FOLDER TARGET OUT: packs the program that FOLDER holds (a build with `--profile dist`) as OUT/dynident-VERSION-TARGET.tar.gz (.zip for Windows), with completions,
-# manual pages and licences. Before that it is tried: it is small enough, and it identifies the robot of README.
+# archive.sh FOLDER TARGET OUT: packs the program in FOLDER (built with `--profile dist`) as OUT/dynident-VERSION-TARGET.tar.gz (.zip for Windows), with completions,
+# manual pages and licences. Before packing it checks the size of the program and identifies the robot of README.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=$1
 target=$2
 mkdir -p "$3"
 out=$(cd "$3" && pwd)
-# Megabytes with all formats, as promised.
+# Documented size limit with all formats, megabytes.
 most_bytes=20000000
 
 program=dynident

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# commands.sh SCRATCH VENV: the commands that README and the book name, once and short: the command as `cargo run --release` built it, programs of measurement as the tests
-# built them (a release build of each would take minutes). Outputs go to SCRATCH; VENV is a Python environment with golden/requirements.txt.
+# commands.sh SCRATCH VENV: runs the commands of README and the book once, in short form, with the release build of the command and the test builds of the measurement programs
+# (a release build of each would take minutes). Outputs go to SCRATCH; VENV is a Python environment with golden/requirements.txt.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=$1
@@ -8,7 +8,7 @@ venv=$2
 dynident=target/release/dynident
 examples=target/debug/examples
 
-# run STATUS COMMAND...: says the command and how long it took; its output is shown only if the exit status is another one.
+# run STATUS COMMAND...: prints the command and its duration; prints its output only if the exit status differs from STATUS.
 run() {
     local wanted=$1 status=0 start=$SECONDS
     shift
@@ -16,7 +16,7 @@ run() {
     printf '%4s s  %s\n' "$((SECONDS - start))" "$*"
     if [ "$status" -ne "$wanted" ]; then
         cat "$out/last"
-        printf 'exit status %s in place of %s\n' "$status" "$wanted" >&2
+        printf 'exit status %s, expected %s\n' "$status" "$wanted" >&2
         exit 1
     fi
 }
@@ -32,14 +32,14 @@ run 0 "$dynident" log golden/formats/bag
 run 0 "$dynident" new --robot robots/ur10.urdf --log examples/ur10_simulated/train.csv examples/ur10_simulated/test.csv --out "$out/new.toml"
 run 0 "$dynident" identify "$out/new.toml" --out "$out/new"
 run 0 "$venv/bin/python" .ci/first_minutes.py "$dynident" "$out/first_minutes"
-# All moments negated, as exporters do: named, and undone in a copy.
+# An exporter error negates all first moments: it is reported, and corrected in a copy.
 sed -E 's/(i[xyz][xyz]=")([1-9]|0\.0*[1-9])/\1-\2/g' robots/iiwa14.urdf >"$out/slip.urdf"
 run 1 "$dynident" inspect "$out/slip.urdf" --json
 run 0 "$dynident" inspect "$out/slip.urdf" --fix "$out/mended.urdf"
 run 0 cmp "$out/mended.urdf" robots/iiwa14.urdf
 run 0 "$dynident" identify examples/ur10_simulated.toml --out "$out/result"
 run 0 "$dynident" validate "$out/result/result.json" --study examples/ur10_simulated.toml
-# Logs as factors, in two files and in one: the same model.
+# Factors of logs, in two files and in one file, give the same model.
 run 2 "$dynident" reduce examples/ur10_simulated.toml --out "$out/train.factors"
 run 0 "$dynident" reduce examples/ur10_simulated.toml --like "$out/result/result.json" --out "$out/train.factors"
 run 0 "$dynident" reduce examples/ur10_simulated.toml --like "$out/result/result.json" --log test --arm left --recorded-at 2026-01-05 --out "$out/test.factors"
@@ -50,16 +50,16 @@ for form in c cpp rust python matlab mjcf urdf sdf ros2-yaml json simulator simu
 done
 run 0 "$venv/bin/python" .ci/export.py "$dynident" "$out/result/result.json" examples/ur10_simulated.toml "$out/export" "$examples/description"
 run 0 "$venv/bin/python" .ci/simulator.py "$dynident" "$out/result/result.json" examples/ur10_simulated.toml examples/ur10_simulated "$out/simulator"
-# The recorded test in MuJoCo, before and after.
+# Replay of the test recording in MuJoCo, before and after identification.
 run 0 "$venv/bin/python" examples/replay_in_mujoco.py robots/ur10.urdf "$out/exported.mjcf" examples/ur10_simulated/test.csv \
     --position 'q{1..6}_rad' --torque 'tau{1..6}_Nm' --require-better
 run 0 "$examples/simulate_ur10" "$out/ur10_simulated"
-# Joints that follow others: two closed chains, found, exported and held against MuJoCo.
+# Dependent joints: two closed chains, identified, exported and compared with MuJoCo.
 run 0 "$dynident" simulate examples/palletizer.toml --out "$out/palletizer_run"
 run 0 "$dynident" check examples/palletizer.toml
 run 0 "$venv/bin/python" .ci/coupled.py "$dynident" "$out/palletizer"
 
-# A designed motion, looked at again, and its torques.
+# A designed motion, its evaluation, and its torques.
 run 0 "$dynident" design examples/design_ur10.toml --out "$out/motion" --to ros2
 run 0 "$dynident" design examples/design_ur10.toml --check "$out/motion/trajectory.csv" --out "$out/checked"
 run 0 "$dynident" design examples/ur10_simulated.toml --check-log train --out "$out/log_checked"
@@ -70,8 +70,8 @@ run 0 "$dynident" design examples/design_paper.toml --out "$out/paper_motion"
 run 0 "$dynident" simulate examples/iterate_ur10.toml --out "$out/run"
 run 0 "$dynident" iterate examples/iterate_paper_2r.toml --out "$out/iteration"
 run 0 "$dynident" iterate examples/iterate_paper_2r_friction.toml --out "$out/friction"
-# A robot outside: MuJoCo behind the line protocol, by the Python of the environment. The robot found is tested on a run of another motion; an iteration that
-# may make one run only ends with status 1.
+# An external robot: MuJoCo behind the line protocol, with the Python of the environment. The identified robot is tested on a run of another motion. An iteration
+# that is limited to one run ends with status 1.
 sed -e "s#\"python3\"#\"$venv/bin/python\"#" -e 's#"\.\./robots#"'"$PWD"'/robots#' examples/iterate_ur10_mujoco.toml >"$out/mujoco.toml"
 run 0 "$dynident" iterate "$out/mujoco.toml" --out "$out/outside" --allow-command
 sed -e 's/max_runs = 5/max_runs = 1/' -e 's/^seed = 1/seed = 2/' "$out/mujoco.toml" >"$out/mujoco_other.toml"
@@ -82,12 +82,12 @@ run 1 "$dynident" iterate "$out/mujoco_other.toml" --out "$out/outside_other" --
     printf '\n[[log]]\nfile = "outside_other/runs/run_1/log.csv"\nrole = "validate"\n'
 } >"$out/mujoco_test.toml"
 run 0 "$dynident" validate "$out/outside/result.json" --study "$out/mujoco_test.toml" --max-validation-error 5
-# A sound robot that no description tells, and one whose drives clip.
+# A robot without faults that differs from its description, and a robot with saturated drives.
 run 0 "$venv/bin/python" benchmarks/campaign.py "$dynident" --out "$out/campaign" --only panda --quick
 run 0 "$venv/bin/python" benchmarks/loop_faults.py "$dynident" --out "$out/loop_faults" --only ur10 --integrators mujoco --quick
 run 0 "$dynident" reproduce --out "$out/paper"
 
-# The programs behind the tables of the book, with the least work that they take.
+# The programs that produce the tables of the book, with minimum settings.
 run 0 "$dynident" benchmark --runs 2 --seed 1 --robots planar2r --noise standard --out "$out/benchmark"
 run 0 target/debug/dynident-benchmark --only rnea
 run 0 "$examples/designs" --seconds 0.2 --criteria d-optimal --families Fourier examples/design_ur10.toml
@@ -100,7 +100,7 @@ run 0 "$examples/basin" 2 601
 run 0 "$examples/logistic_against_fourier" 2 0.3
 run 0 "$examples/differentiators" 1 12
 run 0 "$examples/import_speed" 20000
-# Every format gives the same numbers, and memory does not grow with the recording.
+# All formats give the same numbers, and memory use does not grow with the length of the recording.
 run 0 "$venv/bin/python" benchmarks/log_formats.py "$dynident" "$out/log_formats" --rows 80000 --runs 1 --check
 run 0 "$examples/gallery" "$out/gallery.html"
 run 0 target/debug/dynident-benchmark --limits --only peak_flops,text --csv "$out/panda_arm7.csv" --csv-rows 2000 planar2r

@@ -1,6 +1,6 @@
-"""Comment lines of the sources that are longer than 120 columns, one a line; exit status 1 if there are any.
+"""Lists comment lines in the sources that are longer than 120 columns. Exit status 1 if there are any.
 
-rustfmt's stable settings do not look at comments. Rows of tables, lines with an address and code between fences are let through.
+The stable settings of rustfmt do not check comments. Table rows, lines with a URL and fenced code are exempt.
 """
 import pathlib
 import sys
@@ -19,5 +19,5 @@ for path in sorted(pathlib.Path("crates").glob("**/*.rs")):
             continue
         if text.startswith("//") and len(line) > LIMIT and "://" not in line and not text.lstrip("/! ").startswith("|"):
             long.append(f"{path}:{number}: {len(line)} columns")
-print("\n".join(long) or "no comment line is too long")
+print("\n".join(long) or "all comment lines are within the limit")
 sys.exit(1 if long else 0)

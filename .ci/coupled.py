@@ -1,7 +1,7 @@
-"""coupled.py DYNIDENT SCRATCH: a palletising arm with two closed chains, identified from its logs, in MuJoCo.
+"""coupled.py DYNIDENT SCRATCH: checks a palletising arm with two closed chains, identified from logs, against MuJoCo.
 
-The MJCF that `export` writes holds the joints that follow as constraints: MuJoCo finds them kept where Dynident says that they are, and its inverse dynamics of the tree, Gᵀ tau_tree, is that
-of the exported Python module (rigid bodies and drive inertia; friction apart), to 1e-9 at 200 states. Needs mujoco and numpy.
+The MJCF from `export` contains the dependent joints as constraints. The script checks at 200 states that these constraints hold in MuJoCo and that the projected inverse
+dynamics of the tree, Gᵀ tau_tree, agree with the exported Python module to 1e-9 (rigid bodies and drive inertia, without friction). Needs mujoco and numpy.
 """
 import importlib.util
 import json
@@ -42,7 +42,7 @@ def main():
         else:
             G[row, free.index(joint["name"])] = 1.0
     data = mujoco.MjData(model)
-    # The tree alone: nothing holds it together, and no drive brakes.
+    # Open tree without constraints and friction.
     tree = mujoco.MjModel.from_xml_path(str(scratch / "arm.xml"))
     tree.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     tree.dof_damping[:] = 0
@@ -54,7 +54,7 @@ def main():
         data.qpos, data.qvel, data.qacc = start + G @ q, G @ dq, G @ ddq
         mujoco.mj_forward(model, data)
         equalities = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-        assert equalities.sum() == model.nv - len(free), "a constraint for each joint that follows"
+        assert equalities.sum() == model.nv - len(free), "expected one constraint for each dependent joint"
         open_by = max(open_by, np.abs(data.efc_pos[equalities]).max())
         own.qpos, own.qvel, own.qacc = data.qpos, data.qvel, G @ ddq
         mujoco.mj_inverse(tree, own)
@@ -62,8 +62,8 @@ def main():
         ours = np.asarray(arm.inverse_dynamics(q, dq, ddq)) - np.asarray(arm.friction(dq))
         worst = max(worst, np.abs(theirs - ours).max() / np.abs(ours).max())
     assert worst < SAME_PHYSICS, f"torques differ by {worst:.2e} of the largest"
-    assert open_by < 1e-12, f"MuJoCo finds the followers {open_by:.2e} off"
-    print(f"{STATES} states: torques differ by {worst:.1e} of the largest, followers are off by {open_by:.1e}")
+    assert open_by < 1e-12, f"constraint violation of the dependent joints in MuJoCo: {open_by:.2e}"
+    print(f"{STATES} states: torques differ by {worst:.1e} of the largest, the constraint violation is {open_by:.1e}")
 
 
 if __name__ == "__main__":

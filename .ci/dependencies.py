@@ -1,6 +1,6 @@
-"""What the command is linked from, as Cargo.lock has it: licences that allow any use, only the public registry, nothing that asks for a newer Rust.
+"""Checks the dependencies of the command in Cargo.lock: permissive licences, public registry only, no newer Rust version required.
 
-Reads `cargo metadata --locked`; crates in several versions are told, and are no failure. Exit status 1 with one line for each offence.
+Reads `cargo metadata --locked`. Crates with several versions are listed, but are not an error. Exit status 1 with one line for each violation.
 """
 import json
 import re
@@ -13,7 +13,7 @@ REGISTRY = "registry+https://github.com/rust-lang/crates.io-index"
 
 
 def allowed(expression):
-    """Whether an SPDX expression (AND binds tighter than OR; the old form with a slash is OR) can be met with the allowed licences."""
+    """Whether an SPDX expression (AND binds tighter than OR; the old form with a slash is OR) can be satisfied with the allowed licences."""
     words = re.findall(r"\(|\)|[^\s()]+", expression.replace("/", " OR "))
 
     def alternatives():
@@ -63,7 +63,7 @@ def main():
         if package["source"] not in (None, REGISTRY):
             offences.append(f"{name}: from {package['source']}")
         if package["rust_version"] and version(package["rust_version"]) > stated:
-            offences.append(f"{name}: asks for Rust {package['rust_version']}, the workspace states {stated[0]}.{stated[1]}")
+            offences.append(f"{name}: requires Rust {package['rust_version']}, the workspace states {stated[0]}.{stated[1]}")
     for member in members:
         for dependency in member["dependencies"]:
             if dependency["req"] == "*" and dependency["path"] is None:
@@ -74,7 +74,7 @@ def main():
     for name, several in sorted(versions.items()):
         if len(several) > 1:
             print(f"{name} in {len(several)} versions: {', '.join(several)}")
-    print("\n".join(offences) or f"{len(packages)} crates: licences, sources and Rust versions as they should be")
+    print("\n".join(offences) or f"{len(packages)} crates: all licences, sources and Rust versions are accepted")
     sys.exit(1 if offences else 0)
 
 

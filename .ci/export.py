@@ -1,8 +1,8 @@
-"""export.py DYNIDENT RESULT STUDY SCRATCH DESCRIPTION: what `dynident export` writes, read by those it is written for.
+"""export.py DYNIDENT RESULT STUDY SCRATCH DESCRIPTION: checks the output of `dynident export` with other programs.
 
-The Python module against the C header as gcc and clang compile it at 1,000 states (the C header is compared with the core in the tests); MuJoCo's inverse dynamics of the MJCF and
-Pinocchio's of the URDF against the same model; Pinocchio's of the numbers that json reads from JSON, PyYAML from ROS 2 parameters and libsdformat from SDF. DESCRIPTION is the example of
-dynident-export: with it libsdformat reads every robot of robots/ as well. Prints the time of the C inverse dynamics beside pin.rnea, alternating; no check depends on it.
+Compares the Python module with the C header, compiled by gcc and clang, at 1,000 states (the tests compare the C header with the core). Compares the same model with the inverse
+dynamics of MuJoCo from the MJCF and of Pinocchio from the URDF, from JSON (json), from ROS 2 parameters (PyYAML) and from SDF (libsdformat). DESCRIPTION is the example program of
+dynident-export; it is used to read every robot of robots/ with libsdformat. Prints the run times of the C inverse dynamics and of pin.rnea in alternation; no check depends on them.
 Needs gcc, clang, g++, libsdformat-dev with pkg-config, and golden/requirements.txt.
 """
 import ctypes
@@ -21,9 +21,9 @@ import pinocchio
 import yaml
 
 STATES = 1000
-# Rounding of some thousand operations, as in the tests.
+# Rounding error of some thousand operations, as in the tests.
 SAME_CODE = 1e-12
-# Other algorithms on numbers that went through a file, where inertia stands about the centre of mass.
+# Other algorithms, with numbers from a file in which inertia is about the centre of mass.
 SAME_PHYSICS = 1e-9
 FUNCTIONS = {
     "inverse_dynamics": ["q", "dq", "ddq"],
@@ -42,12 +42,12 @@ def exported(dynident, result, study, form, path):
 
 
 def compiled(compiler, header, prefix, dof, folder):
-    """The C functions as Python functions of contiguous vectors, without a warning of the compiler."""
+    """Compiles the C functions without warnings and wraps them as Python functions of contiguous vectors."""
     calls = []
     for name, inputs in FUNCTIONS.items():
         arguments = ", ".join(f"const double *{vector}" for vector in inputs)
         calls.append(f"void call_{name}({arguments}, double *out) {{ {prefix}_{name}({', '.join(inputs)}, out); }}")
-    # By a pointer that the compiler cannot see through: what does not change would be taken out of the loop.
+    # A volatile pointer prevents the compiler from moving constant work out of the loop.
     calls.append(
         "static void (*volatile called)(const double *, const double *, const double *, double *) = call_inverse_dynamics;\n"
         "void repeat(long n, const double *q, const double *dq, double *ddq, double *out) {"
@@ -88,7 +88,7 @@ def step(constants, dq):
 
 
 def friction_of(kind, constants, dq):
-    """The function of the velocity that a term of a joint that turns has, as the book's page on export says."""
+    """Velocity function of a friction term of a revolute joint, as documented on the export page of the book."""
     part = lambda x: np.maximum(x, 0.0) if constants["direction"] == "+" else np.minimum(x, 0.0)
     logistic = lambda v: 1 / (1 + np.exp(-constants["steepness_s_per_rad"] * (v + constants["offset_speed_rad_s"])))
     return {
@@ -104,7 +104,7 @@ def friction_of(kind, constants, dq):
 
 
 def drives_of(terms, couplings, names, dq):
-    """Friction at velocities and the drives' part of the mass matrix. `terms` are those of each joint, `couplings` those of two, both with kind, value and constants."""
+    """Friction at the given velocities, and the contribution of the drives to the mass matrix. `terms` belong to one joint, `couplings` to two; both have kind, value and constants."""
     friction, inertia = np.zeros_like(dq), np.zeros((len(names), len(names)))
     for joint, own in enumerate(terms):
         for term in own:
@@ -130,11 +130,11 @@ def matrix(six):
 
 
 def assembled(joints, gravity):
-    """A model of Pinocchio from numbers: for each joint parent (-1: the base), whether it turns, placement, axis, mass, centre of mass and inertia about it."""
+    """Builds a Pinocchio model. For each joint: parent (-1 is the base), whether it is revolute, placement, axis, mass, centre of mass and inertia about the centre of mass."""
     model = pinocchio.Model()
     for number, (parent, turns, rotation, translation, axis, mass, com, inertia) in enumerate(joints):
         kind = pinocchio.JointModelRevoluteUnaligned if turns else pinocchio.JointModelPrismaticUnaligned
-        # The first joint of Pinocchio is the universe.
+        # The first joint of a Pinocchio model is the universe.
         joint = model.addJoint(parent + 1, kind(np.array(axis)), pinocchio.SE3(np.array(rotation), np.array(translation)), f"joint {number}")
         model.appendBodyToJoint(joint, pinocchio.Inertia(mass, np.array(com), np.array(inertia)), pinocchio.SE3.Identity())
     model.gravity.linear = np.array(gravity)
@@ -147,7 +147,7 @@ def torques(model, q, dq, ddq):
 
 
 def read_sdf(reader, path):
-    """The joints of an SDF as libsdformat reads it, in the order of the file, as `assembled` wants them; and damping and friction of each."""
+    """Joints of an SDF read by libsdformat, in file order, in the format of `assembled`; and damping and friction of each."""
     told = subprocess.run([reader, str(path)], check=True, capture_output=True, text=True).stdout
     lines = [line.split() for line in told.splitlines()]
     numbers = lambda words: [float(word) for word in words]
@@ -170,10 +170,10 @@ def read_sdf(reader, path):
 
 
 def sdf_reader(folder):
-    """.ci/sdf.cpp, compiled against whatever version of libsdformat there is."""
+    """Compiles .ci/sdf.cpp with the installed version of libsdformat."""
     listed = subprocess.run(["pkg-config", "--list-all"], check=True, capture_output=True, text=True).stdout.split("\n")
     packages = sorted({line.split()[0] for line in listed if line.startswith("sdformat")})
-    assert packages, "libsdformat is not there: install libsdformat-dev"
+    assert packages, "libsdformat is missing: install libsdformat-dev"
     flags = subprocess.run(["pkg-config", "--cflags", "--libs", packages[-1]], check=True, capture_output=True, text=True).stdout.split()
     source, program = pathlib.Path(__file__).with_name("sdf.cpp"), folder / "sdf"
     subprocess.run(["g++", "-std=c++17", "-O0", "-w", str(source), "-o", str(program), *flags], check=True)
@@ -181,7 +181,7 @@ def sdf_reader(folder):
 
 
 def check_numbers(files, reader, module, state, schema):
-    """JSON, ROS 2 parameters and SDF of the result: the same torques from their numbers alone."""
+    """Checks that JSON, ROS 2 parameters and SDF of the result give the same torques."""
     q, dq, ddq = state["q"], state["dq"], state["ddq"]
     of_json = json.loads(files["json"].read_text())
     jsonschema.Draft7Validator(schema).validate(of_json)
@@ -202,7 +202,7 @@ def check_numbers(files, reader, module, state, schema):
     friction, drives = drives_of([joint["terms"] for joint in of_json["joints"]], of_json["couplings"], names, dq)
     rigid = torques(assembled(joints, of_json["gravity_m_s2"]), q, dq, ddq)
     off = worst(rigid + ddq @ drives + friction, module.inverse_dynamics(q, dq, ddq))
-    print(f"Pinocchio's inverse dynamics of the JSON's numbers differ by {off:.1e}")
+    print(f"Pinocchio's inverse dynamics from JSON differ by {off:.1e}")
     assert off < SAME_PHYSICS
 
     (node, section), = yaml.safe_load(files["ros2-yaml"].read_text()).items()
@@ -210,7 +210,7 @@ def check_numbers(files, reader, module, state, schema):
     parameters = section["ros__parameters"]
 
     def only_parameters(value, at):
-        """ROS takes true, integers, numbers, words and arrays of one of them, and names without dots and slashes."""
+        """Checks the types and names of ROS parameters: booleans, integers, numbers, strings and uniform arrays; names without dots and slashes."""
         if isinstance(value, dict):
             assert value and all(key.replace("_", "a").isalnum() and key.isascii() for key in value), at
             for key, inner in value.items():
@@ -225,28 +225,28 @@ def check_numbers(files, reader, module, state, schema):
     flat = lambda terms: [{"constants": term, **term} for term in terms.values()]
     friction, drives = drives_of([flat(one.get("terms", {})) for one in listed], flat(parameters.get("couplings", {})), names, dq)
     assert all(drives[k, k] == one["drive_inertia_kgm2"] for k, one in enumerate(listed))
-    # Placements are robot_description's, which JSON has as well.
+    # Placements come from robot_description, which are also in the JSON.
     of_yaml = [(*joint[:5], one["mass_kg"], one["com_m"], matrix(one["inertia_at_com_kgm2"])) for joint, one in zip(joints, listed)]
     rigid = torques(assembled(of_yaml, parameters["gravity_m_s2"]), q, dq, ddq)
     off = worst(rigid + ddq @ drives + friction, module.inverse_dynamics(q, dq, ddq))
-    print(f"Pinocchio's inverse dynamics of the ROS 2 parameters' numbers differ by {off:.1e}")
+    print(f"Pinocchio's inverse dynamics from the ROS 2 parameters differ by {off:.1e}")
     assert off < SAME_PHYSICS
 
     of_sdf, dry_and_viscous = read_sdf(reader, files["sdf"])
     off = worst(torques(assembled(of_sdf, of_json["gravity_m_s2"]), q, dq, ddq) + ddq @ drives, module.inverse_dynamics(q, dq, ddq) - module.friction(dq))
-    print(f"Pinocchio's inverse dynamics of the SDF as libsdformat reads it differ by {off:.1e}")
+    print(f"Pinocchio's inverse dynamics from the SDF (libsdformat) differ by {off:.1e}")
     assert off < SAME_PHYSICS
     assert np.array_equal(dry_and_viscous, [[one["viscous_nm_s_per_rad"], one["coulomb_nm"]] for one in listed])
 
 
 def check_descriptions(description, reader, folder):
-    """Every robot of robots/ as SDF, against Pinocchio's own reading of the URDF."""
+    """Compares every robot of robots/, exported as SDF, with Pinocchio's model of the URDF."""
     random = np.random.default_rng(2)
     read = 0
     for urdf in sorted(pathlib.Path("robots").glob("*.urdf")):
         written = subprocess.run([description, str(urdf), "sdf"], capture_output=True, text=True)
         if written.returncode != 0:
-            # A description whose bodies are none.
+            # A description with unphysical bodies.
             assert "NotPhysical" in written.stderr, written.stderr
             print(f"{urdf.name}: {written.stderr.strip()}")
             continue
@@ -254,7 +254,7 @@ def check_descriptions(description, reader, folder):
         found, expected = assembled(read_sdf(reader, folder / "one.sdf")[0], [0, 0, -9.81]), pinocchio.buildModelFromUrdf(str(urdf))
         expected.armature = np.zeros(expected.nv)
         assert found.nv == expected.nv, urdf
-        # Pinocchio goes through branches by name, and gives angles without limits as cosine and sine.
+        # Pinocchio sorts branches by name, and uses cosine and sine for unlimited angles.
         q, dq, ddq = (random.uniform(-2, 2, (50, found.nv)) for _ in range(3))
         joints = written.stdout.split('<joint name="')[2:]
         order = [expected.joints[expected.getJointId(joint.split('"')[0])].idx_v for joint in joints]
@@ -267,7 +267,7 @@ def check_descriptions(description, reader, folder):
                 velocity[place], acceleration[place] = dq[k, own], ddq[k, own]
             theirs = pinocchio.rnea(expected, data, angles, velocity, acceleration)[order]
             off = max(off, worst(pinocchio.rnea(found, found.createData(), q[k], dq[k], ddq[k]), theirs))
-        print(f"{urdf.name} as SDF: torque by libsdformat's reading and by Pinocchio's of the URDF differ by {off:.1e}")
+        print(f"{urdf.name} as SDF: torques of the SDF (libsdformat) and of the URDF (Pinocchio) differ by {off:.1e}")
         assert off < SAME_PHYSICS
         read += 1
     assert read >= 6, read
@@ -304,7 +304,7 @@ def main():
     q, dq, ddq = state["q"], state["dq"], state["ddq"]
     bare = np.einsum("sij,sj->si", module.mass_matrix(q), ddq) + module.coriolis(q, dq) + module.gravity(q)
 
-    # MuJoCo adds damping; friction that sticks and stops are constraints, which this comparison leaves out.
+    # MuJoCo adds damping. Dry friction and joint stops are constraints, which this comparison omits.
     simulated = mujoco.MjModel.from_xml_path(str(mjcf))
     data = mujoco.MjData(simulated)
     simulated.dof_frictionloss[:] = 0
@@ -322,7 +322,7 @@ def main():
     check_numbers(files, reader, module, state, json.loads(pathlib.Path("docs/schemas/model.json").read_text()))
     check_descriptions(description, reader, folder)
 
-    # URDF has no drive inertia: what is compared does not hold it.
+    # URDF has no drive inertia, so the comparison omits it.
     described = pinocchio.buildModelFromUrdf(str(urdf))
     workspace = described.createData()
     described.armature = np.zeros(described.nv)

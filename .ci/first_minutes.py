@@ -1,7 +1,7 @@
-"""first_minutes.py DYNIDENT SCRATCH: a person with a robot and a rosbag2 recording alone: new, check, identify, export.
+"""first_minutes.py DYNIDENT SCRATCH: runs new, check, identify and export from a robot description and rosbag2 recordings only.
 
-The simulated recordings of README go into bags by rosbags, which knows nothing of this project: joints in alphabetical order as ros2_control sorts them, stamps that are not those of the recorder, a second topic beside them. The model has to be
-the one that the same samples as CSV give, and the C that is written to compile.
+Writes the simulated recordings of README as bags with the independent package rosbags: joints in alphabetical order, as in ros2_control, time stamps different from those of the recorder,
+and a second topic. The model must agree with that of the same samples in CSV, and the exported C must compile.
 """
 import csv
 import json
@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 ROBOT = "robots/ur10.urdf"
 CSV_STUDY = "examples/ur10_simulated.toml"
 JOINTS = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
-# Stamps count whole nanoseconds from an epoch, and sums of other rounding: nothing against an error bar.
+# Stamps are integer nanoseconds; the rounding is negligible compared with the error bars.
 SAME_STD = 1e-3
 
 
@@ -39,7 +39,7 @@ def bag(table, folder, storage):
                 velocity=np.array([]),
                 effort=values("tau{}_Nm"),
             )
-            # Recorded a while after it was measured.
+            # Recorded some time after the measurement.
             recorded = at + 400_000 + (number * 7919) % 300_000
             writer.write(states, recorded, types.serialize_cdr(message, state.__msgtype__))
             if number % 100 == 0:
@@ -54,7 +54,7 @@ def called(*command, path=None):
 
 
 def with_macros(dynident, scratch):
-    """The robot as xacro, which the program of that name writes out; it stands beside the Python that runs this."""
+    """Writes the robot as xacro; the program `xacro` is in the folder of the Python interpreter."""
     macros = scratch / "arm.urdf.xacro"
     text = pathlib.Path(ROBOT).read_text()
     begin = text.index("<robot")
@@ -64,7 +64,7 @@ def with_macros(dynident, scratch):
     assert "${lift}_joint" in macros.read_text()
     path = f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     seen = [json.loads(called(dynident, "inspect", robot, "--json", "--allow-command", path=path)) for robot in (ROBOT, macros)]
-    # xacro runs Python code of the file: without permission nothing of it runs.
+    # xacro runs Python code from the file; without permission it must not start.
     refused = subprocess.run([str(dynident), "inspect", str(macros)], capture_output=True, text=True)
     assert refused.returncode == 2 and "--allow-command" in refused.stderr, refused.stderr
     for key in ["joints", "bodies", "base_parameters", "moving_mass_kg"]:
@@ -72,7 +72,7 @@ def with_macros(dynident, scratch):
 
 
 def parameters(result):
-    """Estimates and their standard deviations by name, of the base parameters that both have."""
+    """Estimates and standard deviations of the common base parameters, by name."""
     found = json.loads((result / "result.json").read_text())["base_parameters"]
     return {entry["symbol"]: (entry["value"], entry["std"]) for entry in found if entry["std"]}
 
@@ -92,7 +92,7 @@ def main(dynident, scratch):
     (scratch / "arm.c").write_text('#include "arm.h"\n')
     called("cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-c", scratch / "arm.c", "-o", scratch / "arm.o")
 
-    # The same samples as CSV, the study that a person wrote.
+    # The same samples as CSV, with the hand-written study.
     by_hand = pathlib.Path(CSV_STUDY).read_text()
     by_hand = by_hand.replace('"../robots', f'"{pathlib.Path("robots").resolve()}').replace('"ur10_simulated/', f'"{data.resolve()}/')
     (scratch / "csv.toml").write_text(by_hand)

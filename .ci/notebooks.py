@@ -1,4 +1,4 @@
-"""notebooks.py: executes every notebook of notebooks/ from the folder of the repository; a cell that raises fails it. Nothing is written."""
+"""notebooks.py: executes every notebook of notebooks/ in the folder of the repository. Fails if a cell raises an exception. Writes nothing."""
 
 import sys
 import time
@@ -16,6 +16,6 @@ for path in found:
     nbformat.validate(notebook)
     stored = [cell for cell in notebook.cells if cell.cell_type == "code" and cell.outputs]
     if stored:
-        sys.exit(f"{path.name}: has outputs; clear them, for they would differ with every run")
+        sys.exit(f"{path.name}: contains outputs, which differ in every run: clear them")
     nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(root)}}).execute()
     print(f"{path.name}: {time.monotonic() - begin:.0f} s")

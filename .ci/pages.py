@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""pages.py CHROMIUM LIBRARIES PAGE.html...: the reports in a browser.
+"""pages.py CHROMIUM LIBRARIES PAGE.html...: checks the reports in a browser.
 
-Every plot is seen before anything is scrolled to, nothing is said on the console, axe-core finds nothing (light and dark, wide and narrow, before and after
-scrolling), and on paper each headline stands on the page of its plot or table. LIBRARIES is a folder with axe_playwright_python (for its axe.min.js) and pypdf.
+Every plot must be visible before scrolling, the console must be empty, axe-core must find no violation (light and dark, wide and narrow, before and after
+scrolling), and in print each headline must be on the page of its plot or table. LIBRARIES is a folder with axe_playwright_python (for its axe.min.js) and pypdf.
 
-The browser is spoken to by its own protocol through two pipes, so nothing else is needed.
+The script controls the browser with the DevTools protocol over two pipes and needs no further package.
 """
 
 import base64
@@ -17,10 +17,10 @@ import sys
 import tempfile
 import time
 
-# Longest wait for an answer, s.
+# Maximum time for a response, s.
 PATIENCE = 60.0
 
-# A plot is seen if its still picture or its canvas shows something. Of sections with a headline all have one of them.
+# A plot is visible if its static SVG or its canvas is not empty. Every section with a headline has an SVG or a canvas.
 UNSEEN = """(() => {
   const shown = (element) => {
     const box = element.getBoundingClientRect();
@@ -31,7 +31,7 @@ UNSEEN = """(() => {
     return box.width > 5 || box.height > 5;
   });
   const inked = (canvas) => {
-    // Of a copy: reading a page's own canvas makes the browser complain on the console that is looked at below.
+    // Use a copy: reading the original canvas causes a browser warning on the console, which is checked below.
     const copy = document.createElement("canvas");
     [copy.width, copy.height] = [canvas.width, canvas.height];
     const pen = copy.getContext("2d", { willReadFrequently: true });
@@ -46,7 +46,7 @@ UNSEEN = """(() => {
   }).map((section) => section.querySelector("h3")?.textContent ?? section.id);
 })()"""
 
-# Every plot that a person can steer is reached by the tabulator key and has a name.
+# Every interactive plot can be reached with the tab key and has a label.
 WITHOUT_KEYS = """[...document.querySelectorAll("section.plot .chart")].filter((chart) =>
   chart.tabIndex !== 0 || !chart.getAttribute("aria-label")).map((chart) => chart.id)"""
 
@@ -62,7 +62,7 @@ SCROLL = """(async () => {
 AXE = """axe.run(document, { resultTypes: ["violations"] }).then((found) => found.violations.flatMap((rule) =>
   rule.nodes.map((node) => `${rule.id}: ${node.target.join(" ")}: ${node.failureSummary}`)))"""
 
-# Words that are found again on the pages of the PDF: one in each headline, one at either end of what belongs to it.
+# Marker words for finding positions in the PDF: one in each headline, one at each end of its plot or table.
 MARK = """(() => {
   const marks = [];
   document.querySelectorAll("section.plot, section.picture, section:has(> .wide > table)").forEach((section, number) => {
@@ -92,13 +92,13 @@ MARK = """(() => {
 
 
 class Browser:
-    """A headless Chromium, and one page in it."""
+    """A headless Chromium with one page."""
 
     def __init__(self, program, folder):
         to_browser, ours_to = os.pipe()
         ours_from, from_browser = os.pipe()
         options = ["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe", f"--user-data-dir={folder}"]
-        # The protocol's pipes are numbers 3 and 4.
+        # The protocol uses file descriptors 3 and 4.
         command = f'exec "$0" "$@" 3<&{to_browser} 4>&{from_browser}'
         self.process = subprocess.Popen(
             ["bash", "-c", command, program, *options],
@@ -115,7 +115,7 @@ class Browser:
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
             self.call(f"{domain}.enable")
-        # axe-core is put into the page from outside; the page's own policy would forbid nothing else.
+        # The content security policy of the page would block the injected axe-core.
         self.call("Page.setBypassCSP", enabled=True)
 
     def message(self, deadline):
@@ -173,7 +173,7 @@ class Browser:
 
 
 def checked(browser, page, axe, reader):
-    """What is wrong with a page, and how many plots and sheets of paper it has."""
+    """Returns the errors of a page, and its number of plots and printed sheets."""
     wrong = []
     browser.events.clear()
     browser.size(1200, 900)
@@ -181,16 +181,16 @@ def checked(browser, page, axe, reader):
     browser.call("Page.navigate", url=page.resolve().as_uri())
     browser.wait_for("Page.loadEventFired")
     plots = browser.value('document.querySelectorAll("section.plot, section.picture").length')
-    wrong += [f"not seen before it is scrolled to: {title}" for title in browser.value(UNSEEN)]
-    wrong += [f"not reached by keys: {name}" for name in browser.value(WITHOUT_KEYS)]
+    wrong += [f"not visible before scrolling: {title}" for title in browser.value(UNSEEN)]
+    wrong += [f"not reachable by keyboard: {name}" for name in browser.value(WITHOUT_KEYS)]
     browser.value(axe + ";0")
     for width, scheme, scrolled in [(400, "light", False), (1200, "light", False), (1200, "light", True), (1200, "dark", True), (400, "light", True)]:
         browser.size(width, 900)
         browser.scheme(scheme)
         if scrolled:
             left = browser.value(SCROLL)
-            wrong += [f"{left} plots were not drawn when they were scrolled to"] if left else []
-            wrong += [f"not seen after it was scrolled to: {title}" for title in browser.value(UNSEEN)]
+            wrong += [f"{left} plots were not drawn after scrolling"] if left else []
+            wrong += [f"not visible after scrolling: {title}" for title in browser.value(UNSEEN)]
         wrong += [f"axe-core, {width} px, {scheme}: {finding}" for finding in browser.value(AXE)]
     browser.size(1200, 900)
     marks = browser.value(MARK)
@@ -201,7 +201,7 @@ def checked(browser, page, axe, reader):
         headed = where(head)
         for end in ends:
             if not headed or where(end)[:1] != headed[:1]:
-                wrong.append(f"on paper: `{title}` stands on sheet {headed}, and what belongs to it on {where(end)}")
+                wrong.append(f"in print: headline `{title}` is on sheet {headed}, its content on {where(end)}")
     wrong += [f"console: {message}" for message in browser.console()]
     return wrong, plots, len(sheets)
 

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
-# python.sh SCRATCH [--long]: the package of Python as README installs it, in a clean environment with `python3`: tests, types, stubs, the pages of the book. With --long also the
-# notebooks, the comparison with other tools, and the tests with the oldest Python that is here (3.10 or newer; NumPy 1.26) and the newest. Other versions are looked for on the path
+# python.sh SCRATCH [--long]: installs the Python package as in README into a clean environment with `python3` and checks tests, types, stubs and the pages of the book. With --long also the
+# notebooks, the comparison with other tools, and the tests with the oldest (3.10 or newer, NumPy 1.26) and the newest installed Python. Other versions are searched on the path
 # and under PYENV_ROOT.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scratch=$1
-# Built as the main job built the command, so that only the extension module is compiled and linked here. What is shipped has the profile of pyproject.toml: eight processor
-# minutes of linking, twice (docs/decisions/0012-builds-and-packages.md).
+# Uses the build settings of the main job, so that only the extension module is compiled and linked here. Released packages use the profile of pyproject.toml, which needs twice
+# eight minutes of processor time for linking (docs/decisions/0012-builds-and-packages.md).
 export MATURIN_PEP517_ARGS="--profile release"
-# Of a wheel with its symbols and without link-time optimisation; what is shipped is smaller.
+# This wheel has symbols and no link-time optimisation; released wheels are smaller.
 most_bytes=17000000
 
-# interpreters: the Pythons that are here, `minor path`, the oldest first.
+# interpreters: the installed Python versions as `minor path`, oldest first.
 interpreters() {
     local path minor
     for path in $(compgen -c python3 | sort -u | grep -E '^python3(\.[0-9]+)?$' || true) "${PYENV_ROOT:-$HOME/.pyenv}"/versions/*/bin/python3; do
@@ -22,7 +22,7 @@ interpreters() {
     done | sort -n -k1,1 -u
 }
 
-# environment NAME PYTHON PACKAGE OTHERS..: a clean environment with the package (`.` as README installs it, or a wheel) and with others.
+# environment NAME PYTHON PACKAGE OTHERS..: a clean environment with the package (`.` as in README, or a wheel) and other packages.
 environment() {
     local name=$1 python=$2 package=$3
     shift 3
@@ -49,9 +49,9 @@ program=$scratch/python/bin
 [ "${2:-}" = --long ] || exit 0
 
 "$program/python" .ci/notebooks.py
-# One wheel for every Python: pip links it anew each time that it builds it.
+# One wheel for all Python versions; pip would link a new one for each.
 "$program/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$scratch/wheel" .
-# Beside FIGAROH and mujoco.sysid, once and short.
+# Short comparison with FIGAROH and mujoco.sysid.
 environment rivals python3 "$scratch"/wheel/dynident-*.whl -r benchmarks/rivals/requirements.txt
 start=$SECONDS
 "$scratch/rivals/bin/python" -W ignore benchmarks/rivals --quick --out "$scratch/rivals_compared" >"$scratch/last" 2>&1 || { cat "$scratch/last"; exit 1; }

@@ -1,5 +1,5 @@
-// sdf FILE: a model of SDF as libsdformat understands it, for .ci/export.py. One line for each link and joint; frames are resolved by the library.
-// Exit status 1 with its messages where it finds anything wrong.
+// sdf FILE: prints an SDF model as read by libsdformat, for .ci/export.py. One line for each link and joint; the library resolves the frames.
+// Exit status 1 with the messages of the library if it finds an error.
 #include <cstdio>
 #include <iostream>
 #include <sdf/sdf.hh>

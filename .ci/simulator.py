@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""simulator.py DYNIDENT RESULT STUDY FOLDER SCRATCH: what `dynident export --to simulator` says of a simulated robot, against the truth that the robot was simulated with.
+"""simulator.py DYNIDENT RESULT STUDY FOLDER SCRATCH: compares the output of `dynident export --to simulator` with the true values of a simulated robot.
 
-FOLDER holds train.csv and truth.json of the study. The nearest damping and frictionloss of the true law and of the identified one are made here again, by numpy's least squares over
+FOLDER contains train.csv and truth.json of the study. Damping and frictionloss are fitted independently to the true and the identified friction law, with numpy's least squares over
 the velocities of train.csv. Needs numpy, scipy, jsonschema."""
 import json
 import pathlib
@@ -13,14 +13,14 @@ import jsonschema
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-# Bars are 95 % intervals of some twenty values that are not independent: a value beyond twice its bar (four standard deviations) is a wrong bar.
+# The error bars are 95 % intervals of about twenty correlated values; an error above twice the bar (four standard deviations) means a wrong error bar.
 BARS = 2.0
-# Velocities stand in bins of 1/64 to 1/128 of the largest one and are differentiated by another filter here: a middle of a bin is off by 1/128 at most.
+# The export groups velocities in bins of 1/64 to 1/128 of the largest velocity, and the filter here is different: the centre of a bin is off by at most 1/128.
 BINS = 0.02
 
 
 def nearest(velocity, torque):
-    """c, d of c sign(dq) + d dq, and what is left, rms. Neither is at its limit here, or the file says another number."""
+    """Fits c sign(dq) + d dq without limits; returns c, d and the rms residual. No value may be at its limit in these examples."""
     regressor = np.stack([np.sign(velocity), velocity], axis=1)
     found = np.linalg.lstsq(regressor, torque, rcond=None)[0]
     return *found, np.sqrt(np.mean((torque - regressor @ found) ** 2))
@@ -48,7 +48,7 @@ def main():
     compared = 0
     for number, joint in enumerate(written["joints"], 1):
         dq = np.gradient(sosfiltfilt(low_pass, log[f"q{number}_rad"]), 1 / rate)
-        # As the file leaves out what is beside rest.
+        # The export also omits velocities near zero.
         dq = dq[np.abs(dq) > np.abs(dq).max() / 64]
         law = lambda of, shape: of[f"fc{number}"] * shape + of[f"fv{number}"] * dq + of[f"off{number}"]
         coulomb, viscous, left = nearest(dq, law(identified, np.sign(dq)))
@@ -67,7 +67,7 @@ def main():
             print(f"  {value['value']:.4f} ± {value['half_width_95']:.4f} {value['unit']}, in truth {expected:.4f}")
             assert abs(value["value"] - expected) < BARS * value["half_width_95"]
             compared += 1
-        # The simulated torque comes with the motion.
+        # The simulated torque has no delay.
         assert abs(joint["delay"]["value"]) < BARS * joint["delay"]["half_width_95"]
         assert joint["actuator_gain"]["value"] == 1 and "known payload" in joint["actuator_gain"]["note"]
         own = of_mjcf[joint["name"]]

@@ -1,14 +1,14 @@
-# Parts of .ci/run and .ci/long: sourced by both.
+# Shared functions of .ci/run and .ci/long.
 
-# Property tests draw the same cases in every run: what fails here fails because of a change. Without it they draw others each time (CONTRIBUTING.md).
+# Property tests use the same cases in every run, so that a failure is caused by a change. Without this variable the cases are random (CONTRIBUTING.md).
 export PROPTEST_RNG_SEED=20261121
-# Nothing here is built twice, so what an incremental build keeps for next time is only work.
+# Nothing is built twice here, so incremental builds only cost time.
 export CARGO_INCREMENTAL=0
 
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
-# step NAME SECONDS COMMAND...: runs one check with a time limit and says how long it took.
+# step NAME SECONDS COMMAND...: runs one check with a time limit and prints its duration.
 step() {
     local name=$1 limit=$2 start=$SECONDS status=0
     shift 2
@@ -24,15 +24,15 @@ step() {
     printf '== %s: passed in %s s\n' "$name" "$((SECONDS - start))"
 }
 
-# readme_command PREFIX: the README's own command, so that what is checked is what is promised.
+# readme_command PREFIX: returns a command of README, so that the check uses the documented command.
 readme_command() {
     local line
     line=$(grep -m 1 "^$1" README.md) || { echo "README.md has no line that begins with: $1" >&2; exit 1; }
-    # Without the comment behind it.
+    # Remove the comment at the end of the line.
     printf '%s' "${line%%[[:space:]]#*}" | sed 's/[[:space:]]*$//'
 }
 
-# test_program PACKAGE NAME: the test program NAME of a package as the tests above built it (all features of the workspace).
+# test_program PACKAGE NAME: the test program NAME of a package, built by the tests above (all features of the workspace).
 test_program() {
     cargo test --workspace --locked --no-run --message-format json | python3 -c '
 import json, sys
@@ -47,7 +47,7 @@ print(tests[0])' "$1" "$2"
 }
 export -f test_program
 
-# The unit tests of excitation on lanes of four.
+# Unit tests of excitation with four SIMD lanes.
 portable_excitation() {
     local program
     program=$(test_program dynident-excitation dynident_excitation)
@@ -56,7 +56,7 @@ portable_excitation() {
 }
 export -f portable_excitation
 
-# mujoco_robot PYTHON: the test of a robot outside that ordinary runs leave out, for it needs MuJoCo.
+# mujoco_robot PYTHON: the test with an external robot, which is ignored by default because it needs MuJoCo.
 mujoco_robot() {
     local program
     program=$(test_program dynident-iteration it)
@@ -65,7 +65,7 @@ mujoco_robot() {
 }
 export -f mujoco_robot
 
-# A virtual environment; Debian keeps the part that fills it in a package of its own.
+# A virtual environment; on Debian `venv` needs the separate package python3-venv.
 python_environment() {
     if ! python3 -m venv "$1/venv"; then
         [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null || {
@@ -81,13 +81,13 @@ python_environment() {
 }
 export -f python_environment
 
-# What reads exports beside the Python environment: another compiler of C, and libsdformat.
+# Programs for export checks outside the Python environment: a second C compiler, and libsdformat.
 readers_of_exports() {
     if command -v clang >/dev/null && command -v pkg-config >/dev/null && pkg-config --list-all | grep -q '^sdformat'; then
         return 0
     fi
     [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null || {
-        echo "exports are read by clang and libsdformat: install clang, libsdformat-dev and pkg-config" >&2
+        echo "the export checks need clang, libsdformat-dev and pkg-config: install them" >&2
         return 1
     }
     apt-get update -qq
@@ -95,13 +95,13 @@ readers_of_exports() {
 }
 export -f readers_of_exports
 
-# pages_in_a_browser SCRATCH: the reports that the commands wrote, looked at as a person does; see .ci/pages.py. DYNIDENT_CHROMIUM names another browser.
+# pages_in_a_browser SCRATCH: checks the generated reports in a browser; see .ci/pages.py. DYNIDENT_CHROMIUM names another browser.
 pages_in_a_browser() {
     local browser
     browser=${DYNIDENT_CHROMIUM:-$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)}
     if [ -z "$browser" ]; then
         [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null || {
-            echo "no browser to look at pages with: install chromium, or name one in DYNIDENT_CHROMIUM" >&2
+            echo "no browser found: install chromium, or set DYNIDENT_CHROMIUM" >&2
             return 1
         }
         apt-get update -qq

@@ -1,10 +1,10 @@
-"""Whole commands: `dynident identify` on the examples and on a long CSV, beside pandas.read_csv of the same file, in ns of processor time
-(all threads), imports and the start of Python apart.
+"""Measures complete commands: `dynident identify` on the examples and on a long CSV, compared with pandas.read_csv of the same file. Times
+are processor time of all threads in ns, without imports and the start of Python.
 
     bench_commands.py DYNIDENT LOG.csv SCRATCH [--long]
 
-LOG.csv is the recording of the Panda arm that `dynident-benchmark --limits` makes; --long identifies it as well. A row of it is the
-unit of `read_csv` and `identify_csv`, a command that of `identify`. One thread each.
+LOG.csv is the recording of the Panda arm written by `dynident-benchmark --limits`; --long also identifies it. Results are per row for
+`read_csv` and `identify_csv`, and per command for `identify`. One thread each.
 """
 import argparse
 import os
@@ -36,7 +36,7 @@ role = "validate"
 
 
 def command_ns(command):
-    """Processor time of a command and all its threads. Its verdict may be negative (status 1): the work is the same."""
+    """Processor time of a command with all its threads. Status 1 (negative verdict) is accepted, because the work is the same."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode not in (0, 1):
@@ -53,7 +53,7 @@ def main():
     options.add_argument("--long", action="store_true")
     chosen = options.parse_args()
     out = chosen.scratch / "result"
-    # The column of the table where Dynident's own figures at the best level of this processor stand.
+    # The table column with Dynident's results at the best SIMD level of this processor.
     level = os.environ.get("DYNIDENT_INSTRUCTIONS") or machine()["simd"]
 
     def identify(study):

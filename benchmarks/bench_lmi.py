@@ -1,14 +1,14 @@
-"""Clarabel on the random problems of the physically consistent fit, beside the answers of Dynident's two solvers.
+"""Compares Clarabel with Dynident's two solvers on random problems of the physically consistent fit.
 
     cargo bench -p dynident-estimation --bench physical -- --problems 1000 2000 --both-routes > problems.jsonl
     python3 benchmarks/bench_lmi.py problems.jsonl [--scaled] [--gram] [--limit N]
 
-Each line of the file is a problem from its definitions and what Dynident answered. The conic program is written out here, sharing no code with it:
+Each line of the file has the definition of a problem and Dynident's solutions. The conic program is formulated here independently of Dynident:
 
     minimise 1/2 |R B pi - rho|^2 + gamma D(pi, pi0)   with P(pi_i) - margin P0_i positive semidefinite, and the linear limits
 
-`--scaled` gives Clarabel the bodies in coordinates whitened by their references (as Dynident works), otherwise SI units; `--gram` the squares as one
-matrix of the cost, otherwise residuals as variables of their own. The log-det of an entropic prior is the usual triangle with exponential cones.
+`--scaled` whitens the coordinates of the bodies by their references, as Dynident does; the default is SI units. `--gram` uses a cost matrix; the
+default uses the residuals as separate variables. The log-det of an entropic prior is formulated with a triangular matrix and exponential cones.
 Prints one table: processor time, failures by status, largest violation of a whitened cone, gap to the best objective known.
 """
 import argparse
@@ -18,7 +18,7 @@ import multiprocessing
 import os
 import time
 
-os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before NumPy: processor time is that of one core
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before NumPy is imported: use one core only
 
 import clarabel
 import numpy as np
@@ -46,7 +46,7 @@ def pseudo_inertia(p):
 
 
 class Body:
-    """One body's coordinates: pi = T v, and the ten columns of its cone's matrix."""
+    """Coordinates of one body, pi = T v, and the ten columns of the matrix of its cone."""
 
     def __init__(self, entry, scaled):
         self.reference = np.array(entry["reference"])
@@ -92,7 +92,7 @@ class Problem:
         return 0.5 * np.sum((self.data @ pi - self.right) ** 2) + case["prior_weight"] * prior
 
     def violation(self, pi):
-        """How far outside of a cone (whitened by the reference) or of a scalar's limits the point lies."""
+        """Violation of the cones (whitened by the reference) or of scalar limits at the point."""
         worst, n = 0.0, 10 * len(self.bodies)
         for i, b in enumerate(self.bodies):
             if b.known is None:
@@ -124,7 +124,7 @@ class Problem:
         extra = 14 * len(free) if case["prior"] == "entropic" else 0  # Z (10) and t (4) of each body
         n = base + residuals + extra
         Pd, q = np.zeros((base, base)), np.zeros(n)
-        # Rows of A by kind of cone: zero, nonnegative, then PSD and exponential one by one.
+        # Rows of A by type of cone: zero, nonnegative, then individual PSD and exponential cones.
         zero, zero_b, above, above_b, rest, cones = [], [], [], [], [], []
         if gram:
             Pd += M.T @ M
@@ -152,7 +152,7 @@ class Problem:
                 q[v] += weight * (svec(np.eye(4)) @ b.whiten)
                 first = base + residuals + 14 * free.index(i)
                 q[first + 10 : first + 14] -= weight
-                # [P Z; Z' diag(Z)] with Z lower triangular; t_k <= ln Z_kk. ln det P - ln det P0 is what the prior has.
+                # [P Z; Z' diag(Z)] with Z lower triangular; t_k <= ln Z_kk. The prior contains ln det P - ln det P0.
                 lower = [(r_, c_) for c_ in range(4) for r_ in range(c_, 4)]
                 block = np.zeros((36, n))
                 full = lambda column: column.reshape(8, 8)
@@ -222,7 +222,7 @@ class Problem:
 
 
 def judged(task):
-    """Figures of every solver for one line of the file."""
+    """Results of every solver for one line of the file."""
     line, scaled, gram = task
     case = json.loads(line)
     problem = Problem(case, scaled)
@@ -236,7 +236,7 @@ def judged(task):
     for name, own in case["answers"].items():
         answers[name] = (np.array(own["parameters"]), own["time_s"], own["status"], own["iterations"], own["kkt"])
     points = {name: (problem.objective(pi), problem.violation(pi)) for name, (pi, *_) in answers.items()}
-    # The best objective of a point that keeps every cone to 1e-9.
+    # The best objective among points that satisfy every cone to 1e-9.
     best = min((o for o, v in points.values() if v <= 1e-9 and np.isfinite(o)), default=np.nan)
     figures = {}
     for name, (_, seconds, status, iterations, kkt) in answers.items():
@@ -268,7 +268,7 @@ def main():
     parser.add_argument("file", type=argparse.FileType())
     parser.add_argument("--scaled", action="store_true")
     parser.add_argument("--gram", action="store_true")
-    parser.add_argument("--every", type=int, default=1, help="take every so many problems")
+    parser.add_argument("--every", type=int, default=1, help="use every N-th problem")
     parser.add_argument("--processes", type=int, default=1)
     options = parser.parse_args()
     figures = collections.defaultdict(list)

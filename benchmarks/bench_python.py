@@ -1,4 +1,4 @@
-"""Pinocchio called from Python (call overhead included), and the usual Python way from samples to a triangular factor.
+"""Measures Pinocchio called from Python (with call overhead), and the usual computation of a triangular factor from samples in Python.
 
     bench_python.py            one JSON line per robot and algorithm
 """

@@ -1,10 +1,10 @@
 #!/bin/sh
-# build_rivals.sh VENV OUT: compiles the C++ and C rivals into OUT, what is already there stays (2 to 4 minutes and 1 to 2 GB
-# for each Pinocchio build; PINOCCHIO="native" builds that one alone). VENV holds the wheels of
+# build_rivals.sh VENV OUT: compiles the C++ and C rivals into OUT; existing programs are kept (2 to 4 minutes and 1 to 2 GB
+# for each Pinocchio build; PINOCCHIO="native" builds only this one). VENV holds the wheels of
 # benchmarks/requirements.txt; Eigen headers: libeigen3-dev, or EIGEN=folder.
 #   native  Pinocchio header-only, -O3 -march=native
 #   base    the same without -march (SSE2)
-#   wheel   against the wheel's own compiled templates: what a C++ user of the wheel gets
+#   wheel   against the compiled templates of the wheel, as a C++ user of the wheel would use it
 set -eu
 venv=$1 out=$2 here=$(cd "$(dirname "$0")" && pwd)
 eigen=${EIGEN:-/usr/include/eigen3}
@@ -17,7 +17,7 @@ mkdir -p "$out"
 define="-DNDEBUG -std=c++17 -w -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_LIMIT_VECTOR_SIZE=30 \
   -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_FUSION_INVOKE_MAX_ARITY=12"
 
-# Compiles under a second name first: a build that was cut short leaves no program behind.
+# Compiles under a temporary name, so that an interrupted build leaves no program.
 pinocchio() {
   name=$1; shift
   case " ${PINOCCHIO:-native base wheel} " in *" $name "*) ;; *) return 0 ;; esac

@@ -1,19 +1,19 @@
-"""The iteration against robots that are not Dynident's: MuJoCo behind the line protocol, with what real robots have.
+"""Tests the iteration on independent robots: MuJoCo behind the line protocol, with the imperfections of real robots.
 
     pip install mujoco numpy
     python benchmarks/campaign.py target/release/dynident --out target/campaign              # 5 seeds of each arm and fault
     python benchmarks/campaign.py target/release/dynident --out target/campaign --seeds 20 --only ur10,panda
-    python benchmarks/campaign.py target/release/dynident --out target/campaign --quick      # one arm, one fault: what the checks run
+    python benchmarks/campaign.py target/release/dynident --out target/campaign --quick      # one arm, one fault: used by the checks
 
-Every seed draws another robot: each mass and inertia up to 30 % off the description, viscous, dry and Stribeck friction, dry friction
-that grows with the load, drive inertia, 0 to 8 ms between sensors and drives, quantised encoders whose differences are the
-velocities, noise of torque. Studies state none of that friction (`friction = "auto"`). Each arm is also run as robots that no model
-explains: torque that clips, a log that lags, a joint that catches, links of another length. These must never end as converged.
+Each seed draws a different robot. Masses and inertias differ from the description by up to 30 %. The robots have viscous, dry, Stribeck and
+load-dependent dry friction, drive inertia, delays of 0 to 8 ms between sensors and drives, quantised encoders, velocities from position
+differences, and torque noise. The studies do not state the friction (`friction = "auto"`). Each arm is also run with faults that no model
+explains: torque saturation, a delayed log, a sticking joint, wrong link lengths. An iteration with a faulty robot must never converge.
 
-Written to --out: table.md and runs.csv (one line a run), and a folder for each iteration. What is there is not run again. Errors are
-those of the base parameters of bodies and drives in result.json, against the robot's own numbers, in units of the stated standard
-deviation; friction has other laws than MuJoCo's and is judged by what the robot does. Exit status 1 if a faulty robot ended as
-converged, or a robot left its envelope without being stopped.
+Writes table.md and runs.csv (one line per run) to --out, and a folder for each iteration. Existing iterations are not repeated. Errors are
+those of the base parameters of bodies and drives in result.json, compared with the true values, in units of the stated standard deviation.
+Dynident's friction laws differ from MuJoCo's, so friction is judged by the motion of the robot. Exit status 1 if a faulty robot converged,
+or if a robot left its envelope without a stop.
 """
 import argparse
 import csv
@@ -63,7 +63,7 @@ settled = { tracking_tolerance = 1e-2 }
 
 
 def searched(names, speed, acceleration, torque, rest):
-    """A study's design and iteration: limits of each joint, then keys of [iteration] and further tables."""
+    """Design and iteration sections of a study: limits of each joint, then keys of [iteration] and further tables."""
     rows = zip(names, speed, acceleration, torque)
     line = '    { joint = "%s", speed = %s, acceleration = %s, torque = %s },'
     return SEARCH.replace("JOINTS", "\n".join(line % row for row in rows)) + rest
@@ -71,7 +71,7 @@ def searched(names, speed, acceleration, torque, rest):
 
 UR10 = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
 
-# Of each arm: its description, what stands in the study beside robot and drive, and the robot's friction (Nm, Nm s/rad), drive inertia (kg m^2).
+# For each arm: robot description, further sections of the study, true friction (Nm, Nm s/rad) and drive inertia (kg m^2).
 ARMS = {
     "ur10": {
         "urdf": "robots/ur10.urdf",
@@ -145,7 +145,7 @@ envelope = { tracking_error = 3.0 }
         "stribeck": [2, 2, 1.2, 0.6, 0.6, 0.3], "load": [0.03] * 6, "torque_noise": 0.1, "step": 2.5e-4,
         "clip": [132, 132, 103, 3.5, 43, 31], "catch": [2, 0.5, 0.15, 15.0],
     },
-    # Gravity acts on the slide alone, and there it is constant; N, N s/m and kg at the slide.
+    # Gravity acts only on the slide, where it is constant. Units at the slide: N, N s/m and kg.
     "scara": {
         "urdf": "benchmarks/robots/scara.urdf",
         "study": searched(["shoulder", "elbow", "slide", "flange"], [2.0, 2.5, 0.4, 4.0], [8, 10, 3, 20], [90.0, 45.0, 110.0, 9.0],
@@ -172,7 +172,7 @@ def numbers(values):
 
 
 def robot_of(name, fault, seed, client="mujoco", **more):
-    """The robot's command, and the seconds that its sensors and drives are late; `more` are further options of the client."""
+    """Returns the command of the robot, and the total delay of sensors and drives, s. `more` contains further options of the client."""
     arm = ARMS[name]
     random = np.random.default_rng(1000 + seed)
     late = 1e-3 * random.uniform(0.0, 8.0)
@@ -181,7 +181,7 @@ def robot_of(name, fault, seed, client="mujoco", **more):
         "friction", "damping", "armature", "stribeck", "stribeck-speed", "load", "gravity", "kp", "kd") if key in arm}
     options |= {"masses": 30, "seed": seed, "step": arm["step"], "quantum": 1e-5, "speed-filter": 100, "torque-noise": arm["torque_noise"]}
     if "kp" in arm:
-        # The drives close their loop themselves: what is late is what they tell.
+        # The drives close the loop internally; only their reported values are delayed.
         options["log-delay"] = late
     else:
         options |= {"sensor-delay": f"{shares * late:.5f}", "drive-delay": f"{(1 - shares) * late:.5f}"}
@@ -195,12 +195,12 @@ def robot_of(name, fault, seed, client="mujoco", **more):
         options["lengths"] = 12
     options |= more
     words = [sys.executable, str(CLIENTS[client]), str(ROOT / arm["urdf"]), "--truth", "truth.json"]
-    # `--key=value`: values may begin with a minus. True stands for an option without a value.
+    # Use `--key=value`, because values may begin with a minus. True means an option without a value.
     return words + [f"--{key}" if value is True else f"--{key}={value}" for key, value in options.items()], late
 
 
 def write_study(name, seed, command, to, tables=None):
-    """`tables` are design and iteration, where they are not the arm's."""
+    """`tables` replaces the design and iteration sections of the arm."""
     arm = ARMS[name]
     tables = (tables or arm["study"]).replace("SEED", str(seed)).replace("KP", json.dumps(arm.get("kp"))).replace("KD", json.dumps(arm.get("kd")))
     gravity = f"gravity_m_s2 = {arm['gravity']}\n" if "gravity" in arm else ""
@@ -212,7 +212,7 @@ def write_study(name, seed, command, to, tables=None):
 
 
 def true_value(expression, truth):
-    """A base parameter's value for the robot's own parameters; None where friction is in it."""
+    """Value of a base parameter from the true parameters; None if it contains friction."""
     own = {}
     for number, (body, inertia) in enumerate(zip(truth["bodies"], truth["drive_inertia"]), 1):
         for symbol, value in zip(["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"], body):
@@ -234,12 +234,12 @@ def true_value(expression, truth):
 
 
 def judged(folder, status):
-    """What one iteration came to."""
+    """Result of one iteration."""
     row = {"status": "failed", "exit": status, "converged": False, "runs": 0, "parameters": 0, "square": 0.0, "inside": 0,
            "worst": 0.0, "tracking_first": None, "tracking_last": None, "in_envelope": True, "stopped": True, "reason": ""}
     truth_file, file = folder / "truth.json", folder / "result" / "iterations.json"
     truth = json.loads(truth_file.read_text(encoding="utf-8")) if truth_file.exists() else {"runs": []}
-    # A motion that truly left its envelope has to be stopped.
+    # A motion outside its envelope must be stopped.
     left = [run for run in truth["runs"] if run["left_envelope"]]
     row |= {"in_envelope": not left, "stopped": all(run["ended"] == "stopped" for run in left)}
     if not file.exists():
@@ -266,7 +266,7 @@ def judged(folder, status):
 
 
 def run_study(dynident, folder):
-    """Runs study.toml in this folder into result/; exit status, seconds, and seconds of processor time with the robot's program."""
+    """Runs study.toml in this folder into result/; returns the exit status, the wall time, and the processor time including the robot program, s."""
     start = time.monotonic()
     with open(folder / "output.txt", "w", encoding="utf-8") as output:
         process = subprocess.Popen([dynident, "iterate", "study.toml", "--out", "result", "--allow-command", "--fresh"], cwd=folder,
@@ -285,7 +285,7 @@ def write_csv(rows, to):
 
 
 def iterate(dynident, name, fault, seed, out):
-    """One iteration, unless it is there."""
+    """Runs one iteration, unless its result exists."""
     folder = out / f"{name}_{fault or 'sound'}_{seed}"
     done = folder / "row.json"
     if done.exists():
@@ -305,7 +305,7 @@ def percent(count, of):
 
 
 def table(rows):
-    """One line for each arm and fault."""
+    """Table with one line for each arm and fault."""
     lines = ["| arm | robot | seeds | converged | inside the envelope | runs | true tracking error, last run, rad (median) | parameters | rms (error / bar) | inside 95 % |",
              "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
     for key in dict.fromkeys((row["arm"], row["fault"]) for row in rows):
@@ -328,9 +328,9 @@ def main():
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--first-seed", type=int, default=1)
-    parser.add_argument("--only", default=",".join(ARMS), help="arms, with commas between")
-    parser.add_argument("--faults", default=",".join(FAULTS), help="faults, with commas between; none where empty")
-    parser.add_argument("--quick", action="store_true", help="one sound and one clipping robot of the first arm")
+    parser.add_argument("--only", default=",".join(ARMS), help="comma-separated arms")
+    parser.add_argument("--faults", default=",".join(FAULTS), help="comma-separated faults; empty for no fault")
+    parser.add_argument("--quick", action="store_true", help="only the first arm: one robot without faults and one with torque saturation")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     dynident, out = options.dynident.resolve(), options.out.resolve()

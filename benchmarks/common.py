@@ -1,4 +1,4 @@
-"""Shared pieces of the benchmark scripts: robot files, states, timing, one JSON line a figure."""
+"""Shared functions of the benchmark scripts: robot files, states, timing, JSON output (one line per result)."""
 import json
 import os
 import statistics
@@ -39,7 +39,7 @@ def fourier(model, n, duration_s, seed=3, harmonics=5, base_hz=0.1, amplitude=0.
 
 
 def emit_timed(job, build, robot, nv, algo, call, repeats, per=1):
-    """Times `call` by this thread's CPU clock and prints median, minimum and maximum in ns for one of its `per` parts."""
+    """Measures `call` with the CPU clock of this thread, divides by `per`, and prints median, minimum and maximum in ns."""
     call()
     ns = []
     for _ in range(repeats):
@@ -64,5 +64,5 @@ def machine():
                 cpu = line.split(":", 1)[1].strip()
                 break
     flags = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
-    simd = "AVX-512" if "avx512f" in flags else "AVX2" if "avx2" in flags else "no AVX2 seen"
+    simd = "AVX-512" if "avx512f" in flags else "AVX2" if "avx2" in flags else "AVX2 not detected"
     return dict(cpu=cpu, simd=simd, cores=os.cpu_count(), load=round(os.getloadavg()[0], 2), date=time.strftime("%Y-%m-%d"))

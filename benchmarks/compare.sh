@@ -1,11 +1,11 @@
 #!/bin/sh
 # compare.sh [--rivals-only | --own-only] VENV OUT [ROUNDS]
-# Dynident beside Pinocchio (C++ three ways, Python) and MuJoCo on this machine, one core, alternating: every round runs each
-# rival once with Dynident between them, so that a slow minute hits all, and measures what the machine can do at best. Writes JSON
-# lines into OUT and the tables to OUT/table.md and standard output. ROUNDS defaults to 5 (about 3 minutes each). CORE picks the core
-# (default: the last one), CSV_ROWS the length of the recording that is read (default: 100,000), PINOCCHIO its builds (default:
-# native wheel base); DYNIDENT_BENCHMARK and DYNIDENT are programs in place of the release builds, with options
-# (`target/debug/dynident-benchmark --only rnea` for a trial).
+# Compares Dynident with Pinocchio (three C++ builds, Python) and MuJoCo on this machine, on one core. Each round alternates between
+# Dynident and the rivals, so that disturbances affect all programs, and measures the limits of the machine. Writes JSON lines
+# into OUT and the tables to OUT/table.md and standard output. ROUNDS defaults to 5 (about 3 minutes each). CORE selects the core
+# (default: the last one), CSV_ROWS the length of the recording (default: 100,000), PINOCCHIO its builds (default:
+# native wheel base). DYNIDENT_BENCHMARK and DYNIDENT replace the release builds and may include options
+# (for a trial: `target/debug/dynident-benchmark --only rnea`).
 set -eu
 rivals_only= own_only=
 case ${1:-} in
@@ -16,7 +16,7 @@ esac
 here=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$2"
 venv=$(cd "$1" && pwd) out=$(cd "$2" && pwd) rounds=${3:-5}
-# An incremental build leaves instructions of wide registers as calls: batches of the regressor took 2.4 times as long.
+# An incremental build does not inline SIMD instructions: regressor batches took 2.4 times as long.
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 CARGO_INCREMENTAL=0
 python=$venv/bin/python
 pin=
@@ -30,14 +30,14 @@ own=${DYNIDENT_BENCHMARK:-cargo run --release -q -p dynident-benchmark --feature
 [ -n "$rivals_only$own_only" ] || [ -n "${DYNIDENT:-}" ] || cargo build --release -q -p dynident-cli
 dynident=${DYNIDENT:-${CARGO_TARGET_DIR:-target}/release/dynident}
 log=$out/panda_arm7.csv
-# Lines of an earlier comparison would mix two states of the program.
+# Remove results of earlier versions of the program.
 rm -f "$out"/*.jsonl
 
-# Words of $own are a program and its options.
+# $own contains a program and its options.
 own() { [ -n "$rivals_only" ] || $pin $own "$@" >> "$out/dynident.jsonl"; }
-# What the machine can do at best, in every round; what algorithms count is the same in each.
+# Measure the limits of the machine in every round; the operation counts are the same in each round.
 limits() { own --limits --csv "$log" ${CSV_ROWS:+--csv-rows "$CSV_ROWS"}; }
-# A program that was built without the feature `counted` says so, and the table has no shares of operations.
+# A program without the feature `counted` reports this, and the table then has no shares of operations.
 [ -n "$rivals_only" ] || $own --count > "$out/counted.jsonl" || rm "$out/counted.jsonl"
 round=1
 while [ "$round" -le "$rounds" ]; do
@@ -62,7 +62,7 @@ while [ "$round" -le "$rounds" ]; do
 done
 "$python" "$here/table.py" "$out" | tee "$out/table.md"
 if [ -z "$own_only$rivals_only" ]; then
-  # The physically consistent fit on random problems, beside Clarabel's conic solver.
+  # The physically consistent fit on random problems, compared with Clarabel's conic solver.
   cargo bench -q -p dynident-estimation --bench physical -- --problems 1000 1058 > "$out/problems.txt"
   { echo; echo '```text'; $pin "$python" "$here/bench_lmi.py" "$out/problems.txt" --scaled; echo '```'; } | tee -a "$out/table.md"
 fi

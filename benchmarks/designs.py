@@ -1,18 +1,18 @@
-"""Designs of about 30 robots from nothing but their descriptions, checked by Pinocchio and Coal, which share nothing with Dynident.
+"""Designs motions for about 30 robots from their descriptions only, and checks them with the independent libraries Pinocchio and Coal.
 
     python3 -m venv .venv && .venv/bin/pip install -r benchmarks/requirements.txt
     .venv/bin/python benchmarks/designs.py [--dynident target/release/dynident] [--out DIR] [--seconds 10] [--quick] [--only NAME ..]
 
-For each robot it writes a study that names the description only, runs `dynident design`, and checks the exported trajectory of a motion that is called feasible:
+For each robot the script writes a study that contains only the robot description, runs `dynident design`, and checks the exported trajectory of each feasible motion:
 
-* torque by `rnea` plus the description's damping and Coulomb friction, within `effort`;
-* positions and velocities within the description's limits;
-* no contact of links, with the real meshes. Not checked are links on one joint or on neighbours, as everywhere, and what `design.json` lists under `not_checked`:
-  pairs of links, links without a shape, links with a shape that could not be used;
-* no shape below the floor that `design.json` says was assumed, unless it is below it in every posture.
+* torque from `rnea` plus damping and Coulomb friction of the description, within `effort`;
+* positions and velocities within the limits of the description;
+* no contact between links, with the real meshes. Links on the same or on adjacent joints are not checked, and neither are entries of `not_checked` in `design.json`:
+  pairs of links, links without a shape, links with an unusable shape;
+* no shape below the floor given in `design.json`, unless it is below the floor in every posture.
 
-It prints one row for each robot and exits with status 1 if a motion breaks a limit that is not listed, or if a robot of `MUST` has no motion. `--quick` searches with
-one start. The meshes of example-robot-data are in the wheel.
+The script prints one row per robot. Exit status 1 if a motion violates a limit that is not listed, or if a robot in `MUST` has no motion. `--quick` searches with
+one start. The meshes are in the wheel of example-robot-data.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ import pinocchio as pin
 ROOT = Path(__file__).resolve().parents[1]
 DATA = "example-robot-data/robots/"
 ROBOTS = {
-    # Arms, most with meshes.
+    # Arms, mostly with meshes.
     "ur3": DATA + "ur_description/urdf/ur3_robot.urdf",
     "ur3_gripper": DATA + "ur_description/urdf/ur3_gripper.urdf",
     "ur5": DATA + "ur_description/urdf/ur5_robot.urdf",
@@ -57,7 +57,7 @@ ROBOTS = {
     "iiwa14": ROOT / "robots/iiwa14.urdf",
     "planar2r": ROOT / "robots/planar2r.urdf",
     "scara": ROOT / "benchmarks/robots/scara_shapes.urdf",
-    # Legs and hands, held at the base.
+    # Legs and hands with a fixed base.
     "finger": DATA + "finger_edu_description/robots/finger_edu.urdf",
     "bolt": DATA + "bolt_description/robots/bolt.urdf",
     "solo8": DATA + "solo_description/robots/solo.urdf",
@@ -69,14 +69,14 @@ ROBOTS = {
     "anymal_c": DATA + "anymal_c_simple_description/urdf/anymal.urdf",
     "hyq": DATA + "hyq_description/robots/hyq_no_sensors.urdf",
 }
-MUST = {"ur3", "ur5", "ur5_limited", "ur10", "kinova", "so101", "scara"}  # reported as without a motion, or as in contact, once
-TOUCH = 1e-6  # m: closer than this is contact
-SLACK = 1e-6  # relative: rounding of the file
-SAMPLES = 500  # of the trajectory that are checked for contact
+MUST = {"ur3", "ur5", "ur5_limited", "ur10", "kinova", "so101", "scara"}  # robots for which an earlier version found no motion, or a motion with contact
+TOUCH = 1e-6  # m: a smaller distance is a contact
+SLACK = 1e-6  # relative rounding error of the file
+SAMPLES = 500  # samples of the trajectory that are checked for contact
 
 
 def share() -> Path:
-    """Where the wheel of example-robot-data keeps its files."""
+    """Folder of the files in the wheel of example-robot-data."""
     for folder in map(Path, sys.path):
         found = folder / "cmeel.prefix" / "share"
         if (found / "example-robot-data").is_dir():
@@ -85,7 +85,7 @@ def share() -> Path:
 
 
 class Referee:
-    """One robot as Pinocchio and Coal read it, and one design of it."""
+    """One robot, as read by Pinocchio and Coal, and one design."""
 
     def __init__(self, urdf: Path, out: Path) -> None:
         self.design = json.loads((out / "design.json").read_text())
@@ -95,7 +95,7 @@ class Referee:
         self.shapes = pin.buildGeomFromUrdf(self.model, str(urdf), pin.GeometryType.COLLISION, None, folders)
         self.data, self.placed = self.model.createData(), pin.GeometryData(self.shapes)
         names = self.design["joints"]
-        # Column of the file, factor and offset of each joint of the tree.
+        # File column, factor and offset of each joint of the tree.
         self.follows = {name: (column, 1.0, 0.0) for column, name in enumerate(names)}
         for joint in ElementTree.parse(urdf).getroot().findall("joint"):
             mimic = joint.find("mimic")
@@ -106,7 +106,7 @@ class Referee:
                        if self.model.names[k] in self.follows]
 
     def state(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions, velocities and accelerations of Pinocchio for a row of the file without its time."""
+        """Positions, velocities and accelerations for Pinocchio from a file row without its time."""
         n = len(self.design["joints"])
         q, v, a = pin.neutral(self.model), np.zeros(self.model.nv), np.zeros(self.model.nv)
         for joint, column, factor, offset in self.joints:
@@ -119,7 +119,7 @@ class Referee:
         return q, v, a
 
     def limits(self) -> dict[str, float]:
-        """The largest share of the limits of torque, position and velocity."""
+        """Largest ratio of torque, position and velocity to their limits."""
         worst = {"torque": 0.0, "position": 0.0, "velocity": 0.0}
         model = self.model
         for row in self.rows:
@@ -177,11 +177,11 @@ class Referee:
         return float(at.translation[2] - reach)
 
     def touching(self) -> tuple[dict[str, float], int]:
-        """Pairs of links in contact and links below the floor, with the first time; and the number of pairs checked."""
+        """Pairs of links in contact and links below the floor, each with the first time, and the number of checked pairs."""
         pairs, found = self.pairs(), {}
         plane = re.search(r"above the plane z = (-?[\d.]+) m", "\n".join(self.design["assumed"]))
         moving = [i for i, shape in enumerate(self.shapes.geometryObjects) if shape.parentJoint > 0]
-        # Rounded to a millimetre in the sentence.
+        # The message rounds to 1 mm.
         plane = float(plane[1]) - 1e-3 if plane else -np.inf
         heights = np.full((len(self.rows), len(moving)), np.inf)
         request = coal.DistanceRequest()
@@ -201,13 +201,13 @@ class Referee:
             heights[k] = [self.lowest(i) for i in moving]
         for column, i in enumerate(moving):
             low = heights[::every, column] < plane
-            # A link that never leaves the floor is no news.
+            # Ignore links that are always below the floor.
             if low.any() and not low.all():
                 found[f"{self.link(i)} / floor"] = self.rows[::every][low.argmax(), 0]
         return found, len(pairs)
 
     def near(self, i: int, j: int) -> bool:
-        """Whether balls about two shapes overlap."""
+        """Whether the bounding spheres of two shapes overlap."""
         centres, radii = [], 0.0
         for s in (i, j):
             geometry = self.shapes.geometryObjects[s].geometry
@@ -228,7 +228,7 @@ def study(urdf: Path, options: argparse.Namespace) -> str:
 
 
 def row(name: str, urdf: Path, folder: Path, options: argparse.Namespace) -> tuple[list[str], list[str]]:
-    """The row of one robot, and what is wrong."""
+    """Returns the row of one robot and its errors."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "study.toml").write_text(study(urdf, options))
     begun = time.monotonic()
@@ -256,9 +256,9 @@ def row(name: str, urdf: Path, folder: Path, options: argparse.Namespace) -> tup
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dynident", default=str(ROOT / "target/release/dynident"))
-    parser.add_argument("--out", type=Path, help="keeps the designs there (default: a temporary folder)")
-    parser.add_argument("--seconds", type=float, help="duration of the motions (default: that of the command)")
-    parser.add_argument("--quick", action="store_true", help="one start for each search")
+    parser.add_argument("--out", type=Path, help="folder for the designs (default: a temporary folder)")
+    parser.add_argument("--seconds", type=float, help="duration of the motions, s (default: that of the command)")
+    parser.add_argument("--quick", action="store_true", help="use one start per search")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--only", nargs="+", choices=ROBOTS, metavar="NAME")
     options = parser.parse_args()

@@ -1,5 +1,5 @@
-"""fleet.py [--logs N] [--quick]: a fleet of simulated UR10 reduced in a loop and on Ray with one and two workers, while workers are killed; bytes, seconds and memory that the
-page on fleets reckons with. Needs the package, ray and dask (python/tests/requirements.txt)."""
+"""fleet.py [--logs N] [--quick]: reduces the logs of a fleet of simulated UR10 robots in a loop, on Ray with one and two workers, and on Ray while workers are killed.
+Prints the sizes, times and memory use quoted on the fleet page. Needs the package, ray and dask (python/tests/requirements.txt)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ARMS = 20
 
 
 def recorded(seed: int, seconds: float = SECONDS) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Time, positions and torques of one run: arm `seed % ARMS`, whose friction differs by 3 % from arm to arm."""
+    """Time, positions and torques of one run of arm `seed % ARMS`. The friction differs by 3 % between arms."""
     robot = dynident.Robot.load(ROOT / "robots" / "ur10.urdf")
     draw, arm = np.random.default_rng(seed), np.random.default_rng(seed % ARMS)
     t = np.arange(0.0, seconds, 1.0 / RATE_HZ)
@@ -64,7 +64,7 @@ def reduced(path: Path) -> dynident.Factors:
 
 
 class Killer(threading.Thread):
-    """Kills one busy worker of Ray after another."""
+    """Kills busy Ray workers one after another."""
 
     def __init__(self, most: int) -> None:
         super().__init__(daemon=True)
@@ -98,13 +98,13 @@ def on_ray(paths: list[Path], workers: int, kill: int = 0) -> tuple[float, bytes
 
 
 def high_water_mb() -> float:
-    """Most memory of this process since its program was loaded, megabytes (Linux)."""
+    """Peak memory of this process since its program was loaded, megabytes (Linux)."""
     (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
     return float(line.split()[1]) / 1024
 
 
 def reduce_file(path: Path) -> None:
-    """The work of one worker on one file, in a process of its own: its memory, and bytes of the factors."""
+    """Runs the work of one worker on one file in a separate process; returns its peak memory and the size of the factors in bytes."""
     log = dynident.Log.read(path, position="q{1..6}", torque="tau{1..6}", time="t")
     robot = dynident.Robot.load(ROOT / "robots" / "ur10.urdf")
     factors = fleet.reduce(robot, log, segments=4, **STATED)
@@ -112,13 +112,13 @@ def reduce_file(path: Path) -> None:
 
 
 def peak(rows: int, folder: Path) -> tuple[float, int]:
-    """Megabytes of a process that reduces a CSV file of so many rows, and bytes of its factors."""
+    """Peak memory of a process that reduces a CSV file with this number of rows, megabytes, and size of its factors, bytes."""
     path = folder / f"{rows}.csv"
     t, q, tau = recorded(1, 4000 / RATE_HZ)
     with path.open("w") as file:
         file.write(",".join(["t", *(f"q{k}" for k in range(1, 7)), *(f"tau{k}" for k in range(1, 7))]) + "\n")
         for begin in range(0, rows, t.size):
-            # The same motion again and again: it need not join smoothly to show how memory grows.
+            # The motion is repeated; jumps between the repetitions do not affect the memory measurement.
             table = np.column_stack([t + begin / RATE_HZ, q, tau])[: rows - begin]
             np.savetxt(file, table, fmt="%.7g", delimiter=",")
     done = subprocess.run([sys.executable, __file__, "--file", str(path)], capture_output=True, text=True, check=False)
@@ -132,7 +132,7 @@ def peak(rows: int, folder: Path) -> tuple[float, int]:
 def main() -> None:
     ask = argparse.ArgumentParser(description=__doc__)
     ask.add_argument("--logs", type=int, default=1000)
-    ask.add_argument("--quick", action="store_true", help="a few logs: that it runs, not how fast")
+    ask.add_argument("--quick", action="store_true", help="few logs: test the script without a meaningful measurement")
     ask.add_argument("--file", type=Path, help=argparse.SUPPRESS)
     asked = ask.parse_args()
     if asked.file:
@@ -169,7 +169,7 @@ def main() -> None:
         seconds = {}
         for workers in (1, 2, 1, 2) if not asked.quick else (1, 2):
             once, gathered, _ = on_ray(paths, workers)
-            assert gathered == bytes_of_loop, "Ray gives other bytes than the loop"
+            assert gathered == bytes_of_loop, "Ray and the loop give different bytes"
             seconds[workers] = min(once, seconds.get(workers, once))
         print(f"Ray: one worker {seconds[1]:.1f} s, two {seconds[2]:.1f} s: {seconds[1] / seconds[2]:.2f} times")
         once, gathered, killed = on_ray(paths, 2, kills)

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Dynident's algorithms beside C that is generated for one robot, from the same numbers.
+"""Compares Dynident's algorithms with C code generated for one robot from the same numbers.
 
     generated.py DYNIDENT_BENCHMARK DESCRIPTION SCRATCH [ROBOT.urdf ..] [--rounds 5]
 
-DYNIDENT_BENCHMARK is the program of that name, DESCRIPTION the example of dynident-export, which writes a robot as C: inertial numbers as constants, products with zero and one left out, equal
-values made once, the way of CppADCodeGen. Both as release builds. The C is compiled by each compiler of gcc and clang that there is, with -O3 -march=native -ffast-math as well as without the
-last. Every round runs Dynident and each compilation once. Prints a table: nanoseconds of processor time for a call, least of all rounds, at 64 random states in turn.
+DYNIDENT_BENCHMARK is the program dynident-benchmark. DESCRIPTION is the example program of dynident-export, which writes a robot as C: inertial parameters are constants, products with zero and one
+are omitted and equal values are computed once, as in CppADCodeGen. Both must be release builds. The C code is compiled with gcc and clang, if installed, with -O3 -march=native, with and without
+-ffast-math. Each round runs Dynident and each compiled program once. Prints a table with the processor time per call in ns, the minimum of all rounds, at 64 alternating random states.
 """
 import argparse
 import json
@@ -19,7 +19,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 QUANTITIES = {"rnea": ("inverse_dynamics", "q, dq, ddq"), "crba": ("mass_matrix", "q"), "aba": ("forward_dynamics", "q, dq, ddq")}
 FLAGS = {"O3": ["-O3", "-march=native"], "fast": ["-O3", "-march=native", "-ffast-math"]}
 
-# States in turn: one alone would let the compiler keep its sines.
+# Alternate the states; with a single state the compiler could keep its sines.
 PROGRAM = """
 #include "{header}"
 #include <stdio.h>
@@ -51,7 +51,7 @@ PART = """  {{ double least = 1e300;
 
 
 def compiled(description, robot, scratch, prefix_of):
-    """Every compilation of the robot's C, by name."""
+    """Compiled programs of the robot's C code, by name."""
     header = scratch / f"{robot.stem}.h"
     header.write_text(subprocess.run([description, robot, "c"], check=True, capture_output=True, text=True).stdout)
     prefix, dof = prefix_of(header.read_text())
@@ -105,7 +105,7 @@ def main():
                     quantity, nanoseconds = line.split()
                     take(robot, quantity, name, float(nanoseconds))
     columns = ["Dynident", *dict.fromkeys(name for own in programs.values() for name in own)]
-    print("| robot | quantity |", " | ".join(columns), "| best C beside Dynident |")
+    print("| robot | quantity |", " | ".join(columns), "| best C / Dynident |")
     print("| --- | --- |", " | ".join("---:" for _ in columns), "| ---: |")
     for robot in programs:
         for quantity in QUANTITIES:

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""How time and memory grow: `dynident identify` against rows, logs, joints and threads, single calls and batches of the dynamics against joints.
+"""Measures how time and memory grow: `dynident identify` with rows, logs, joints and threads; single calls and batches of the dynamics with joints.
 
     growth.py DYNIDENT DYNIDENT_BENCHMARK SCRATCH [--full] [--rows N] [--joints N] [--logs N] [--limit-s 300] [--only CURVE..] [--out growth.csv]
 
-One line of CSV a point: curve, number, threads, processor and wall seconds (least of RUNS while a run is short), peak memory; then the slope of every curve from point
-to point in logarithms (1: proportional). Short by default; --full goes to 10^6 rows, 200 joints and 1,000 logs, --rows 100000000 further. A curve ends behind a point
-that took longer than --limit-s, and says so. Recordings are made with NumPy and `dynident evaluate`, and stay in SCRATCH.
+Prints one CSV line per point: curve, number, threads, processor and wall time in s (minimum of RUNS for short runs), peak memory. Then prints the logarithmic slope of each curve
+between adjacent points (1 is proportional). Short by default; --full measures up to 10^6 rows, 200 joints and 1,000 logs, --rows 100000000 more rows. A curve ends after a point
+that took longer than --limit-s, with a note. Recordings are computed with NumPy and `dynident evaluate`, and stay in SCRATCH.
 
-rows     a Panda arm, 22 columns at 1 kHz, the last fifth tested on
-logs     the same arm, N recordings of 2,000 rows each, the last one tested on
-log      nothing but `dynident log` of the files of rows: reading alone
-identify serial chains of N joints, 4,000 rows at 200 Hz, the last fifth tested on
+rows     a Panda arm, 22 columns at 1 kHz; the last fifth is for validation
+logs     the same arm, N recordings of 2,000 rows each; the last one is for validation
+log      `dynident log` of the files of `rows`: reading only
+identify serial chains of N joints, 4,000 rows at 200 Hz; the last fifth is for validation
 others   serial chains: one call, or one sample of a batch
 """
 import argparse
@@ -28,16 +28,16 @@ from common import machine
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PANDA = ROOT / "robots/panda_arm7.urdf"
-# A run shorter than this, s, is made RUNS times.
+# A run shorter than this, s, is repeated RUNS times.
 SHORT_S, RUNS = 3.0, 3
 ROWS_OF_A_LOG, ROWS_OF_A_CHAIN = 2_000, 4_000
 CHUNK = 100_000
-# NumPy writes as many rows in some minutes.
+# NumPy writes this number of rows in a few minutes.
 OWN_NOISE = 10_000_000
 HEADER = ["curve", "number", "threads", "processor_s", "wall_s", "memory_mib"]
 CALLS = ["rnea", "crba", "aba", "rnea_derivatives", "joint_torque_regressor", "rnea_batch", "crba_batch", "rnea_derivatives_batch", "regressor_batch"]
 
-# A process begins with the memory of the one that made it, so a small one makes it.
+# Peak memory includes that of the parent process at the start, so a small process starts the command.
 HELPER = """
 import json, resource, subprocess, sys, time
 start = time.perf_counter()
@@ -48,12 +48,12 @@ print(json.dumps([used.ru_utime + used.ru_stime, wall, used.ru_maxrss / 1024, do
 
 
 def measured(command):
-    """Least processor and wall time, s, and most memory, MiB, of a command."""
+    """Minimum processor and wall time, s, and peak memory, MiB, of a command."""
     best = None
     for _ in range(RUNS):
         printed = subprocess.run([sys.executable, "-S", "-c", HELPER, *map(str, command)], check=True, capture_output=True).stdout
         processor, wall, memory, code, told = json.loads(printed)
-        # A verdict may be negative: the work is the same.
+        # Accept a negative verdict, because the work is the same.
         if code not in (0, 1):
             sys.exit(f"exit status {code}: {' '.join(map(str, command))}\n{told}")
         best = [processor, wall, memory] if best is None else [min(best[0], processor), min(best[1], wall), max(best[2], memory)]
@@ -63,7 +63,7 @@ def measured(command):
 
 
 def motion(joints, rate_hz, seed):
-    """Ten seconds of a series of five harmonics of 0.1 Hz, which repeats: q, dq, ddq."""
+    """q, dq, ddq over one period (10 s) of a Fourier series with five harmonics of 0.1 Hz."""
     random = np.random.default_rng(seed)
     t = np.arange(round(10 * rate_hz)) / rate_hz
     q, dq, ddq = np.zeros((3, len(t), joints))
@@ -88,7 +88,7 @@ def torque(dynident, robot, scratch, arrays):
 
 
 def write_log(path, period, rows, rate_hz, seed):
-    """Time, positions, velocities, torques; noise of 1e-5 rad and 0.05 Nm. What is there already stays. Rows behind OWN_NOISE repeat the first ones, at times of their own."""
+    """Time, positions, velocities, torques; noise of 1e-5 rad and 0.05 Nm. Existing files are kept. Rows after OWN_NOISE repeat the first rows with new times."""
     if path.exists():
         return
     if rows > OWN_NOISE:
@@ -111,7 +111,7 @@ def write_log(path, period, rows, rate_hz, seed):
 
 
 def repeat_log(first, path, rows, rate_hz):
-    """The rows of a log again and again, with the time going on."""
+    """Repeats the rows of a log with continuous time."""
     unfinished = path.with_suffix(".part")
     with open(unfinished, "wb") as file:
         at = 0
@@ -127,7 +127,7 @@ def repeat_log(first, path, rows, rate_hz):
 
 
 def study(path, robot, joints, logs):
-    """A study of these logs, of one its last fifth as a test, else the last."""
+    """Writes a study of these logs. The last log is for validation; of a single log, the last fifth."""
     text = f'[robot]\nfile = "{robot}"\n\n[format]\ntime = {{ column = "t" }}\n'
     text += "".join(f'{key} = {{ columns = "{name}{{1..{joints}}}" }}\n' for key, name in (("position", "q"), ("velocity", "dq"), ("torque", "tau")))
     if len(logs) == 1:
@@ -139,7 +139,7 @@ def study(path, robot, joints, logs):
 
 
 def chain(path, joints):
-    """A serial arm: axes z, y, x by turns, links of 0.1 m and 1 kg that grow lighter."""
+    """A serial arm: axes alternate between z, y and x; links of 0.1 m, mass decreasing from 1.5 to 0.5 kg."""
     links, joint_texts = ['<link name="base"/>'], []
     for k in range(joints):
         mass, axis = 0.5 + 1.0 / (1 + k), ["0 0 1", "0 1 0", "1 0 0"][k % 3]
@@ -182,7 +182,7 @@ class Curves:
         self.tell([curve, number, 1, f"{seconds:.4g}", "", ""])
 
     def slopes(self):
-        print("\nslopes of processor time, and of memory above the first point's:")
+        print("\nlogarithmic slopes of processor time, and increase of memory from the first point:")
         for curve, threads in dict.fromkeys((point[0], point[2]) for point in self.points):
             own = [point for point in self.points if (point[0], point[2]) == (curve, threads)]
             told = []
@@ -235,7 +235,7 @@ def main():
         for number in [n for n in (1, 3, 10, 30, 100, 300, 1000) if n <= logs]:
             while len(files) < number + 1:
                 files.append(scratch / f"log{len(files)}.csv")
-                # Each begins elsewhere in the motion.
+                # Each log starts at a different point of the motion.
                 turned = [np.roll(array, -733 * len(files), axis=0) for array in period]
                 write_log(files[-1], turned, ROWS_OF_A_LOG, 1000.0, 100 + len(files))
             for count in threads:

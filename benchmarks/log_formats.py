@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""One recording of seven joints (21 channels and time) in every format that logs are read from, each written by another program: time and memory of reading it.
+"""Measures time and memory for reading one recording (seven joints, 21 channels and time) in every supported log format. Each file is written by an independent program.
 
     log_formats.py DYNIDENT SCRATCH [--rows 1000000] [--runs 3] [--identify] [--check]
 
-A table of Markdown: size, wall time (the least of RUNS) and peak memory of `dynident log FILE`, with --identify those of `dynident identify` as well; as multiples of CSV's.
---check asserts what does not depend on the machine's speed: every format gives CSV's numbers, and the memory of formats that are read as a stream does not grow between
-ROWS / 4 and ROWS. Files stay in SCRATCH and are not written again. Needs numpy, scipy, pyarrow, h5py, zstandard, rosbags."""
+Prints a Markdown table: size, wall time (minimum of RUNS) and peak memory of `dynident log FILE`, with --identify also of `dynident identify`, relative to CSV.
+--check asserts the results that do not depend on the speed of the machine: every format gives the same numbers as CSV, and the memory of streamed formats does not grow between
+ROWS / 4 and ROWS. Files stay in SCRATCH and are used again. Needs numpy, scipy, pyarrow, h5py, zstandard, rosbags."""
 import argparse
 import csv
 import gzip
@@ -31,11 +31,11 @@ ROBOT = ROOT / "robots/iiwa14.urdf"
 JOINTS = 7
 RATE_HZ = 1000.0
 SEED = 20261123
-# Peak memory moves by some MiB from run to run (pages of threads and of the allocator); three quarters of 80,000 rows are 10 MiB of numbers.
+# Peak memory varies by a few MiB between runs (pages of threads and of the allocator); three quarters of 80,000 rows are 10 MiB of numbers.
 STEADY_MIB = 5
-# A page of a Parquet column has one MiB of numbers as pyarrow writes it, and one page of each column is unpacked at a time: memory grows up to so many rows.
+# pyarrow writes Parquet pages of 1 MiB per column, and one page per column is unpacked at a time: memory grows up to this number of rows.
 PAGE_ROWS = 1 << 17
-# Rows of a batch of Arrow, as pyarrow writes Feather files.
+# Rows per Arrow batch in Feather files written by pyarrow.
 BATCH_ROWS = 1 << 16
 FLAT = {"time": "t_s", "position": "q{1..7}_rad", "velocity": "dq{1..7}_rad_s", "torque": "tau{1..7}_Nm"}
 ARRAYS = {"time": "t", "position": "q[{0..6}]", "velocity": "dq[{0..6}]", "torque": "tau[{0..6}]"}
@@ -43,7 +43,7 @@ TOPIC = {"time": "/arm.header.stamp", "position": "/arm.position[joint{1..7}]", 
 
 
 def recording(dynident, scratch, rows):
-    """t, q, dq, tau of the robot under way, noise on position and torque."""
+    """t, q, dq, tau of the moving robot, with noise on position and torque."""
     random = np.random.default_rng(SEED)
     t = np.arange(rows) / RATE_HZ
     harmonics, base = 5, 2 * np.pi * 0.1
@@ -56,7 +56,7 @@ def recording(dynident, scratch, rows):
             q[:, joint] += amplitude[joint, k] * np.sin(angle)
             dq[:, joint] += amplitude[joint, k] * omega * np.cos(angle)
             ddq[:, joint] -= amplitude[joint, k] * omega**2 * np.sin(angle)
-    # The motion repeats every ten seconds: its torque is computed once.
+    # The motion has a period of 10 s, so its torque is computed once.
     period = min(rows, round(10 * RATE_HZ))
     states, torques = scratch / "states.csv", scratch / "torques.csv"
     with open(states, "w", newline="") as file:
@@ -79,7 +79,7 @@ def write_csv(path, *arrays):
     with open(path, "w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(names)
-        # What a double needs to come back.
+        # Digits for an exact round trip of a double.
         writer.writerows(table.tolist())
 
 
@@ -120,7 +120,7 @@ def write_feather(path, *arrays):
 
 
 def messages(types, t, q, dq, tau):
-    """JointState messages as rosbags serializes them: the first one by it, the others by what differs, the last one compared."""
+    """Serialized JointState messages: rosbags serializes the first one, the others replace the changed bytes, and the last one is compared with rosbags."""
     state, header, stamp = (types.types[name] for name in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
     names = [f"joint{k}" for k in range(1, JOINTS + 1)]
     nanoseconds = 1_790_000_000_000_000_000 + np.round(1e9 * t).astype(np.int64)
@@ -132,7 +132,7 @@ def messages(types, t, q, dq, tau):
     table = np.tile(np.frombuffer(serialized(0), dtype=np.uint8), (len(t), 1))
     words = np.stack([nanoseconds // 10**9, nanoseconds % 10**9], axis=1).astype("<u4")
     table[:, 4:12] = words.view(np.uint8)
-    # Three sequences at the end: a length, padding, numbers.
+    # Three sequences at the end, each with length, padding and numbers.
     numbers = 8 * JOINTS
     for place, values in enumerate((tau, dq, q)):
         end = table.shape[1] - place * (numbers + 8)
@@ -152,7 +152,7 @@ def write_bag(plugin):
     return write
 
 
-# name: (columns, rows from which on memory does not grow, or None where all is held, writer). CSV comes first: the others are compared with it, and packed ones are made of it.
+# name: (columns, rows above which memory does not grow, or None if the complete file is held in memory, writer). CSV is first: the others are compared with it, and compressed files are made from it.
 FORMATS = {
     "log.csv": (FLAT, 0, write_csv),
     "log.csv.gz": (FLAT, 0, write_packed(lambda path: gzip.open(path, "wb", compresslevel=6))),
@@ -173,7 +173,7 @@ def size(path):
     return sum(file.stat().st_size for file in path.rglob("*")) if path.is_dir() else path.stat().st_size
 
 
-# A process begins with the memory of the one that made it, so a small one makes it.
+# Peak memory includes that of the parent process at the start, so a small process starts the command.
 HELPER = """
 import json, resource, subprocess, sys, time
 start = time.perf_counter()
@@ -183,7 +183,7 @@ print(json.dumps([time.perf_counter() - start, resource.getrusage(resource.RUSAG
 
 
 def measured(command):
-    """Wall time in seconds, peak memory in MiB, what was printed, exit status."""
+    """Wall time in s, peak memory in MiB, output, exit status."""
     with tempfile.NamedTemporaryFile() as printed:
         helper = [sys.executable, "-S", "-c", HELPER, printed.name, *map(str, command)]
         took, memory, code = json.loads(subprocess.run(helper, check=True, capture_output=True).stdout)
@@ -207,7 +207,7 @@ def study(folder, name, columns):
 
 
 def numbers(printed, columns):
-    """Samples, missing values and range of every channel of the study, in order; time by its span."""
+    """Samples, missing values and range of every channel of the study, in order; for the time, its span."""
     told = json.loads(printed)
     channels = {channel["name"]: channel for channel in told["channels"]}
     names = [columns[key].replace("{1..7}", "{}").replace("{0..6}", "{}") for key in ("position", "velocity", "torque")]
@@ -254,11 +254,11 @@ def main():
             shown.append(f"{cells[2]:.1f} | {cells[2] / of_csv[0][2]:.2f} | {cells[3]:.0f}")
         print(f"| `{name}` | {size(folder / name) / 1e6:.0f} | {' | '.join(shown)} |", flush=True)
         if chosen.check:
-            assert values == of_csv[1], f"{name}: other numbers than CSV's"
+            assert values == of_csv[1], f"{name}: the numbers differ from those of CSV"
             assert all(samples == chosen.rows and missing == 0 for samples, missing, _ in values), name
             if steady_rows is not None and chosen.rows // 4 >= steady_rows:
                 before = best([chosen.dynident, "log", fewer / name, "--json"], 1)[1]
-                assert memory < before + STEADY_MIB, f"{name}: {before:.0f} MiB became {memory:.0f} with four times the rows"
+                assert memory < before + STEADY_MIB, f"{name}: memory grows from {before:.0f} to {memory:.0f} MiB with four times the rows"
 
 
 if __name__ == "__main__":

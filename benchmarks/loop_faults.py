@@ -4,7 +4,7 @@
     python benchmarks/loop_faults.py target/release/dynident --out target/loop_faults                       # everything, 1 seed
     python benchmarks/loop_faults.py target/release/dynident --out target/loop_faults --only ur10,scara --faults honest,swapped-log
     python benchmarks/loop_faults.py target/release/dynident --out target/loop_faults --seeds 5 --jobs 2 --integrators pinocchio
-    python benchmarks/loop_faults.py target/release/dynident --out target/loop_faults --quick               # what the checks run
+    python benchmarks/loop_faults.py target/release/dynident --out target/loop_faults --quick               # used by the checks
 
 The robots are those of campaign.py with shorter motions (6 s at 250 Hz; the paper's arm 125 Hz), simulated by MuJoCo or by Pinocchio with another integrator
 and exact stiction. Each fault is an option of the robot's program (examples/robots/robot_faults.py). Seed k draws masses, noise and
@@ -31,7 +31,7 @@ from campaign import ARMS, ROOT
 
 # Unmet conditions that claim a cause by their name; others (tracking, prediction, unexplained torque) are symptoms.
 CAUSAL_CONDITIONS = {"clipping", "lag", "long-lag", "lag-changes", "length"}
-# Words for the admission that no cause was found, which is never wrong.
+# Cause names that mean "no cause found"; these are never wrong.
 UNDETERMINED = r"undetermined|unknown|not-determined|not determined"
 
 
@@ -47,7 +47,7 @@ class Fault:
 
 
 def on(value, rest=1.0):
-    """This value at the faulty joints, another at the rest."""
+    """This value at the faulty joints, another value at the other joints."""
     return lambda arm, joints: campaign.numbers(value if joint in joints else rest for joint in range(len(arm["friction"])))
 
 
@@ -88,9 +88,9 @@ def faulty_joints(fault, joints, seed):
 
 
 def short_tables(name):
-    """The arm's design and iteration with a shorter motion at a lower rate."""
+    """Design and iteration sections of the arm with a shorter motion at a lower rate."""
     text = ARMS[name]["study"]
-    # The paper's arm is slow: its strokes keep their time.
+    # The arm of the paper is slow, so its motion keeps its duration.
     for old, new in (("rate_hz = 250.0\nevery_sample", "rate_hz = 125.0\nevery_sample"), ("rate_hz = 500.0", "rate_hz = 250.0"),
                      ("duration_s = 10.0", "duration_s = 6.0"), ("factor = 25", "factor = 12"), ("max_runs = 6", "max_runs = 4"), ("speed_steps = [0.5]\n", ""), ("starts = 2", "starts = 1")):
         text = text.replace(old, new)
@@ -147,7 +147,7 @@ def named_causes(iterations):
 
 
 def problems(row, fault, joints):
-    """What is wrong with the verdict on a robot; `joints` are the names of the faulty joints."""
+    """Errors in the verdict on a robot; `joints` contains the names of the faulty joints."""
     found = ["converged"] if row["converged"] and not fault.may_converge else []
     for named in row["causes"]:
         if re.search(UNDETERMINED, named["cause"]):
@@ -162,7 +162,7 @@ def problems(row, fault, joints):
 
 
 def iterate(dynident, name, client, fault_name, seed, out):
-    """One iteration, unless its row exists."""
+    """Runs one iteration, unless its row exists."""
     fault, arm = FAULTS[fault_name], ARMS[name]
     folder = out / f"{name}_{client}_{fault_name}_{seed}"
     ran = folder / "ran.json"
@@ -175,7 +175,7 @@ def iterate(dynident, name, client, fault_name, seed, out):
         campaign.write_study(name, seed, command, folder / "study.toml", tables)
         status, seconds, processor = campaign.run_study(dynident, folder)
         ran.write_text(json.dumps({"status": status, "seconds": seconds, "processor_s": processor}), encoding="utf-8")
-    # The verdict is read anew each time: it follows this script, not the run.
+    # The verdict is evaluated again each time, because it depends on this script and not on the run.
     run = json.loads(ran.read_text(encoding="utf-8"))
     row = {"arm": name, "integrator": client, "fault": fault_name, "seed": seed, "seconds": run["seconds"], "processor_s": run["processor_s"]}
     row |= campaign.judged(folder, run["status"])
@@ -196,7 +196,7 @@ def iterate(dynident, name, client, fault_name, seed, out):
 
 
 def table(rows):
-    """One line for each arm, integrator and fault."""
+    """Table with one line for each arm, integrator and fault."""
     lines = ["| arm | integrator | fault | seeds | converged | right cause | no cause | wrong cause or joint | runs | processor, s | rms (error / sigma) | inside 95 % |",
              "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
     for key in dict.fromkeys((row["arm"], row["integrator"], row["fault"]) for row in rows):
@@ -217,13 +217,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dynident", type=Path)
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--only", default=",".join(ARMS), help="arms, with commas between")
-    parser.add_argument("--integrators", default=",".join(campaign.CLIENTS), help="mujoco, pinocchio, or both with a comma")
-    parser.add_argument("--faults", default=",".join(FAULTS), help="faults, with commas between")
+    parser.add_argument("--only", default=",".join(ARMS), help="comma-separated arms")
+    parser.add_argument("--integrators", default=",".join(campaign.CLIENTS), help="mujoco, pinocchio, or both, comma-separated")
+    parser.add_argument("--faults", default=",".join(FAULTS), help="comma-separated faults")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--first-seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=1, help="iterations at a time")
-    parser.add_argument("--quick", action="store_true", help="the first arm with each integrator, and five faults")
+    parser.add_argument("--jobs", type=int, default=1, help="number of parallel iterations")
+    parser.add_argument("--quick", action="store_true", help="only the first arm with each integrator, and five faults")
     options = parser.parse_args()
     names, clients, faults = (text.split(",") for text in (options.only, options.integrators, options.faults))
     for given, known in ((names, ARMS), (clients, campaign.CLIENTS), (faults, FAULTS)):

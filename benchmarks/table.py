@@ -1,10 +1,10 @@
-"""Markdown tables from the JSON lines in a folder (see compare.sh): minimum (median) in ns, rivals beside Dynident; what the machine
-can do at best; and how much of that each of Dynident's figures is.
+"""Writes Markdown tables from the JSON lines in a folder (see compare.sh): minimum (median) in ns of Dynident and the rivals, the limits
+of the machine, and the share of these limits that Dynident reaches.
 
     table.py FOLDER
 
-Several rounds of one program are merged: least of the minima, median of the medians. Pinocchio's two conventions of one
-algorithm (world, local) count as its better one, by minimum.
+Several rounds of one program are merged: least of the minima, median of the medians. If Pinocchio has two conventions of an
+algorithm (world, local), the faster one is used, by minimum.
 """
 import json
 import re
@@ -24,13 +24,13 @@ NAMES = {
     ("mujoco", "wheel"): "MuJoCo",
     ("pandas", "wheel"): "pandas",
 }
-# Dynident's batched kernels have no counterpart in Pinocchio: the same quantity one call at a time stands beside them.
+# Dynident's batched kernels have no counterpart in Pinocchio; they are compared with single calls for the same quantity.
 SAME_QUANTITY = {"regressor_batch": "joint_torque_regressor", "rnea_batch": "rnea", "crba_batch": "crba",
                  "rnea_derivatives_batch": "rnea_derivatives", "aba_batch": "aba"}
 VARIANT = re.compile(r"_(world|local)$")
 
 
-# Rivals of which the last column speaks, the first one that has a figure.
+# Rivals for the last column; the first one with a result is used.
 ANCHORS = ("Pinocchio C++ native", "Pinocchio Python", "MuJoCo", "pandas")
 
 
@@ -82,7 +82,7 @@ def compiler(command):
 
 
 def comparison(table, ours, rivals):
-    """One table of these rows, with the columns that have a figure."""
+    """One table of these rows, with the columns that have results."""
     present = {c for cells in table.values() for c in cells}
     ours, rivals = ([c for c in columns if c in present] for columns in (ours, rivals))
     heads = ["robot", "quantity", *ours, *rivals, *(["times as fast"] if ours else [])]
@@ -100,7 +100,7 @@ def comparison(table, ours, rivals):
 
 
 def limits(folder):
-    """{(limit, column): (most per second, what it is)}"""
+    """{(limit, column): (maximum rate per second, description)}"""
     found = {}
     for d in lines(folder):
         if d.get("job") == "limit":
@@ -144,9 +144,9 @@ def main():
     rounds = max(cell[2] for cells in table.values() for cell in cells.values())
     print(f"{m['date']}, {m['cpu']} ({m['simd']}, {m['cores']} cores; one used; load {m['load']}), {compiler('g++')}, {compiler('rustc')},")
     packages = ", ".join(f"{name} {version(package)}" for name, package in PACKAGES.items())
-    print(f"{packages}. ns a call, a sample, a row or a command of one thread's CPU time:")
-    print(f"minimum (median), up to {rounds} runs each, alternating. Last column: best Dynident against the first of")
-    print(f"{', '.join(ANCHORS)} that has a figure, by minima.\n")
+    print(f"{packages}. CPU time of one thread in ns per call, sample, row or command:")
+    print(f"minimum (median), up to {rounds} runs each, alternating. Last column: best Dynident compared with the first of")
+    print(f"{', '.join(ANCHORS)} with a result, by minima.\n")
     of_pinocchio = {key: cells for key, cells in table.items() if any(c.startswith("Pinocchio") for c in cells)} or table
     comparison(of_pinocchio, ours, rivals)
     others = {key: cells for key, cells in table.items() if key not in of_pinocchio}
@@ -155,16 +155,16 @@ def main():
         comparison(others, ours, rivals)
     limit = limits(sys.argv[1])
     if limit:
-        print("\nThe machine at its best, one core, measured in the same run:\n")
-        print("| limit | | a second | what |\n| --- | --- | ---: | --- |")
+        print("\nLimits of the machine, one core, measured in the same run:\n")
+        print("| limit | | per second | description |\n| --- | --- | ---: | --- |")
         for (name, column), (rate, what) in limit.items():
             unit = "GFLOP" if name == "peak_flops" else "GB"
             print(f"| {name.replace('_', ' ')} | {column.removeprefix('Dynident ')} | {rate / 1e9:.3g} {unit} | {what} |")
     rows = shares(sys.argv[1], table, limit)
     if rows:
-        print("\nShare of that: operations as counted in the program by scalars that count (a multiply-add is two; plain arithmetic outside of the")
-        print("kernels is not counted), over the least time. The peak is that of all lanes full and nothing but multiply-adds.\n")
-        print("| robot | quantity | | a call | reached | share |\n| --- | --- | --- | ---: | ---: | --- |")
+        print("\nShare of these limits: operations counted by the program with counting scalars (a multiply-add is two operations; plain arithmetic outside of the")
+        print("kernels is not counted), divided by the minimum time. The peak is the rate of multiply-adds in all lanes.\n")
+        print("| robot | quantity | | per call | reached | share |\n| --- | --- | --- | ---: | ---: | --- |")
         for row in rows:
             print("| " + " | ".join(row) + " |")
 

@@ -1,7 +1,7 @@
-"""The short tables and the pictures of the book's comparison pages, from the CSV files in docs/src/data.
+"""Creates the short tables and the pictures of the comparison pages of the book from the CSV files in docs/src/data.
 
 python3 docs/summaries.py           prints the tables and writes the pictures into docs/src/images
-python3 docs/summaries.py --check   says whether pages and pictures are as the data say; exit status 1 if not
+python3 docs/summaries.py --check   checks pages and pictures against the data; exit status 1 if they differ
 """
 import csv
 import math
@@ -25,7 +25,7 @@ def table(header, rows):
 
 
 def estimators():
-    """One row an estimator: the largest error of the four robots at each level, coverage and median time over all cells."""
+    """One row per estimator: the largest error of the four robots at each level, coverage and median time over all cells."""
     cells = data("estimators.csv")
     names = list(dict.fromkeys(cell["estimator"] for cell in cells))
     rows = []
@@ -47,7 +47,7 @@ def estimators_picture():
     ranges = {}
     for cell in cells:
         ranges.setdefault(cell["estimator"], []).append((float(cell["rmse_over_bound"]), cell["noise"]))
-    # Variants that differ in their error bars alone would repeat their neighbour's line.
+    # Omit variants that differ only in their error bars, because their lines would be identical.
     bars = {"weighted-white", "weighted-segments", "weighted-newey-west", "weighted-bootstrap"}
     shown = sorted((name for name in ranges if name not in bars), key=lambda name: statistics.median(value for value, _ in ranges[name]))
     left, right, top, step = 250, 700, 46, 24
@@ -81,7 +81,7 @@ def estimators_picture():
 
 
 def differentiators():
-    """One table a motion: bias without fault and with a shape that is 0.1 % off, and noise at 1e-3 degrees, of q̇ and q̈."""
+    """One table per motion: bias of q̇ and q̈ without fault and with a shape error of 0.1 %, and noise at 1e-3 degrees."""
     cells = data("differentiators.csv")
     tables = []
     for motion in dict.fromkeys(cell["motion"] for cell in cells):
@@ -100,7 +100,7 @@ def differentiators():
 
 
 def designs(robots, suffix):
-    """One row a family: log det where that was looked for, condition number where this was."""
+    """One row per family: log det of the D-optimal design and condition number of the design with minimum condition number."""
     cells = data("designs.csv")
     rows = []
     for family in dict.fromkeys(cell["family"] for cell in cells if cell["robot"] == robots[0] + suffix):
@@ -132,7 +132,7 @@ def percent(part, whole):
 
 
 def default_cases():
-    """One row a case: the default beside the truth in hand and beside plain least squares, its bars, laws and lag."""
+    """One row per case: the default compared with known true settings and with plain least squares; error bars, friction laws and lag."""
     rows = []
     for cell in data("default.csv"):
         motion, noise = default_motion(cell)
@@ -151,7 +151,7 @@ def default_cases():
 
 
 def default_goals():
-    """What the default is to reach, one row a goal, as in crates/dynident-benchmark/src/default_study/table.rs."""
+    """Targets of the default settings, one row per target, as in crates/dynident-benchmark/src/default_study/table.rs."""
     cells = data("default.csv")
 
     def ratios(what, over):
@@ -191,7 +191,7 @@ def default_goals():
 
 
 def default_estimators():
-    """One row an estimator by name: its error over that of the default's estimate, where it settled in all runs."""
+    """One row per named estimator: its error relative to the default, for cases in which it converged in all runs."""
     cells, rows = data("default.csv"), []
     for name in default_names():
         asked = [cell for cell in cells if cell[f"{name}_settled"]]
@@ -205,7 +205,7 @@ def default_estimators():
 
 
 def default_picture():
-    """The default's error over the best, case by case, with that of the laws stated, plain least squares and the best by name."""
+    """Error of the default relative to the best for each case, with those of stated laws, plain least squares and the best named estimator."""
     cells = sorted(data("default.csv"), key=lambda cell: float(cell["default_percent"]) / float(cell["best_percent"]))
     left, right, top, step = 330, 700, 62, 17
     lowest, highest = 0.7, 400.0
@@ -254,7 +254,7 @@ LINES = ["#1f4e8c", "#b03030", "#2e7d32", "#8a5a00", "#6a3d9a"]
 
 
 def growth_picture():
-    """Logarithmic panels of benchmarks/growth.py; a thin grey line in each is proportional growth."""
+    """Logarithmic panels of the results of benchmarks/growth.py; a thin grey line shows proportional growth."""
     cells = [cell for cell in data("growth.csv") if cell["threads"] == "1"]
     wide, high, left, top = 330, 230, 52, 30
     out = [
@@ -293,7 +293,7 @@ def growth_picture():
                 y += 3
             taken.append(y)
             out.append(f'<text x="{x + 6:.1f}" y="{y + 4:.1f}" fill="{colour}" font-size="10">{label}</text>')
-        # Proportional growth from the least of the first points on, as far as the panel goes.
+        # Proportional growth from the lowest first point to the edge of the panel.
         first = min((points[0] for points in lines.values()), key=lambda point: point[1])
         reach = min(10**high_x / first[0], 10**high_y / first[1])
         ends = f"{place(*first)} {place(first[0] * reach, first[1] * reach)}"
@@ -324,5 +324,5 @@ for name, picture in PICTURES.items():
         if "--check" not in sys.argv:
             path.write_text(picture(), encoding="utf-8")
 if "--check" in sys.argv:
-    print(f"not as the data say: {', '.join(wrong)}" if wrong else "pages and pictures are as the data say")
+    print(f"differs from the data: {', '.join(wrong)}" if wrong else "pages and pictures agree with the data")
     sys.exit(1 if wrong else 0)

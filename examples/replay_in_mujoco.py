@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""A recorded log replayed in MuJoCo, with a model of before the identification and the identified one.
+"""Replays a recorded log in MuJoCo, with the model before the identification and the identified model.
 
     replay_in_mujoco.py BEFORE AFTER LOG.csv --time t_s --position 'q{1..6}_rad' --torque 'tau{1..6}_Nm' [--from 0.7] [--require-better]
 
-BEFORE and AFTER are MJCF or URDF (whose shapes are left out); joints that only BEFORE has are fixed at zero. Two questions are asked of each:
+BEFORE and AFTER are MJCF or URDF files; URDF shapes are ignored. Joints that exist only in BEFORE are fixed at zero. Each model is tested in two ways:
 
-inverse: which torque does the model ask for at the recorded motion, and how far is that from the recorded torque? Nm (N) rms after one low-pass for both.
-forward: where does the model go under the recorded torque? A weak controller, the same for both models, holds it near the recorded motion: rms distance
-         from that in mrad (mm), and the torque that the controller had to add. A perfect model needs none.
+inverse: difference between the torque of the model for the recorded motion and the recorded torque, Nm (N) rms, with the same low-pass for both.
+forward: motion of the model with the recorded torque. A weak controller, the same for both models, keeps it near the recorded motion. Results are the rms
+         tracking error in mrad (mm) and the torque of the controller. A perfect model needs no controller torque.
 
 Needs mujoco, numpy and scipy."""
 import argparse
@@ -45,7 +45,7 @@ def moving(root):
 
 
 def loaded(path, kept):
-    """The model with the joints `kept` alone and without constraints but friction."""
+    """The model with only the joints `kept`, and without constraints except friction."""
     root = ElementTree.parse(path).getroot()
     if root.tag == "robot":
         for link in root.iter("link"):
@@ -61,14 +61,14 @@ def loaded(path, kept):
                 parent.remove(joint)
         model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
     model.jnt_limited[:] = 0
-    # Contacts are no part of the arm's dynamics.
+    # Contacts are not part of the arm's dynamics.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    # The world of a description without gravity has MuJoCo's.
+    # A robot description without gravity gets MuJoCo's default.
     return model
 
 
 class Replay:
-    """A model with its joints in the order of the log."""
+    """A model with the joints in the order of the log."""
 
     def __init__(self, model, names):
         self.model, self.data = model, mujoco.MjData(model)
@@ -96,10 +96,10 @@ class Replay:
         return np.mean(diagonals, axis=0)
 
     def forward(self, times, wanted, torque, stiffness, damping, step):
-        """Positions and the controller's torque at every `step` under the recorded torque and the controller."""
+        """Returns positions and controller torque at every `step`, driven by the recorded torque and the controller."""
         model, data = self.model, self.data
         model.opt.timestep = step
-        # MuJoCo integrates damping implicitly: the controller's is a part of the model's, for a wrist without its drive is light.
+        # Add the controller's damping to the model, because MuJoCo integrates damping implicitly; a wrist without drive inertia is light.
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         model.dof_damping[self.v] += damping
         mujoco.mj_resetData(model, data)
@@ -123,21 +123,21 @@ def main():
     for name in ("before", "after", "log"):
         options.add_argument(name)
     options.add_argument("--time", default="t_s")
-    options.add_argument("--position", required=True, help="columns, rad (m): 'q{1..6}_rad' or names with commas")
+    options.add_argument("--position", required=True, help="columns, rad (m): 'q{1..6}_rad' or comma-separated names")
     options.add_argument("--torque", required=True, help="columns, Nm (N)")
-    options.add_argument("--joints", help="names of the joints in the order of the columns; without it the order of AFTER")
-    options.add_argument("--from", dest="first", type=float, default=0.0, help="begin at this share of the log")
-    options.add_argument("--cutoff-hz", type=float, default=3.0, help="of the low-pass that motion and torque go through")
-    options.add_argument("--controller-hz", type=float, default=2.0, help="natural frequency of the controller that holds the forward run: weight moves an arm that is held below 1 Hz out of reach")
-    options.add_argument("--delay-ms", type=float, default=0.0, help="by how much the logged torque comes after the motion: `delay` of simulator.json")
-    options.add_argument("--require-better", action="store_true", help="fail unless AFTER is nearer at every joint, inverse, and as a whole, forward")
+    options.add_argument("--joints", help="names of the joints in column order (default: order of AFTER)")
+    options.add_argument("--from", dest="first", type=float, default=0.0, help="start at this fraction of the log")
+    options.add_argument("--cutoff-hz", type=float, default=3.0, help="cut-off of the low-pass for motion and torque, Hz")
+    options.add_argument("--controller-hz", type=float, default=2.0, help="natural frequency of the controller in the forward test, Hz; below 1 Hz gravity moves the arm far from the recorded motion")
+    options.add_argument("--delay-ms", type=float, default=0.0, help="delay of the logged torque relative to the motion: `delay` in simulator.json")
+    options.add_argument("--require-better", action="store_true", help="fail unless AFTER is better at every joint in the inverse test and on average in the forward test")
     chosen = options.parse_args()
 
     roots = [ElementTree.parse(path).getroot() for path in (chosen.before, chosen.after)]
     common = [name for name in moving(roots[1]) if name in moving(roots[0])]
     names = chosen.joints.split(",") if chosen.joints else common
     if missing := [name for name in names if name not in common]:
-        sys.exit(f"joints that one of the models does not have: {', '.join(missing)}")
+        sys.exit(f"joints missing in one of the models: {', '.join(missing)}")
     models = [Replay(loaded(path, names), names) for path in (chosen.before, chosen.after)]
 
     with open(chosen.log, newline="") as file:
@@ -148,7 +148,7 @@ def main():
     if positions.shape[1] != len(names) or torques.shape[1] != len(names):
         sys.exit(f"{positions.shape[1]} positions and {torques.shape[1]} torques for the joints {', '.join(names)}")
 
-    # An even clock, a low-pass in both directions, derivatives of a spline of the fifth order.
+    # Uniform sampling, a zero-phase low-pass, derivatives of a fifth-order spline.
     rate = 1.0 / np.median(np.diff(times))
     grid = np.arange(times[0], times[-1], 1.0 / rate)
     even = lambda values, t: np.stack([np.interp(t, times, column) for column in values.T], axis=1)
@@ -157,21 +157,21 @@ def main():
     wanted = make_interp_spline(grid, smooth(even(positions, grid)), k=5)
     measured = even(torques, grid + 1e-3 * chosen.delay_ms)
     motion = [wanted(grid), wanted(grid, 1), wanted(grid, 2)]
-    # Without the ends, where the filter invents what came before and after.
+    # Omit the ends, where the filter extrapolates.
     edge = int(rate / chosen.cutoff_hz)
     inside = slice(edge, len(grid) - edge)
 
     target = smooth(measured)[inside]
     off = [rms(smooth(model.inverse(motion))[inside] - target) for model in models]
     print(f"{len(grid)} samples at {rate:.1f} Hz, below {chosen.cutoff_hz:g} Hz\n")
-    print("inverse dynamics at the recorded motion: torque off by, rms\n\n| joint | torque rms | before | after |\n| --- | --- | --- | --- |")
+    print("inverse dynamics at the recorded motion: torque error, rms\n\n| joint | torque rms | before | after |\n| --- | --- | --- | --- |")
     size = rms(target)
     for name, own, before, after in zip(names, size, *off):
         print(f"| {name} | {own:.3f} | {before:.3f} | {after:.3f} |")
     relative = [100 * np.linalg.norm(error) / np.linalg.norm(size) for error in off]
-    print(f"| all, of the torque | | {relative[0]:.1f} % | {relative[1]:.1f} % |\n")
+    print(f"| all, relative to the torque | | {relative[0]:.1f} % | {relative[1]:.1f} % |\n")
 
-    # One controller for both models, from the inertia of the identified one: without drives a wrist has next to none.
+    # Use one controller for both models, from the inertia of the identified model; without drive inertia a wrist has almost no inertia.
     inertia = models[1].inertia(motion[0][:: max(1, len(grid) // 50)])
     frequency = 2 * np.pi * chosen.controller_hz
     stiffness, damping = inertia * frequency**2, 2 * inertia * frequency
@@ -181,7 +181,7 @@ def main():
     recorded = wanted(np.arange(grid[0], grid[-1], step))
     away = [1e3 * rms(run - recorded) for run, _ in runs]
     helped = [rms(added) for _, added in runs]
-    print(f"forward under the recorded torque, held by {chosen.controller_hz:g} Hz: away by, rms (torque that the controller added)\n")
+    print(f"forward dynamics with the recorded torque, controller at {chosen.controller_hz:g} Hz: tracking error, rms (controller torque)\n")
     print("| joint | before, mrad | after, mrad |\n| --- | --- | --- |")
     for name, before, after, help_before, help_after in zip(names, *away, *helped):
         print(f"| {name} | {before:.1f} ({help_before:.2f} Nm) | {after:.1f} ({help_after:.2f} Nm) |")
@@ -191,9 +191,9 @@ def main():
     if chosen.require_better:
         worse = [name for name, before, after in zip(names, *off) if not after < before]
         if worse:
-            sys.exit(f"the identified model is no nearer to the recorded torque at {', '.join(worse)}")
+            sys.exit(f"the identified model does not improve the torque of the joints {', '.join(worse)}")
         if not whole[1] < whole[0]:
-            sys.exit("the identified model goes no nearer along the recorded motion")
+            sys.exit("the identified model does not improve the tracking of the recorded motion")
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""Makes the golden files again and compares them with the committed ones: exit status 1 and one line a difference.
+"""Creates the golden files again and compares them with the committed files. Exit status 1 and one line for each difference.
 
     python golden/check.py [NAME ...]
 
-NAME picks generators of the table below (default: all). Text and structure must be equal, numbers to 1e-12 relative to
-the largest of their array: the generators are deterministic, and what remains between two machines is the last bit of
-sine and cosine (the C library picks its version by processor), which shows here as up to 2e-14 of an array's largest entry,
-and the linear algebra library's choice of kernel, which shows as up to 2e-13 in the estimators' covariances.
+NAME selects generators of the table below (default: all). Text and structure must be equal, numbers to 1e-12 relative to
+the largest entry of their array. The generators are deterministic. Differences between machines are the last bit of sine
+and cosine (the C library selects its version by processor), up to 2e-14 of the largest entry of an array, and the kernel
+of the linear algebra library, up to 2e-13 in the covariances of the estimators.
 """
 import json
 import subprocess
@@ -15,10 +15,10 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 RELATIVE = 1e-12
-# An iterative solver's last digits are those of its stopping rule; the problems that it solves are judged by RELATIVE all the same.
+# The last digits of an iterative solver depend on its stopping rule; its inputs are still compared with RELATIVE.
 SOLVED = {"cvxpy_physical.json": ("solution", 1e-6)}
 
-# name: (script, golden files it makes). Every script takes `--out DIR` (default: its own folder).
+# name: (script, golden files). Every script takes `--out DIR` (default: its own folder).
 GENERATORS = {
     "pinocchio": ("pinocchio.py", "pinocchio/*.json"),
     "mujoco": ("mujoco_inverse.py", "mujoco/*.json"),
@@ -38,7 +38,7 @@ GENERATORS = {
 
 
 def numbers(x):
-    """The numbers of a nested list, or None where it holds anything else."""
+    """The numbers of a nested list, or None if it contains anything else."""
     if isinstance(x, bool) or not isinstance(x, (int, float, list)):
         return None
     if not isinstance(x, list):
@@ -66,30 +66,30 @@ def differences(old, new, where, limit=RELATIVE, solved=None):
             for i, (x, y) in enumerate(zip(old, new)):
                 yield from differences(x, y, f"{where}[{i}]", limit, solved)
         elif old != new:
-            yield f"{where}: {old!r} became {new!r}"
+            yield f"{where}: {old!r} changed to {new!r}"
     elif shape(old) != shape(new):
         yield f"{where}: the shape changed"
     elif a:
         error = max(abs(x - y) for x, y in zip(a, b))
-        # Quantities are in SI units of a human-sized arm: what is below 1e-3 in all its entries is judged absolutely.
+        # Quantities are in SI units of a human-sized arm; arrays with all entries below 1e-3 are compared absolutely.
         scale = max(max(map(abs, a)), 1e-3)
         if not error <= limit * scale:
             yield f"{where}: differs by {error:.3g}, {error / scale:.3g} of its largest entry (limit {limit:g})"
 
 
 def check(name, folder):
-    """Differences between the committed files of one generator and those it makes now in `folder`."""
+    """Differences between the committed files of one generator and its new files in `folder`."""
     script, pattern = GENERATORS[name]
     if not (HERE / script).exists():
-        return [f"golden/{script}: missing, though the table of golden/check.py lists it"]
+        return [f"golden/{script}: missing, but listed in the table of golden/check.py"]
     made = subprocess.run([sys.executable, str(HERE / script), "--out", str(folder)], capture_output=True, text=True)
     if made.returncode:
         return [f"golden/{script}: exit status {made.returncode}\n{made.stderr.strip()}"]
     old = {p.relative_to(HERE) for p in HERE.glob(pattern)}
     new = {p.relative_to(folder) for p in folder.glob(pattern)}
-    found = [f"golden/{p}: only {'committed' if p in old else 'made now'}" for p in sorted(old ^ new)]
+    found = [f"golden/{p}: only {'committed' if p in old else 'new'}" for p in sorted(old ^ new)]
     if not new:
-        found.append(f"golden/{script}: made no file {pattern}")
+        found.append(f"golden/{script}: created no file {pattern}")
     for path in sorted(old & new):
         a, b = (json.loads((root / path).read_text(encoding="utf-8")) for root in (HERE, folder))
         found += list(differences(a, b, f"golden/{path}", solved=SOLVED.get(path.name)))

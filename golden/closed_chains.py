@@ -1,10 +1,10 @@
-"""A robot whose closed chains an MJCF holds by <connect>, from MuJoCo, as one small JSON file.
+"""Reference values from MuJoCo for a robot with closed chains (MJCF <connect>), as one small JSON file.
 
     python golden/closed_chains.py [--out DIR]
 
-Writes DIR/closed_chains.json (default: this script's folder): where the passive joints of golden/coupled/palletizer.xml stand for
-positions of the driven ones (Newton's method on the distances that MuJoCo gives for its own constraints), and the torques of the drives,
-G' tau of MuJoCo's inverse dynamics of the tree, with G from MuJoCo's Jacobian of the constraints.
+Writes DIR/closed_chains.json (default: this script's folder): positions of the passive joints of golden/coupled/palletizer.xml for
+positions of the driven joints (Newton's method on MuJoCo's constraint errors), and the drive torques G' tau, with tau from MuJoCo's
+inverse dynamics of the tree and G from MuJoCo's constraint Jacobian.
 """
 import argparse
 import sys
@@ -42,7 +42,7 @@ def main():
         return data.efc_pos.copy(), data.efc_J.reshape(data.nefc, model.nv).copy()
 
     def closed(target):
-        """Along the way from the drawn pose in small steps."""
+        """Solves the constraints in small steps from the reference pose."""
         q = model.qpos0.copy()
         for share in np.linspace(0, 1, 21):
             q[active] = model.qpos0[active] + share * target
@@ -53,7 +53,7 @@ def main():
         return q
 
     def inverse(q, dq, ddq):
-        """Of the tree alone."""
+        """Inverse dynamics of the tree without constraints."""
         disabled = model.opt.disableflags
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
         data.qpos[:], data.qvel[:], data.qacc[:] = q, dq, ddq
@@ -70,7 +70,7 @@ def main():
         G = np.zeros((model.nv, len(active)))
         G[active], G[passive] = np.eye(len(active)), follow
         dq, ddq = rng.uniform(-2, 2, len(active)), rng.uniform(-5, 5, len(active))
-        # A parallelogram's G is the same in every posture: G ddq is all that accelerates.
+        # G of a parallelogram is constant, so the accelerations are G ddq.
         tau = G.T @ inverse(q, G @ dq, G @ ddq)
         states.append({"q": q[active], "dq": dq, "ddq": ddq, "tau": tau, "passive": q[passive]})
     write(out / "closed_chains.json", {

@@ -1,12 +1,12 @@
-"""Dynamics of robots whose joints follow others, from Pinocchio, as one small JSON file.
+"""Reference dynamics from Pinocchio for robots with dependent joints, as one small JSON file.
 
     python golden/coupled_joints.py [--out DIR]
 
-Writes DIR/coupled_joints.json (default: this script's folder). `mimic`: robots with mimic tags, read by Pinocchio with
-them. `loops`: `examples/robots/palletizer.urdf` with its two closed chains, by Pinocchio's mass matrix, bias and frame
-Jacobians of the **tree** and the constraint that the cut points stay together: M ddq + h = tau + J' lambda, J ddq =
--dJ dq, solved by least squares (the chains are plane, so three equations a point hold one too many). Where the passive
-joints stand is found by Newton's method along the way from zero, not from how they follow.
+Writes DIR/coupled_joints.json (default: this script's folder). `mimic`: robots with mimic tags, which Pinocchio
+reads. `loops`: `examples/robots/palletizer.urdf` with its two closed chains, from Pinocchio's mass matrix, bias and frame
+Jacobians of the **tree** and the constraint that the cut points coincide: M ddq + h = tau + J' lambda, J ddq =
+-dJ dq, solved by least squares (the chains are planar, so one of three equations per point is redundant). Positions of
+the passive joints are found by Newton's method from zero in small steps, independent of the coupling equations.
 """
 import argparse
 import sys
@@ -37,7 +37,7 @@ def near(a, b, what):
 
 
 def full_position(model, angles):
-    """Pinocchio holds an unlimited joint as cosine and sine."""
+    """Converts positions: Pinocchio uses cosine and sine for an unlimited joint."""
     q = pin.neutral(model)
     for name, angle in angles.items():
         joint = model.joints[model.getJointId(name)]
@@ -52,7 +52,7 @@ def mimic(path, rng):
     """States of a robot with mimic tags."""
     model = pin.buildModelFromUrdf(str(path), mimic=True)
     tree = pin.buildModelFromUrdf(str(path))
-    # Joints that follow have no velocity of their own.
+    # Dependent joints have no separate velocity.
     names = [n for n in list(model.names)[1:] if model.joints[model.getJointId(n)].nv == 1 and "Mimic" not in model.joints[model.getJointId(n)].shortname()]
     at = [model.joints[model.getJointId(n)].idx_v for n in names]
     data, of_tree = model.createData(), tree.createData()
@@ -91,14 +91,14 @@ def loops(path, rng):
         return np.vstack([own(a) - own(b) for a, b in frames])
 
     def closed(target):
-        """Along the way from zero in small steps, each closed by Newton's method."""
+        """Closes the loops with Newton's method in small steps from zero."""
         q = np.zeros(model.nq)
         for share in np.linspace(0, 1, 21):
             q[active] = share * target
             for _ in range(20):
                 q[passive] -= np.linalg.lstsq(jacobian(q)[:, passive], gap(q), rcond=1e-10)[0]
         if not np.abs(gap(q)).max() < 1e-13:
-            raise SystemExit("a loop does not close")
+            raise SystemExit("a loop cannot be closed")
         return q
 
     states, regressors = [], []
@@ -119,13 +119,13 @@ def loops(path, rng):
         M = pin.crba(model, data, q)
         M = np.triu(M) + np.triu(M, 1).T
         h = pin.rnea(model, data, q, dq, np.zeros(model.nv))
-        # Forward: accelerations and the forces of the cut joints.
+        # Forward: accelerations and forces at the cut joints.
         system = np.block([[M, -J.T], [J, np.zeros((J.shape[0],) * 2)]])
         applied = np.zeros(model.nv)
         applied[active] = tau
         forward = np.linalg.lstsq(system, np.concatenate([applied - h, -bend]), rcond=1e-11)[0][: model.nv]
-        near(J @ forward + bend + 10.0, np.full(len(bend), 10.0), "constraint, beside accelerations of some 10 m/s^2")
-        # Inverse: accelerations of all joints by the constraint, then torques of the active ones and those forces.
+        near(J @ forward + bend + 10.0, np.full(len(bend), 10.0), "constraint, compared with accelerations of about 10 m/s^2")
+        # Inverse: accelerations of all joints from the constraint, then torques of the active joints and constraint forces.
         ddq = G @ ddq_active
         ddq[passive] -= np.linalg.lstsq(J[:, passive], bend, rcond=1e-10)[0]
         select = np.zeros((model.nv, len(active)))
@@ -140,7 +140,7 @@ def loops(path, rng):
     values = np.linalg.svd(np.vstack(regressors) / np.abs(np.vstack(regressors)).max(), compute_uv=False)
     rank = int(np.sum(values > 1e-9 * values[0]))
     if not values[rank] < 1e-3 * values[rank - 1]:
-        raise SystemExit("the rank is not clear")
+        raise SystemExit("the rank is ambiguous")
     return {"joints": ACTIVE, "passive": PASSIVE, "states": states, "base_parameters": rank}
 
 

@@ -3,8 +3,8 @@
     python3 golden/cvxpy_physical.py [--out DIR]
 
 Writes cvxpy_physical.json. Small random problems: rows R over base parameters theta = B pi, bodies with pseudo-inertia P >= margin P0, mass limits,
-a box for the centre of mass, an ellipsoid for all mass, total mass, scalars that are not negative; one of three priors. Everything is written out here from the
-definitions; Dynident shares no code with it.
+a box for the centre of mass, an ellipsoid for all mass, total mass, nonnegative scalars; one of three priors. The problems are formulated here from the
+definitions, independently of Dynident.
 """
 import argparse
 import pathlib
@@ -18,14 +18,14 @@ from write_json import write
 
 SEED = 20261121
 MARGIN = 1e-4
-# What Clarabel is asked for; the first that it reaches holds. An entropic prior is flat where the data say nothing: there a gap of 1e-10 leaves parameters
-# open to a few 1e-6, and each machine stops elsewhere. Quadratic priors agree to 1e-8 at 1e-10 and are at the end of double precision below it.
+# Tolerances for Clarabel; the first one that it reaches is used. An entropic prior is flat for parameters without data: there a gap of 1e-10 leaves parameter
+# differences of a few 1e-6, which depend on the machine. Quadratic priors agree to 1e-8 with a tolerance of 1e-10, which is the limit of double precision.
 TOLERANCES = {"entropic": [1e-12, 1e-11], "pullback": [1e-10], "euclidean": [1e-10]}
 DIGITS = 9
 
 
 def pseudo_inertia(p):
-    """[Sigma h; h' m] of the ten parameters, as a NumPy array or a cvxpy expression."""
+    """Pseudo-inertia [Sigma h; h' m] of the ten parameters, as a NumPy array or a cvxpy expression."""
     half = 0.5 * (p[4] + p[7] + p[9])
     rows = [
         [half - p[4], -p[5], -p[6], p[1]],
@@ -129,7 +129,7 @@ def solve(case):
     program = cp.Problem(cp.Minimize(data + case["prior_weight"] * distances), constraints)
     for tolerance in TOLERANCES[case["prior"]]:
         with warnings.catch_warnings():
-            # cvxpy warns of a tolerance that was not reached; the next one is tried.
+            # cvxpy warns if a tolerance is not reached; then the next one is tried.
             warnings.simplefilter("ignore", UserWarning)
             program.solve(solver=cp.CLARABEL, tol_gap_abs=tolerance, tol_gap_rel=tolerance, tol_feas=tolerance, max_iter=200, warm_start=False)
         if program.status == cp.OPTIMAL:

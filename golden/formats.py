@@ -1,9 +1,9 @@
-"""Golden log files in the formats that dynident-formats reads, each made by another program, and the numbers in them.
+"""Golden log files in the formats that dynident-formats reads, written by independent programs, with their values.
 
     python3 golden/formats.py [--out DIR]
 
-Writes formats/*: the files, and values.json with the columns that each must give, as hexadecimal floats. Seeded; the versions that
-made them are in values.json. Every file holds the same motion of two joints where its format can.
+Writes formats/*: the files, and values.json with the expected columns of each file, as hexadecimal floats, and the versions of the
+programs. Seeded. Every file contains the same motion of two joints, if its format allows this.
 """
 import argparse
 import gzip
@@ -105,7 +105,7 @@ T = np.arange(ROWS) / 100.0
 Q = np.array([np.sin(3.0 * T + 0.4), 0.7 * np.cos(5.0 * T)])
 TAU = np.array([8.0 * np.cos(2.0 * T), 3.0 * np.sin(7.0 * T)]) + 0.01 * rng.standard_normal((2, ROWS))
 DQ = np.gradient(Q, 0.01, axis=1)
-# Stamps with jitter; recorded a little later.
+# Stamps with jitter; the recording times are slightly later.
 STAMPS = [START_NS + 10_000_000 * i + int(rng.integers(-40_000, 40_000)) for i in range(ROWS)]
 LOGGED = [stamp + 300_000 + int(rng.integers(0, 50_000)) for stamp in STAMPS]
 F32 = Q.astype(np.float32)
@@ -150,7 +150,7 @@ TEXT_COLUMNS = {"t_s": T, "q1": Q[0], "q2": Q[1], "tau1": TAU[0], "tau2": TAU[1]
 def packed_text(out):
     text = text_table()
     with open(out / "table.csv.gz", "wb") as file:
-        # Two members after each other, as rotated logs are joined.
+        # Two gzip members, as in concatenated rotated logs.
         for part in (text[:900], text[900:]):
             file.write(gzip.compress(part, mtime=0))
     (out / "table.csv.zst").write_bytes(zstandard.ZstdCompressor(level=5).compress(text))
@@ -166,7 +166,7 @@ def numpy_files(out):
     rows = np.zeros(ROWS, kind)
     rows["t"], rows["mode"], rows["label"], rows["q"], rows["ticks"] = T, np.arange(ROWS) % 3, b"ab", F32.T, np.arange(ROWS) * -7
     np.save(out / "structured.npy", rows)
-    # Savez stamps members with a fixed date.
+    # savez uses a fixed date for its members.
     np.savez_compressed(out / "packed.npz", t=T, q=Q, tau=TAU.T, gains=np.array([1.0, 2.0]), name=np.array("arm"))
     np.savez(out / "stored.npz", t=T, q=Q.T, half=F32[0].astype(np.float16))
     columns = {str(k): matrix[:, k] for k in range(5)}
@@ -244,7 +244,7 @@ DYNAMIC_COLUMNS = {
 
 
 def interpolated(at, times, values):
-    """What linear interpolation gives, in the order of operations that makes it exact to the last bit."""
+    """Linear interpolation, with the same order of operations as Dynident for bit-identical results."""
     k = np.searchsorted(times, at, side="right") - 1
     share = [(a - times[i]) / (times[i + 1] - times[i]) if times[i] != a else 0.0 for a, i in zip(at, k)]
     return np.array([values[i] if w == 0.0 else values[i] + (values[i + 1] - values[i]) * w for i, w in zip(k, share)])
@@ -265,7 +265,7 @@ def bags(out):
         known = {topic: writer.register_msgdef(kind, text) for topic, (kind, text) in schemas.items()}
         put = lambda topic, message, stamp: writer.write_message(topic, known[topic], message, log_time=stamp, publish_time=stamp)
         for i in range(ROWS):
-            # The order of joints changes, as it does where a driver fills a map.
+            # The joint order changes between messages, as with drivers that use a map.
             put("/joint_states", joint_state(i, (0, 1) if i % 3 else (1, 0)), LOGGED[i])
             if name != "lz4":
                 continue
@@ -277,7 +277,7 @@ def bags(out):
         golden[f"{name}.mcap"] = dict(STATE_COLUMNS)
     golden["lz4.mcap"] |= DYNAMIC_COLUMNS | OWN_COLUMNS | CONTROLLER_COLUMNS
 
-    # Torques of their own topic at 40 Hz, without a header: joined by the times at which they were recorded.
+    # Torques in a separate topic at 40 Hz without a header; they are joined by recording time.
     buffer = io.BytesIO()
     writer = Ros2Writer(buffer, compression=CompressionType.ZSTD)
     known = {topic: writer.register_msgdef(kind, text) for topic, (kind, text) in schemas.items()}
@@ -300,7 +300,7 @@ def bags(out):
         "/tau.data[1]": interpolated(at, np.array(times), values[1]),
     }
 
-    # JSON messages, as web tools write them.
+    # JSON messages, as written by web tools.
     buffer = io.BytesIO()
     writer = RawWriter(buffer, compression=CompressionType.ZSTD)
     writer.start()
@@ -316,7 +316,7 @@ def bags(out):
 
 
 def cdr_messages():
-    """Serialised messages by the writer's own CDR, for the databases."""
+    """Messages for the databases, serialised with the CDR code of the writer."""
     from mcap_ros2._dynamic import serialize_dynamic
 
     def serialiser(kind, text):
@@ -340,10 +340,10 @@ def databases(out):
         path = out / name
         path.unlink(missing_ok=True)
         database = sqlite3.connect(path)
-        # Small pages, so that trees have inner pages and long messages go over to further ones.
+        # Small pages, so that trees have inner pages and long messages need overflow pages.
         database.execute("PRAGMA page_size = 512")
         database.execute("PRAGMA journal_mode = MEMORY")
-        # The text of rosbag2_storage_sqlite3, in its two versions.
+        # Schema of rosbag2_storage_sqlite3, in its two versions.
         database.execute(
             "CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format TEXT NOT NULL,"
             "offered_qos_profiles TEXT NOT NULL" + (",type_description_hash TEXT NOT NULL)" if definitions else ")")
@@ -430,7 +430,7 @@ def parquet_files(out):
 
 
 def arrow_files(out):
-    """What a column may be, in every packing, as a file and as a stream."""
+    """All column types with every compression, as a file and as a stream."""
     holes = [i % 7 == 3 for i in range(ROWS)]
     lists = [None if hole else [float(x) for x in Q[:, i]][: 1 if i == 9 else 2] for i, hole in enumerate(holes)]
     table = pa.table({
@@ -493,7 +493,7 @@ def arrow_files(out):
 
 
 def lerobot_files(out):
-    """Data sets as lerobot 0.4.4 (version 3, episodes one after the other in files) and 0.3 (version 2.1, one file an episode) lay them out, written by pyarrow."""
+    """Data sets in the layout of lerobot 0.4.4 (version 3, several episodes per file) and 0.3 (version 2.1, one file per episode), written by pyarrow."""
     lengths = [15, 12, 13]
     bounds = np.cumsum([0, *lengths])
     stamps = np.concatenate([np.arange(n) / 100.0 for n in lengths]).astype(np.float32)
@@ -551,8 +551,8 @@ def lerobot_files(out):
 
 
 def diadem_files(out):
-    """Headers and numbers by NI's description of DIAdem's keys and by published traces of KUKA's controllers (no program that writes them runs here): a
-    trace of two drives, and numbers of several types, channel after channel, highest byte first."""
+    """Writes headers and numbers according to NI's documentation of the DIAdem keys and published traces of KUKA controllers, because no program that writes
+    them is available here: a trace of two drives, and numbers of several types, stored by channel, big-endian."""
     def header(order, channels):
         lines = ["DIAEXTENDED", "#BEGINGLOBALHEADER", "  1,DOS", '102,rob "#KR6R900"', "111,9.9000000000E+34", f"112,{order}", "#ENDGLOBALHEADER", ""]
         for channel in channels:
@@ -598,7 +598,7 @@ def matlab_files(out):
     for name, packed in [("plain.mat", False), ("packed.mat", True)]:
         buffer = io.BytesIO()
         scipy.io.savemat(buffer, variables, do_compression=packed)
-        # SciPy writes the date into the text of the header.
+        # Replace the header text, which contains the date.
         data = bytearray(buffer.getvalue())
         data[:116] = b"MATLAB 5.0 MAT-file Platform: posix, made by SciPy".ljust(116)
         (out / name).write_bytes(data)
@@ -617,7 +617,7 @@ def hdf5_files(out):
         arm.create_dataset("tau", data=TAU.astype(np.float32), track_times=False)
         arm.create_dataset("ticks", data=np.arange(ROWS, dtype=">i4"), track_times=False)
         file.create_dataset("note", data="text")
-    # What MATLAB's save -v7.3 writes: 512 bytes before the HDF5 file, matrices with their sides exchanged.
+    # Format of MATLAB's save -v7.3: 512 bytes before the HDF5 file, transposed matrices.
     with h5py.File(out / "v73.mat", "w", userblock_size=512) as file:
         for name, values in [("t", T[None, :]), ("q", Q), ("tau", TAU)]:
             data = file.create_dataset(name, data=values, track_times=False)
@@ -634,7 +634,7 @@ def hdf5_files(out):
 
 
 def pooled(files):
-    """Every series once, and which of them each column is."""
+    """Stores every distinct series once, with the index of the series for each column."""
     numbers, series = {}, []
     for columns in files.values():
         for name, values in columns.items():

@@ -1,10 +1,10 @@
-"""Inverse dynamics of MJCF models by MuJoCo: what Dynident's reader of MJCF is held against.
+"""Inverse dynamics of MJCF models from MuJoCo: reference for Dynident's MJCF reader.
 
     python golden/mjcf.py [--out DIR]
 
 Reads golden/mjcf/*.xml (published models, see golden/mjcf_models.py, and rules_*.xml, written for single rules of the
 format) and writes DIR/mjcf.json: joints, `mj_inverse` at random states without armature, damping, dry friction,
-springs, media, gravity compensation and constraints, and these numbers as MuJoCo compiled them.
+springs, media, gravity compensation and constraints, and the compiled values of these properties.
 """
 import argparse
 import sys
@@ -22,7 +22,7 @@ SEED = 20261123
 
 
 def moves(model, body):
-    """True where the body, or one that carries it, has a joint (a mocap body has none)."""
+    """True for a body that has a joint or is carried by such a body (a mocap body is not)."""
     while body and not model.body_dofnum[body]:
         body = model.body_parentid[body]
     return bool(body)
@@ -53,7 +53,7 @@ def golden(path, random):
     model.opt.density = model.opt.viscosity = 0
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT)
     data = mujoco.MjData(model)
-    # Joints that only slide in the world have their inertia, armature with it, worked out beforehand.
+    # MuJoCo precomputes the inertia of joints that only slide in the world, including armature.
     mujoco.mj_setConst(model, data)
     entry["states"] = []
     for _ in range(STATES):
@@ -67,7 +67,7 @@ def golden(path, random):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=HERE, help="folder that receives mjcf.json")
+    parser.add_argument("--out", type=Path, default=HERE, help="output folder for mjcf.json")
     options = parser.parse_args()
     random = np.random.default_rng(SEED)
     models = {path.stem: golden(path, random) for path in sorted((HERE / "mjcf").glob("*.xml"))}

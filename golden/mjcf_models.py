@@ -1,11 +1,11 @@
-"""Copies of published MJCF models for golden/mjcf, from the packages that carry them.
+"""Copies published MJCF models from their packages to golden/mjcf.
 
     pip install --no-deps robosuite==1.5.2 dm-control==1.0.50 gymnasium==1.4.0 gymnasium-robotics==1.4.2
     python golden/mjcf_models.py [--out DIR]
 
-Models without meshes are copied byte by byte, with the files that they include. From the others meshes, sites, cameras,
-lights, sensors and textures are taken out, and a copy is written only if MuJoCo gives the same mass matrix and the same
-inverse dynamics for it as for the original (1e-12 of the largest entry).
+Models without meshes are copied byte by byte, with included files. For the others, meshes, sites, cameras, lights, sensors
+and textures are removed. The copy is written only if MuJoCo gives the same mass matrix and inverse dynamics as for the
+original (1e-12 of the largest entry).
 """
 import argparse
 import importlib.metadata
@@ -29,7 +29,7 @@ def package(name):
 
 
 def plain(element):
-    """The element without what needs other files, and the names of the tendons that go with it."""
+    """Removes parts that need other files from the element; returns it with the names of the removed tendons."""
     for child in list(element):
         is_mesh = child.tag == "geom" and (child.get("type") == "mesh" or child.get("mesh"))
         if child.tag in DROPPED or is_mesh:
@@ -45,7 +45,7 @@ def plain(element):
 
 
 def expanded(path):
-    """The document with its included files in their places."""
+    """The document with its included files inserted."""
     root = ElementTree.parse(path).getroot()
 
     def fill(element):
@@ -65,7 +65,7 @@ def expanded(path):
 
 
 def torques(model):
-    """Mass matrix and inverse dynamics at a few states."""
+    """Mass matrix and inverse dynamics at several states."""
     data, random = mujoco.MjData(model), np.random.default_rng(3)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     found = []
@@ -89,12 +89,12 @@ def stripped(source, target, drop_bodies=()):
     a, b = torques(original), torques(copy)
     if a.shape != b.shape or not np.max(np.abs(a - b)) <= SAME * np.max(np.abs(a)):
         target.unlink()
-        raise SystemExit(f"{source.name}: the copy moves another way, {a.shape} {b.shape} {np.max(np.abs(a - b)) if a.shape == b.shape else ''}")
+        raise SystemExit(f"{source.name}: the dynamics of the copy differ, {a.shape} {b.shape} {np.max(np.abs(a - b)) if a.shape == b.shape else ''}")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=HERE / "mjcf", help="folder that receives the models")
+    parser.add_argument("--out", type=Path, default=HERE / "mjcf", help="output folder for the models")
     out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
     for robot in ROBOSUITE:

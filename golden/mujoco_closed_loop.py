@@ -2,9 +2,9 @@
 
     python golden/mujoco_closed_loop.py [ROBOTS] [--out DIR]
 
-The torque `kp (q_d - q) + kd (dq_d - dq)` is put into `qfrc_applied` before every `mj_step`; the reference is
-`centre + amplitude sin(omega t + phase)` joint by joint. Runs: `euler` and `rk4` without damping, and `euler_damped` with the
-viscous friction of `damping`, which MuJoCo's Euler integrator takes at the end of the step. Writes DIR/mujoco_closed_loop.json.
+The torque `kp (q_d - q) + kd (dq_d - dq)` is written to `qfrc_applied` before every `mj_step`; the reference is
+`centre + amplitude sin(omega t + phase)` for each joint. Runs: `euler` and `rk4` without damping, and `euler_damped` with the
+viscous friction of `damping`, which MuJoCo's Euler integrator evaluates at the end of the step. Writes DIR/mujoco_closed_loop.json.
 """
 import argparse
 import sys
@@ -60,7 +60,7 @@ def run(model, integrator, damping):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("robots", nargs="?", type=Path, default=HERE.parent / "robots", help="folder of URDF files")
-    parser.add_argument("--out", type=Path, default=HERE, help="folder that receives mujoco_closed_loop.json")
+    parser.add_argument("--out", type=Path, default=HERE, help="output folder for mujoco_closed_loop.json")
     options = parser.parse_args()
     model = load(options.robots / "panda_arm7.urdf")
     model.opt.gravity[:] = [0, 0, -9.81]

@@ -1,10 +1,10 @@
-"""A second referee for inverse dynamics: MuJoCo on two arms, at the states of the Pinocchio files.
+"""A second reference for inverse dynamics: MuJoCo on two arms, at the states of the Pinocchio files.
 
     python golden/mujoco_inverse.py [ROBOTS] [--out DIR]
 
 Reads golden/pinocchio/<robot>.json for the states, runs `mj_inverse` and the mass matrix on the same URDF (damping,
-dry friction, armature, limits and contacts switched off) and writes DIR/mujoco/<robot>.json with MuJoCo's own numbers,
-once they agree with Pinocchio's to 1e-11 of the largest entry (measured: 2e-15).
+dry friction, armature, limits and contacts switched off) and writes DIR/mujoco/<robot>.json with MuJoCo's results,
+if they agree with Pinocchio's to 1e-11 of the largest entry (measured: 2e-15).
 """
 import argparse
 import json
@@ -20,12 +20,12 @@ sys.path.insert(0, str(HERE))
 from write_json import write  # noqa: E402
 
 ARMS = ["panda_arm7", "ur10"]
-# Two independent programs in double precision on one file: rounding alone, with room for sums of large terms.
+# Differences between two programs in double precision are rounding errors; the limit allows for sums of large terms.
 AGREEMENT = 1e-11
 
 
 def load(path):
-    """The URDF as MuJoCo reads it, with inertias as given and fixed bodies kept apart from the world."""
+    """Loads the URDF in MuJoCo with the given inertias, without merging fixed bodies into the world."""
     tree = ElementTree.parse(path)
     extension = ElementTree.SubElement(tree.getroot(), "mujoco")
     # balanceinertia and boundmass stay off: MuJoCo must not fix the inertias that are compared.
@@ -83,7 +83,7 @@ def golden(path, reference):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("robots", nargs="?", type=Path, default=HERE.parent / "robots", help="folder of URDF files")
-    parser.add_argument("--out", type=Path, default=HERE, help="folder that receives mujoco/<robot>.json")
+    parser.add_argument("--out", type=Path, default=HERE, help="output folder for mujoco/<robot>.json")
     options = parser.parse_args()
     for name in ARMS:
         reference = json.loads((HERE / "pinocchio" / f"{name}.json").read_text(encoding="utf-8"))

@@ -3,23 +3,23 @@
     python golden/pinocchio.py [ROBOTS] [--out DIR] [--only NAME ...]
 
 ROBOTS is a folder of URDF files (default: `robots/` of the repository). Writes DIR/pinocchio/<robot>.json; DIR is
-this script's folder unless given. The same seed and versions give the same bytes. `golden/README.md` says what
-every key means.
+this script's folder unless given. The same seed and versions give the same bytes. `golden/README.md` explains
+every key.
 
 Conventions: fixed base, world = frame of the root link, joints and bodies by joint name (the vectors follow
 `joints`), SI units and radians. A moving body is named by its joint and its frame is that joint's child-link frame;
 links behind fixed joints are lumped on it. Inertial parameters per body, about that frame's origin:
 [m, m rx, m ry, m rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz]. Mimic tags are ignored (every joint is free).
 
-Every value written is checked here by a second route (Y pi = RNEA, ABA after RNEA, M from unit accelerations,
-differences for the derivatives), so that a wrong use of Pinocchio cannot become a reference.
+Every value is checked with a second method (Y pi = RNEA, ABA after RNEA, M from unit accelerations, differences for
+the derivatives), to detect a wrong use of Pinocchio.
 """
 import argparse
 import sys
 import zlib
 from pathlib import Path
 
-# This file is named after the library: keep its own folder off the import path while importing it.
+# This file has the name of the library, so remove its folder from the import path during the import.
 HERE = Path(__file__).resolve().parent
 sys.path = [p for p in sys.path if Path(p or ".").resolve() != HERE]
 import numpy as np  # noqa: E402
@@ -31,30 +31,30 @@ from write_json import write  # noqa: E402
 SEED = 20261121
 SMALL_DOF = 9  # up to this many joints: full regressors, derivatives, base parameters
 GRAVITY = np.array([0.0, 0.0, -9.81])
-TILTED_GRAVITY = np.array([3.0, -4.0, -8.0])  # a base that does not stand upright
+TILTED_GRAVITY = np.array([3.0, -4.0, -8.0])  # tilted base
 # Pinocchio orders a body's inertia [Ixx, Ixy, Iyy, Ixz, Iyz, Izz]; this picks [Ixx, Ixy, Ixz, Iyy, Iyz, Izz].
 OURS = np.array([0, 1, 2, 3, 4, 5, 7, 6, 8, 9])
 PARAMETERS = ["m", "m_rx", "m_ry", "m_rz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"]
 # A column is dependent when its part outside the span of earlier independent columns is below this share of it:
-# rounding leaves about 1e-15, and the least independent column of the robots here keeps more than half.
+# rounding errors are about 1e-15, and for these robots the ratio of all independent columns is above 0.5.
 DEPENDENT = 1e-9
 
 
-# Descriptions whose links have no inertia about some axis (the drives' inertia stands elsewhere): forward dynamics has no answer.
+# Robot descriptions with zero inertia about an axis (drive inertia is given elsewhere); forward dynamics is undefined.
 WITHOUT_FORWARD_DYNAMICS = {"tx40"}
 
 
 def close(a, b, relative, what):
-    """Refuses to write a reference whose two routes disagree."""
+    """Fails if two methods for a reference value disagree."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     error = np.max(np.abs(a - b), initial=0.0)
     scale = max(np.max(np.abs(a), initial=0.0), np.max(np.abs(b), initial=0.0), 1e-12)
     if not error <= relative * scale:
-        raise SystemExit(f"{what}: two routes differ by {error:g} (scale {scale:g})")
+        raise SystemExit(f"{what}: two methods differ by {error:g} (scale {scale:g})")
 
 
 def body_columns(model):
-    """Column indices that bring a 10 n wide matrix into our parameter order."""
+    """Column indices that convert a matrix with 10 n columns to our parameter order."""
     return np.concatenate([10 * b + OURS for b in range(model.njoints - 1)])
 
 
@@ -154,7 +154,7 @@ def state_entry(model, tilted, rng, label, q, dq, ddq, probes):
 
 
 def independent_columns(W):
-    """Indices of the columns that do not depend on earlier ones (left to right, Gram-Schmidt done twice)."""
+    """Indices of columns that are independent of earlier columns (left to right, Gram-Schmidt applied twice)."""
     basis, chosen = np.empty((W.shape[0], 0)), []
     smallest_kept, largest_dropped, largest = 1.0, 0.0, np.linalg.norm(W, axis=0).max()
     for j, column in enumerate(W.T):
@@ -177,7 +177,7 @@ def independent_columns(W):
 
 
 def rank(W):
-    """Numerical rank with columns scaled to one; columns that are nothing but rounding are left out first."""
+    """Numerical rank with columns scaled to one, without columns that contain only rounding errors."""
     norms = np.linalg.norm(W, axis=0)
     seen = norms > DEPENDENT * norms.max()
     W = W[:, seen] / norms[seen]
@@ -207,9 +207,9 @@ def base_parameters(model, rng):
         raise SystemExit(f"{model.name}: {len(independent)} independent columns, rank {rank(W)}")
     K = np.linalg.lstsq(W[:, independent], W, rcond=None)[0]
     close(W[:, independent] @ K, W, 1e-11, f"{model.name}: W = W_b K")
-    # Entries are lengths, their products and sines: nothing real lies between rounding and a micrometre.
+    # Entries are lengths, their products and sines, so no true value is between rounding error and 1e-6 m.
     if np.any((np.abs(K) > 1e-9) & (np.abs(K) < 1e-6)):
-        raise SystemExit(f"{model.name}: a coefficient that may be rounding")
+        raise SystemExit(f"{model.name}: a coefficient may be a rounding error")
     combination = [
         [[j, K[i, j]] for j in range(W.shape[1]) if abs(K[i, j]) > 1e-9] for i in range(len(independent))
     ]
@@ -238,7 +238,7 @@ def golden(path):
     tilted.gravity.linear = TILTED_GRAVITY
     if model.nq != model.nv or np.any(model.armature):
         raise SystemExit(f"{path}: joints with one coordinate each and no armature expected")
-    # One stream per robot: adding a robot leaves the others' files as they are.
+    # One random stream per robot, so that a new robot does not change the files of the others.
     rng = np.random.default_rng([SEED, zlib.crc32(path.stem.encode())])
     names = list(model.names)[1:]
     probes = rng.standard_normal((3 if model.nv > SMALL_DOF else 1, 10 * model.nv))
@@ -266,8 +266,8 @@ def golden(path):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("robots", nargs="?", type=Path, default=HERE.parent / "robots", help="folder of URDF files")
-    parser.add_argument("--out", type=Path, default=HERE, help="folder that receives pinocchio/<robot>.json")
-    parser.add_argument("--only", nargs="+", metavar="NAME", help="these robots alone")
+    parser.add_argument("--out", type=Path, default=HERE, help="output folder for pinocchio/<robot>.json")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="only these robots")
     options = parser.parse_args()
     wanted = [p for p in sorted(options.robots.glob("*.urdf")) if not options.only or p.stem in options.only]
     paths = [p for p in wanted if p.stem not in WITHOUT_FORWARD_DYNAMICS]

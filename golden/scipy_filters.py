@@ -1,8 +1,8 @@
-"""Golden numbers for the filters of dynident-recording, made by SciPy and NumPy.
+"""Golden values for the filters of dynident-recording, from SciPy and NumPy.
 
     python3 golden/scipy_filters.py [--out DIR]
 
-Writes scipy_filters.json. Seeded; the versions that made it are in the file.
+Writes scipy_filters.json. Seeded; the file contains the library versions.
 """
 import argparse
 import math
@@ -20,8 +20,8 @@ SEED = 20261121
 
 
 def smooth_and_derivatives(x, order, cutoff_hz, rate_hz):
-    """sosfiltfilt of x, and central differences of sixth order of its output, the odd extension kept so that the
-    differences at the ends are central too."""
+    """sosfiltfilt of x, and sixth-order central differences of its output. The odd extension is kept, so that the
+    differences at the ends are also central."""
     sos = signal.butter(order, cutoff_hz, fs=rate_hz, output="sos")
     sections = len(sos)
     pad = 3 * (2 * sections + 1 - min((sos[:, 2] == 0).sum(), (sos[:, 5] == 0).sum()))
@@ -59,8 +59,8 @@ def polynomial_weights(window, degree, at, derivative):
 
 
 def savitzky_golay(x, window, degree, rate_hz):
-    """What `savgol_filter(mode="interp")` means. SciPy itself solves with powers of the sample number: over 101 samples at degree
-    8 that costs it all but three digits, and which ones depends on the processor. So the weights are exact, and SciPy is the witness."""
+    """Definition of `savgol_filter(mode="interp")` with exact weights. SciPy uses powers of the sample number, which leaves three
+    correct digits for 101 samples and degree 8, and the error depends on the processor. SciPy is used as a check."""
     half, derivatives = window // 2, []
     for d in range(3):
         inside = polynomial_weights(window, degree, 0, d)
@@ -75,7 +75,7 @@ def savitzky_golay(x, window, degree, rate_hz):
 
 
 def causal(x, order, cutoff_hz, rate_hz):
-    """sosfilt of x behind its odd extension, and central differences of sixth order of the output, the extension at the end kept."""
+    """sosfilt of x after its odd extension, and sixth-order central differences of the output with the extension at the end."""
     sos = signal.butter(order, cutoff_hz, fs=rate_hz, output="sos")
     pad = 3 * (order + 1)
     extended = odd_ext(x, pad)
@@ -107,7 +107,7 @@ def series(x, base_hz, harmonics, trend, rate_hz):
 
 
 def in_frequency(x, cutoff_hz, mirrored, rate_hz):
-    """numpy.fft: jw X up to the cut-off, nothing beyond."""
+    """numpy.fft: jw X up to the cut-off, zero above."""
     whole = np.concatenate([x, x[-2:0:-1]]) if mirrored else x
     spectrum, f = np.fft.rfft(whole), np.fft.rfftfreq(len(whole), 1 / rate_hz)
     kept = np.where(f <= cutoff_hz, spectrum, 0)
@@ -116,7 +116,7 @@ def in_frequency(x, cutoff_hz, mirrored, rate_hz):
 
 
 def averaged_differences(x, window, rate_hz):
-    """numpy.gradient-like second differences of second order, then a centred mean whose window shrinks at the ends."""
+    """numpy.gradient-like second differences of second order, then a centred mean with a shorter window at the ends."""
     second = np.empty_like(x)
     second[1:-1] = x[2:] - 2 * x[1:-1] + x[:-2]
     second[0], second[-1] = second[1], second[-2]
@@ -134,7 +134,7 @@ def five_points(x, passes):
 
 
 def kaiser_taps(factor, stop_band_db, rate_hz):
-    """Kaiser-windowed sinc by scipy.signal.firwin, with the length and shape that DecimationSettings documents."""
+    """Kaiser-windowed sinc by scipy.signal.firwin, with the length and shape documented in DecimationSettings."""
     reduced = rate_hz / factor
     attenuation = stop_band_db + 2.0
     width = 2 * math.pi * 0.4 * reduced / rate_hz
@@ -154,7 +154,7 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent)
     out = parser.parse_args().out
     random = np.random.default_rng(SEED)
-    # A motion with an offset, an end away from rest, and encoder noise.
+    # A motion with an offset, a nonzero velocity at the end, and encoder noise.
     t = np.arange(160) / 200.0
     x = 1.3 + np.sin(4.0 * t + 0.3) + 0.4 * np.cos(11.0 * t) + 1e-3 * random.standard_normal(len(t))
     golden = {

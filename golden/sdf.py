@@ -1,8 +1,8 @@
-"""Inverse dynamics of SDF models by Drake, whose reader is Gazebo's libsdformat: what Dynident's reader of SDF is held against.
+"""Inverse dynamics of SDF models from Drake, which reads them with Gazebo's libsdformat: reference for Dynident's SDF reader.
 
     python golden/sdf.py [--out DIR]
 
-Reads golden/sdf/*.sdf (two examples of Drake's own, urdf_*.sdf, published URDFs as libsdformat's converter writes them, and rules_*.sdf, written for single rules of the format), fixes a base that is free to the world, and writes DIR/sdf.json: joints with their limits, the torque of rigid bodies at random states, without damping and dry friction.
+Reads golden/sdf/*.sdf (two examples of Drake; urdf_*.sdf, published URDFs converted by libsdformat; and rules_*.sdf, written for single rules of the format), fixes a free base to the world, and writes DIR/sdf.json: joints with limits, and rigid-body torques at random states without damping and dry friction.
 """
 import argparse
 import sys
@@ -24,19 +24,19 @@ SEED = 20261123
 
 
 def limit(value):
-    """None where the format means none."""
+    """None for an unlimited joint."""
     return value if abs(value) < 1e16 else None
 
 
 def plant_of(path):
-    """Drake's model, its base fixed to the world where the document does not."""
+    """Drake's model, with a free base fixed to the world."""
     plant = MultibodyPlant(time_step=0.0)
     Parser(plant).AddModels(str(path))
     children = {plant.get_joint(index).child_body().index() for index in plant.GetJointIndices()}
     bodies = [plant.get_body(BodyIndex(number)) for number in range(1, plant.num_bodies())]
     for body in [body for body in bodies if body.index() not in children]:
         plant.WeldFrames(plant.world_frame(), body.body_frame())
-    # Drake's plant has a gravity of its own in place of the document's.
+    # Drake ignores the gravity of the document.
     gravity = ElementTree.parse(path).findtext(".//world/gravity")
     if gravity is not None:
         plant.mutable_gravity_field().set_gravity_vector([float(word) for word in gravity.split()])
@@ -51,13 +51,13 @@ def golden(path, random):
     joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
     joints = [joint for joint in joints if joint.num_positions() == 1]
     if len(joints) != plant.num_positions():
-        raise SystemExit(f"{path.name}: a body is free")
+        raise SystemExit(f"{path.name}: a body is not connected")
 
     order = np.array([joint.position_start() for joint in joints])
     turns = np.array([isinstance(joint, RevoluteJoint) for joint in joints])
     assert all(isinstance(joint, (RevoluteJoint, PrismaticJoint)) for joint in joints)
     entry = {
-        # Without the models around it: Drake puts a joint into its child's.
+        # Names without enclosing models, because Drake assigns a joint to the model of its child.
         "joints": [joint.name() for joint in joints],
         "turns": turns.tolist(),
         "lower": [limit(joint.position_lower_limit()) for joint in joints],
@@ -74,7 +74,7 @@ def golden(path, random):
         dq[order], ddq[order] = random.uniform(-2, 2, len(joints)), random.uniform(-5, 5, len(joints))
         plant.SetPositions(context, q)
         plant.SetVelocities(context, dq)
-        # Gravity, and no damping.
+        # Gravity without damping.
         gravity = plant.CalcGravityGeneralizedForces(context)
         forces.SetZero()
         tau = plant.CalcInverseDynamics(context, ddq, forces) - gravity
@@ -84,7 +84,7 @@ def golden(path, random):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=HERE, help="folder that receives sdf.json")
+    parser.add_argument("--out", type=Path, default=HERE, help="output folder for sdf.json")
     options = parser.parse_args()
     random = np.random.default_rng(SEED)
     models = {path.stem: golden(path, random) for path in sorted((HERE / "sdf").glob("*.sdf"))}

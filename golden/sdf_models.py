@@ -1,11 +1,11 @@
-"""Published URDFs as SDF for golden/sdf, by libsdformat's own converter.
+"""Converts published URDFs to SDF for golden/sdf with the converter of libsdformat.
 
     pip install --no-deps example-robot-data==6.0.0
     g++ -O1 -std=c++17 golden/urdf_to_sdf.cpp -o urdf_to_sdf $(pkg-config --cflags --libs sdformat12)
     python golden/sdf_models.py urdf_to_sdf [--out DIR]
 
-Shapes, materials, transmissions and simulator blocks are taken out before. A model is written only if Drake's inverse
-dynamics of the SDF are Pinocchio's of the URDF (1e-9 of the largest torque: the converter writes 12 digits).
+Shapes, materials, transmissions and simulator blocks are removed first. A model is written only if Drake's inverse dynamics
+of the SDF agree with Pinocchio's of the URDF (1e-9 of the largest torque, because the converter writes 12 digits).
 """
 import argparse
 import importlib.metadata
@@ -19,7 +19,7 @@ import numpy as np
 from pydrake.multibody.tree import MultibodyForces
 
 HERE = Path(__file__).resolve().parent
-# Or `pinocchio` is the script beside this one.
+# Otherwise `pinocchio` is the script in this folder.
 sys.path.remove(str(HERE))
 import pinocchio  # noqa: E402
 
@@ -44,7 +44,7 @@ PUBLISHED = {
 
 
 def plain(path):
-    """The URDF's links with their inertials, and its joints."""
+    """A URDF with only the links, their inertials, and the joints."""
     root = ElementTree.parse(path).getroot()
     for child in list(root):
         if child.tag not in ("link", "joint"):
@@ -57,9 +57,9 @@ def plain(path):
 
 
 def off(urdf, sdf):
-    """By how much the two programs' torques differ, as a share of the largest."""
+    """Difference between the torques of the two programs, relative to the largest torque."""
     model, plant = pinocchio.buildModelFromXML(urdf), plant_of(sdf)
-    # Pinocchio's joints have the description's rotors, which no rigid body has.
+    # Pinocchio adds the rotor inertias of the description, which are not part of the rigid bodies.
     model.armature = np.zeros(model.nv)
     data, context, forces = model.createData(), plant.CreateDefaultContext(), MultibodyForces(plant)
     joints = [joint for joint in map(plant.get_joint, plant.GetJointIndices()) if joint.num_positions() == 1]
@@ -86,8 +86,8 @@ def off(urdf, sdf):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("converter", help="golden/urdf_to_sdf.cpp as a program")
-    parser.add_argument("--out", type=Path, default=HERE / "sdf", help="folder that receives the models")
+    parser.add_argument("converter", help="the compiled golden/urdf_to_sdf.cpp")
+    parser.add_argument("--out", type=Path, default=HERE / "sdf", help="output folder for the models")
     options = parser.parse_args()
     data = Path(importlib.metadata.distribution("example-robot-data").locate_file(""))
     data = data / "cmeel.prefix/share/example-robot-data/robots"
@@ -105,7 +105,7 @@ def main():
             print(f"{name}: Drake's torque of the SDF and Pinocchio's of the URDF differ by {difference:.1e}")
             if not difference < SAME:
                 target.unlink()
-                raise SystemExit(f"{name}: the converted model moves another way")
+                raise SystemExit(f"{name}: the dynamics of the converted model differ")
 
 
 if __name__ == "__main__":

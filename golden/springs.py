@@ -1,9 +1,9 @@
-"""Joint springs and a cable by MuJoCo: what Dynident's declared torques are held against.
+"""Joint springs and a cable in MuJoCo: reference for Dynident's declared torques.
 
     python golden/springs.py [--out DIR]
 
 Writes DIR/springs.json: the MJCF of an arm of two links with a spring in its second joint (`stiffness`, `springref`)
-and a cable from the base to the first link that pulls beyond its length (a spatial tendon with `stiffness` and
+and a cable from the base to the first link that pulls when stretched beyond its length (a spatial tendon with `stiffness` and
 `springlength`), and `mj_inverse` at random states.
 """
 import argparse
@@ -46,7 +46,7 @@ MODEL = """<mujoco model="springs">
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=HERE, help="folder that receives springs.json")
+    parser.add_argument("--out", type=Path, default=HERE, help="output folder for springs.json")
     options = parser.parse_args()
     random = np.random.default_rng(SEED)
     model = mujoco.MjModel.from_xml_string(MODEL)

@@ -2,8 +2,8 @@
 
     python3 golden/statsmodels_estimators.py [--out DIR]
 
-Writes statsmodels_estimators.json. Two logs of two joints with different lengths; joint 1 sees all columns, joint 2 only the last
-three. Columns of very different size; residuals AR(1). Segments of 25 rows, the last of a log shorter.
+Writes statsmodels_estimators.json. Two logs of two joints with different lengths; joint 1 depends on all columns, joint 2 only on the
+last three. Columns of very different magnitude; AR(1) residuals. Segments of 25 rows; the last segment of a log is shorter.
 """
 import argparse
 import pathlib
@@ -25,7 +25,7 @@ ROWS = [310, 215]
 
 
 def simulated_logs():
-    """The logs as they stand in the file; then all rows stacked: regressor, torque, joint and cluster numbers."""
+    """The logs in file format, and all rows stacked: regressor, torque, joint and cluster numbers."""
     rng = np.random.default_rng(SEED)
     logs = []
     X, y, joint_of, cluster, log_cluster = [], [], [], [], []
@@ -70,7 +70,7 @@ def fit(X, y, cluster, log_cluster, weights):
 
 
 def joint_sigma(residual, joint_of):
-    """Each joint's noise, with its share of the five parameters as lost degrees of freedom."""
+    """Noise of each joint; its share of the five parameters reduces the degrees of freedom."""
     return np.array([np.sqrt((residual[joint_of == j] ** 2).sum() / ((joint_of == j).sum() - 5 / 2)) for j in range(2)])
 
 
@@ -97,7 +97,7 @@ def main():
         theta = np.linalg.lstsq(A, np.concatenate([y * w, mean / std]), rcond=None)[0]
         sigma = joint_sigma(y - X @ theta, joint_of)
     prior["values"] = theta.tolist()
-    # By QR: the normal equations would square the condition.
+    # Use QR, because the normal equations square the condition number.
     inverse = np.linalg.inv(np.linalg.qr(A, mode="r"))
     prior["covariance_white"] = (inverse @ inverse.T).tolist()
     golden = {

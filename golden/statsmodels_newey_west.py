@@ -2,8 +2,8 @@
 
     python3 golden/statsmodels_newey_west.py [--out DIR]
 
-Writes statsmodels_newey_west.json: 240 rows of four columns with AR(1) residuals, the covariance with Bartlett's kernel, and the automatic bandwidth of Newey and West (1994) written out with
-NumPy, with the trace of the autocovariances of the scores in the metric of the information in place of their weights.
+Writes statsmodels_newey_west.json: 240 rows of four columns with AR(1) residuals, the covariance with Bartlett's kernel, and the automatic bandwidth of Newey and West (1994) in
+NumPy. In place of their weights, the bandwidth uses the trace of the autocovariances of the scores in the metric of the information matrix.
 """
 import argparse
 import pathlib
@@ -19,7 +19,7 @@ ROWS, COLUMNS = 240, 4
 
 
 def bandwidth(scores, information):
-    """Lag of Bartlett's kernel."""
+    """Maximum lag of Bartlett's kernel."""
     rows = len(scores)
     pilot = int(4 * (rows / 100) ** (2 / 9))
     inverse = np.linalg.inv(information)

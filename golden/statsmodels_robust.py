@@ -2,8 +2,8 @@
 
     python3 golden/statsmodels_robust.py [--out DIR]
 
-Writes statsmodels_robust.json: one joint with gross errors (RLM with Huber's and Tukey's weights), one with noise in the regressor and instruments (IV2SLS, clusters by
-hand; the Durbin-Wu-Hausman test as an F test of the augmented OLS), two joints with correlated errors (GLS, iterated).
+Writes statsmodels_robust.json: one joint with gross errors (RLM with Huber's and Tukey's weights), one with noise in the regressor and instruments (IV2SLS with a manual cluster
+covariance; the Durbin-Wu-Hausman test as an F test of the augmented OLS), two joints with correlated errors (GLS, iterated).
 """
 import argparse
 import pathlib
@@ -56,7 +56,7 @@ def instrumental(rng):
     c = groups / (groups - 1) * (rows - 1) / (rows - 3)
     augmented = sm.OLS(y, np.hstack([X, left[:, :2]])).fit()
     test = augmented.f_test(np.eye(5)[3:])
-    # Cragg-Donald for the two noisy columns, the constant taken out of all.
+    # Cragg-Donald statistic for the two noisy columns, with the constant removed from all columns.
     V = left[:, :2]
     centred = fitted[:, :2] - fitted[:, :2].mean(axis=0)
     sigma = V.T @ V / (rows - 3)

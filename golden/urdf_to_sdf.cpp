@@ -1,4 +1,4 @@
-// urdf_to_sdf FILE.urdf: the model as SDF, by libsdformat's own converter, to standard output. Exit status 1 with its messages where it finds anything wrong.
+// urdf_to_sdf FILE.urdf: converts a model to SDF with the converter of libsdformat and prints it. Exit status 1 with its messages if it finds anything wrong.
 //
 //     g++ -O1 -std=c++17 golden/urdf_to_sdf.cpp -o urdf_to_sdf $(pkg-config --cflags --libs sdformat12)
 #include <iostream>

@@ -1,5 +1,5 @@
-"""One JSON form for every golden file: sorted keys, vectors on one line, matrices one row a line, floats by
-repr (the shortest text that reads back to the same bits), no NaN and no negative zero."""
+"""JSON format of all golden files: sorted keys, vectors on one line, matrices with one row per line, floats from
+repr (the shortest text with an exact round trip), no NaN and no negative zero."""
 import json
 import math
 
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def plain(x):
-    """NumPy arrays and scalars as Python lists and numbers."""
+    """Converts NumPy arrays and scalars to Python lists and numbers."""
     if isinstance(x, np.ndarray):
         return plain(x.tolist())
     if isinstance(x, dict):
@@ -32,7 +32,7 @@ def text(x, indent=0):
         return "[\n" + ",\n".join(inner + text(v, indent + 1) for v in x) + f"\n{pad}]"
     if isinstance(x, list):
         return "[" + ", ".join(text(v) for v in x) + "]"
-    # A whole number is the same number without its fraction, and the regressors are mostly zeros.
+    # Integers are written without a fraction, which saves space because regressors contain mostly zeros.
     if isinstance(x, float) and x.is_integer() and abs(x) < 1e15:
         return str(int(x))
     return json.dumps(x, allow_nan=False)

@@ -1,10 +1,10 @@
-"""Dynident beside FIGAROH on FIGAROH's UR10 example, and beside mujoco.sysid on its tutorial's arm: one run, one thread, in alternation.
+"""Compares Dynident with FIGAROH on FIGAROH's UR10 example, and with mujoco.sysid on the arm of its tutorial: alternating runs, one thread.
 
     python benchmarks/rivals [--rounds 2] [--seeds 5] [--quick] [--out FOLDER]
 
-Every round draws the noise of every seed; theirs and ours read the same recording, one after the other. Writes table.md and figures.json into FOLDER
-(target/rivals) and the table to standard output. --quick is one round of one seed with fewer settings. Exit status 1 if FIGAROH's reference case or Dynident
-misses what FIGAROH's example asks, on the draw that it judges: within 0.1 Nm rms of the true torque at every joint of the held-out motion.
+Each round draws the noise of each seed; all tools use the same recording, one after the other. Writes table.md and figures.json into FOLDER
+(target/rivals) and the table to standard output. --quick runs one round of one seed with fewer settings. Exit status 1 if FIGAROH's reference case or Dynident
+misses the target of FIGAROH's example for its noise draw: 0.1 Nm rms error of the true torque at every joint of the held-out motion.
 """
 import os
 
@@ -37,12 +37,12 @@ import with_figaroh
 import with_sysid
 
 HERE = Path(__file__).resolve().parent
-# FIGAROH's own acceptance of the identified model, against the noise-free torque of the held-out motion.
+# FIGAROH's acceptance limit for the identified model, relative to the noise-free torque of the held-out motion.
 MOST_RMS_NM = 0.1
 
 
 def lines(file, begin, end):
-    """Lines of a user's program between two marks, blank lines, comments and documentation apart."""
+    """Number of lines in a user's program between two marks, without blank lines, comments and docstrings."""
     own = (HERE / file).read_text().split(f"# begin {begin}\n")[1].split(f"# end {end}\n")[0].splitlines()
     return sum(1 for line in own if line.strip() and not line.strip().startswith(("#", '"""')))
 
@@ -52,14 +52,14 @@ def percent(found, truth):
 
 
 class Figures:
-    """What all runs of one setting gave."""
+    """Results of all runs with one setting."""
 
     def __init__(self):
         self.seconds, self.true, self.measured, self.worst_joint, self.rms_nm = [], [], [], [], []
         self.bars, self.inside, self.refused, self.warned = [], [], 0, 0
 
     def judge(self, tau, truth, measured=None):
-        """Held-out torques, samples by joints, against what was and what was measured."""
+        """Adds held-out torques (samples, joints), compared with the true and the measured torques."""
         self.true.append(percent(tau, truth))
         self.worst_joint.append(max(percent(tau[:, joint], truth[:, joint]) for joint in range(tau.shape[1])))
         self.rms_nm.append(float(np.sqrt(np.mean((tau - truth) ** 2, axis=0)).max()))
@@ -88,7 +88,7 @@ class Figures:
 
 @contextlib.contextmanager
 def timed(figures):
-    """Adds the seconds of the processor that a run takes; what it prints is not shown."""
+    """Adds the processor time of a run, s; hides its output."""
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         begin = time.process_time()
@@ -113,7 +113,7 @@ DYNIDENT = {
 
 
 def run_figaroh(figures, settings, folder, test):
-    """FIGAROH on the recordings in a folder; how it is judged is outside the time."""
+    """Runs FIGAROH on the recordings in a folder; the evaluation is not part of the measured time."""
     settings = dict(settings)
     calls = {key: settings.pop(key) for key in ("kind", "wls", "decimate") if key in settings}
     kind = "exact" if calls.get("kind") is with_figaroh.ExactUR10 else "positions"
@@ -125,7 +125,7 @@ def run_figaroh(figures, settings, folder, test):
         figures.refused += 1
     else:
         figures.judge(with_figaroh.predict(found, *motion), test.tau, test.tau_measured)
-    # The true base parameters are those that make the noise-free torques of the held-out motion exactly.
+    # The true base parameters reproduce the noise-free torques of the held-out motion exactly.
     truth, *_ = np.linalg.lstsq(with_figaroh.base_regressor(found, *motion), test.tau.T.ravel(), rcond=None)
     told = found.result["wls_std_deviations"] if calls.get("wls") else found.std_relative
     inertial = [not name.startswith(("fv", "fs", "off")) for name in found.params_base]
@@ -145,7 +145,7 @@ def run_dynident(figures, sections, folder, test, truth):
 
 
 def ur10(seeds, rounds, quick, folder):
-    """All settings at every level of noise: level to setting to figures."""
+    """Results of all settings at every noise level, by level and setting."""
     (folder / "ur10.urdf").write_text(ur10_example.urdf(ur10_example.NOMINAL))
     # FIGAROH names Ixx, Ixy, Iyy, Ixz, Iyz, Izz; Dynident Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
     truth = with_dynident.symbols(ur10_example.TRUTH[:, [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]])
@@ -169,7 +169,7 @@ def ur10(seeds, rounds, quick, folder):
     return found
 
 
-# What is asked for: position noise rad, and whether damping is known.
+# Questions: position noise, rad, and whether damping is known.
 QUESTIONS = {
     "tutorial": ("as the tutorial: 0.6 rad, armatures unknown", 0.6, True),
     "encoder": ("0.001 rad, armatures unknown", 1e-3, True),
@@ -179,7 +179,7 @@ QUESTIONS = {
 }
 
 
-# Where mujoco.sysid starts. Dynident's problem is linear: it has no start.
+# Start values of mujoco.sysid. Dynident's problem is linear and needs no start values.
 STARTS = {
     "sysid": ("mujoco.sysid, from 0.01", {"armature": arm_tutorial.FIRST_GUESS, "damping": 0.01}),
     "sysid nearer": ("mujoco.sysid, from 0.3 and 0.5", {"armature": 0.3, "damping": 0.5}),
@@ -212,7 +212,7 @@ def run_dynident_on_arm(figures, known, train, test):
 
 
 def arm(seeds, rounds, quick):
-    """Both tools on every question: question to tool to figures."""
+    """Results of both tools for every question, by question and tool."""
     test = arm_tutorial.record("test", 0.0, 0)
     found = {}
     for key in ["tutorial", "encoder"] if quick else QUESTIONS:
@@ -228,7 +228,7 @@ def arm(seeds, rounds, quick):
 
 
 def number(value, digits=2):
-    """Short for a table: so many digits, or all before the point; beyond a thousand nothing but that."""
+    """Formats a number for a table: the given significant digits, at least all digits before the decimal point; "> 1000" for larger values."""
     if value is None:
         return ""
     return "> 1000" if value > 1000 else f"{value:.{digits}g}" if value < 10**digits else f"{value:.0f}"
@@ -299,10 +299,10 @@ def main():
     plain = {robot: {case: {key: one.numbers() for key, one in of.items()} for case, of in cases.items()} for robot, cases in figures.items()}
     (options.out / "figures.json").write_text(json.dumps(plain, indent=1) + "\n")
     print(text, end="")
-    # The example judges its first draw.
+    # The example evaluates its first draw.
     first = {key: ur10_found["low"][key].rms_nm[:1] for key in ("reference", *DYNIDENT)}
     if not all(rms and rms[0] <= MOST_RMS_NM for rms in first.values()):
-        sys.exit(f"a joint of the held-out motion is more than {MOST_RMS_NM} Nm rms off, or the model was refused: {first}")
+        sys.exit(f"the torque error of a joint in the held-out motion is above {MOST_RMS_NM} Nm rms, or the model was refused: {first}")
 
 
 if __name__ == "__main__":

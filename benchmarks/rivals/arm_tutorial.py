@@ -1,7 +1,7 @@
-"""The arm of mujoco.sysid's tutorial and its recording, made anew: five joints under open-loop torques, armatures unknown.
+"""The arm of mujoco.sysid's tutorial with a simulated recording: five joints under open-loop torques, armatures unknown.
 
-The tutorial is the notebook beside the package (`python/mujoco/sysid/sysid.ipynb` of github.com/google-deepmind/mujoco), "Robot Arm: Identifying Joint Armature".
-Arm, torques, length, rate and noise are its numbers; the samples come from MuJoCo itself, as there.
+The tutorial is the notebook in the repository of the package (`python/mujoco/sysid/sysid.ipynb` of github.com/google-deepmind/mujoco), "Robot Arm: Identifying Joint Armature".
+Arm, torques, length, rate and noise are those of the tutorial; the samples are simulated with MuJoCo, as in the tutorial.
 """
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ AXES = ["0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0"]
 HEIGHT = [0.1, 0.1, 0.1, 0.1, 0.08]
 RATE_HZ = 500.0
 DURATION_S = 2.0
-# Amplitude Nm, frequency Hz, phase rad of the torque of every joint: the tutorial's, and another motion to test on.
+# Amplitude Nm, frequency Hz, phase rad of the torque of every joint: those of the tutorial, and another motion for validation.
 TORQUES = {
     "train": [(5.0, 0.5, 0.0), (4.0, 0.7, 0.5), (3.0, 0.4, 1.0), (2.0, 0.9, 1.5), (1.0, 0.6, 2.0)],
     "test": [(4.0, 0.8, 0.3), (3.0, 1.0, 2.0), (2.5, 0.9, 0.4), (1.5, 0.6, 2.5), (0.8, 1.0, 0.7)],
@@ -28,7 +28,7 @@ TORQUES = {
 
 @dataclass
 class Recording:
-    """What was, and the positions as recorded; torques are commanded and exact, as in the tutorial."""
+    """True motion and recorded positions; the torques are the exact commanded torques, as in the tutorial."""
 
     t: np.ndarray
     q: np.ndarray
@@ -39,7 +39,7 @@ class Recording:
 
 
 def bodies():
-    """m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz of every body about its joint's frame."""
+    """m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz of every body about the frame of its joint."""
     com = np.array(COM_Z)
     across = MASS * (0.01 + com**2)
     nothing = 0 * MASS
@@ -65,7 +65,7 @@ def mjcf(armature, damping):
 
 
 def record(name, noise_rad, seed):
-    """The arm under the torques called `name`, from rest upright, with white noise on its positions."""
+    """Simulates the arm with the torques `name` from rest in the upright posture, with white noise on the positions."""
     model = mujoco.MjModel.from_xml_string(mjcf(ARMATURE, DAMPING))
     data = mujoco.MjData(model)
     t = np.arange(int(DURATION_S * RATE_HZ)) / RATE_HZ
@@ -78,12 +78,12 @@ def record(name, noise_rad, seed):
         ddq[row] = data.qacc
         mujoco.mj_step(model, data)
     if np.abs(q).max() > 3.14:
-        raise RuntimeError(f"{name}: the arm runs into its limits")
+        raise RuntimeError(f"{name}: the arm reaches its limits")
     return Recording(t, q, dq, ddq, tau, q + np.random.default_rng(seed).normal(0.0, noise_rad, q.shape))
 
 
 def inverse(model, q, dq, ddq):
-    """Torques, Nm, that a MuJoCo model needs for a motion."""
+    """Torques, Nm, of a MuJoCo model for a motion."""
     data, tau = mujoco.MjData(model), np.zeros_like(q)
     for row, (data.qpos, data.qvel, data.qacc) in enumerate(zip(q, dq, ddq)):
         mujoco.mj_inverse(model, data)

@@ -1,9 +1,9 @@
 """The data of FIGAROH's own UR10 example, rebuilt from its published numbers.
 
-The example (`examples/ur10/identification_reference.py` of github.com/thanhndv212/figaroh-examples, which the README of FIGAROH 1.0.2 begins with) has a robot
-of which the truth is known: the inertias of a UR10e with camera and tool, each moved at random. Its folder `data/truth` (`manifest.json` of commit 98345176 and
-`truth_parameters.csv`) has the numbers: the truth, the rest points of the motion to fit to (FIGAROH's own optimiser found them), the Fourier coefficients of the
-held-out one, levels and seeds of the noise. `rebuild` makes the samples of these, and refuses if the torques are not the published ones.
+The example (`examples/ur10/identification_reference.py` of github.com/thanhndv212/figaroh-examples, the first example in the README of FIGAROH 1.0.2) has a robot
+with known parameters: the inertias of a UR10e with camera and tool, with random changes. Its folder `data/truth` (`manifest.json` of commit 98345176 and
+`truth_parameters.csv`) contains the true parameters, the rest points of the training motion (from FIGAROH's optimiser), the Fourier coefficients of the
+held-out motion, and levels and seeds of the noise. `rebuild` computes the samples from them, and fails if the torques differ from the published ones.
 """
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ import pinocchio
 
 JOINTS = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
 RATE_HZ = 100.0
-# Effort noise as a share of the joint's rms torque in training; position noise, rad.
+# Torque noise as a fraction of the rms torque of the joint in training; position noise, rad.
 NOISE = {"low": (0.01, 1e-5), "high": (0.05, 1e-4)}
 SEEDS = [(101, 201), (102, 202), (103, 203), (104, 204), (105, 205)]
 
@@ -26,7 +26,7 @@ PLACEMENTS = [
     ((0.0, -0.11985, -2.458164590756244e-11), (1.570796327, 0.0, 0.0)),
     ((0.0, 0.11655, -2.390480459346185e-11), (1.570796326589793, 3.141592653589793, 3.141592653589793)),
 ]
-# m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the joint's frame: what truly is, and what the description says.
+# m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the frame of the joint: true values, and values of the robot description.
 TRUTH = np.array([
     [9.2785424448557379, 0.074257512849005267, 0.18162523855835286, 0.41584445326358582, 0.056064381884902571, -0.0020089596323490944, 0.059896101501369682, -0.0031152023030816644, -0.0086161252780670369, 0.029054883664591608],
     [13.11759619519256, -3.6324529832947858, 0.19965971135572402, 2.3275010088266241, 0.4724957659450626, 0.14358514888394841, 1.967482800655306, 0.67481034607286394, -0.04071676833499753, 1.5706657882377348],
@@ -43,7 +43,7 @@ NOMINAL = np.array([
     [1.96, 0.0, 0.0, 0.0, 0.0051082479566999994, 0.0, 0.0051082479566999994, 0.0, 0.0, 0.0055124999999999992],
     [0.474, -0.0013618153318366135, -0.0095502871808523376, -0.0046899895245451704, 0.0038666771550539963, -0.00018652554541069523, 0.0061748731375646689, 4.0949299973973887e-06, 4.5182723511901787e-05, 0.0072031825645269172],
 ])
-# At rest at each point, two seconds from one to the next.
+# At rest at each point; 2 s between points.
 INTERVAL_S = 2.0
 WAYPOINTS = np.array([
     [-2.5132741228718345, -1.4707963267948965, 1.315240771239341, -0.82412966012823, -1.6007963267948966, -0.5099999999999999],
@@ -88,7 +88,7 @@ TORQUE_RMS = {
 
 @dataclass
 class Recording:
-    """One motion: what was (`q`, `dq`, `ddq`, `tau`) and what a robot's controller would have recorded (`q_measured`, `tau_measured`)."""
+    """One motion: true values (`q`, `dq`, `ddq`, `tau`) and recorded values (`q_measured`, `tau_measured`)."""
 
     t: np.ndarray
     q: np.ndarray
@@ -100,7 +100,7 @@ class Recording:
 
 
 def urdf(bodies):
-    """The robot with these bodies, each ten numbers as in `TRUTH`."""
+    """The robot with these bodies; each has ten numbers as in `TRUTH`."""
     parts = ['<robot name="ur10e"><link name="base"/>']
     parent = "base"
     for joint, (xyz, rpy), (m, mx, my, mz, xx, xy, yy, xz, yz, zz) in zip(JOINTS, PLACEMENTS, bodies):
@@ -146,7 +146,7 @@ def torques(model, q, dq, ddq):
 
 
 def rebuild(noise, seeds):
-    """The recordings to fit to and to test on, with the noise that is called `noise` from these seeds."""
+    """The training and validation recordings, with noise level `noise` from these seeds."""
     truth = pinocchio.buildModelFromXML(urdf(TRUTH))
     recordings = {}
     effort, position = NOISE[noise]
@@ -155,7 +155,7 @@ def rebuild(noise, seeds):
         tau = torques(truth, *motion[1:])
         rms = np.sqrt(np.mean(tau**2, axis=0))
         if not np.allclose(rms, TORQUE_RMS[name], rtol=1e-9):
-            raise RuntimeError(f"{name}: the torques are not FIGAROH's: rms {rms.tolist()} in place of {TORQUE_RMS[name]}")
+            raise RuntimeError(f"{name}: the torques differ from FIGAROH's: rms {rms.tolist()}, expected {TORQUE_RMS[name]}")
         draw = np.random.RandomState(seed)
         noise_tau, noise_q = draw.standard_normal(tau.shape), draw.standard_normal(tau.shape)
         recordings[name] = Recording(*motion, tau, motion[1] + position * noise_q, tau + sigma * noise_tau)
@@ -164,7 +164,7 @@ def rebuild(noise, seeds):
 
 
 def agree_with_mujoco(recording):
-    """MuJoCo's inverse dynamics of the same robot, which shares no code with Pinocchio's, must give the same torques."""
+    """Checks that MuJoCo's inverse dynamics of the same robot give the same torques as Pinocchio's."""
     spec = mujoco.MjSpec.from_string(urdf(TRUTH))
     spec.compiler.boundmass = spec.compiler.boundinertia = 0.0
     model = spec.compile()
@@ -173,4 +173,4 @@ def agree_with_mujoco(recording):
         data.qpos, data.qvel, data.qacc = q, dq, ddq
         mujoco.mj_inverse(model, data)
         if not np.allclose(data.qfrc_inverse, tau, atol=1e-6):
-            raise RuntimeError(f"MuJoCo and Pinocchio do not agree on the robot: {data.qfrc_inverse} and {tau} Nm")
+            raise RuntimeError(f"MuJoCo and Pinocchio give different torques: {data.qfrc_inverse} and {tau} Nm")

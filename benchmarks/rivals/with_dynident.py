@@ -1,4 +1,4 @@
-"""What a user of Dynident writes for either robot."""
+"""Dynident user code for both robots."""
 import dynident
 
 # begin ur10
@@ -17,11 +17,11 @@ NO_FRICTION = dict(drive={"viscous": False, "coulomb": "none", "offset": False},
 
 
 def identify_arm(xml, recording, damping=None):
-    """Armatures and, unless they are given, dampings of an arm whose bodies are known."""
+    """Identifies armatures and, unless given, dampings of an arm with known bodies."""
     arm = dynident.Robot.from_mjcf(xml)
     log = dynident.Log.from_arrays(recording.t, recording.q_measured, recording.tau)
     known = {f"link{i}": {"known": body.tolist()} for i, body in enumerate(arm.inertial_parameters, 1)}
-    # Limits that touch are refused; these leave a millionth.
+    # Equal limits are rejected, so the limits differ by 1e-6 (relative).
     laws = {} if damping is None else {f"fv{i}": [0.999999 * one, 1.000001 * one] for i, one in enumerate(damping, 1)}
     drive = {"drive_inertia": True, "coulomb": "none", "offset": False}
     estimator = {"physical": {"bodies": known, "laws": laws}}
@@ -33,13 +33,13 @@ PARAMETERS = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"]
 
 
 def symbols(bodies, **drives):
-    """What every symbol in the name of a base parameter stands for: `bodies` ten numbers each, `drives` one of each joint."""
+    """Values of all symbols in names of base parameters: `bodies` has ten numbers each, `drives` one per joint."""
     found = {f"{symbol}{i}": value for i, body in enumerate(bodies, 1) for symbol, value in zip(PARAMETERS, body)}
     return found | {f"{symbol}{i}": value for symbol, values in drives.items() for i, value in enumerate(values, 1)}
 
 
 def value_of(name, truth):
-    """The sum that a base parameter is, `Izz1 + 0.49 m2 - my3`, of the true values; what the truth does not have is nothing."""
+    """True value of a base parameter such as `Izz1 + 0.49 m2 - my3`; symbols without a true value are zero."""
     total, sign, factor = 0.0, 1.0, 1.0
     for word in name.split():
         if word in "+-":
@@ -52,7 +52,7 @@ def value_of(name, truth):
 
 
 def errors_in_bars(model, truth, counts=lambda name: True):
-    """Of every excited base parameter that counts its error in standard deviations, and whether the truth lies in its interval."""
+    """For all excited base parameters selected by `counts`: errors in standard deviations, and whether the interval contains the true value."""
     excited = [one["excited"] for one in model.result["base_parameters"]]
     rows = [
         (value - value_of(name, truth), std, half_width)

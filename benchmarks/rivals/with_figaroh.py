@@ -1,4 +1,4 @@
-"""What a user of FIGAROH writes for the UR10: a configuration and a class, and the calls of its example."""
+"""FIGAROH user code for the UR10: a configuration, a class, and the calls of the example."""
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +65,7 @@ def identify(urdf, configuration, train, kind=UR10, wls=False, decimate=False):
 
 
 class GradientUR10(UR10):
-    """Leaves the derivatives to FIGAROH's pipeline: central differences of the filtered positions."""
+    """Uses the derivatives of FIGAROH's pipeline: central differences of the filtered positions."""
 
     def load_trajectory_data(self, data_source=None):
         table = pd.read_csv(data_source or self.train)
@@ -79,7 +79,7 @@ class GradientUR10(UR10):
 
 
 class ExactUR10(UR10):
-    """Takes velocities and accelerations as the recording has them, and filters nothing: what the reference case does."""
+    """Uses recorded velocities and accelerations without a filter, as the reference case does."""
 
     def load_trajectory_data(self, data_source=None):
         table = pd.read_csv(data_source or self.train)
@@ -97,7 +97,7 @@ def write_configuration(path, test, *, friction=False, offset=False, cutoff_hz=1
 
 
 def write_recording(path, recording, exact):
-    """The table that is read: t, q, tau as recorded; with `exact` the motion's own derivatives as well."""
+    """The input table: recorded t, q, tau; with `exact` also the exact derivatives of the motion."""
     groups = dict(q=recording.q_measured, tau=recording.tau_measured)
     if exact:
         groups |= dict(dq=recording.dq, ddq=recording.ddq)
@@ -106,13 +106,13 @@ def write_recording(path, recording, exact):
 
 
 def base_regressor(found, q, dq, ddq):
-    """The regressor of the base parameters that were chosen, rows joint by joint; which columns these are no public name tells."""
+    """Regressor of the selected base parameters, rows sorted by joint. FIGAROH has no public name for the selected columns."""
     W = build_regressor_basic(found.robot, q, dq, ddq, found.identif_config)
     return build_regressor_reduced(W, found._idx_eliminated)[:, list(found._base_indices)]
 
 
 def predict(found, q, dq, ddq):
-    """Torques, Nm, samples by joints; of the physically consistent bodies if these were selected."""
+    """Torques, Nm, shape (samples, joints); of the physically consistent bodies if these were selected."""
     if found.selected is not None:
         tau = found.selected.predict(build_regressor_basic(found.robot, q, dq, ddq, found.identif_config))
     else:

@@ -1,4 +1,4 @@
-"""What a user of mujoco.sysid writes for the arm of its tutorial."""
+"""mujoco.sysid user code for the arm of its tutorial."""
 import mujoco
 import numpy as np
 from mujoco import sysid
@@ -7,7 +7,7 @@ from mujoco import sysid
 
 
 def identify(xml, recording, unknown, first_guess, most):
-    """Fits the attributes `unknown` ("armature", "damping") of all joints; their values, half widths of 95 % and the model."""
+    """Fits the attributes `unknown` ("armature", "damping") of all joints; returns values, half widths of the 95 % intervals and the model."""
     spec = mujoco.MjSpec.from_string(xml)
     model = spec.compile()
     parameters = sysid.ParameterDict()
@@ -23,7 +23,7 @@ def identify(xml, recording, unknown, first_guess, most):
             name = f"{joint}_{attribute}"
             parameters.add(sysid.Parameter(name, nominal=first_guess[attribute], min_value=0.01, max_value=most[attribute], modifier=write))
     control = sysid.TimeSeries(recording.t, recording.tau)
-    # A rollout's sensors are those of the state before each step, its times those after it.
+    # In a rollout, sensors belong to the state before each step, and times to the state after the step.
     positions = sysid.TimeSeries.from_names(recording.t[:-1] + model.opt.timestep, recording.q_measured[:-1], model)
     data = mujoco.MjData(model)
     start = sysid.create_initial_state(model, data.qpos, data.qvel, data.act)

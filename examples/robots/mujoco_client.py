@@ -3,17 +3,17 @@
     pip install mujoco numpy
     python examples/robots/mujoco_client.py robots/panda_arm7.urdf [--friction 0.2] [--damping 0.5] [--armature 0.1]
 
-It offers both modes. In `run` it runs the control loop itself from the two files that it gets: joint PD and PID by their gains,
-model-based controllers through a Newton-Euler recursion over the numbers of controller.json (robot_controller.py). In `step` it holds
-the torques that it is sent. Where the study states a home it begins there, and runs approach, trajectory and return. It stops at a
-stop message, when its input ends, and when a sample leaves the envelope that a motion comes with: a simulated robot stands at once, a
-real one brakes here (robot_program.py). --friction, --damping and --armature give the joints dry (Nm) and viscous (Nm s/rad) friction
-and drive inertia (kg m^2) that the URDF does not have: one number, or one for each joint with commas between. --kp and --kd are the
-drives' own position loop, for the controller position-loop. Other properties of real robots are off by default: Stribeck and load
-friction, masses that differ from the description, delays, quantised and noisy encoders, velocities from differences. So are properties
-that no model has: a joint that catches (--catch), links of another length (--lengths), and faults of torque and clock
-(robot_faults.py). --truth FILE states what the robot really is and did (benchmarks/campaign.py, benchmarks/loop_faults.py). Standard
-output belongs to the protocol; messages go to standard error.
+The client supports both modes. In mode `run` it runs the control loop with the two received files. Joint PD and PID use their gains;
+model-based controllers use a Newton-Euler recursion with the numbers of controller.json (robot_controller.py). In mode `step` it holds
+the received torques. If the study has a home position, the client starts there, and runs approach, trajectory and return. It stops at
+a stop message, at the end of its input, and when a sample leaves the envelope of the motion. A simulated robot stops immediately; a
+real robot must brake here (robot_program.py). --friction, --damping and --armature add dry (Nm) and viscous (Nm s/rad) friction and
+drive inertia (kg m^2) that are not in the URDF: one number, or one per joint, comma-separated. --kp and --kd are the gains of the
+position loop inside the drives, for the controller position-loop. Other properties of real robots are off by default: Stribeck and
+load-dependent friction, masses different from the description, delays, quantised and noisy encoders, velocities from differences. Faults
+that no model describes are also off: a sticking joint (--catch), wrong link lengths (--lengths), and faults of torque and clock
+(robot_faults.py). --truth FILE writes the true parameters and results (benchmarks/campaign.py, benchmarks/loop_faults.py). Standard
+output is for the protocol; messages go to standard error.
 """
 import xml.etree.ElementTree as ElementTree
 
@@ -26,7 +26,7 @@ from robot_program import DryFriction, Messages, Program, parser_for
 def load(path, options):
     friction, damping, armature, step_s = options.friction, options.damping, options.armature, options.step
     tree = ElementTree.parse(path)
-    # A point mass is no body here: a grain of dust on it is.
+    # MuJoCo rejects point masses; give them a small inertia.
     for inertial in tree.getroot().iter("inertial"):
         mass, inertia = inertial.find("mass"), inertial.find("inertia")
         moments = ("ixx", "iyy", "izz")
@@ -38,9 +38,9 @@ def load(path, options):
                            discardvisual="true")
     model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree.getroot(), encoding="unicode"))
     model.dof_frictionloss[:], model.dof_damping[:], model.dof_armature[:] = friction, damping, armature
-    # Dry friction is a soft constraint here: as stiff as the steps allow, or it comes 20 ms late.
+    # Dry friction is a soft constraint: make it as stiff as the step allows, otherwise it acts with a delay of 20 ms.
     model.dof_solref[:], model.dof_solimp[:] = (2 * step_s, 1.0), (0.999, 0.999, 1e-3, 0.5, 2.0)
-    # Limits of joints are the controller's business, and links may overlap at their joints.
+    # The envelope checks the joint limits, and links may overlap at their joints.
     model.jnt_limited[:] = 0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     if options.gravity is not None:
@@ -54,7 +54,7 @@ def load(path, options):
 
 
 def bodies(model):
-    """What hangs rigidly on each joint: the ten inertial parameters about its frame, as Dynident has them."""
+    """The ten inertial parameters of all bodies rigidly attached to each joint, about the frame of the joint, as in Dynident."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     out = np.zeros((model.njnt, 10))
@@ -73,7 +73,7 @@ def bodies(model):
 
 
 class MujocoRobot:
-    """What robot_program.py needs of a simulator."""
+    """Simulator interface of robot_program.py."""
 
     def __init__(self, model, options):
         self.model, self.data, self.scratch = model, mujoco.MjData(model), mujoco.MjData(model)
@@ -127,7 +127,7 @@ class MujocoRobot:
         return bodies + self.model.dof_armature * ddq + self.model.dof_damping * dq + self.dry.level(q, dq, bodies) * np.sign(dq)
 
     def place(self, joint, offset_m):
-        """Bodies stand where the last step began."""
+        """Uses the body positions at the beginning of the last step."""
         body = self.model.jnt_bodyid[mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, joint)]
         return self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ offset_m
 

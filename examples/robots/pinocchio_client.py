@@ -1,31 +1,31 @@
-"""A robot program for Dynident's line protocol: Pinocchio's rigid bodies and this file's integrator (see docs/src/robot-protocol.md).
+"""A robot program for Dynident's line protocol: Pinocchio's rigid-body dynamics with the integrator in this file (see docs/src/robot-protocol.md).
 
     pip install pin numpy
     python examples/robots/pinocchio_client.py robots/panda_arm7.urdf [--friction 0.2] [--damping 0.5] [--armature 0.1]
 
-The options are those of mujoco_client.py; the dynamics share nothing with it. A step is a drift of half its length, a kick with the
-dynamics at its middle, and a drift of the other half, which is of second order in the step. Dry friction is exact stiction: of all
-friction torques within their limits, those with which the joints come to rest, or slide against them (projected Gauss-Seidel).
+The options are those of mujoco_client.py; the dynamics are independent of it. A step is a drift of half its length, a kick with the
+dynamics at its middle, and a drift of the other half; the error is of second order. Dry friction has exact stiction: projected Gauss-Seidel
+finds friction torques within their limits that stop a joint, or the limit torque against the motion of a sliding joint.
 """
 import numpy as np
 import pinocchio
 
 from robot_program import DryFriction, Messages, Program, parser_for
 
-# Sweeps over the joints, and the change of a friction torque relative to its limit at which they end.
+# Maximum number of sweeps over the joints, and the stopping limit for the change of a friction torque relative to its limit.
 SWEEPS, SETTLED = 50, 1e-9
 
 
 def load(options):
     model = pinocchio.buildModelFromUrdf(str(options.urdf))
     if model.nq != model.nv:
-        raise SystemExit(f"{options.urdf}: joints without limits are unknown to this client; make them revolute")
+        raise SystemExit(f"{options.urdf}: this client does not support continuous joints: make them revolute")
     if options.gravity is not None:
         model.gravity.linear = options.gravity
     factors = 1.0 + 0.01 * options.masses * np.random.default_rng(options.seed).uniform(-1.0, 1.0, model.njoints)
     for joint in range(1, model.njoints):
         body = model.inertias[joint]
-        # Mass and moments of inertia alike; the centre of mass stays in proportion to the lengths.
+        # Scale mass and moments of inertia equally; scale the centre of mass with the lengths.
         model.inertias[joint] = pinocchio.Inertia(factors[joint] * body.mass, body.lever, factors[joint] * body.inertia)
         placement = model.jointPlacements[joint]
         model.jointPlacements[joint] = pinocchio.SE3(placement.rotation, placement.translation * (1.0 + 0.01 * options.lengths))
@@ -34,14 +34,14 @@ def load(options):
 
 
 def inertial(body):
-    """The ten inertial parameters about the joint's frame, as Dynident has them."""
+    """The ten inertial parameters about the frame of the joint, as in Dynident."""
     mass, com = body.mass, body.lever
     about = body.inertia + mass * (com @ com * np.eye(3) - np.outer(com, com))
     return [mass, *(mass * com), *about[0], *about[1, 1:], about[2, 2]]
 
 
 class PinocchioRobot:
-    """What robot_program.py needs of a simulator."""
+    """Simulator interface of robot_program.py."""
 
     def __init__(self, model, options):
         self.model, self.data = model, model.createData()
@@ -58,7 +58,7 @@ class PinocchioRobot:
     def advance(self, tau):
         h, model, data = self.step_s, self.model, self.data
         middle = self.q + 0.5 * h * self.dq
-        # The velocity in the middle of the step, as the last acceleration foretells it.
+        # Velocity in the middle of the step, predicted with the last acceleration.
         speed = self.dq + 0.5 * h * self.acceleration
         bias = pinocchio.nonLinearEffects(model, data, middle, speed)
         inverse = np.triu(pinocchio.computeMinverse(model, data, middle))
@@ -94,10 +94,10 @@ class PinocchioRobot:
 
 
 def with_dry_friction(velocity, response, limit, torque):
-    """The velocity after a step, and the dry friction torque in it.
+    """Returns the velocity after a step, and the dry friction torque during the step.
 
-    `velocity` is the velocity without dry friction, `response` its change by a torque in this step, `torque` the guess to begin with.
-    A joint at rest has a friction torque within its limit, a sliding one its limit against the motion.
+    `velocity` is the velocity without dry friction, `response` its change per unit torque in this step, `torque` the initial guess.
+    At rest the friction torque is within its limit; in motion it equals the limit and opposes the motion.
     """
     joints = range(len(velocity))
     torque = [min(max(torque[i], -limit[i]), limit[i]) for i in joints]

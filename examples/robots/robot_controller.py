@@ -1,13 +1,13 @@
-"""The controllers of docs/src/robot-protocol.md, computed from controller.json and trajectory.csv alone.
+"""The controllers of docs/src/robot-protocol.md, computed from controller.json and trajectory.csv only.
 
-Both example clients use this module: the inverse dynamics, the friction laws and the control laws that a robot program needs in the
-mode `run`. Nothing here depends on a simulator.
+Both example clients use this module. It contains the inverse dynamics, the friction laws and the control laws for a robot program in
+mode `run`. It does not depend on a simulator.
 """
 import numpy as np
 
 
 def cross(a, b):
-    """The cross product of two vectors; numpy's own takes ten times as long for one pair."""
+    """Cross product of two vectors, ten times faster than numpy.cross for one pair."""
     a0, a1, a2 = a.tolist()
     b0, b1, b2 = b.tolist()
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
@@ -28,7 +28,7 @@ class InverseDynamics:
             self.bodies.append((m, np.array([hx, hy, hz]), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])))
         self.gravity = np.array(model["gravity_m_s2"])
         self.laws = [(law, [names.index(name) for name in law["joints"]]) for law in model["laws"]]
-        # How far each elastic element is deflected.
+        # Deflection of each elastic element.
         self.period_s, self.deflections = period_s, [0.0] * len(self.laws)
 
     def bodies_torque(self, q, dq, ddq):
@@ -71,7 +71,7 @@ class InverseDynamics:
         return tau
 
     def torque(self, q, dq, ddq, friction_speed):
-        """`friction_speed` is the speed at which friction is taken, or None for no friction."""
+        """`friction_speed` is the speed for the friction laws, or None for no friction."""
         tau = self.bodies_torque(q, dq, ddq)
         load = tau.copy()
         for number, (law, joints) in enumerate(self.laws):
@@ -107,18 +107,18 @@ class InverseDynamics:
         return tau
 
 
-# What friction() knows, and what is not friction.
+# Laws supported by friction(), and terms that are not friction.
 KNOWN_LAWS = {"viscous", "coulomb", "stribeck", "sigmoid", "power", "directional-viscous", "directional-coulomb", "load",
               "maxwell-slip", "drive-inertia", "offset", "coupling"}
 
 
 def step(shape, speed):
-    """The step of dry friction near rest."""
+    """Step function of dry friction near rest."""
     return np.tanh(speed / shape["width"]) if shape["step"] == "smooth" else np.sign(speed)
 
 
 def friction(law, speed, load):
-    """The law's torque for the parameter 1 (docs/src/friction.md)."""
+    """Torque of the law for a parameter value of 1 (docs/src/friction.md)."""
     kind = law["kind"]
     if kind == "viscous":
         return speed
@@ -139,14 +139,14 @@ def friction(law, speed, load):
 
 
 class Unknown(Exception):
-    """Something of the files that this client does not know: the motion is declined before anything moves."""
+    """The files contain a law or controller that this client does not support. The client declines the motion before the robot moves."""
 
     def __str__(self):
-        return f"this client does not know {self.args[0]}: add it here, or run in the mode step"
+        return f"this client does not support {self.args[0]}: implement it in robot_controller.py, or use the mode step"
 
 
 class Controller:
-    """Torque from the files' settings; `own_loop` are the gains of the drives' own position loop, in the files' order."""
+    """Computes the torque with the settings of the files. `own_loop` has the gains of the position loop inside the drives, in file order."""
 
     def __init__(self, file, own_loop):
         self.settings, n = file["controller"], len(file["joints"])
@@ -160,7 +160,7 @@ class Controller:
         of = lambda key: np.broadcast_to(np.array(self.settings.get(key) or 0.0, float), n)
         self.kp, self.ki, self.kd = of("kp"), of("ki"), of("kd")
         if self.settings["kind"] == "position-loop":
-            # The drives' own gains, whatever the file believes of them.
+            # Use the true gains of the drives, not those in the file.
             self.kp, self.kd = own_loop
         limit = self.settings.get("integral_limit")
         self.limit = np.broadcast_to(np.array(np.inf if limit is None else limit, float), n)
@@ -172,7 +172,7 @@ class Controller:
         return np.where(np.abs(x) < blend, inside, np.sign(x) * np.abs(x) ** alpha)
 
     def torque(self, target, q, dq, ahead):
-        """`ahead` is the trajectory's own torque column, where it has one."""
+        """`ahead` is the feedforward torque column of the trajectory, if it has one."""
         q_d, dq_d, ddq_d = target
         e, de, kind = q_d - q, dq_d - dq, self.settings["kind"]
         if kind == "position-loop":

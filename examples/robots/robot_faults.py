@@ -1,8 +1,8 @@
-"""Faults of a robot's torque channel and clock, for tests of the checks that have to find them (benchmarks/loop_faults.py).
+"""Faults of a robot's torque channel and clock, for tests of the checks that must detect them (benchmarks/loop_faults.py).
 
-All faults are off by default. Joints are numbered from 0 in the order of the program's `hello`. The order in which a torque passes
-them is: the controller's command, exchanged joints and chatter (`sent`), clipping, drive gain (`delivered`); and in the log: command
-or delivered torque, minus gravity and friction, exchanged joints, scale, delay, noise.
+All faults are off by default. Joints are numbered from 0 in the order of the `hello` message. Faults are applied to a torque in this
+order: controller command, exchanged joints and chatter (`sent`), clipping, drive gain (`delivered`). In the log: command or delivered
+torque, minus gravity and friction, exchanged joints, scale, delay, noise.
 """
 import collections
 
@@ -10,26 +10,26 @@ import numpy as np
 
 
 def numbers(text):
-    """Numbers with commas between."""
+    """Parses comma-separated numbers."""
     return np.array([float(part) for part in text.split(",")])
 
 
 def add_options(parser):
-    """The options of all faults."""
+    """Adds the options of all faults."""
     group = parser.add_argument_group("faults of torque and clock")
-    group.add_argument("--torque", type=numbers, default=np.inf, help="largest torque of the drives, Nm (N)")
+    group.add_argument("--torque", type=numbers, default=np.inf, help="maximum torque of the drives, Nm (N)")
     group.add_argument("--torque-share", type=numbers, default=np.inf,
-                       help="largest torque of the drives, as a share of the true peak torque along the trajectory")
-    group.add_argument("--drive-gain", type=numbers, default=1.0, help="delivered over commanded torque; the log does not show it")
-    group.add_argument("--log-command", action="store_true", help="the log has the command where the drives clip it")
+                       help="maximum torque of the drives as a fraction of the true peak torque along the trajectory")
+    group.add_argument("--drive-gain", type=numbers, default=1.0, help="ratio of delivered to commanded torque; not visible in the log")
+    group.add_argument("--log-command", action="store_true", help="the log contains the command instead of the clipped torque")
     group.add_argument("--swap-command", type=numbers, help="J,K: the commands of two joints go to the wrong drives")
     group.add_argument("--chatter", type=numbers, default=0.0, help="torque that alternates from sample to sample, Nm (N)")
-    group.add_argument("--chatter-share", type=float, default=0.2, help="share of each second with chatter")
-    group.add_argument("--log-scale", type=numbers, default=1.0, help="logged over true torque; negative: reversed sign")
+    group.add_argument("--chatter-share", type=float, default=0.2, help="fraction of each second with chatter")
+    group.add_argument("--log-scale", type=numbers, default=1.0, help="ratio of logged to true torque; negative for a reversed sign")
     group.add_argument("--log-swap", type=numbers, help="J,K: the logged torques of two joints are exchanged")
-    group.add_argument("--log-without", default="", help="what the log lacks, with commas between: the torques gravity and friction; speed, which is no fault")
-    group.add_argument("--log-torque-delay", type=float, default=0.0, help="how late the log has torque, s")
-    group.add_argument("--log-clock", type=float, default=1.0, help="seconds of the log's clock in one true second")
+    group.add_argument("--log-without", default="", help="comma-separated parts missing in the log: gravity and friction (torques), or speed (not a fault)")
+    group.add_argument("--log-torque-delay", type=float, default=0.0, help="delay of the logged torque, s")
+    group.add_argument("--log-clock", type=float, default=1.0, help="seconds of the log clock per true second")
 
 
 def exchanged(values, pair):
@@ -43,10 +43,10 @@ def exchanged(values, pair):
 
 
 class TorqueChannel:
-    """What happens to torque between controller, drives and log in one run."""
+    """Torque faults between controller, drives and log in one run."""
 
     def __init__(self, options, joints, rate_hz, peak):
-        """`peak` is the true peak torque of each joint along the trajectory, or None where that is not known."""
+        """`peak` is the true peak torque of each joint along the trajectory, or None if unknown."""
         each = lambda values: np.broadcast_to(np.asarray(values, float), joints)
         self.options, self.rate_hz, self.samples = options, rate_hz, 0
         self.limit = each(options.torque)
@@ -57,7 +57,7 @@ class TorqueChannel:
         self.waiting = collections.deque(maxlen=1 + round(options.log_torque_delay * rate_hz))
 
     def deliver(self, commanded):
-        """The torque that the drives were sent, and the torque that they deliver."""
+        """Returns the torque sent to the drives, and the delivered torque."""
         sent = exchanged(commanded, self.options.swap_command)
         second = int(self.rate_hz)
         if self.samples % second < self.options.chatter_share * second:
@@ -67,7 +67,7 @@ class TorqueChannel:
         return (sent if self.options.log_command else clipped), self.gain * clipped
 
     def logged(self, sent, gravity, friction):
-        """The torque as the log has it; `gravity` and `friction` give the true torques of the moment."""
+        """Returns the logged torque; `gravity` and `friction` return the current true torques."""
         torque = sent
         if "gravity" in self.lacks:
             torque = torque - gravity()
@@ -79,7 +79,7 @@ class TorqueChannel:
 
 
 class Regression:
-    """Least squares of logged on commanded torque, joint by joint: what a check of the log should find."""
+    """Regression of logged on commanded torque for each joint: the reference for a check of the log."""
 
     def __init__(self):
         self.commanded, self.logged = [], []
@@ -89,7 +89,7 @@ class Regression:
         self.logged.append(logged)
 
     def result(self):
-        """Slope, intercept (Nm, N) and correlation of each joint; null where a joint's torque is constant."""
+        """Slope, intercept (Nm, N) and correlation of each joint; null for a joint with constant torque."""
         x, y = np.array(self.commanded), np.array(self.logged)
         if len(x) < 3:
             return None

@@ -1,13 +1,13 @@
-"""A robot program for the line protocol of docs/src/robot-protocol.md, without the robot: messages, modes, sensors, log, truth.
+"""A robot program for the line protocol of docs/src/robot-protocol.md, without the robot: messages, modes, sensors, log, true values.
 
-`mujoco_client.py` and `pinocchio_client.py` put a simulator behind it. A simulator is an object with
+`mujoco_client.py` and `pinocchio_client.py` add a simulator. A simulator is an object with
 
     joints                       names, in the order of all vectors
     q, dq                        true positions and velocities
     begin(step_s, q, dq)         starts a motion at this state, with steps of this length
     advance(tau)                 one step with this torque of the drives
-    gravity(), friction()        true torques of the moment that the drives have to overcome, Nm (N)
-    along(q, dq, ddq)            the torque that the drives need for this state of motion, friction included
+    gravity(), friction()        current true torques that the drives must overcome, Nm (N)
+    along(q, dq, ddq)            the required drive torque for this state of motion, including friction
     place(joint, offset_m)       base coordinates of a point in the frame of a joint
     truth()                      the true parameters, as a JSON object
 """
@@ -33,7 +33,7 @@ def send(kind, **fields):
 
 
 class Messages:
-    """What the host writes, read by a thread, so that the program notices a stop while the robot moves."""
+    """Messages of the host. A thread reads them, so that the program can stop while the robot moves."""
 
     def __init__(self):
         self.waiting = queue.Queue()
@@ -42,7 +42,7 @@ class Messages:
     def read(self):
         for line in sys.stdin:
             self.waiting.put(json.loads(line))
-        # The end of the input is a stop, too.
+        # The end of the input is also a stop.
         self.waiting.put(None)
 
     def next(self):
@@ -58,7 +58,7 @@ class Messages:
 
 
 def breach(envelope, joints, q, dq, tau, q_d):
-    """What leaves the envelope, in words, or None. Limits that are null are not checked."""
+    """Returns a description of an envelope violation, or None. Limits that are null are not checked."""
     if envelope is None:
         return None
     for j, name in enumerate(joints):
@@ -73,7 +73,7 @@ def breach(envelope, joints, q, dq, tau, q_d):
 
 
 def outside(envelope, robot):
-    """Which point leaves the workspace, in words, or None."""
+    """Returns a description of the point that leaves the workspace, or None."""
     if envelope is None or "workspace" not in envelope:
         return None
     box = envelope["workspace"]
@@ -86,13 +86,13 @@ def outside(envelope, robot):
 
 
 def read_table(path):
-    """The rows of a trajectory file: t_s, q, dq, ddq, and the model's torques if there is a model."""
+    """The rows of a trajectory file: t_s, q, dq, ddq, and the torques of the model, if available."""
     with open(path, newline="", encoding="utf-8") as text:
         return np.array([[float(x) for x in row] for row in list(csv.reader(text))[1:]])
 
 
 class Sensors:
-    """Positions and velocities as controller and log get them: late, quantised, noisy."""
+    """Measured positions and velocities for controller and log: delayed, quantised, noisy."""
 
     def __init__(self, options, random, step_s, period_s, q, dq):
         self.options, self.random, self.period_s = options, random, period_s
@@ -102,7 +102,7 @@ class Sensors:
         self.before, self.speed = None, dq
 
     def see(self, q, dq):
-        """The true state after a step of the integration."""
+        """True state after an integration step."""
         self.seen.append((q, dq))
 
     def measured(self):
@@ -144,7 +144,7 @@ class Program:
                 return
 
     def begin(self, rate_hz, q, dq, peak):
-        # Whole steps from one sample of the controller to the next.
+        # An integer number of integration steps per controller sample.
         self.steps = max(1, int(np.ceil(1.0 / (rate_hz * self.options.step) - 1e-9)))
         step_s = 1.0 / rate_hz / self.steps
         self.robot.begin(step_s, np.array(q, float), np.array(dq, float))
@@ -159,7 +159,7 @@ class Program:
             self.sensors.see(self.robot.q.copy(), self.robot.dq.copy())
 
     def log(self, time_s, q, dq, sent):
-        """The sample as the log has it."""
+        """Returns the logged sample."""
         q, dq = self.sensors.for_log(q, dq)
         torque = self.channel.logged(sent, self.robot.gravity, self.robot.friction)
         if self.options.torque_noise:
@@ -170,7 +170,7 @@ class Program:
         return torque, sample
 
     def note(self, message, largest, left, ended):
-        """Writes what the robot really is and did."""
+        """Writes the true parameters and results of the robot."""
         if self.options.truth:
             self.truth["runs"].append({"run": message["run"], "left_envelope": left, "ended": ended,
                                        **{name: values.tolist() for name, values in largest.items()},
@@ -180,7 +180,7 @@ class Program:
 
     def run(self, message):
         file = json.loads(Path(message["controller"]).read_text(encoding="utf-8"))
-        # The files have the host's order of joints; this robot's own order is that of its hello.
+        # The files use the joint order of the host; the robot uses the order of its hello message.
         order = [file["joints"].index(name) for name in self.robot.joints]
         back = [self.robot.joints.index(name) for name in file["joints"]]
         n = len(order)
@@ -189,11 +189,11 @@ class Program:
         except Unknown as unknown:
             return send("end", status="stopped", reason=str(unknown))
         envelope = message.get("envelope")
-        # From home to the trajectory and back, where the message has these paths: one controller runs through all of it.
+        # If the message has paths from and to the home position, one controller runs approach, trajectory and return.
         motion = read_table(message["trajectory"])
         parts = [("motion", motion)]
         if "home" in message:
-            # The trajectory has the posture that it shares with a path.
+            # Omit the shared posture from the paths; the trajectory contains it.
             parts = [("approach", read_table(message["home"]["approach"])[:-1]), *parts,
                      ("return", read_table(message["home"]["return"])[1:])]
         rows = [(part, row) for part, table in parts for row in table]
@@ -222,10 +222,10 @@ class Program:
             if part == "motion":
                 self.regression.add(commanded, torque)
             send("sample", part=part, **sample)
-            # After any early end the robot stays where it is, and does not go home.
+            # After an early stop the robot keeps its position and does not return to the home position.
             if self.messages.stop_asked():
                 self.note(message, largest, truly_left, "stopped")
-                return send("end", status="stopped", reason="the host asked for it")
+                return send("end", status="stopped", reason="stop requested by the host")
             left = breach(envelope, self.robot.joints, q, dq, delivered, target[0][order]) or outside(envelope, self.robot)
             if left:
                 self.note(message, largest, truly_left, "stopped")
@@ -241,7 +241,7 @@ class Program:
             send("state", t_s=sample / message["rate_hz"], q=q.tolist(), dq=dq.tolist())
             answer = self.messages.next()
             if answer is None or answer["type"] not in ("torque", "finish"):
-                return send("end", status="stopped", reason="the host asked for it")
+                return send("end", status="stopped", reason="stop requested by the host")
             if answer["type"] == "finish":
                 break
             _, delivered = self.channel.deliver(np.array(answer["tau"], float))
@@ -250,47 +250,47 @@ class Program:
 
 
 def parser_for(description):
-    """The options that all clients have."""
+    """Adds the options of all clients."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("urdf", type=Path)
     parser.add_argument("--friction", type=numbers, default=0.0, help="dry friction of the joints, Nm (N)")
     parser.add_argument("--damping", type=numbers, default=0.0, help="viscous friction of the joints, Nm s/rad (N s/m)")
     parser.add_argument("--armature", type=numbers, default=0.0, help="drive inertia of the joints, kg m^2 (kg)")
-    parser.add_argument("--kp", type=numbers, default=0.0, help="stiffness of the drives' own position loop, Nm/rad (N/m)")
-    parser.add_argument("--kd", type=numbers, default=0.0, help="damping of the drives' own position loop, Nm s/rad (N s/m)")
-    parser.add_argument("--step", type=float, default=1e-3, help="longest step of the integration, s")
-    parser.add_argument("--gravity", type=numbers, help="gravity in the world, m/s^2; the default is 9.81 down")
-    parser.add_argument("--stribeck", type=numbers, default=0.0, help="dry friction at rest on top, Nm (N)")
-    parser.add_argument("--stribeck-speed", type=numbers, default=0.05, help="where that has fallen to a third, rad/s (m/s)")
-    parser.add_argument("--load", type=numbers, default=0.0, help="dry friction for each Nm (N) of the bodies' torque")
-    parser.add_argument("--masses", type=float, default=0.0, help="largest error of every link's mass and inertia, percent; drawn by --seed")
-    parser.add_argument("--sensor-delay", type=float, default=0.0, help="how late the controller and the log see positions and velocities, s")
-    parser.add_argument("--drive-delay", type=float, default=0.0, help="how late drives give their torque, s")
-    parser.add_argument("--log-delay", type=float, default=0.0, help="how late the log alone has positions and velocities, s")
-    parser.add_argument("--quantum", type=float, default=0.0, help="step of the encoders, rad (m)")
+    parser.add_argument("--kp", type=numbers, default=0.0, help="stiffness of the position loop inside the drives, Nm/rad (N/m)")
+    parser.add_argument("--kd", type=numbers, default=0.0, help="damping of the position loop inside the drives, Nm s/rad (N s/m)")
+    parser.add_argument("--step", type=float, default=1e-3, help="maximum integration step, s")
+    parser.add_argument("--gravity", type=numbers, help="gravity in the world frame, m/s^2 (default: 9.81 down)")
+    parser.add_argument("--stribeck", type=numbers, default=0.0, help="additional dry friction at rest (Stribeck), Nm (N)")
+    parser.add_argument("--stribeck-speed", type=numbers, default=0.05, help="velocity at which the --stribeck friction has decreased to a third, rad/s (m/s)")
+    parser.add_argument("--load", type=numbers, default=0.0, help="dry friction per Nm (N) of rigid-body torque")
+    parser.add_argument("--masses", type=float, default=0.0, help="maximum random error of mass and inertia of each link, percent; see --seed")
+    parser.add_argument("--sensor-delay", type=float, default=0.0, help="delay of measured positions and velocities for controller and log, s")
+    parser.add_argument("--drive-delay", type=float, default=0.0, help="delay of the drive torque, s")
+    parser.add_argument("--log-delay", type=float, default=0.0, help="additional delay of positions and velocities in the log, s")
+    parser.add_argument("--quantum", type=float, default=0.0, help="resolution of the encoders, rad (m)")
     parser.add_argument("--position-noise", type=float, default=0.0, help="noise of the encoders, rad (m)")
     parser.add_argument("--torque-noise", type=numbers, default=0.0, help="noise of the logged torque, Nm (N)")
-    parser.add_argument("--speed-filter", type=float, default=0.0, help="velocities are differences through a first-order low-pass, Hz")
-    parser.add_argument("--catch", type=numbers, help="JOINT,POSITION,WIDTH,NM: this much more dry friction near a position")
-    parser.add_argument("--lengths", type=float, default=0.0, help="links longer than the description's, percent")
-    parser.add_argument("--seed", type=int, default=1, help="of masses and noise")
-    parser.add_argument("--truth", type=Path, help="where to write what the robot is and did")
+    parser.add_argument("--speed-filter", type=float, default=0.0, help="cut-off of the first-order low-pass for velocities from differences, Hz")
+    parser.add_argument("--catch", type=numbers, help="JOINT,POSITION,WIDTH,NM: additional dry friction near a position")
+    parser.add_argument("--lengths", type=float, default=0.0, help="increase of the link lengths relative to the description, percent")
+    parser.add_argument("--seed", type=int, default=1, help="seed of masses and noise")
+    parser.add_argument("--truth", type=Path, help="output file for true parameters and results")
     add_options(parser)
     return parser
 
 
 class DryFriction:
-    """The dry friction of all joints at a state: constant, Stribeck, growing with load, and near a position."""
+    """Dry friction of all joints at a state: constant, Stribeck, load-dependent, and near a position."""
 
     def __init__(self, options, joints):
         each = lambda values: np.broadcast_to(np.asarray(values, float), joints)
         self.dry, self.stribeck, self.speed, self.load = map(each, (options.friction, options.stribeck, options.stribeck_speed, options.load))
         self.catch = options.catch
-        # Whether it changes along a motion.
+        # Whether the friction changes during a motion.
         self.varies = bool(np.any(self.stribeck) or np.any(self.load) or options.catch is not None)
 
     def level(self, q, dq, load):
-        """Largest dry friction torque, Nm (N); `load` is the torque of the bodies, without drives."""
+        """Maximum dry friction torque, Nm (N); `load` is the torque of the bodies, without drives."""
         level = self.dry + self.stribeck * np.exp(-((dq / self.speed) ** 2)) + self.load * np.abs(load)
         if self.catch is not None:
             joint, position, width, torque = self.catch

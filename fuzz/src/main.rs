@@ -1,7 +1,8 @@
-//! Mutated inputs for every parser and for the small commands: none may panic, hang or give a number that is none.
+//! Mutated inputs for every parser and for the small commands. No input may cause a panic, a hang or a number that is
+//! not finite.
 //!
-//! On stable Rust and in one process: seeds of `corpus/`, mutated by bytes, by words and by numbers, round after round
-//! over all targets, until the time is up. The same seed makes the same inputs, whatever the number of threads.
+//! Runs on stable Rust in one process. Mutates bytes, words and numbers of the seeds in `corpus/`, in rounds over all
+//! targets, until the time limit. The inputs depend only on the seed, not on the number of threads.
 
 mod mutation;
 mod targets;
@@ -19,13 +20,13 @@ use watch::Watch;
 /// Runs every target on mutated inputs.
 #[derive(Parser)]
 struct Arguments {
-    /// How long, s.
+    /// Time limit, s.
     #[arg(long, default_value_t = 60)]
     seconds: u64,
-    /// Stop after so many executions of all targets together.
+    /// Total number of executions over all targets.
     #[arg(long)]
     executions: Option<u64>,
-    /// Threads.
+    /// Number of threads.
     #[arg(long, default_value_t = 2)]
     threads: u64,
     /// Seed of the mutations.
@@ -37,12 +38,12 @@ struct Arguments {
     /// Folder for inputs that failed.
     #[arg(long, default_value = "fuzz/found")]
     found: PathBuf,
-    /// Run this input once, on the one target given, without mutation.
+    /// Run this input once on the given target, without mutation.
     #[arg(long)]
     input: Option<PathBuf>,
 }
 
-/// What became of one target so far.
+/// Results of one target so far.
 #[derive(Default)]
 struct Tally {
     executions: AtomicU64,
@@ -58,7 +59,7 @@ fn main() -> ExitCode {
         .collect();
     if chosen.is_empty() || arguments.targets.len() > chosen.len() {
         let names: Vec<&str> = TARGETS.iter().map(|target| target.name).collect();
-        say(&format!("no such target; there are: {}", names.join(", ")));
+        say(&format!("unknown target; the targets are: {}", names.join(", ")));
         return ExitCode::from(2);
     }
     let outcome = match &arguments.input {
@@ -75,7 +76,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The failures of one input.
+/// Returns the failures of one input.
 fn once(target: &Target, input: &Path, found: &Path) -> Result<u64, std::io::Error> {
     let bytes = std::fs::read(input)?;
     let watch = Watch::new(found, 1);
@@ -96,7 +97,7 @@ fn once(target: &Target, input: &Path, found: &Path) -> Result<u64, std::io::Err
     Ok(u64::from(failed))
 }
 
-/// The failures of all targets until the time is up.
+/// Returns the failures of all targets until the time limit.
 fn fuzz(chosen: &[&Target], arguments: &Arguments) -> Result<u64, std::io::Error> {
     let corpora: Vec<Corpus> = chosen.iter().map(|target| Corpus::read(target.name)).collect::<Result<_, _>>()?;
     let tallies: Vec<Tally> = chosen.iter().map(|_| Tally::default()).collect();
@@ -106,11 +107,11 @@ fn fuzz(chosen: &[&Target], arguments: &Arguments) -> Result<u64, std::io::Error
     let most = arguments.executions.unwrap_or(u64::MAX);
     let worker = |thread: u64| -> Result<(), std::io::Error> {
         let mut runs = chosen.iter().map(|target| (target.new)()).collect::<Result<Vec<_>, _>>()?;
-        // Inputs are numbered; a thread takes every so many of them.
+        // Inputs are numbered; with n threads, each thread takes every n-th input.
         let mut round = thread;
         while begun.elapsed() < limit && all.load(Ordering::Relaxed) < most {
             for (k, target) in chosen.iter().enumerate() {
-                // Fast targets are run as often as they are fast, so that each gets about the same time.
+                // Faster targets get more executions, so that each target gets about the same time.
                 for repetition in 0..target.repetitions {
                     let mut mutator = Mutator::new(arguments.seed, round * target.repetitions + repetition, k as u64);
                     let (kind, bytes) = mutator.input(&corpora[k]);
@@ -145,8 +146,8 @@ fn fuzz(chosen: &[&Target], arguments: &Arguments) -> Result<u64, std::io::Error
     Ok(failures)
 }
 
-/// The only place that prints.
-#[allow(clippy::print_stdout, reason = "a program of development")]
+/// Prints a line; the only place with output.
+#[allow(clippy::print_stdout, reason = "a development program")]
 fn say(text: &str) {
     println!("{text}");
 }

@@ -1,11 +1,11 @@
-//! Seeds and what is made of them.
+//! Seeds and their mutations.
 
 use std::path::Path;
 
-/// Longest input that is made, bytes.
+/// Maximum length of a mutated input, bytes.
 const LONGEST: usize = 1 << 17;
 
-/// Numbers at which arithmetic goes wrong.
+/// Numbers that often cause arithmetic errors.
 const NUMBERS: [&str; 26] = [
     "0",
     "-0",
@@ -55,7 +55,7 @@ impl Corpus {
     }
 }
 
-/// Makes one input; two with the same numbers make the same.
+/// Creates mutated inputs; equal seed numbers create equal inputs.
 pub(crate) struct Mutator {
     state: u64,
 }
@@ -80,7 +80,7 @@ impl Mutator {
         (self.next() % end.max(1) as u64) as usize
     }
 
-    /// The name of a seed, and that seed with one mutation, half as often with two, and so on.
+    /// Returns the name of a seed, and the seed with one mutation, half as often with two, and so on.
     pub(crate) fn input<'a>(&mut self, corpus: &'a Corpus) -> (&'a str, Vec<u8>) {
         let (name, seed) = &corpus.seeds[self.below(corpus.seeds.len())];
         let mut bytes = seed.clone();
@@ -110,7 +110,7 @@ impl Mutator {
                 let to = self.below(bytes.len() + 1);
                 bytes.splice(to..to, piece);
             }
-            // A piece of another seed.
+            // Insert a piece of another seed.
             4 => {
                 let (_, other) = &corpus.seeds[self.below(corpus.seeds.len())];
                 let from = self.below(other.len());
@@ -118,7 +118,7 @@ impl Mutator {
                 bytes.splice(at..at, other[from..end].to_vec());
             }
             5 => bytes.truncate(at),
-            // A line twice, or gone.
+            // Duplicate or delete a line.
             6 | 7 => {
                 let line = line_around(bytes, at);
                 if self.next().is_multiple_of(2) {
@@ -128,7 +128,7 @@ impl Mutator {
                     bytes.drain(line);
                 }
             }
-            // A number becomes another, the usual way for arithmetic to go wrong.
+            // Replace a number; this is the most frequent cause of arithmetic errors.
             _ => {
                 let Some(range) = number_after(bytes, at) else { return };
                 let new = NUMBERS[self.below(NUMBERS.len())];
@@ -144,7 +144,7 @@ fn line_around(bytes: &[u8], at: usize) -> core::ops::Range<usize> {
     start..end
 }
 
-/// The first number that begins at `at` or later.
+/// Finds the first number that begins at `at` or later.
 fn number_after(bytes: &[u8], at: usize) -> Option<core::ops::Range<usize>> {
     let start = at + bytes[at..].iter().position(u8::is_ascii_digit)?;
     let part = |byte: &u8| byte.is_ascii_digit() || matches!(byte, b'.' | b'-' | b'+' | b'e' | b'E');

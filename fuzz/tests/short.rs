@@ -1,4 +1,4 @@
-//! Every target runs, on inputs that are the same every time.
+//! Runs every target on a fixed set of inputs.
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -8,7 +8,7 @@ use std::process::Command;
 fn a_few_hundred_inputs_of_each_target_do_no_harm() {
     let found = tempfile::tempdir().unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_dynident-fuzz"))
-        // One thread: of several the faster one takes more of the numbered inputs, so that which ones are run is chance.
+        // One thread: with several, the speed of the threads would determine which inputs are run.
         .args(["--executions", "3000", "--seconds", "60", "--seed", "8", "--threads", "1", "--found"])
         .arg(found.path())
         .output()

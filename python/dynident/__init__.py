@@ -1,4 +1,4 @@
-"""Robot dynamic identification: from a description and logs to a dynamic model with error bars.
+"""Robot dynamic identification: estimates a dynamic model with error bars from a robot description and logs.
 
 >>> import dynident
 >>> arm = dynident.Robot.load("arm.urdf")                               # doctest: +SKIP

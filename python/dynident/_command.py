@@ -9,7 +9,7 @@ from ._native import _command
 
 
 def main() -> int:
-    """Runs the command line of this process."""
-    # The command listens for Ctrl-C itself, or is ended by it as any program.
+    """Runs the command with the arguments of this process."""
+    # The command handles Ctrl-C; otherwise the default handler must end it.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     return _command(["dynident", *sys.argv[1:]])

@@ -1,4 +1,4 @@
-"""Before there is a study: look at a robot's description, and write a study from it and recordings."""
+"""Inspects a robot description, and writes a study from a robot description and recordings."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ from ._progress import Progress
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """What a robot's description says, and what is wrong with it."""
+    """Contents of a robot description and the problems found in it."""
 
     result: dict[str, Any]
     """``dynident inspect --json`` as a dictionary."""
     fixed: str | None
-    """The URDF with every slip corrected whose numbers can be known, and every other byte as it was; None where there is
-    none (``dynident inspect --fix``).
+    """The URDF with every error corrected for which the correct numbers are known; all other bytes are unchanged. None
+    if there is no such error (``dynident inspect --fix``).
     """
 
     @property
     def audit(self) -> list[dict[str, Any]]:
-        """What speaks against its physics: ``level``, ``check``, ``where``, ``what``."""
+        """Violations of physical consistency: ``level``, ``check``, ``where``, ``what``."""
         found: list[dict[str, Any]] = self.result["audit"]
         return found
 
     @property
     def base_parameters(self) -> list[str]:
-        """What torque can tell of its bodies, as sums of inertial parameters."""
+        """Identifiable combinations of inertial parameters (base parameters), as sums."""
         found: list[str] = self.result["base_parameters"]["expressions"]
         return found
 
     @property
     def slips(self) -> list[dict[str, Any]]:
-        """Mistakes that a pattern of its numbers gives away: ``slip``, ``links``, ``what``, ``evidence``,
+        """Errors recognised by their number patterns: ``slip``, ``links``, ``what``, ``evidence``,
         ``corrections``.
         """
         found: list[dict[str, Any]] = self.result["slips"]
@@ -47,23 +47,23 @@ class Inspection:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is a problem."""
+        """Whether no problem was found."""
         return not self.slips and all(entry["level"] != "problem" for entry in self.audit)
 
     def __str__(self) -> str:
         lines = [f"{entry['level']}: {entry['where']}: {entry['what']}" for entry in self.audit]
         lines += [f"slip: {', '.join(slip['links'])}: {slip['what']}" for slip in self.slips]
-        return "\n".join(lines) or f"{self.result['name']}: nothing stands against it"
+        return "\n".join(lines) or f"{self.result['name']}: no problem found"
 
 
 def inspect(
     robot: Robot | str | PathLike[str], *, total_mass_kg: float | None = None, allow_command: bool = False
 ) -> Inspection:
-    """Reads and audits a robot's description as it was read (keys of ``[robot]`` are not in force): masses, centres of
-    mass and inertias that cannot be, limits, slips of exporters; lists its base parameters.
+    """Checks a robot description for unphysical masses, centres of mass and inertias, for wrong limits and for exporter
+    errors, and lists its base parameters. The keys of ``[robot]`` are not applied.
 
-    ``robot`` is a ``Robot`` or a description's path; ``total_mass_kg`` what all masses, the base's with them, should add
-    up to; ``allow_command`` as of ``Robot.load``.
+    ``robot`` is a ``Robot`` or the path of a robot description. ``total_mass_kg`` is the expected sum of all masses,
+    including the base. For ``allow_command``, see ``Robot.load``.
 
     >>> import dynident
     >>> found = dynident.inspect("robots/ur10.urdf")
@@ -77,33 +77,33 @@ def inspect(
 
 @dataclass(frozen=True, eq=False)
 class NewStudy:
-    """A study that was written from a robot and recordings."""
+    """A study generated from a robot description and recordings."""
 
     result: dict[str, Any]
     """``dynident new --json`` as a dictionary."""
     path: Path
-    """Where it stands or would stand: files in it are as seen from there."""
+    """Path of the study, even if it was not written. Paths in the study are relative to its folder."""
     allow_command: bool = False
     """Whether the program ``xacro`` may expand its robot file."""
 
     @property
     def text(self) -> str:
-        """The study file, every line with what speaks for it."""
+        """The study file, each line with its evidence."""
         return str(self.result["text"])
 
     @property
     def unsure(self) -> list[dict[str, Any]]:
-        """What a person should look at: ``line``, ``reason``, and ``proposed``, lines that may be ``stated``."""
+        """Lines to check before using the study: ``line``, ``reason``, and ``proposed`` (lines for ``stated``)."""
         found: list[dict[str, Any]] = self.result["unsure"]
         return found
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is left to look at."""
+        """Whether no line needs a check."""
         return not self.unsure
 
     def study(self) -> Study:
-        """The study, read."""
+        """Reads the study."""
         return Study.parse(self.text, self.path, allow_command=self.allow_command)
 
     def __str__(self) -> str:
@@ -123,13 +123,16 @@ def new(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> NewStudy:
-    """Writes a study from a robot's description and recordings in any format: which columns are which joints, units,
-    rate, drives, what tests the model (the last of several recordings). Then examines it, as ``dynident new``.
+    """Generates a study from a robot description and recordings in any format, and checks it, as ``dynident new`` does.
+    It assigns columns to joints and determines units, rate and drives. The last of several recordings validates the
+    model.
 
-    With ``out`` it is written there, over what is there only with ``force``; without, it is as for ``study.toml`` in the
-    working folder, and nothing is written. ``rate_hz`` is for recordings without times; ``stated`` are lines in place of
-    those that are not sure, as ``unsure`` proposes them: ``[line for one in found.unsure for line in one["proposed"]]``. A robot file with xacro macros needs ``allow_command=True``; ``xacro`` are arguments of the program
-    that expands them, ``{"ur_type": "ur5e"}``, and are written into the study.
+    ``out`` is the path of the new study; an existing file is replaced only with ``force``. Without ``out`` nothing is
+    written, and paths are relative to the working folder. ``rate_hz`` is for recordings without times. ``stated`` lists
+    lines that replace uncertain ones, as proposed by ``unsure``:
+    ``[line for one in found.unsure for line in one["proposed"]]``. A robot file with xacro macros needs
+    ``allow_command=True``. ``xacro`` contains arguments for the program ``xacro``, such as ``{"ur_type": "ur5e"}``;
+    they are written into the study.
 
     >>> import dynident
     >>> logs = ["examples/ur10_simulated/train.csv", "examples/ur10_simulated/test.csv"]
@@ -139,7 +142,7 @@ def new(
     """
     place = Path("study.toml" if out is None else out)
     if out is not None and place.exists() and not force:
-        raise StudyError(f"{place} is there already, and may hold what somebody wrote: give another out, or force=True")
+        raise StudyError(f"{place} already exists: give another out, or set force=True to replace it")
     files = [logs] if isinstance(logs, (str, PathLike)) else list(logs)
     lines = json.dumps([dict(line) for line in stated])
     text = _native._new(

@@ -1,4 +1,4 @@
-"""Code of one's own in a study: callables in the place of names."""
+"""User-defined functions in a study: callables in place of names."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 DIFFERENTIATOR_KEYS = ("context_samples", "minimum_samples", "smooth")
-"""Keys of ``motion.differentiator`` that go with its function, and not into the study."""
+"""Keys of ``motion.differentiator`` that are passed with the function and not written into the study."""
 
 
 class FunctionWarning(UserWarning):
-    """A part of a study is a function of Python: called again and again, slow, and in no file."""
+    """A part of the study is a Python function: slow, and not included in files."""
 
 
 class Functions:
-    """The functions of a study, by the names that its sections give them."""
+    """The functions of a study, by their names in its sections."""
 
     def __init__(self) -> None:
         self.named: dict[str, dict[str, Any]] = {}
@@ -30,13 +30,13 @@ class Functions:
         return name
 
     def _section(self, section: Mapping[str, Any], defaults: Mapping[str, Any], keys: tuple[str, ...] = ()) -> dict[str, Any]:
-        """A section with the name of its function in place of the function."""
+        """Replaces the function of a section with its name."""
         further = {key: section[key] for key in keys if key in section}
         rest = {key: value for key, value in section.items() if key not in keys}
         return {**defaults, **rest, "function": self._name(section["function"], further)}
 
     def taken_from(self, content: Mapping[str, Any]) -> dict[str, Any]:
-        """Sections of a study in which names stand in place of functions."""
+        """Sections of a study with names in place of functions."""
         found = dict(content)
         torques = found.get("torque")
         if isinstance(torques, (list, tuple)):
@@ -66,7 +66,7 @@ class Functions:
 
 
 def _mapping(value: Any) -> Any:
-    """A function alone is a section of nothing but the function."""
+    """Treats a callable as a section that contains only this function."""
     return {"function": value} if callable(value) else value
 
 

@@ -1,4 +1,4 @@
-"""Run, identify, load the better model, run again."""
+"""Runs the robot, identifies it, loads the better model and repeats."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from ._native import ResultError, Robot, Run, Study
 from ._study import study as make_study
 
 RobotFunction = Callable[[Run], object]
-"""Brings a robot to ``run.q[0]``, asks ``run.torque(time_s, q, dq)`` at every sample and applies it."""
+"""Moves a robot to ``run.q[0]``, then calls ``run.torque(time_s, q, dq)`` at every sample and applies the torque."""
 
 
 @dataclass(frozen=True, eq=False)
 class Iteration:
-    """How an iteration ended."""
+    """Result of an iteration."""
 
     result: dict[str, Any]
     """``iterations.json`` as a dictionary: every run with its tracking error, estimate and verdict."""
     folder: Path
-    """Where its files are: ``result.json``, ``identified.urdf``, ``controller.json``, ``report.html``, ``runs/``."""
+    """Output folder: ``result.json``, ``identified.urdf``, ``controller.json``, ``report.html``, ``runs/``."""
     study: Study
     """The study that was iterated."""
 
     @property
     def converged(self) -> bool:
-        """Whether tracking and parameters have converged and nothing stands against it."""
+        """Whether tracking and parameters have converged and no problem was found."""
         return bool(self.result["converged"])
 
     @property
     def runs(self) -> list[dict[str, Any]]:
-        """The runs, the first first."""
+        """The runs in chronological order."""
         found: list[dict[str, Any]] = self.result["runs"]
         return found
 
     def model(self) -> Model:
-        """The model that was found; raises ``ResultError`` where the runs gave none."""
+        """The identified model. Raises ``ResultError`` if no model was identified."""
         if not (self.folder / "result.json").is_file():
             reason = self.result.get("no_result") or self.result.get("reason") or self.result["status"]
             raise ResultError(f"{self.folder}: no model was found: {reason}")
@@ -59,15 +59,16 @@ def iterate(
     heard: Callable[[int, float], object] | None = None,
     **sections: Any,
 ) -> Iteration:
-    """Runs a robot again and again, each time with the better model, until all has settled.
+    """Runs a robot repeatedly, each time with the newly identified model, until tracking error and parameters converge.
 
-    ``robot`` is a function that runs a robot under the controller of each ``Run`` it is given (``dynident.mujoco`` has
-    one for a MuJoCo model); without it the study says which: its simulation, a program, a folder. Programs that the
-    files name or need are started only with ``allow_command``. ``out`` keeps all runs: called again it goes on where it ended, unless
-    ``resume`` is False. ``heard(run, largest tracking error)`` is called after every run. A robot that is a function
-    needs gains that somebody stands for, or ``iteration={"bandwidth_hz": 2.0, ...}``, as every robot outside.
+    ``robot`` is a function that runs a robot with the controller of the given ``Run``; ``dynident.mujoco`` contains one
+    for MuJoCo models. Without it the study defines the robot: a simulation, a program or a folder. Programs that the
+    files name or need are started only with ``allow_command``. All runs are stored in ``out``. A repeated call
+    continues there, unless ``resume`` is False. ``heard(run, largest tracking error)`` is called after every run. A
+    function as robot needs confirmed gains or ``iteration={"bandwidth_hz": 2.0, ...}``, like every external robot.
 
-    Ctrl-C stops the robot and keeps what was recorded. What the function raises ends the iteration and is raised.
+    Ctrl-C stops the robot and keeps the recorded samples. An exception of the function ends the iteration and is raised
+    again.
     """
     if isinstance(study, Study):
         whole = study
@@ -76,6 +77,6 @@ def iterate(
     else:
         whole = Study.load(fspath(study), allow_command=allow_command)
     if sections and not isinstance(study, Robot):
-        raise TypeError(f"{', '.join(sections)}: a study has its sections already")
+        raise TypeError(f"{', '.join(sections)}: a Study already contains its sections: omit these arguments")
     text = _native._iterate(whole, fspath(out), robot, resume, allow_command, threads, heard)
     return Iteration(json.loads(text), Path(out), whole)

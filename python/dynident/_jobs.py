@@ -24,7 +24,7 @@ Found = TypeVar("Found")
 
 
 class ProblemWarning(UserWarning):
-    """What stands against a result: whoever loads the model into a robot should know it."""
+    """A problem of a result. Read it before loading the model into a robot."""
 
 
 def _study_of(
@@ -32,7 +32,7 @@ def _study_of(
 ) -> Study:
     if isinstance(study, Study):
         if sections:
-            raise TypeError(f"{', '.join(sections)}: a study has its sections already")
+            raise TypeError(f"{', '.join(sections)}: a Study already contains its sections: omit these arguments")
         return study if logs is None else with_logs(study, logs)
     if isinstance(study, Robot):
         return make_study(study, () if logs is None else logs, **sections)
@@ -69,16 +69,17 @@ def identify(
     progress: bool | Progress | None = None,
     **sections: Any,
 ) -> Model:
-    """Fits a dynamic model to recordings and tests it on those that were held out.
+    """Fits a dynamic model to recordings and tests it on the held-out recordings.
 
-    ``study`` is a ``Study``, the path of one, or a robot (an object or a description's path) with ``logs`` and sections
-    as ``dynident.study`` takes them. The result is the same, bit for bit, as that of ``dynident identify`` for the
-    same study, for any number of threads. What stands against the model is warned of as ``ProblemWarning`` and stands
-    in ``Model.problems``. ``progress`` shows where the job is: by default on a terminal and in a notebook; a callable
-    hears ``(stage, rows done, rows in all or None)``. A path whose robot file has xacro macros needs ``allow_command=
-    True``: the program ``xacro`` expands them, and runs Python code of the file.
+    ``study`` is a ``Study``, the path of one, or a robot (a ``Robot`` or the path of a robot description). A robot
+    needs ``logs`` and sections, see ``dynident.study``. The result is bit-identical to that of ``dynident identify``
+    for the same study, for any number of threads. Problems of the model are issued as ``ProblemWarning`` and listed in
+    ``Model.problems``. ``progress`` enables the progress display; by default it is enabled on a terminal and in a
+    notebook. A callable receives ``(stage, rows done, total rows or None)``. A robot file with xacro macros needs
+    ``allow_command=True``: the program ``xacro`` expands them, and runs Python code of the file.
 
-    Raises ``StudyError``, ``RobotError`` or ``LogError`` with file, place and what to do. Ctrl-C ends it.
+    Raises ``StudyError``, ``RobotError`` or ``LogError`` with the file, the position and the fix. Ctrl-C interrupts the
+    fit.
     """
     whole = _study_of(study, logs, sections, allow_command)
     return _warned(Model(_watched(progress, lambda hear: _native._identify(whole, threads, hear))))
@@ -93,8 +94,8 @@ def check(
     progress: bool | Progress | None = None,
     **sections: Any,
 ) -> Check:
-    """Examines a study against its robot and its logs before any fit is believed: units, signs, order of joints,
-    mounting, clock, and more. Each finding names the key to write. Arguments as of ``identify``.
+    """Tests whether study, robot and logs are consistent: units, signs, joint order, mounting, clock and more. Run it
+    before you trust a fit. Each finding names the key to change. For the arguments, see ``identify``.
     """
     whole = _study_of(study, logs, sections, allow_command)
     return Check(json.loads(_watched(progress, lambda hear: _native._check(whole, threads, hear))))
@@ -107,8 +108,8 @@ def validate(
     threads: int | None = None,
     progress: bool | Progress | None = None,
 ) -> dict[str, Any]:
-    """Tests a finished model on logs (or those of a study) that it was not fitted to; without any on the held-out ones of
-    its own study. ``dynident validate --json`` as a dictionary, with the error of every joint.
+    """Tests an identified model on logs (or the logs of a study) that were not used for the fit. By default these are
+    the held-out logs of its study. Returns ``dynident validate --json`` as a dictionary, with the error of every joint.
     """
     if logs is None:
         whole = model.study
@@ -121,14 +122,14 @@ def validate(
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """What ``check`` found."""
+    """Result of ``check``."""
 
     result: dict[str, Any]
     """``dynident check --json`` as a dictionary."""
 
     @property
     def findings(self) -> list[dict[str, Any]]:
-        """All findings, the gravest first: ``level``, ``kind``, ``what``, ``evidence``, ``write``."""
+        """All findings, the most severe first: ``level``, ``kind``, ``what``, ``evidence``, ``write``."""
         found: list[dict[str, Any]] = self.result["check"]["findings"]
         return found
 
@@ -147,14 +148,14 @@ class Check:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A motion to record."""
+    """A designed motion, ready to record."""
 
     result: dict[str, Any]
     """``design.json`` as a dictionary."""
     csv: str
     """``trajectory.csv``."""
     svg: str
-    """A picture: position, velocity, acceleration and torque of every joint over time."""
+    """Plot of position, velocity, acceleration and torque of every joint over time."""
     time_s: npt.NDArray[np.float64]
     """Times, shape ``(samples,)``."""
     q: npt.NDArray[np.float64]
@@ -166,7 +167,7 @@ class Design:
 
     @property
     def feasible(self) -> bool:
-        """Whether every limit is kept; what was not checked stands in ``result["not_checked"]``."""
+        """Whether all limits are satisfied; unchecked limits are listed in ``result["not_checked"]``."""
         return bool(self.result["feasible"])
 
     def _repr_svg_(self) -> str:
@@ -181,8 +182,8 @@ def design(
     threads: int | None = None,
     **sections: Any,
 ) -> Design:
-    """Finds the motion that says most about a robot inside every limit. ``study`` is a ``Study``, the path of one, or a
-    robot with sections (``design={...}``); ``rate_hz`` is the rate of the arrays.
+    """Computes an optimal excitation trajectory within all limits. ``study`` is a ``Study``, the path of one, or a
+    robot with sections (``design={...}``). ``rate_hz`` is the sample rate of the arrays.
     """
     whole = _study_of(study, None, sections, allow_command)
     text, csv, svg, time_s, (q, dq, ddq) = _native._design(whole, rate_hz, threads)
@@ -194,9 +195,9 @@ class Simulation:
     """One run of a simulated robot."""
 
     truth: dict[str, Any]
-    """``truth.json`` as a dictionary: what truly was."""
+    """``truth.json`` as a dictionary: the true values."""
     csv: str
-    """The log as the command writes it."""
+    """The log in the format of the command."""
     time_s: npt.NDArray[np.float64]
     """Times, shape ``(samples,)``."""
     q: npt.NDArray[np.float64]
@@ -216,8 +217,8 @@ def simulate(
     threads: int | None = None,
     **sections: Any,
 ) -> Simulation:
-    """Lets the simulated robot of a study (``[simulation]``) run its trajectory (``[iteration] trajectory``, or its
-    ``[design]``) under its ``[controller]``.
+    """Simulates the robot of a study (``[simulation]``) on its trajectory (``[iteration] trajectory``, or ``[design]``)
+    with its ``[controller]``.
     """
     whole = _study_of(study, None, sections, allow_command)
     truth, csv = _native._simulate(whole, threads)
@@ -232,6 +233,6 @@ def simulate(
 
 
 def log_contents(file: str | PathLike[str]) -> dict[str, Any]:
-    """What a recording holds: its format, and its channels with rates and ranges."""
+    """Format of a recording, and its channels with rates and ranges."""
     found: dict[str, Any] = json.loads(_native._log_contents(fspath(file)))
     return found

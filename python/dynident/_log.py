@@ -1,4 +1,4 @@
-"""Recordings: arrays, tables of pandas, files."""
+"""Recordings: arrays, pandas tables, files."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ Channel = str | Sequence[str | int] | Mapping[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """One recording: samples in memory or a file, what its columns mean, what it is for.
+    """One recording: samples in memory or a file, with the meaning of its columns and its role.
 
-    Made by ``Log.from_arrays``, ``Log.from_pandas`` or ``Log.read``. Joints stand in the robot's order unless the robot
-    was given ``joints``. Nothing is read before a job needs it.
+    Create it with ``Log.from_arrays``, ``Log.from_pandas`` or ``Log.read``. Joints are in the robot's order unless the
+    robot was loaded with ``joints``. The file is not read until a job needs it.
     """
 
     name: str
-    """What it is called in results and messages."""
+    """Name in results and messages."""
     format: Mapping[str, Any] = field(default_factory=dict)
-    """What its columns mean: the keys of ``[format]`` of a study."""
+    """Meaning of the columns: the keys of ``[format]`` of a study."""
     role: Role = "identify"
-    """Fitted to, or tested on."""
+    """Whether the log is used for the fit or for validation."""
     payload: str | None = None
-    """The payload that it was recorded with, by name."""
+    """Name of the payload during the recording."""
     file: str | None = None
-    """The file, if it is one."""
+    """The file; None for samples in memory."""
     columns: Mapping[str, npt.NDArray[np.float64]] | None = None
-    """Samples in memory by column, if it is none."""
+    """Samples in memory by column; None for a file."""
     part: Mapping[str, Any] = field(default_factory=dict)
-    """Which rows: ``rows``, ``fraction``, ``time_range_s``, ``drop_rows``, ``drop_time_s`` of ``[[log]]``."""
+    """Selected rows: ``rows``, ``fraction``, ``time_range_s``, ``drop_rows``, ``drop_time_s`` of ``[[log]]``."""
 
     @classmethod
     def from_arrays(
@@ -58,11 +58,11 @@ class Log:
         payload: str | None = None,
         **format: Any,
     ) -> Log:
-        """A log of arrays in SI: ``q`` and ``tau`` of shape ``(samples, n)``, rad and Nm (m and N).
+        """Creates a log from arrays in SI units: ``q`` and ``tau`` of shape ``(samples, n)``, rad and Nm (m and N).
 
         ``time_s`` of shape ``(samples,)`` in seconds, or None with ``rate_hz``. ``dq`` and ``ddq`` (rad/s, rad/s²) are
-        compared with what the positions say, never fitted to. Further keyword arguments are keys of ``[format]``, as
-        ``torque={"unit": "A", "scale": 11.4}`` or ``missing="drop"``.
+        compared with the derivatives of the positions but not used in the fit. Further keyword arguments are keys of
+        ``[format]``, such as ``torque={"unit": "A", "scale": 11.4}`` or ``missing="drop"``.
 
         >>> import numpy as np, dynident
         >>> t = np.arange(0.0, 2.0, 0.01)
@@ -114,11 +114,11 @@ class Log:
         payload: str | None = None,
         **format: Any,
     ) -> Log:
-        """A log of a data frame. ``position`` and ``torque`` name its columns: a list, a pattern as ``"q{1..6}"``, or a
-        mapping with units as in ``[format]``: ``{"columns": "q{1..6}_deg", "unit": "deg"}``.
+        """Creates a log from a data frame. ``position`` and ``torque`` name its columns: a list, a pattern such as
+        ``"q{1..6}"``, or a mapping with units as in ``[format]``: ``{"columns": "q{1..6}_deg", "unit": "deg"}``.
 
-        ``time`` names the column of seconds, or is ``{"column": "t", "unit": "ms"}``; without it the index is the time
-        if it is a number or a date, else give ``rate_hz``. Further keyword arguments are keys of ``[format]``.
+        ``time`` names the column with seconds, or is ``{"column": "t", "unit": "ms"}``. Without it the index is the
+        time if it is numeric or a date; otherwise give ``rate_hz``. Further keyword arguments are keys of ``[format]``.
         """
         channels = _channels(position, torque, time, format)
         columns: dict[str, npt.NDArray[np.float64]] = {}
@@ -133,7 +133,7 @@ class Log:
             elif index.dtype.kind == "f":
                 seconds = index
             else:
-                raise LogError(f"{name}: give time, the column of seconds, or rate_hz")
+                raise LogError(f"{name}: give time (the column with seconds) or rate_hz")
             columns["index_s"] = np.asarray(seconds, dtype=np.float64)
             channels["time"] = {"column": "index_s"}
         return cls(name=name, format=channels, role=role, payload=payload, columns=columns)
@@ -151,8 +151,9 @@ class Log:
         payload: str | None = None,
         **format: Any,
     ) -> Log:
-        """A log of a file in any format that the command reads (CSV, Parquet, MCAP, rosbag2, MAT, HDF5, npy, ...), told
-        by its content; ``dynident.log_contents(file)`` says what it holds. Columns as in ``from_pandas``.
+        """Creates a log from a file in any supported format (CSV, Parquet, MCAP, rosbag2, MAT, HDF5, npy, ...). The
+        content determines the format; ``dynident.log_contents(file)`` lists the channels. Columns as in
+        ``from_pandas``.
         """
         path = fspath(file)
         stem = path.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
@@ -165,15 +166,15 @@ class Log:
         return None if self.columns is None else len(next(iter(self.columns.values())))
 
     def validating(self) -> Log:
-        """The same to test on."""
+        """The same log with the role ``validate``."""
         return replace(self, role="validate")
 
     def rows(self, first: int, end: int) -> Log:
-        """The part from row ``first`` up to but without row ``end``, 0-based."""
+        """The rows from ``first`` up to but excluding ``end``, 0-based."""
         return replace(self, part={**self._other_parts(), "rows": [first, end]}, name=f"{self.name} [{first}:{end}]")
 
     def fraction(self, begin: float, end: float) -> Log:
-        """The part between two shares of its rows, as ``log.fraction(0.0, 0.65)``."""
+        """The rows between two fractions of the log, such as ``log.fraction(0.0, 0.65)``."""
         return replace(
             self,
             part={**self._other_parts(), "fraction": [begin, end]},

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DESCRIPTIONS = ("identified.urdf", "identified.toml", "identified.xml", "identified.sdf")
-"""Files of the description with the new values: URDF, D-H table, MJCF, SDF."""
+"""Files of the robot description with the identified values: URDF, D-H table, MJCF, SDF."""
 
 
 class Model:
-    """A dynamic model with error bars and its proof: what ``identify`` gives.
+    """An identified dynamic model with error bars and validation, the result of ``identify``.
 
-    ``result`` is all that ``result.json`` holds. Models are pickled without the samples that they were fitted to.
+    ``result`` has the complete contents of ``result.json``. Pickled models do not contain the samples of the fit.
     """
 
     def __init__(self, native: FittedModel) -> None:
@@ -35,7 +35,7 @@ class Model:
     def load(
         cls, folder: str | PathLike[str], study: Study | str | PathLike[str], *, allow_command: bool = False
     ) -> Model:
-        """The model in a folder that ``dynident identify`` or ``save`` wrote, with its study."""
+        """Loads the model and its study from a folder written by ``dynident identify`` or ``save``."""
         place = Path(folder)
         own = study if isinstance(study, Study) else Study.load(study, allow_command=allow_command)
 
@@ -47,13 +47,13 @@ class Model:
 
     @cached_property
     def result(self) -> dict[str, Any]:
-        """``result.json`` as a dictionary; its keys stand in ``docs/schemas/result.json``."""
+        """``result.json`` as a dictionary; its keys are described in ``docs/schemas/result.json``."""
         found: dict[str, Any] = json.loads(self._native.json)
         return found
 
     @property
     def study(self) -> Study:
-        """The study that it was made with."""
+        """The study that was used for the fit."""
         return self._native.study
 
     @property
@@ -63,13 +63,13 @@ class Model:
 
     @property
     def problems(self) -> list[str]:
-        """What stands against it; empty if nothing does."""
+        """Problems of the model; empty if no problem was found."""
         found: list[str] = self.result["problems"]
         return found
 
     @property
     def ok(self) -> bool:
-        """Whether nothing stands against it."""
+        """Whether no problem was found."""
         return not self.problems
 
     @property
@@ -93,7 +93,7 @@ class Model:
 
     @property
     def half_width_95(self) -> npt.NDArray[np.float64]:
-        """Half the widths of their 95 % intervals."""
+        """Half widths of their 95 % intervals."""
         return self._numbers("half_width_95")
 
     @property
@@ -103,21 +103,21 @@ class Model:
 
     @property
     def bodies(self) -> dict[str, npt.NDArray[np.float64]]:
-        """By body the ten inertial parameters in its frame, physically consistent: ``m, mx, my, mz, Ixx, Ixy, Ixz, Iyy,
+        """Physically consistent inertial parameters of each body in its frame: ``m, mx, my, mz, Ixx, Ixy, Ixz, Iyy,
         Iyz, Izz`` about the frame's origin, kg, kg m, kg m².
         """
         return {body["name"]: np.array(body["parameters"], dtype=np.float64) for body in self.result["bodies"]}
 
     @property
     def friction(self) -> dict[str, dict[str, float]]:
-        """By joint the values of its friction, drive inertia and offset, by symbol."""
+        """Friction, drive inertia and offset of each joint, by symbol."""
         return {
             joint["name"]: {term["symbol"]: term["value"] for term in joint["laws"]} for joint in self.result["joints"]
         }
 
     @property
     def validation_error_percent(self) -> dict[str, float | None]:
-        """By held-out log ``100 ‖τ - τ̂‖ / ‖τ‖`` of the model that is written."""
+        """Relative torque error ``100 ‖τ - τ̂‖ / ‖τ‖`` of the exported model on each held-out log, in %."""
 
         def error(log: dict[str, Any]) -> float | None:
             found: float | None = (log["physical"] or log)["relative_error_percent"]
@@ -128,14 +128,16 @@ class Model:
     def predict(
         self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None, ddq: npt.ArrayLike | None = None
     ) -> npt.NDArray[np.float64]:
-        """Torques along a motion, Nm (N), friction included; shapes ``(..., n)``, samples in the order of time."""
+        """Computes the torques of a motion including friction, Nm (N). Shapes ``(..., n)``, samples in chronological
+        order.
+        """
         return self._native.predict(q, dq, ddq)[0]
 
     def predict_with_band(
         self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None, ddq: npt.ArrayLike | None = None
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """The same with half the width of the 95 % band of a torque that is filtered as in the fit:
-        ``t sqrt(w V wᵀ + σ²)``.
+        """Computes the torques as in ``predict`` and the half width of the 95 % band of the filtered torque,
+        ``t sqrt(w V wᵀ + σ²)``. The filter is that of the fit.
         """
         return self._native.predict(q, dq, ddq)
 
@@ -151,13 +153,13 @@ class Model:
         drift_alarms_per_hour: float | None = None,
         half_window: int | None = None,
     ) -> Watch:
-        """A watch over the robot that this model is of: contact, payload and drift, sample by sample.
+        """Creates a monitor that detects contact, payload and drift, sample by sample.
 
-        ``forgetting_s`` is the time after which a sample counts half; with None the estimate goes on from this model
-        for ever, and drift is not looked for. ``correlation_s`` is the time over which residuals forget themselves (1);
-        ``collision_s`` (0.02) and ``payload_s`` (2) are the time constants of both looks; false alarms in an hour are
-        ``contact_alarms_per_hour`` (0.05) and ``drift_alarms_per_hour`` (0.1). Derivatives that are not given are taken
-        from ``half_window`` (10) samples on each side.
+        ``forgetting_s`` is the half-life of the sample weights. None keeps all samples and disables drift detection.
+        ``correlation_s`` (1) is the correlation time of the residuals. ``collision_s`` (0.02) and ``payload_s`` (2) are
+        the time constants of collision and payload detection. ``contact_alarms_per_hour`` (0.05) and
+        ``drift_alarms_per_hour`` (0.1) are the accepted false alarm rates. Missing derivatives are computed from
+        ``half_window`` (10) samples on each side.
         """
         return self._native.online(
             rate_hz,
@@ -171,25 +173,25 @@ class Model:
         )
 
     def robot(self) -> Robot:
-        """A robot with the identified bodies; raises ``ResultError`` where there is no description to write them into."""
+        """A robot with the identified bodies. Raises ``ResultError`` if no robot description can contain them."""
         return Robot.from_urdf(self.to_urdf())
 
     def export(self, form: str) -> str:
-        """The model as ``c``, ``cpp``, ``rust``, ``python``, ``matlab``, ``mjcf``, ``urdf``, ``sdf``, ``ros2-yaml`` or
-        ``json``; what the form cannot hold stands in a comment.
+        """Exports the model as ``c``, ``cpp``, ``rust``, ``python``, ``matlab``, ``mjcf``, ``urdf``, ``sdf``,
+        ``ros2-yaml`` or ``json``. A comment lists the parts that the format cannot represent.
         """
         return self._native.export(form)[0]
 
     def to_urdf(self) -> str:
-        """The user's URDF with the new values (of another description, one that describes the same robot)."""
+        """The user's URDF with the identified values; for other formats a generated URDF of the same robot."""
         return self._native.descriptions[0] or self.export("urdf")
 
     def to_mjcf(self) -> str:
-        """The user's MJCF with the new values, or one that describes the same robot."""
+        """The user's MJCF with the identified values, or a generated MJCF of the same robot."""
         return self._native.descriptions[2] or self.export("mjcf")
 
     def to_sdf(self) -> str:
-        """The user's SDF with the new values, or one that describes the same robot."""
+        """The user's SDF with the identified values, or a generated SDF of the same robot."""
         return self._native.descriptions[3] or self.export("sdf")
 
     def to_c(self) -> str:
@@ -197,25 +199,25 @@ class Model:
         return self.export("c")
 
     def to_simulator(self) -> dict[str, Any]:
-        """Armature, damping, frictionloss, delay and actuator gain of every joint with error bars, as MuJoCo and its kin
-        mean them: ``dynident export --to simulator`` as a dictionary.
+        """Armature, damping, frictionloss, delay and actuator gain of every joint with error bars, as defined by MuJoCo
+        and similar simulators: ``dynident export --to simulator`` as a dictionary.
         """
         found: dict[str, Any] = json.loads(self._native.simulator()[0])
         return found
 
     def to_simulator_table(self) -> str:
-        """The same as a table of Markdown."""
+        """The values of ``to_simulator`` as a Markdown table."""
         return self._native.simulator()[1]
 
     def to_payload(self, controller: str, name: str | None = None) -> str:
-        """A payload that was estimated, in the form that the controller of ``"ur"`` (a line of URScript), ``"franka"``
-        (JSON), ``"kuka"`` (LOAD_DATA) or ``"abb"`` (loaddata) takes; ``name`` says which where there are several.
+        """An estimated payload in the format of a controller: ``"ur"`` (a line of URScript), ``"franka"`` (JSON),
+        ``"kuka"`` (LOAD_DATA) or ``"abb"`` (loaddata). ``name`` selects one of several payloads.
         """
         return self._native.payload(controller, name)[0]
 
     @property
     def functions(self) -> list[str]:
-        """Parts of its study that were code of Python, each with the name of its function."""
+        """Parts of the study that were Python functions, each with the name of the function."""
         found: list[str] = self.result["method"].get("functions", [])
         return found
 
@@ -226,7 +228,7 @@ class Model:
         return pd.DataFrame.from_records(self.result["base_parameters"]).set_index("expression")
 
     def save(self, folder: str | PathLike[str]) -> None:
-        """Writes ``result.json``, ``report.html`` and the description with the new values, as ``dynident identify``."""
+        """Writes ``result.json``, ``report.html`` and the updated robot description, as ``dynident identify`` does."""
         texts = {
             **dict(zip(DESCRIPTIONS, self._native.descriptions, strict=True)),
             "report.html": self._native.report,
@@ -235,13 +237,13 @@ class Model:
         _write_files(fspath(folder), texts)
 
     def plot_parameters(self) -> Figure:
-        """Base parameters with their 95 % intervals beside the description's values."""
+        """Plots the base parameters with 95 % intervals and their nominal values."""
         from ._plots import parameters
 
         return parameters(self)
 
     def plot_prediction(self, time_s: npt.ArrayLike, q: npt.ArrayLike, dq: npt.ArrayLike, ddq: npt.ArrayLike, tau: npt.ArrayLike | None = None) -> Figure:
-        """Torque of every joint over time with its 95 % band, and what was measured if given."""
+        """Plots the torque of every joint over time with its 95 % band, and the measured torque if given."""
         from ._plots import prediction
 
         return prediction(self, time_s, q, dq, ddq, tau)

@@ -1,4 +1,4 @@
-"""Pictures with matplotlib, where it is installed."""
+"""Plots with matplotlib (optional)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def parameters(model: Model) -> Figure:
-    """Base parameters over their 95 % intervals: each divided by its own size, so that one axis holds all."""
+    """Plots base parameters with 95 % intervals, each divided by its magnitude so that all fit on one axis."""
     from matplotlib.figure import Figure
 
     entries = [one for one in model.result["base_parameters"] if one["excited"]]
@@ -28,10 +28,10 @@ def parameters(model: Model) -> Figure:
     axes.errorbar(values / size, places, xerr=bars / size, fmt="o", markersize=3, capsize=2, label="estimate, 95 %")
     prior = np.array([np.nan if one["prior"] is None else one["prior"] for one in entries], dtype=np.float64)
     if np.isfinite(prior).any():
-        axes.plot(np.clip(prior / size, -3.0, 3.0), places, "x", markersize=4, label="description")
+        axes.plot(np.clip(prior / size, -3.0, 3.0), places, "x", markersize=4, label="nominal value")
     axes.set_yticks(places, [one["expression"] if len(one["expression"]) < 50 else one["symbol"] for one in entries])
     axes.invert_yaxis()
-    axes.set_xlabel("value over its size")
+    axes.set_xlabel("value / magnitude")
     axes.legend(loc="best")
     return figure
 
@@ -44,7 +44,7 @@ def prediction(
     ddq: npt.ArrayLike,
     tau: npt.ArrayLike | None,
 ) -> Figure:
-    """Torque of every joint over time with its 95 % band."""
+    """Plots the torque of every joint over time with its 95 % band."""
     from matplotlib.figure import Figure
 
     predicted, half = model.predict_with_band(q, dq, ddq)

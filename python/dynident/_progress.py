@@ -1,4 +1,4 @@
-"""Progress on standard error, for people who watch."""
+"""Progress display on standard error."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ WIDTH = 78
 
 
 class Line:
-    """A line that is written over, once a job takes longer than a second."""
+    """A status line, updated in place once a job takes longer than one second."""
 
     def __init__(self) -> None:
         self._begin = time.monotonic()
@@ -22,7 +22,7 @@ class Line:
 
     def __call__(self, stage: str, done: int, total: int | None) -> None:
         now = time.monotonic()
-        # A stage may hold the name of a log, and that any character.
+        # A stage may contain the name of a log, which may contain any character.
         stage = "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in stage)
         if self._stage[0] != stage:
             self._stage = (stage, now)
@@ -46,7 +46,7 @@ class Line:
 
 
 def is_watched() -> bool:
-    """Whether somebody looks: a terminal or a notebook."""
+    """Whether the output is a terminal or a notebook."""
     try:
         if sys.stderr.isatty():
             return True

@@ -1,4 +1,4 @@
-"""Studies put together from objects."""
+"""Builds studies from objects."""
 
 from __future__ import annotations
 
@@ -25,29 +25,31 @@ def study(
     allow_command: bool = False,
     **sections: Any,
 ) -> Study:
-    """A study of a robot and its logs.
+    """Builds a study from a robot and its logs.
 
-    ``allow_command`` lets the program ``xacro`` expand a robot file with macros, as of ``Robot.load``.
-    ``friction`` is ``"auto"`` (chosen from the data, which is the default) or ``"stated"`` (that of ``drive``).
+    ``allow_command`` permits the program ``xacro`` to expand a robot file with macros, see ``Robot.load``.
+    ``friction`` is ``"auto"`` (selected from the data, the default) or ``"stated"`` (the terms of ``drive``).
     ``estimator`` is a method's name or the keys of ``[estimator]``. Further keyword arguments are sections of a study
     by their names, each a mapping of its keys (a list of mappings where the study has ``[[...]]``): ``drive``,
     ``coupling``, ``torque``, ``payload``, ``arm``, ``motion``, ``parallel_filter``, ``design``, ``controller``,
     ``simulation``, ``iteration``. Unknown keys raise ``StudyError``.
 
-    Where a torque, a differentiator, the estimator or the family of a design is code of your own, it stands under the
-    key ``function`` (of estimator and differentiator also in the place of the whole section):
+    A torque, a differentiator, the estimator or the family of a design may be your own function, under the key
+    ``function``. For the estimator and the differentiator the function may also replace the whole section:
 
     - ``torque=[{"name": "k", "joint": "joint1", "function": f}]``: ``f(q, dq)``, both of shape ``(samples, n)``, gives
       the torque per unit of the coefficient, ``(samples,)``;
     - ``motion={"differentiator": f}``: ``f(q, rate_hz)`` with the positions of one joint, ``(samples,)``, gives
-      ``q, dq, ddq``, each ``(samples,)``; a mapping may also hold ``context_samples`` (how far a sample is felt; by
-      default over the whole log), ``minimum_samples`` (5) and ``smooth(signal, rate_hz)`` for the torque;
-    - ``estimator=f``: ``f(rows)`` with ``EstimatorRows`` gives values, ``(columns,)``, or a pair of values and
-      covariance;
+      ``q, dq, ddq``, each ``(samples,)``; a mapping may also hold ``context_samples`` (the number of
+      neighbouring samples that affect a sample; by default the whole log), ``minimum_samples`` (5) and the filter
+      ``smooth(signal, rate_hz)`` for the torque;
+    - ``estimator=f``: ``f(rows)`` with ``EstimatorRows`` gives the values, ``(columns,)``, or a pair of values
+      and covariance;
     - ``design={"family": {"function": f, "parameters": k, "linear": True}}``: ``f(parameters, time_s)`` with ``(n, k)``
-      and ``(samples,)`` gives ``q, dq, ddq, dddq``, each ``(samples, n)``; without ``linear`` it is differentiated.
+      and ``(samples,)`` gives ``q, dq, ddq, dddq``, each ``(samples, n)``; without ``linear``
+      Dynident differentiates it numerically.
 
-    Such a study is no text (``to_toml`` raises), and slow: ``FunctionWarning`` says so.
+    Such a study cannot be written as text (``to_toml`` raises) and is slow; a ``FunctionWarning`` reports this.
 
     >>> import dynident
     >>> own = dynident.study("robots/planar2r.urdf", drive={"drive_inertia": True})
@@ -74,12 +76,12 @@ def study(
     samples = [log._samples() for log in logs]
     made = Study._assemble(_json(content), "<study>", robot, samples, functions.named or None)
     for part in made.functions:
-        warnings.warn(f"{part} is a function of Python: for trying an idea, and slow", FunctionWarning, stacklevel=3)
+        warnings.warn(f"{part} is a Python function: slow, for experiments only", FunctionWarning, stacklevel=3)
     return made
 
 
 def with_logs(own: Study, logs: Log | Iterable[Log]) -> Study:
-    """The study with these logs in place of its own."""
+    """The study with these logs in place of the existing ones."""
     logs = [logs] if isinstance(logs, Log) else list(logs)
     content = json.loads(own.to_json())
     content["log"] = [log._section() for log in logs]
@@ -91,7 +93,7 @@ def _json(content: Mapping[str, Any]) -> str:
 
 
 def _plain(value: object) -> object:
-    """Numbers and arrays of NumPy, paths."""
+    """Converts NumPy numbers and arrays and paths to plain values."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, np.ndarray):
@@ -100,4 +102,4 @@ def _plain(value: object) -> object:
         return fspath(value)
     if isinstance(value, Mapping):
         return dict(value)
-    raise TypeError(f"{type(value).__name__} is nothing that a study can hold")
+    raise TypeError(f"{type(value).__name__} is not supported in a study: use numbers, strings, lists or mappings")

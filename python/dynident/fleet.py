@@ -1,4 +1,4 @@
-"""Many logs, many robots: reduce logs where they lie, put the factors together, see how a fleet differs.
+"""Many logs and robots: reduces logs to factors on each machine, merges the factors and compares the robots.
 
 >>> from dynident import fleet                                                              # doctest: +SKIP
 >>> factors = fleet.merged(reduce_one, paths, on="ray")                                     # doctest: +SKIP
@@ -58,16 +58,16 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class ReducedLog:
-    """A log of which factors are left."""
+    """A log that was reduced to factors."""
 
     name: str
-    """What it is called."""
+    """Name of the log."""
     arm: str | None
-    """The robot that it was recorded on."""
+    """The robot on which the log was recorded."""
     recorded_at: datetime | None
     """When, UTC."""
     sha256: str
-    """Hash of its numbers: two logs with the same one are one log."""
+    """Hash of the samples; logs with the same hash are the same log."""
     rows: int
     """Filtered rows."""
 
@@ -85,12 +85,14 @@ def reduce(
     progress: bool | Progress | None = False,
     **sections: Any,
 ) -> Factors:
-    """Reduces the training logs of a study to factors: some kilobytes for each joint and segment, however long the log.
+    """Reduces the training logs of a study to factors. Their size is a few kilobytes per joint and segment, independent
+    of the length of the log.
 
-    All logs must be read alike, so cut-off and friction are stated, or those of ``like``, a model that was identified
-    from a few of them (its lag as well). ``arm`` and ``recorded_at`` (UTC where it names no zone, or seconds since 1970)
-    say whose log it is; ``segments`` are kept of each log: error bars of few logs need many, of hundreds one will do.
-    Other arguments as of ``dynident.identify``; one thread by default, for a fleet has a worker for each processor.
+    All logs need the same settings. State cut-off and friction, or give ``like``, a model identified from a few of the
+    logs; its cut-off, friction and lag are then used. ``arm`` and ``recorded_at`` (UTC if without a time zone, or
+    seconds since 1970) identify the log. ``segments`` is the number of segments per log: error bars from few logs need
+    many segments, with hundreds of logs one is enough. For other arguments, see ``dynident.identify``. The default is
+    one thread, because a fleet job uses one worker per processor.
     """
     whole = _study_of(study, logs, sections, allow_command)
     seconds = _seconds(recorded_at)
@@ -105,15 +107,15 @@ def _seconds(at: datetime | float | None) -> float | None:
 
 
 def merge(parts: Iterable[Factors]) -> Factors:
-    """All logs of several, the same to the last bit in whatever order they come and however often a log comes.
+    """Merges factors. The result is bit-identical for any order of the logs, and duplicate logs are ignored.
 
-    Raises ``ResultError`` for factors of another robot or other settings.
+    Raises ``ResultError`` if the factors belong to different robots or settings.
     """
     return Factors.merged(list(parts))
 
 
 def save(factors: Factors, path: str | PathLike[str]) -> None:
-    """Writes factors into a file, whole or not at all."""
+    """Writes factors to a file atomically."""
     place = Path(path)
     beside = place.with_name(place.name + ".part")
     beside.write_bytes(factors.to_bytes())
@@ -121,12 +123,12 @@ def save(factors: Factors, path: str | PathLike[str]) -> None:
 
 
 def load(path: str | PathLike[str]) -> Factors:
-    """Reads factors; raises ``ResultError`` for a file that is not as it was written."""
+    """Reads factors. Raises ``ResultError`` if the file was changed or is damaged."""
     return Factors.from_bytes(Path(path).read_bytes())
 
 
 def logs(factors: Factors) -> list[ReducedLog]:
-    """The logs of factors, by robot, time, name."""
+    """The logs in the factors, sorted by robot, time and name."""
 
     def when(seconds: float | None) -> datetime | None:
         return None if seconds is None else datetime.fromtimestamp(seconds, timezone.utc)
@@ -135,7 +137,7 @@ def logs(factors: Factors) -> list[ReducedLog]:
 
 
 def by_arm(factors: Factors) -> dict[str, Factors]:
-    """The factors of each robot alone; logs that name none stand under ``""``."""
+    """Splits factors by robot; logs without a robot are under ``""``."""
     places: dict[str, list[int]] = {}
     for place, (_, arm, *_) in enumerate(factors._logs):
         places.setdefault(arm or "", []).append(place)
@@ -143,9 +145,10 @@ def by_arm(factors: Factors) -> dict[str, Factors]:
 
 
 def windows(factors: Factors, days: float = 7.0) -> dict[datetime, Factors]:
-    """The factors of successive windows of time, by the middle of the logs in each; logs without a time are left out."""
+    """Splits factors into successive time windows, keyed by the mean time of the logs. Logs without a time are omitted.
+    """
     if not days > 0.0:
-        raise ValueError(f"days = {days}: give a length above zero")
+        raise ValueError(f"days = {days}: give a positive length")
     known = [(at, place) for place, (_, _, at, *_) in enumerate(factors._logs) if at is not None]
     if not known:
         return {}
@@ -163,17 +166,16 @@ def windows(factors: Factors, days: float = 7.0) -> dict[datetime, Factors]:
 def identify(
     factors: Factors, *, threads: int | None = None, progress: bool | Progress | None = None, warn: bool = True
 ) -> Model:
-    """The model that explains all logs of ``factors``, as ``dynident.identify`` makes it of the logs with cut-off,
-    friction and lag stated. What only samples show is missing: delays, torque over time, held-out errors (``errors``
-    has those from factors).
+    """Identifies one model from all logs of ``factors``, as ``dynident.identify`` does with stated cut-off, friction
+    and lag. Results that need samples are missing: delays, torque over time and held-out errors (see ``errors``).
     """
     model = Model(_watched(progress, lambda hear: _native._identify_factors(factors, threads, hear)))
     return _warned(model) if warn else model
 
 
 def errors(factors: Factors, model: Model) -> dict[str, float | None]:
-    """By log ``100 ‖τ - Wθ‖ / ‖τ‖`` of a model, θ its estimates: exact, from factors alone. Of logs that the model was
-    not fitted to, this is its proof.
+    """Computes the relative torque error ``100 ‖τ - Wθ‖ / ‖τ‖`` of a model with the estimates θ for each log, in %. The
+    value is exact and uses only factors. Use logs that were not used for the fit to validate the model.
     """
     found = _native._factors_errors(factors, model._native)
     return {name: error for (name, *_), error in zip(factors._logs, found, strict=True)}
@@ -184,19 +186,18 @@ def _identify_quietly(factors: Factors) -> Model:
 
 
 def identify_each(factors: Factors, *, on: object = None) -> dict[str, Model]:
-    """One model for each robot. ``on`` as of ``each``; what stands against a model stands in its ``problems``."""
+    """Identifies one model per robot. For ``on``, see ``each``. Problems of a model are listed in its ``problems``."""
     arms = by_arm(factors)
     return dict(zip(arms, each(_identify_quietly, arms.values(), on=on), strict=True))
 
 
 def each(function: Callable[[Item], Found], items: Iterable[Item], *, on: object = None) -> list[Found]:
-    """``[function(item) for item in items]``, in that order, on other processes and machines.
+    """Computes ``[function(item) for item in items]`` in that order, on other processes and machines.
 
-    ``on`` is None (here, one after the other), ``"ray"`` or ``"dask"`` (the cluster that this process is connected to,
-    or one on this machine), a ``dask.distributed.Client``, or a ``concurrent.futures`` executor. Workers that are lost
-    are replaced and their items done again by Ray or Dask; as every job gives the same bits wherever it runs, no result
-    shows it. What ``function`` raises is raised here and not tried again. Seeds of ``design``, studies of ``simulate``
-    and whole iterations go through it as logs do.
+    ``on`` is None (sequential, in this process), ``"ray"`` or ``"dask"`` (the connected cluster, or one on this
+    machine), a ``dask.distributed.Client``, or a ``concurrent.futures`` executor. Ray and Dask replace lost workers and
+    repeat their items; the results do not change, because every job is deterministic. An exception of ``function`` is
+    raised here without a retry. Items may be logs, seeds of ``design``, studies of ``simulate`` or whole iterations.
     """
     todo = list(items)
     if on is None:
@@ -211,9 +212,9 @@ def each(function: Callable[[Item], Found], items: Iterable[Item], *, on: object
 def merged(
     function: Callable[[Item], Factors], items: Iterable[Item], *, on: object = None, batch: int = 16
 ) -> Factors:
-    """``merge(each(function, items, on=on))``, where a worker takes ``batch`` items at a time and merges what they give:
-    fewer and larger messages, for logs whose reduction takes some milliseconds. Of a lost worker the whole batch is done
-    again.
+    """Computes ``merge(each(function, items, on=on))``. A worker takes ``batch`` items at a time and merges their
+    factors. This sends fewer and larger messages, for logs that are reduced in a few milliseconds. If a worker is lost,
+    its whole batch is repeated.
     """
     if batch < 1:
         raise ValueError(f"batch = {batch}: give at least 1")
@@ -234,7 +235,7 @@ def _on_ray(function: Callable[[Item], Found], items: Sequence[Item]) -> list[Fo
     def run(item: Item) -> Found:
         return function(item)
 
-    # Lost workers are no failure, however many; what the function raises is.
+    # Tasks of lost workers are retried without limit; exceptions of the function are not retried.
     task = ray.remote(max_retries=-1, retry_exceptions=False)(run)
     most = max(2, 4 * int(ray.cluster_resources().get("CPU", 1)))
     found: list[Any] = [None] * len(items)
@@ -249,7 +250,7 @@ def _on_ray(function: Callable[[Item], Found], items: Sequence[Item]) -> list[Fo
 
 
 def _collect(running: dict[Any, int], found: list[Any]) -> None:
-    """Waits for one task; few are under way at once, so that no result waits in a store for the last one."""
+    """Waits for one task. Only a few tasks run at once, so that few results are stored until the last task ends."""
     import ray
 
     done, _ = ray.wait(list(running))
@@ -268,7 +269,7 @@ def _on_dask(function: Callable[[Item], Found], items: Sequence[Item], client: A
         except ValueError:
             client = own = Client(processes=True, dashboard_address=None)
     try:
-        # A worker that is lost is no failure of the item that it was at.
+        # A lost worker does not mean that its item failed.
         with dask.config.set({"distributed.scheduler.allowed-failures": 1000}):
             return list(client.gather(client.map(function, items, pure=False)))
     finally:
@@ -278,14 +279,14 @@ def _on_dask(function: Callable[[Item], Found], items: Sequence[Item], client: A
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """How the robots of a fleet differ."""
+    """Differences between the robots of a fleet."""
 
     names: list[str]
     """The base parameters."""
     result: dict[str, Any]
-    """By parameter ``mean``, ``mean_std``, ``between_std`` (from robot to robot, beyond the bars), ``tail``, ``differs``;
-    by robot ``deviation`` (of every parameter, in standard deviations of what a robot like the others shows), ``worst``,
-    ``tail``, ``is_unlike``.
+    """For each parameter ``mean``, ``mean_std``, ``between_std`` (standard deviation between robots, without the
+    estimation error), ``tail`` and ``differs``. For each robot ``deviation`` (of every parameter, in standard
+    deviations expected for a robot like the others), ``worst``, ``tail`` and ``is_unlike``.
     """
 
     @property
@@ -295,12 +296,12 @@ class Spread:
 
     @property
     def differing(self) -> list[str]:
-        """Parameters that differ from robot to robot beyond their bars, robots that are unlike set aside."""
+        """Parameters that differ between robots by more than their error bars; outlier robots are excluded."""
         found = zip(self.names, self.result["parameters"], strict=True)
         return [name for name, one in found if one is not None and one["differs"]]
 
     def why(self, robot: str) -> str | None:
-        """The parameter by which a robot is furthest off."""
+        """The parameter with the largest deviation of each robot."""
         (own,) = (one for one in self.result["members"] if one["name"] == robot)
         return None if own["worst"] is None else self.names[own["worst"]]
 
@@ -314,35 +315,35 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """How the parameters of one robot change over time."""
+    """Changes of the parameters of one robot over time."""
 
     names: list[str]
     """The base parameters."""
     result: list[dict[str, Any] | None]
-    """By parameter ``slope`` (a day), ``slope_std``, ``half_width_95``, ``scatter``, ``tail``, ``drifts``."""
+    """For each parameter ``slope`` (per day), ``slope_std``, ``half_width_95``, ``scatter``, ``tail``, ``drifts``."""
 
     @property
     def drifting(self) -> list[str]:
-        """Parameters that wander."""
+        """Parameters that change over time."""
         return [name for name, one in zip(self.names, self.result, strict=True) if one is not None and one["drifts"]]
 
 
 def _table(models: Mapping[Any, Model]) -> tuple[list[str], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Names of the parameters, values and standard deviations; zero for a value that was not estimated."""
+    """Names, values and standard deviations of the parameters; zero in place of values that are not finite."""
     if not models:
-        raise ValueError("there is no model: give at least three")
+        raise ValueError("no models: give at least three")
     names = next(iter(models.values())).names
     for name, model in models.items():
         if model.names != names:
-            raise ValueError(f"the model of {name} has other base parameters: identify all from factors of one study")
+            raise ValueError(f"the model of {name} has different base parameters: identify all models from factors of one study")
     std = np.nan_to_num(np.array([model.std for model in models.values()]), nan=0.0, posinf=0.0)
     return names, np.nan_to_num(np.array([model.values for model in models.values()])), std
 
 
 def spread(models: Mapping[str, Model], *, false_alarm: float = 0.01) -> Spread:
-    """Compares the models of several robots, at least three: which parameters differ beyond their bars, which robot is
-    not like the others. ``false_alarm`` is the chance that any robot, or any parameter, of a fleet of equals is named.
-    Equations and sources: ``dynident-estimation``, ``fleet``.
+    """Compares the models of at least three robots. Finds parameters that differ by more than their error bars, and
+    outlier robots. ``false_alarm`` is the probability that any robot, or any parameter, of identical robots is
+    reported. Equations and sources: ``dynident-estimation``, ``fleet``.
     """
     names, values, std = _table(models)
     found = json.loads(_native._spread([str(name) for name in models], values, std, false_alarm))
@@ -350,8 +351,8 @@ def spread(models: Mapping[str, Model], *, false_alarm: float = 0.01) -> Spread:
 
 
 def drift(models: Mapping[datetime, Model], *, false_alarm: float = 0.01) -> Drift:
-    """Lays a line through each parameter of one robot's models over time, at least three (``windows`` makes their
-    factors): which wander. ``false_alarm`` is the chance that any parameter of a robot that does not change is named.
+    """Fits a line over time to each parameter of one robot, from at least three models (see ``windows``), and finds
+    parameters that change. ``false_alarm`` is the probability that any parameter of an unchanged robot is reported.
     """
     names, values, std = _table(models)
     days = [(_seconds(at) or 0.0) / 86_400.0 for at in models]

@@ -1,4 +1,4 @@
-"""A MuJoCo model as the robot of an iteration. Needs the package ``mujoco``."""
+"""Runs a MuJoCo model as the robot of an iteration. Needs the package ``mujoco``."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 
 class MujocoRobot:
-    """Runs a MuJoCo model under the torques of a ``Run``, applied at its joints (``qfrc_applied``).
+    """Runs a MuJoCo model with the torques of a ``Run``, applied at the joints (``qfrc_applied``).
 
-    ``joints`` are the model's joints in the order of the run's, by default those of the same names. ``noise`` is the
-    standard deviation of the measured positions, rad. Between two samples of the controller the simulation takes as many
-    steps as fit: the controller's period has to be a multiple of ``model.opt.timestep``.
+    ``joints`` are the model's joints in the order of the run, by default the joints with the same names. ``noise`` is
+    the standard deviation of the measured positions, rad. The controller's period must be a multiple of
+    ``model.opt.timestep``.
 
-    MuJoCo's dry friction (``dof_frictionloss``) is a soft constraint that comes late by default; as stiff as the steps
-    allow it is with ``dof_solref = 2 * timestep, 1`` and ``dof_solimp = 0.999, 0.999, 1e-3, 0.5, 2``.
+    MuJoCo's dry friction (``dof_frictionloss``) is a soft constraint that acts with a delay by default. It is as stiff
+    as the time step allows with ``dof_solref = 2 * timestep, 1`` and ``dof_solimp = 0.999, 0.999, 1e-3, 0.5, 2``.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class MujocoRobot:
         steps = round(period / model.opt.timestep)
         if steps < 1 or abs(steps * model.opt.timestep - period) > 1e-6 * period:
             raise ValueError(
-                f"the controller's period {period} s is no multiple of the model's timestep {model.opt.timestep} s"
+                f"the controller's period {period} s is not a multiple of the model's timestep {model.opt.timestep} s"
             )
         noise = np.random.default_rng([self.seed, run.number])
         data = mujoco.MjData(model)

@@ -1,4 +1,4 @@
-"""What all tests share: the repository's robots, and a motion."""
+"""Fixtures for all tests: the robots of the repository and a motion."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def planar() -> dynident.Robot:
 
 
 def motion(joints: int, seconds: float = 12.0, rate_hz: float = 200.0, seed: int = 0):
-    """Sines of incommensurable frequencies, with their derivatives."""
+    """Sines with incommensurable frequencies, and their derivatives."""
     draw = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, 1.0 / rate_hz)
     q, dq, ddq = (np.zeros((t.size, joints)) for _ in range(3))
@@ -43,7 +43,7 @@ def motion(joints: int, seconds: float = 12.0, rate_hz: float = 200.0, seed: int
 
 @pytest.fixture(scope="session")
 def planar_logs(planar: dynident.Robot) -> list[dynident.Log]:
-    """A planar arm with viscous friction of 0.8 and 0.4 Nm s/rad, white noise of 0.02 Nm."""
+    """A planar arm with viscous friction of 0.8 and 0.4 Nm s/rad and white torque noise of 0.02 Nm."""
     logs = []
     for seed, role in [(1, "identify"), (2, "validate")]:
         t, q, dq, ddq = motion(planar.n, seed=seed)

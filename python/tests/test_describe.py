@@ -1,4 +1,4 @@
-"""Descriptions and new studies; payloads and drives in others' forms."""
+"""Tests robot descriptions, new studies, and exports of payloads and drives."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def test_a_description_is_audited(ur10: dynident.Robot, root: Path) -> None:
     assert found.ok and found.fixed is None and not found.slips
     assert found.base_parameters == ur10.base_parameters or len(found.base_parameters) == len(ur10.base_parameters)
     assert found.result == dynident.inspect(root / "robots" / "ur10.urdf").result
-    # All moments negated, as exporters do: named, and undone in a copy that is the original again.
+    # An exporter error negates all first moments; the corrected copy must equal the original.
     text = (root / "robots" / "iiwa14.urdf").read_text()
     harmed = re.sub(r'(i[xyz][xyz]=")([1-9]|0\.0*[1-9])', r"\1-\2", text)
     slipped = dynident.inspect(dynident.Robot.from_urdf(harmed))
@@ -30,7 +30,7 @@ def test_a_study_is_written(root: Path, tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.chdir(root)
     logs = [Path("examples/ur10_simulated") / name for name in ("train.csv", "test.csv")]
     place = tmp_path / "study.toml"
-    # What somebody states stands in the place of what would be written.
+    # Stated lines replace generated lines.
     stated = [{"table": "format.torque", "line": 'unit = "Nm"'}]
     found = dynident.new("robots/ur10.urdf", logs, place, stated=stated)
     assert found.ok, found.unsure
@@ -58,7 +58,7 @@ def test_drives_for_simulators(planar: dynident.Robot, planar_logs: list[dyniden
 def test_a_payload_in_a_controllers_form(planar: dynident.Robot) -> None:
     text = planar.text
     logs = []
-    # The load that the second link carries: 1 kg at its end.
+    # The payload at the end of the second link: 1 kg.
     loaded = re.sub(
         r'(<link name="link2">.*?<mass value=")([^"]+)', lambda found: f"{found[1]}{float(found[2]) + 1.0}", text, flags=re.DOTALL
     )

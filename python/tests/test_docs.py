@@ -1,4 +1,4 @@
-"""Examples in docstrings run."""
+"""Runs the examples in docstrings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import dynident
 
 @pytest.mark.parametrize("module", ["dynident", "dynident._log", "dynident._study", "dynident._jobs", "dynident._model", "dynident._describe"])
 def test_examples_run(module: str, root, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Their files are the repository's.
+    # The examples use files of the repository.
     monkeypatch.chdir(root)
     found = doctest.testmod(importlib.import_module(module), optionflags=doctest.ELLIPSIS)
     assert found.failed == 0

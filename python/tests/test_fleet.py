@@ -1,4 +1,4 @@
-"""Factors of logs, fleets, and the same on Ray and Dask."""
+"""Tests factors of logs and fleets, locally and on Ray and Dask."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MONDAY = datetime(2026, 1, 5, tzinfo=timezone.utc)
 
 
 def recorded(seed: int, viscous: tuple[float, float] = (0.8, 0.4), seconds: float = 8.0) -> dynident.Log:
-    """A run of a planar arm, white noise of 0.02 Nm."""
+    """A run of a planar arm with white torque noise of 0.02 Nm."""
     robot = dynident.Robot.load(ROOT / "robots" / "planar2r.urdf")
     t, q, dq, ddq = motion(robot.n, seconds, seed=seed)
     noise = 0.02 * np.random.default_rng(1000 + seed).standard_normal(q.shape)
@@ -45,7 +45,7 @@ def reduced_quickly(seed: int) -> bytes:
 
 
 def reduced_by_a_worker_that_is_killed(task: tuple[int, str]) -> bytes:
-    """The first time that an item is tried, its worker is killed."""
+    """Kills the worker on the first attempt of each item."""
     seed, folder = task
     mark = Path(folder) / str(seed)
     if seed % 3 == 0 and not mark.exists():
@@ -63,7 +63,7 @@ def test_factors_give_the_model_that_the_logs_give(planar: dynident.Robot) -> No
     logs = [recorded(seed) for seed in range(3)]
     of_logs = dynident.identify(planar, logs, **STATED)
     of_factors = fleet.identify(fleet.merge([fleet.reduce(planar, log, segments=64, **STATED) for log in logs]))
-    # As many segments as the fit itself has: the same numbers, so the same bits.
+    # With the same segments as the fit the results are bit-identical.
     np.testing.assert_array_equal(of_factors.values, of_logs.values)
     np.testing.assert_array_equal(of_factors.covariance, of_logs.covariance)
     assert {name: list(body) for name, body in of_factors.bodies.items()} == {
@@ -71,7 +71,7 @@ def test_factors_give_the_model_that_the_logs_give(planar: dynident.Robot) -> No
     }
     _, q, dq, ddq = motion(2, seed=77)
     np.testing.assert_array_equal(of_factors.predict(q, dq, ddq), of_logs.predict(q, dq, ddq))
-    # Fewer segments: values to rounding of sums of some thousand rows.
+    # With fewer segments the values differ by the rounding of sums over thousands of rows.
     few = fleet.identify(fleet.merge([fleet.reduce(planar, log, segments=4, **STATED) for log in logs]))
     np.testing.assert_allclose(few.values, of_logs.values, rtol=0, atol=1e-10)
     assert pickle.loads(pickle.dumps(of_factors)).result == of_factors.result
@@ -115,7 +115,7 @@ def test_what_is_left_to_the_logs_is_refused_or_taken_from_a_model(planar: dynid
     assert found.names == like.names
     chosen = like.result["method"]["motion"]["differentiator"]
     assert found.result["method"]["motion"]["differentiator"] == chosen
-    # The model's estimator may have weighed rows otherwise; the values agree within its bars.
+    # The estimator of the model may use other weights; the values agree within their error bars.
     assert np.all(np.abs(found.values - like.values) <= 3 * np.maximum(like.std, found.std) + 1e-12)
 
 
@@ -129,19 +129,19 @@ def test_errors_from_factors_are_those_of_the_rows(some: list[dynident.Factors])
     model = fleet.identify(fleet.merge(some[:4]))
     errors = fleet.errors(fleet.merge(some[4:]), model)
     assert set(errors) == {"run 4", "run 5"}
-    # White noise of 0.02 Nm beside torques of several Nm is all that is left.
+    # The residual is white noise of 0.02 Nm; the torques are several Nm.
     assert all(error is not None and error < 2.0 for error in errors.values())
     log = recorded(4)
     of_rows = dynident.validate(model, dynident.with_logs(model.study, log.validating()))
     percent = of_rows["validation"][0]["relative_error_percent"]
-    # The same sums of squares from a triangle: rounding.
+    # Sums of squares from a triangular factor differ by rounding only.
     assert errors["run 4"] == pytest.approx(percent, rel=1e-9)
     ill = fleet.errors(reduced(9, viscous=(1.6, 0.4)), model)
     assert ill["run 9"] > 5 * max(error for error in errors.values() if error is not None)
 
 
 def test_a_fleet_names_the_robot_that_is_unlike_it() -> None:
-    # Ten robots, two runs each, friction of one 20 % too large.
+    # Ten robots, two runs each; the friction of one robot is 20 % larger.
     parts = [
         reduced(2 * arm + run, f"arm {arm}", (0.96, 0.4) if arm == 7 else (0.8, 0.4)) for arm in range(10) for run in (0, 1)
     ]
@@ -163,7 +163,7 @@ def test_friction_that_grows_is_seen() -> None:
     found = fleet.drift(weeks)
     assert found.drifting == ["fv1"]
     growth = found.result[found.names.index("fv1")]
-    # 0.01 a week; its own interval holds the truth in 95 of 100 draws, twice of it in all.
+    # 0.01 per week; a tolerance of twice the 95 % interval holds in practically all draws.
     assert growth is not None and abs(7 * growth["slope"] - 0.01) < 2 * 7 * growth["half_width_95"]
 
 

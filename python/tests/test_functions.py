@@ -1,4 +1,4 @@
-"""Code of one's own in a study: torques, differentiators, estimators, families of motions."""
+"""Tests user-defined functions in a study: torques, differentiators, estimators, motion families."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ warnings.simplefilter("ignore", dynident.FunctionWarning)
 pytestmark = pytest.mark.filterwarnings("ignore::dynident.FunctionWarning")
 
 STATED = {"drive": {"viscous": True, "coulomb": "none", "offset": False}, "friction": "stated"}
-# Nothing is chosen from the logs, so that two estimators see the same rows.
+# All settings are stated, so that two estimators use the same rows.
 MOTION = {"differentiator": {"method": "butterworth", "cutoff_hz": 8.0}, "torque_lag_s": 0.0}
 STIFF_S, SLOW = 20.0, 4.0
 
 
 def stribeck(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-    """Friction of the first joint that falls with the velocity."""
+    """Friction of the first joint that decreases with the velocity."""
     return np.tanh(STIFF_S * dq[:, 0]) * np.exp(-SLOW * np.abs(dq[:, 0]))
 
 
@@ -57,7 +57,7 @@ def test_a_torque_as_code_is_the_torque_as_an_expression(planar: dynident.Robot,
 
     code, expression = own({"function": stribeck}), own({"expression": EXPRESSION})
     assert code.names == expression.names
-    # The same columns but for the last place of tanh and exp.
+    # The columns differ only by the rounding of tanh and exp.
     np.testing.assert_allclose(code.values, expression.values, rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(code.std, expression.std, rtol=1e-8)
     assert abs(of(code, "ks") - 0.5) < 4 * code.std[code.names.index("ks")]
@@ -65,7 +65,8 @@ def test_a_torque_as_code_is_the_torque_as_an_expression(planar: dynident.Robot,
     assert expression.functions == []
     _, q, dq, ddq = motion(2, seed=5)
     np.testing.assert_allclose(code.predict(q, dq, ddq), expression.predict(q, dq, ddq), atol=1e-9)
-    # No language has it, a description says what it leaves out, and its own study validates it.
+    # No export language can represent the function, robot descriptions list it as omitted, and the study can validate
+    # it.
     with pytest.raises(dynident.ResultError, match="code of a function"):
         code.to_c()
     assert "stribeck" in code.export("mjcf")
@@ -74,7 +75,7 @@ def test_a_torque_as_code_is_the_torque_as_an_expression(planar: dynident.Robot,
 
 
 def test_a_torque_that_no_expression_says(planar: dynident.Robot) -> None:
-    # A cable that pulls only where it is taut, by a table of another program.
+    # A cable that pulls only where it is taut, from an external table.
     lengths, pulls = np.linspace(-4.0, 4.0, 9), np.array([0, 0, 0, 0, 0.1, 0.5, 1.5, 2.0, 2.2])
 
     def cable(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
@@ -90,7 +91,7 @@ def test_a_torque_that_no_expression_says(planar: dynident.Robot) -> None:
 
 
 def differences(q: np.ndarray, rate_hz: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Central differences of order two; at the ends the parabola of three points."""
+    """Second-order central differences; a parabola through three points at the ends."""
     second = np.empty_like(q)
     second[1:-1] = q[2:] - 2 * q[1:-1] + q[:-2]
     second[0], second[-1] = second[1], second[-2]
@@ -106,8 +107,8 @@ def test_differences_as_code_are_the_differences(planar: dynident.Robot) -> None
     in_pieces = {"function": differences, "context_samples": 2, "minimum_samples": 3}
     pieces = dynident.identify(planar, log, motion={"differentiator": in_pieces}, **STATED)
     for own in (whole, pieces):
-        # Differences of differences and weights of points: rounding of positions times the rate squared, 4e-12 of
-        # accelerations of some rad/s².
+        # The derivatives differ by the rounding of positions times the squared rate: 4e-12 for accelerations of a few
+        # rad/s².
         np.testing.assert_allclose(own.values, built_in.values, rtol=1e-8, atol=1e-9)
         assert own.functions == ["motion.differentiator: differences"]
         assert own.result["method"]["motion"]["differentiator"] == {"method": "function", "function": "differences"}
@@ -115,7 +116,7 @@ def test_differences_as_code_are_the_differences(planar: dynident.Robot) -> None
 
 def test_a_differentiator_that_is_not_built_in(planar: dynident.Robot) -> None:
     def fourier(q: np.ndarray, rate_hz: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Least squares on cosines over the whole log, with a line: half a wave a term, up to 4 Hz."""
+        """Least-squares fit of a line and cosines over the whole log: half a period per term, up to 4 Hz."""
         t = np.arange(q.size) / rate_hz
         span = t[-1]
         omega = np.pi * np.arange(int(8 * span)) / span
@@ -170,7 +171,7 @@ def test_rows_are_those_of_the_logs_and_a_covariance_is_taken(planar: dynident.R
     own = dynident.identify(planar, logs[0], estimator=weighted, motion=MOTION, **STATED)
     estimator = {"method": "weighted", "covariance": "white"}
     white = dynident.identify(planar, logs[0], estimator=estimator, motion=MOTION, **STATED)
-    # By the normal equations, whose condition is the square.
+    # The normal equations square the condition number.
     np.testing.assert_allclose(own.values, white.values, rtol=1e-8, atol=1e-10)
     np.testing.assert_allclose(own.covariance, white.covariance, rtol=1e-5, atol=1e-12)
     assert own.result["method"]["covariance"] == "as the function gave it"
@@ -180,7 +181,7 @@ def test_rows_are_those_of_the_logs_and_a_covariance_is_taken(planar: dynident.R
     assert rows.W.shape == (len(rows.tau), len(rows.names)) and len(rows.joint) == len(rows.tau)
     of_joint = np.array(rows.joint) == 1
     residual = (rows.tau - rows.W @ own.values)[of_joint]
-    # A few digits of a residual that is a millionth of the torque: the logs have no noise.
+    # The logs have no noise: the residual is a millionth of the torque and agrees in few digits.
     left = own.result["training"]["joints"][1]["rmse_nm"]
     assert np.sqrt(residual @ residual / rows.samples[1]) == pytest.approx(left, rel=1e-3)
 
@@ -201,14 +202,14 @@ HARMONICS, SECONDS, BASE = 3, 6.0, 2 * np.pi / 6.0
 
 
 def null_space(normal: np.ndarray) -> np.ndarray:
-    """As the built-in family chooses it: a Householder reflection without its first column."""
+    """A Householder reflection without its first column, as in the built-in family."""
     mirror = normal / np.linalg.norm(normal)
     mirror[0] += np.sign(mirror[0])
     return (np.eye(normal.size) - 2.0 * np.outer(mirror, mirror) / (mirror @ mirror))[:, 1:]
 
 
 def series(parameters: np.ndarray, time_s: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Fourier series at rest at both ends, as ``kind = "fourier"``."""
+    """Fourier series at rest at both ends, as with ``kind = "fourier"``."""
     k = np.arange(1, HARMONICS + 1)
     a, b = (own @ null_space(one).T for own, one in [
         (parameters[:, 1:HARMONICS], np.ones(HARMONICS)), (parameters[:, HARMONICS:], k.astype(float)),
@@ -237,7 +238,7 @@ def test_a_series_as_code_is_the_series(planar: dynident.Robot) -> None:
     free = 2 * HARMONICS - 1
     found = designed(planar, {"function": series, "parameters": free, "linear": True})
     assert found.feasible and built_in.feasible
-    # From the same starts; rounding may part the ways of two searches, not what they reach.
+    # Both searches have the same starts; rounding may change the path of a search, but not its result.
     assert found.result["criterion_figure"] == pytest.approx(built_in.result["criterion_figure"], abs=0.05)
     assert found.result["family"] == "function"
     assert found.result["family_settings"]["function"] == "series"
@@ -245,7 +246,7 @@ def test_a_series_as_code_is_the_series(planar: dynident.Robot) -> None:
 
 def test_a_family_that_is_not_linear(planar: dynident.Robot) -> None:
     def pulses(parameters: np.ndarray, time_s: np.ndarray) -> tuple[np.ndarray, ...]:
-        """A sine of free size and frequency around a free place, under a window that begins and ends at rest."""
+        """A sine with free amplitude, frequency and offset, multiplied by a window that is at rest at both ends."""
         x = np.pi * time_s[:, None] / SECONDS
         size, omega = 0.5 * np.tanh(parameters[:, 0]), 2.0 + np.tanh(parameters[:, 1])
         w = np.sin(x) ** 4
@@ -325,11 +326,11 @@ def test_a_study_with_code_is_no_text_and_is_pickled(planar: dynident.Robot, log
     model = pickle.loads(pickle.dumps(of_study))
     _, q, dq, ddq = motion(2, seed=5)
     np.testing.assert_array_equal(model.predict(q, dq, ddq), of_study.predict(q, dq, ddq))
-    # Of another place than a module's it is not, and Python says why.
+    # Only functions at module level can be pickled; Python reports the reason.
     own = [{"name": "ks", "joint": planar.joint_names[0], "function": lambda q, dq: stribeck(q, dq)}]
     with pytest.raises((pickle.PicklingError, AttributeError), match="lambda"):
         pickle.dumps(dynident.study(planar, logs[0], torque=own, **STATED))
-    # Nor are there factors of it, and a study that only names it says what is missing.
+    # Factors are not supported either; a study that only names the function reports that it is missing.
     with pytest.raises(dynident.ResultError, match="stribeck is a function"):
         fleet.reduce(study)
     named = json.loads(study.to_json())

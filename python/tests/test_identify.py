@@ -1,4 +1,4 @@
-"""From arrays, tables and files to a model."""
+"""Tests identification from arrays, tables and files."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_arrays_to_a_model(model: dynident.Model, planar: dynident.Robot) -> Non
     truth = dict(zip(planar.base_parameters, planar.base_projection @ planar.inertial_parameters.ravel(), strict=True))
     truth |= {"fv1": 0.8, "fv2": 0.4}
     off = [abs(value - truth[name]) / bar for name, value, bar in zip(model.names, model.values, model.std, strict=True)]
-    # Of eight values one beyond four standard deviations happens in one of 2,000 draws, and the draw is fixed.
+    # One of eight values exceeds four standard deviations in one of 2,000 draws; the draw is fixed.
     assert max(off) < 4.0, dict(zip(model.names, off, strict=True))
     assert abs(friction["fv1"] - 0.8) < 0.01
     assert model.covariance.shape == (len(model.names),) * 2
@@ -180,7 +180,7 @@ def test_progress_is_heard(planar: dynident.Robot) -> None:
 
 LONG = """
 import signal, sys, time, dynident
-# Who starts this in the background may have it ignored.
+# A background job may inherit an ignored SIGINT.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 study = dynident.Study.load(sys.argv[1])
 print("begun", flush=True)
@@ -202,7 +202,7 @@ def test_ctrl_c_ends_a_job(root: Path) -> None:
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
         try:
-            # It answers within a fraction of a second; a busy machine gets a minute.
+            # The interrupt takes a fraction of a second; the limit allows for a busy machine.
             answer, _ = process.communicate(timeout=60)
         finally:
             process.kill()
@@ -237,8 +237,8 @@ def test_pictures(model: dynident.Model) -> None:
 
 
 def test_noise_of_positions_is_no_other_robot(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The arm of mujoco.sysid's tutorial with the noise of encoders: accelerations from 2 s of it are noisy, and before
-    slower parts of the motion were looked at every run ended with "the description is not this robot's".
+    """The arm of mujoco.sysid's tutorial with encoder noise. Accelerations from 2 s of data are noisy; the torque
+    check must not conclude that the robot description is wrong.
     """
     pytest.importorskip("mujoco")
     monkeypatch.syspath_prepend(str(root / "benchmarks" / "rivals"))

@@ -1,4 +1,4 @@
-"""Design, simulation, and the iteration on a robot that is a function of Python."""
+"""Tests design, simulation, and iteration with a Python function as robot."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_design_and_simulate(planar: dynident.Robot) -> None:
     found = dynident.design(planar, design=DESIGN, rate_hz=200.0)
     assert found.feasible
     assert np.abs(found.dq).max() <= 2.0 + 1e-9
-    # Sampled derivatives of a smooth motion: second order in the step of 5 ms.
+    # Sampled derivatives have second-order errors in the step of 5 ms.
     np.testing.assert_allclose(np.gradient(found.q, found.time_s, axis=0)[2:-2], found.dq[2:-2], atol=1e-2)
     assert found.svg.startswith("<svg")
     run = dynident.simulate(planar, design=DESIGN, simulation={"rate_hz": 500.0})
@@ -35,7 +35,7 @@ def test_design_and_simulate(planar: dynident.Robot) -> None:
 
 
 class Arm:
-    """The planar arm with other masses and friction, by its own forward dynamics."""
+    """The planar arm with other masses and friction and separate forward dynamics."""
 
     def __init__(self, robot: dynident.Robot) -> None:
         self.robot = robot
@@ -78,7 +78,7 @@ def test_a_function_is_a_robot(planar: dynident.Robot, root: Path, tmp_path: Pat
     friction = found.model().friction
     assert friction["joint1"]["fv1"] == pytest.approx(0.8, rel=0.05)
     assert friction["joint2"]["fv2"] == pytest.approx(0.4, rel=0.05)
-    # Called again it goes on where it ended: nothing is run twice.
+    # A second call continues; no run is repeated.
     dynident.iterate(planar, tmp_path, robot=arm, **SECTIONS)
     assert arm.runs == len(heard)
 
@@ -122,7 +122,7 @@ def test_mujoco_is_a_robot(planar: dynident.Robot, root: Path, tmp_path: Path) -
     model = mujoco.MjModel.from_xml_path(str(root / "robots" / "planar2r.urdf"))
     model.opt.timestep = 1e-3
     model.dof_damping[:] = 0.8, 0.4
-    # What the description says, and `coulomb = "none"` does not.
+    # The robot description has Coulomb friction; `coulomb = "none"` removes it.
     model.dof_frictionloss[:] = 0.0
     found = dynident.iterate(planar, tmp_path, robot=MujocoRobot(model, noise=1e-6), **SECTIONS)
     friction = found.model().friction
@@ -166,12 +166,12 @@ def test_ctrl_c_stops_a_robot_that_is_a_function(root: Path, tmp_path: Path) -> 
         assert child.stdout is not None
         assert child.stdout.readline() == "moving\n"
         child.send_signal(signal.SIGINT)
-        # 1500 samples of 10 ms are left of the run, had it gone on.
+        # 1500 samples of 10 ms remain in the run.
         said, _ = child.communicate(timeout=60)
         begin = json.loads(said.splitlines()[-1])
     finally:
         child.kill()
     assert begin == {"interrupted": True, "stopped": [True]}
     assert child.returncode == 0
-    # What was recorded is kept, and says why it ends.
+    # The recorded samples are kept, with the reason of the stop.
     assert json.loads((tmp_path / "iterations.json").read_text())["status"] == "interrupted"

@@ -1,4 +1,4 @@
-"""A robot under watch, sample by sample."""
+"""Tests monitoring of a robot, sample by sample."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def work(planar: dynident.Robot, seed: int, seconds: float, friction: np.ndarray
 def test_the_estimate_goes_on_from_the_model(model: dynident.Model, planar: dynident.Robot) -> None:
     watch = model.online(rate_hz=RATE_HZ, forgetting_s=None, correlation_s=0.05)
     assert watch.names == model.names
-    # What is known before the first sample is the model: the estimate of the consistent parameters, and its bars.
+    # Before the first sample the estimate is that of the model: the consistent parameters and their error bars.
     np.testing.assert_allclose(watch.covariance, model.covariance, rtol=1e-6, atol=1e-6 * abs(model.covariance).max())
     before = watch.values
     q, dq, ddq, tau = work(planar, seed=7, seconds=20.0)
@@ -39,7 +39,7 @@ def test_the_estimate_goes_on_from_the_model(model: dynident.Model, planar: dyni
     expected = np.array([truth[name] for name in watch.names])
     std = np.sqrt(np.diag(watch.covariance))
     assert (std < np.sqrt(np.diag(model.covariance))).all()
-    # Two in a thousand draws of eight numbers are beyond.
+    # Two in a thousand draws of eight numbers exceed the limit.
     assert (abs(watch.values - expected) < 4.0 * std).all()
     assert (watch.values != before).all()
     bodies, friction = watch.consistent()
@@ -73,7 +73,7 @@ def test_a_push_and_a_payload_are_seen(model: dynident.Model, planar: dynident.R
     q, _, _, tau = work(planar, seed=9, seconds=60.0)
     watch.calibrate(q, tau)
     assert watch.thresholds_nm.shape == stated.shape == (2, 2)
-    # The model knows of noise behind its filter alone, and takes the rest to be as loud; slow errors are none here.
+    # The model has only the noise after its filter and assumes the same level elsewhere; there are no slow errors here.
     ratio = watch.thresholds_nm / stated
     assert (ratio[:, 0] > 0.6).all()
     assert (ratio < 1.4).all()
@@ -88,14 +88,14 @@ def test_a_push_and_a_payload_are_seen(model: dynident.Model, planar: dynident.R
     first = watch.update(q, pushed)[0]
     assert first["kind"] == "collision"
     assert first["joint"] == planar.joint_names[1]
-    # A twentieth of a second and what derivatives look ahead.
+    # 0.05 s plus the delay of the derivatives.
     assert -0.05 <= first["time_s"] - (start_s + 10.0) < 0.05
     assert watch.contact is not None
     assert watch.alarms[0] == first
 
 
 def test_friction_that_grows_is_drift(model: dynident.Model, planar: dynident.Robot) -> None:
-    # A second of half-life, a check every four; thresholds of contact out of the way.
+    # Half-life 1 s, a check every 4 s; the contact thresholds are out of reach.
     watch = model.online(rate_hz=RATE_HZ, forgetting_s=1.0, contact_alarms_per_hour=1e-9)
     q, dq, ddq, tau = work(planar, seed=11, seconds=120.0)
     assert [alarm for alarm in watch.update(q, tau, dq, ddq) if alarm["kind"] == "drift"] == []

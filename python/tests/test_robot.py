@@ -1,4 +1,4 @@
-"""Dynamics over arrays: shapes, and identities that no implementation can fake."""
+"""Tests dynamics over arrays: shapes and physical identities."""
 
 from __future__ import annotations
 
@@ -62,13 +62,13 @@ def test_the_equation_of_motion_holds(ur10: dynident.Robot) -> None:
     tau = ur10.inverse_dynamics(q, dq, ddq)
     bias = ur10.inverse_dynamics(q, dq)
     rebuilt = np.einsum("sij,sj->si", ur10.mass_matrix(q), ddq) + bias
-    # Rounding of torques of 100 Nm.
+    # Rounding error of torques of 100 Nm.
     np.testing.assert_allclose(rebuilt, tau, atol=1e-11)
     np.testing.assert_allclose(ur10.forward_dynamics(q, dq, tau), ddq, atol=1e-8)
     np.testing.assert_allclose(ur10.regressor(q, dq, ddq) @ ur10.inertial_parameters.ravel(), tau, atol=1e-11)
     base = ur10.base_projection @ ur10.inertial_parameters.ravel()
     regressor = ur10.regressor(q, dq, ddq)[..., ur10.base_columns]
-    # Columns that are sums of others by structure, to 1e-9 of the largest.
+    # Columns that are linearly dependent by structure, to 1e-9 of the largest column.
     np.testing.assert_allclose(regressor @ base, tau, atol=1e-6)
     step = 1e-6
     by_q, by_dq, by_ddq = ur10.derivatives(q[7], dq[7], ddq[7])
@@ -79,7 +79,7 @@ def test_the_equation_of_motion_holds(ur10: dynident.Robot) -> None:
             (by_dq, ((q[7], dq[7] + one, ddq[7]), (q[7], dq[7] - one, ddq[7]))),
             (by_ddq, ((q[7], dq[7], ddq[7] + one), (q[7], dq[7], ddq[7] - one))),
         ]:
-            # Differences of torques of 100 Nm over 2e-6: rounding of 1e-8.
+            # Difference quotient of torques of 100 Nm with a step of 2e-6: rounding error 1e-8.
             difference = (ur10.inverse_dynamics(*a) - ur10.inverse_dynamics(*b)) / (2 * step)
             np.testing.assert_allclose(found[:, joint], difference, atol=1e-6)
 
@@ -89,7 +89,7 @@ def test_batches_equal_single_calls_whatever_the_layout(ur10: dynident.Robot) ->
     whole = ur10.inverse_dynamics(q, dq, ddq)
     fortran = ur10.inverse_dynamics(np.asfortranarray(q), dq[:, ::1], ddq.astype(">f8"))
     np.testing.assert_array_equal(whole, fortran)
-    # Lanes add in another order than single calls.
+    # The SIMD lanes add in another order than single calls.
     single = np.array([ur10.inverse_dynamics(*row) for row in zip(q[:50], dq[:50], ddq[:50], strict=True)])
     np.testing.assert_allclose(whole[:50], single, atol=1e-12)
     np.testing.assert_array_equal(ur10.inverse_dynamics(q.tolist(), dq.tolist(), ddq.tolist()), whole)
@@ -146,7 +146,7 @@ def _regressor_sum(robot: dynident.Robot) -> float:
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="the system does not fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_threads_and_forked_processes(ur10: dynident.Robot) -> None:
-    # Large enough for the pool, so that a child has to make its own.
+    # Large enough for the thread pool, so that a child process must create its own pool.
     expected = _regressor_sum(ur10)
     with concurrent.futures.ThreadPoolExecutor(4) as threads:
         assert set(threads.map(_regressor_sum, [ur10] * 8)) == {expected}
@@ -156,7 +156,7 @@ def test_threads_and_forked_processes(ur10: dynident.Robot) -> None:
 
 
 def test_a_regressor_is_written_where_it_is_wanted(ur10: dynident.Robot) -> None:
-    # More than a block, and no whole number of them.
+    # More than one block, but not a whole number of blocks.
     _, q, dq, ddq = motion(6, seconds=3.0, rate_hz=100.0)
     whole = ur10.regressor(q, dq, ddq)
     out = np.full_like(whole, np.nan)

@@ -50,7 +50,6 @@ impl ModelFile {
                 upper: own.limits.upper,
                 velocity: own.limits.velocity,
                 effort: own.limits.effort,
-                ..JointLimits::default()
             },
             damping: None,
             friction: None,

@@ -1,4 +1,4 @@
-//! Files of every format that logs have: what they hold, and all of it read.
+//! Log files of every format: lists the contents and reads all rows.
 
 use super::Run;
 use dynident::log_contents;
@@ -31,7 +31,7 @@ impl Run for AnyFormat {
     }
 }
 
-/// Reads a file through all its rows.
+/// Reads all rows of a file.
 pub(crate) fn any() -> io::Result<Box<dyn Run>> {
     Ok(Box::new(AnyFormat { folder: tempfile::tempdir()? }))
 }

@@ -1,4 +1,4 @@
-//! The small commands on a folder in which one file was mutated: study, robot, log, states or result.
+//! Runs the small commands on a folder with one mutated file: study, robot, log, states or result.
 
 use super::Run;
 use dynident::{Quantity, ResultFile, RunOptions, Silent, Study, check, identify, inspect, validate};
@@ -13,7 +13,7 @@ struct Jobs {
     folder: TempDir,
 }
 
-/// A folder of good files.
+/// A folder of valid files.
 pub(crate) fn jobs() -> io::Result<Box<dyn Run>> {
     let folder = tempfile::tempdir()?;
     for file in FILES {
@@ -33,13 +33,13 @@ impl Run for Jobs {
             return false;
         }
         let accepted = commands(&at);
-        // The next input finds good files again.
+        // Restore the valid files for the next input.
         let _ = std::fs::copy(seed(file), at(file));
         accepted
     }
 }
 
-/// Inspects, evaluates, validates, checks and identifies.
+/// Runs inspect, evaluate, validate, check and identify.
 fn commands(at: &dyn Fn(&str) -> std::path::PathBuf) -> bool {
     let mut accepted = true;
     let mut heard = |outcome: Result<(), dynident::Error>| {
@@ -49,7 +49,7 @@ fn commands(at: &dyn Fn(&str) -> std::path::PathBuf) -> bool {
         }
     };
     heard(inspect(&at("arm.urdf")).map(|inspection| {
-        // No number of what is printed is none.
+        // All numbers in the output are finite.
         let text = serde_json::to_string(&inspection.base_parameters).unwrap_or_default();
         assert!(!text.contains("null"), "{text}");
     }));
@@ -65,7 +65,7 @@ fn commands(at: &dyn Fn(&str) -> std::path::PathBuf) -> bool {
             heard(check(&study, &path, &options).map(|_| ()));
             heard(identify(&study, &path, &options).map(|found| {
                 let finite = found.result.base_parameters.iter().all(|parameter| parameter.value.is_finite());
-                assert!(finite, "a parameter that is no number");
+                assert!(finite, "a parameter is not finite");
             }));
         }
         Err(error) => heard(Err(error)),

@@ -1,4 +1,4 @@
-//! What is run: one target for each parser, and the small commands on a folder of files.
+//! Fuzz targets: one for each parser, and one for the small commands on a folder of files.
 
 mod formats;
 mod jobs;
@@ -6,19 +6,19 @@ mod parsers;
 
 use std::io;
 
-/// Something that takes an input.
+/// Runs a target on an input.
 pub(crate) trait Run {
-    /// Whether `input` was accepted; `seed` is the name of the file that it was made from.
+    /// Returns whether `input` was accepted; `seed` is the name of the original file.
     fn run(&mut self, seed: &str, input: &[u8]) -> bool;
 }
 
-/// A target.
+/// A fuzz target.
 pub(crate) struct Target {
-    /// Its name, and that of its folder in `corpus`.
+    /// Name of the target and of its folder in `corpus`.
     pub(crate) name: &'static str,
-    /// Executions in a round.
+    /// Executions per round.
     pub(crate) repetitions: u64,
-    /// Makes what runs it; each thread has its own.
+    /// Creates the runner; each thread has a separate one.
     pub(crate) new: fn() -> io::Result<Box<dyn Run>>,
 }
 

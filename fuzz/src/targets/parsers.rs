@@ -1,4 +1,4 @@
-//! One target for each format that is read.
+//! One target for each input format.
 
 use super::Run;
 use dynident::iteration::IterationStore;
@@ -17,7 +17,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A target without memory.
+/// A target without state.
 struct Plain(fn(&[u8]) -> bool);
 
 impl Run for Plain {
@@ -40,7 +40,7 @@ impl Run for OfFile {
     }
 }
 
-#[allow(clippy::unnecessary_wraps, reason = "the shape of all targets")]
+#[allow(clippy::unnecessary_wraps, reason = "all targets have the same signature")]
 fn plain(run: fn(&[u8]) -> bool) -> io::Result<Box<dyn Run>> {
     Ok(Box::new(Plain(run)))
 }
@@ -65,7 +65,7 @@ pub(crate) fn mesh() -> io::Result<Box<dyn Run>> {
     })
 }
 
-/// A message that a person can be shown: one that says something.
+/// Checks that a message is not empty.
 fn said(message: &impl ToString) -> bool {
     assert!(!message.to_string().trim().is_empty(), "an empty message");
     false
@@ -77,7 +77,7 @@ fn sound(model: &Model) {
     assert!(model.inertials().iter().all(|inertial| inertial.0.iter().all(|x| x.is_finite())), "not finite");
 }
 
-/// URDF: reading, audit, slips, writing back.
+/// URDF: read, audit, find description errors, write.
 pub(crate) fn urdf() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let Ok(text) = core::str::from_utf8(input) else { return false };
@@ -90,11 +90,11 @@ pub(crate) fn urdf() -> io::Result<Box<dyn Run>> {
         if let Ok(changes) = link_changes(&robot.model, robot.model.inertials())
             && let Ok(written) = rewrite_urdf(text, &changes, &[])
         {
-            assert!(read_urdf(&written).is_ok(), "what was written is not read");
+            assert!(read_urdf(&written).is_ok(), "the written description cannot be read");
         }
         match slips(text, &robot.model, None) {
             Ok(found) => match rewrite_inertials(text, &found.stated, &found.corrected) {
-                Ok(mended) => assert!(read_urdf(&mended).is_ok(), "what was mended is not read"),
+                Ok(mended) => assert!(read_urdf(&mended).is_ok(), "the corrected description cannot be read"),
                 Err(error) => return said(&error),
             },
             Err(error) => return said(&error),
@@ -103,11 +103,11 @@ pub(crate) fn urdf() -> io::Result<Box<dyn Run>> {
     })
 }
 
-/// MJCF: reading with its includes, writing back.
+/// MJCF: read with includes, write.
 pub(crate) fn mjcf() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let Ok(text) = core::str::from_utf8(input) else { return false };
-        // A file that includes itself, and another that is not there.
+        // A file that includes itself, and a missing file.
         let mut include = |file: &str| match file {
             "itself.xml" => Ok(text.to_owned()),
             _ => Err("no such file".to_owned()),
@@ -121,13 +121,13 @@ pub(crate) fn mjcf() -> io::Result<Box<dyn Run>> {
         if let Ok(changes) = link_changes(&robot.model, robot.model.inertials())
             && let Ok(written) = rewrite_mjcf(text, &mut include, &changes, &[])
         {
-            assert!(read_mjcf_with(&written, &mut include).is_ok(), "what was written is not read");
+            assert!(read_mjcf_with(&written, &mut include).is_ok(), "the written description cannot be read");
         }
         true
     })
 }
 
-/// SDF: reading, the URDF of it, and new drives in it.
+/// SDF: read, convert to URDF, write new drive values.
 pub(crate) fn sdf() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let Ok(text) = core::str::from_utf8(input) else { return false };
@@ -137,7 +137,7 @@ pub(crate) fn sdf() -> io::Result<Box<dyn Run>> {
         };
         sound(&robot.model);
         assert!(!write_urdf(&robot.model).is_empty());
-        // The same drives everywhere: written, read, and written again without a change.
+        // Writing equal drive values a second time must not change the file.
         let drive = |joint: &Joint| JointChange {
             joint: joint.name.clone(),
             damping: Some(0.25),
@@ -148,7 +148,7 @@ pub(crate) fn sdf() -> io::Result<Box<dyn Run>> {
         let joints: Vec<JointChange> = robot.model.joints().iter().map(drive).collect();
         match rewrite_sdf(text, &[], &joints) {
             Ok(written) => {
-                let Ok(again) = read_sdf(&written) else { panic!("not read again: {written}") };
+                let Ok(again) = read_sdf(&written) else { panic!("the written SDF cannot be read: {written}") };
                 assert!(again.model.joints().iter().all(|joint| joint.damping == Some(0.25)));
                 assert_eq!(rewrite_sdf(&written, &[], &joints).ok(), Some(written));
             }
@@ -172,7 +172,7 @@ pub(crate) fn dh() -> io::Result<Box<dyn Run>> {
     })
 }
 
-/// Study: reading, and the names and formats of its logs.
+/// Study: read, with the names and formats of its logs.
 pub(crate) fn study() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let Ok(text) = core::str::from_utf8(input) else { return false };
@@ -193,7 +193,7 @@ fn two_joints() -> Vec<String> {
     ["shoulder", "elbow"].map(str::to_owned).to_vec()
 }
 
-/// Text tables of samples, through clock and differentiator; and a robot program's table.
+/// Text tables of samples, with clock and differentiator, and the table of a robot program.
 pub(crate) fn log() -> io::Result<Box<dyn Run>> {
     of_file("log.csv", |path| {
         let time = TimeColumn::seconds(ColumnRef::Name("t".to_owned()));
@@ -249,7 +249,7 @@ pub(crate) fn states() -> io::Result<Box<dyn Run>> {
     })
 }
 
-/// An expression of a declared torque: its values and slopes are numbers, and its text reads back.
+/// An expression of a declared torque: checks that values and slopes are numbers and that its text can be parsed.
 pub(crate) fn expression() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let text = String::from_utf8_lossy(input);
@@ -277,7 +277,7 @@ pub(crate) fn result() -> io::Result<Box<dyn Run>> {
     })
 }
 
-/// A file of factors, its hash made anew: without it every mutated file would be refused for its hash.
+/// A file of factors with a recomputed hash; otherwise every mutated file would be rejected for its hash.
 pub(crate) fn factors() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let hash = Sha256::digest(input);
@@ -296,7 +296,7 @@ pub(crate) fn design() -> io::Result<Box<dyn Run>> {
     })
 }
 
-/// `run.json` of an iteration's folder.
+/// `run.json` in the folder of an iteration.
 pub(crate) fn iterations() -> io::Result<Box<dyn Run>> {
     of_file("runs/run_1/run.json", |path| {
         let Some(folder) = path.ancestors().nth(3) else { return false };
@@ -307,7 +307,7 @@ pub(crate) fn iterations() -> io::Result<Box<dyn Run>> {
     })
 }
 
-/// Lines of a robot program.
+/// Messages of a robot program.
 pub(crate) fn protocol() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let mut accepted = false;

@@ -194,8 +194,8 @@ impl ConsistentIntervals {
 
     /// Interval of standard parameter `index` (ten per body, then the scalars). It has zero width for a known body.
     ///
-    /// [`PhysicalError::Mismatch`] for an index out of range. [`PhysicalError::Mismatch`] if there is no such
-    /// parameter.
+    /// # Errors
+    /// [`PhysicalError::Mismatch`] if there is no such parameter.
     pub fn of(&self, index: usize) -> Result<ConsistentInterval, PhysicalError> {
         if index >= self.sizes.len() {
             return Err(PhysicalError::Mismatch {

@@ -70,6 +70,7 @@ impl LinearProblem {
     /// Adds the rows of joint number `joint` in the log called `log`; `columns` gives for every column of the factor
     /// its number in the problem. Add the joints of one log under the same log name.
     ///
+    /// # Errors
     /// [`EstimationError::Mismatch`] for a joint out of range or a wrong length of `columns`;
     /// [`EstimationError::Column`] for a column out of range or duplicate.
     pub fn add(
@@ -108,6 +109,7 @@ impl LinearProblem {
 
     /// Sets the values of columns that the data do not excite, for example nominal values; zero by default.
     ///
+    /// # Errors
     /// [`EstimationError::Mismatch`] for a wrong number of values, [`EstimationError::Setting`] for a value that is
     /// not finite.
     pub fn with_fallback(mut self, values: Vec<f64>) -> Result<Self, EstimationError> {
@@ -221,6 +223,7 @@ impl LinearProblem {
     /// One factor of all rows over all columns. The rows of joint j are multiplied by `weights[j]` (1/σ_j for weighted
     /// least squares); the prior's rows, if any, have weight 1.
     ///
+    /// # Errors
     /// [`EstimationError::Mismatch`] for a wrong number of weights; [`EstimationError::Setting`] for a weight that is
     /// negative, NaN or infinite.
     pub fn combined(&self, weights: &[f64]) -> Result<TriangularFactor, EstimationError> {

@@ -86,6 +86,7 @@ impl SegmentedFactor {
 
     /// Restores the factor from its [`shape`](Self::shape) and [`numbers`](Self::numbers), bit by bit.
     ///
+    /// # Errors
     /// [`EstimationError::Mismatch`] for a wrong count of numbers or segments; [`EstimationError::Unusable`] for an
     /// invalid value; [`EstimationError::Setting`] as [`SegmentSettings::validate`].
     pub fn from_numbers(shape: &FactorShape, numbers: &[f64]) -> Result<Self, EstimationError> {

@@ -139,6 +139,7 @@ impl TriangularFactor {
     /// Takes about 2·rows·(columns + 1)² operations, in blocks of [`BLOCK_ROWS`]. The order of rows and their division
     /// into calls change the result by rounding only.
     ///
+    /// # Errors
     /// [`EstimationError::Shape`] for a panel of the wrong length; [`EstimationError::Unusable`] for a NaN, an
     /// infinity or a magnitude above 1e140. The factor is then unchanged.
     pub fn absorb(&mut self, panel: &[f64], rows: usize) -> Result<(), EstimationError> {

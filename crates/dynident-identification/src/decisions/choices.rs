@@ -21,6 +21,7 @@ pub(super) struct CutoffChoice {
 }
 
 #[derive(Clone)]
+#[allow(clippy::large_enum_variant, reason = "there is one value for each identification")]
 pub(super) enum FrictionChoice {
     Open,
     /// With the constants of a grid: enough to estimate a lag.

@@ -138,13 +138,11 @@ impl<'a, 'w> Workspace<'a, 'w> {
             self.logs.push(Logs::new(model, &self.task.recordings, rows, self.training, of_arm_hz, self.execution)?);
         }
         let logs = self.logs[0].clone().with_chosen_cutoff(&self.settings.motion, cutoff_hz);
-        match self.logs.iter().find(|known| known.motion == logs.motion) {
-            Some(known) => Ok(logs.with_motion_of(known)),
-            None => {
-                self.logs.push(logs.clone());
-                Ok(logs)
-            }
+        if let Some(known) = self.logs.iter().find(|known| known.motion == logs.motion) {
+            return Ok(logs.with_motion_of(known));
         }
+        self.logs.push(logs.clone());
+        Ok(logs)
     }
 
     pub(super) fn fit(&mut self) -> Result<&Fit<'a>, IdentificationError> {

@@ -141,9 +141,9 @@ impl CorrectedStudy {
         robot: ParametricModel,
         rows: MotionRows,
         mistakes: Vec<Mistake>,
-        settings: DiagnosisSettings,
+        settings: &DiagnosisSettings,
     ) -> Self {
-        Self { robot, rows, mistakes, torque_growth: 0.0, settings }
+        Self { robot, rows, mistakes, torque_growth: 0.0, settings: *settings }
     }
 
     /// The same with one more mistake corrected.

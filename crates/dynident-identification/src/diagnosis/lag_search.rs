@@ -128,7 +128,7 @@ impl<'a> LagSearch<'a> {
         let mistakes: Vec<Mistake> = self.mistake(joints, channels, lag_s).into_iter().collect();
         let explained = |lag_s: f64, mistakes: Vec<Mistake>| {
             let rows = self.rows(joints, channels, lag_s, instants);
-            CorrectedStudy::new(robot.clone(), rows, mistakes, *self.settings).explained(consistency).ok()
+            CorrectedStudy::new(robot.clone(), rows, mistakes, self.settings).explained(consistency).ok()
         };
         let (late, unshifted) = (explained(lag_s, mistakes)?, explained(0.0, Vec::new())?.hypothesis);
         let gain = unshifted.score() - late.hypothesis.score();

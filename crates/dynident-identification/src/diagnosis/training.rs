@@ -57,7 +57,7 @@ pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, Dia
     let compensated_s = |joint| logs.motion.torque_lag_s.as_ref().and_then(|lag_s| lag_s.at(joint)).unwrap_or(0.0);
     let compensated_s: Vec<f64> = (0..robot.dof()).map(compensated_s).collect();
     let lag_search = LagSearch::new(&robot, &samples, compensated_s.clone(), limits);
-    let as_written = CorrectedStudy::new(robot, rows, Vec::new(), *limits).explained(&consistency)?;
+    let as_written = CorrectedStudy::new(robot, rows, Vec::new(), limits).explained(&consistency)?;
     let SearchResults { searches, study, written } = search_with_lag(&as_written, lag_search.as_ref(), &consistency);
     let search = select_search(searches, &study);
     let again = unless_confirmed(&written, &search.corrected(&study), &search, &consistency)?;

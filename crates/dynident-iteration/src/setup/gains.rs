@@ -91,10 +91,10 @@ pub fn lowered_bandwidths(
 /// Derives critically damped controllers for a robot with nominal bodies; the natural frequency of each joint is `ω =
 /// 2π bandwidth`:
 ///
-/// * * joint PD: `K_p = ω² m`, `K_d = 2 ω m`, `m = (1 - uncertainty) max M_jj(q)` along the motions;
-/// * * computed torque with the nominal model: `K_p = (1 - uncertainty) ω²`, `K_d = 2 √K_p`; without described drive
+/// * joint PD: `K_p = ω² m`, `K_d = 2 ω m`, `m = (1 - uncertainty) max M_jj(q)` along the motions;
+/// * computed torque with the nominal model: `K_p = (1 - uncertainty) ω²`, `K_d = 2 √K_p`; without described drive
 ///   inertia, the model and M_jj use that of a typical drive (the effort limit accelerates it by 300 rad/s²);
-/// * * computed torque with an identified model: `K_p = ω²`, `K_d = 2 ω`.
+/// * computed torque with an identified model: `K_p = ω²`, `K_d = 2 ω`.
 ///
 /// So the lightest robot within the uncertainty is not faster than requested: under computed torque in all postures,
 /// under joint PD in the posture with the largest inertia of the joint (in others it is faster, and overdamped). A

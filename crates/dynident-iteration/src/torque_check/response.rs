@@ -1,11 +1,11 @@
 //! Checks whether the motion fits the torque. If the log contains the commanded torque, it does not show that drives
 //! deliver another torque; and a robot that runs away is stopped before the log is long enough for a fit.
 //!
-//! * * Exchanged joints and a reversed sign show within tenths of a second. In the log: the torque of joint i is the
+//! * Exchanged joints and a reversed sign show within tenths of a second. In the log: the torque of joint i is the
 //!   command of joint j, its own with the opposite sign, or its own up to a limit. In the motion, if the log contains
 //!   the commanded torque: the acceleration of joint i follows the torque of joint j without gravity, or decreases
 //!   while its own increases. Constants are free, so wrong masses have no effect.
-//! * * Saturation: the rows of the joint fit a model much better with limited torque, `clamp(τ_j, ±L) = W_j θ_j +
+//! * Saturation: the rows of the joint fit a model much better with limited torque, `clamp(τ_j, ±L) = W_j θ_j +
 //!   friction`, than with the logged torque. θ_j is free, so no robot description is needed.
 
 use super::command::LoggedMotion;

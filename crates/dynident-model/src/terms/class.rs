@@ -39,7 +39,7 @@ impl TermClass {
                 vec![simple().into_iter().chain(own().find(|term| *term == drive)).collect()]
             }
             Self::FunctionsOfMotion => {
-                let kept: Vec<TorqueTerm> = own().filter(|term| Self::is_function_of_motion(term)).collect();
+                let kept: Vec<TorqueTerm> = own().filter(Self::is_function_of_motion).collect();
                 let has_step = kept.iter().any(|term| term.is_joint_friction() && term.step().is_some());
                 if has_step || own().all(|term| Self::is_function_of_motion(&term)) {
                     return vec![kept];

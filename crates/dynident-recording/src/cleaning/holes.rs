@@ -80,11 +80,11 @@ fn empty_like(block: &RawBlock) -> RawBlock {
     }
 }
 
-/// A block with its holes filled; `filled` are the indices of the rows that were not measured.
+/// A block with its holes filled; `missing` are the indices of the rows that were not measured.
 pub(super) struct Filled {
     pub(super) raw: RawBlock,
     pub(super) places: Places,
-    pub(super) filled: Vec<usize>,
+    pub(super) missing: Vec<usize>,
     /// For each row of the original block, its index in this block.
     pub(super) new_index: Vec<usize>,
 }
@@ -96,7 +96,7 @@ pub(super) fn fill(before: &PastRows, block: &RawBlock, places: &Places, next: O
     let mut out = Filled {
         raw: empty_like(block),
         places: Places::default(),
-        filled: Vec::new(),
+        missing: Vec::new(),
         new_index: Vec::with_capacity(block.rows()),
     };
     let mut done = 0;
@@ -115,7 +115,7 @@ pub(super) fn fill(before: &PastRows, block: &RawBlock, places: &Places, next: O
             append(&mut out.raw, &rows.raw, 0..count);
             out.places.steps.extend_from_slice(&rows.places.steps);
             out.places.begins.extend_from_slice(&rows.places.begins);
-            out.filled.extend(shift..shift + count);
+            out.missing.extend(shift..shift + count);
             take(&mut out, hole, hole + 1);
         } else {
             take(&mut out, hole, hole + 1);

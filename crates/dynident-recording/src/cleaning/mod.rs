@@ -111,7 +111,7 @@ impl CleanRows {
             CleanBlock { raw, places, marked }
         } else {
             let holes = places.holes.len() as u64;
-            let Filled { raw, places, filled, new_index } = fill(&self.before, &raw, &places, next);
+            let Filled { raw, places, missing: filled, new_index } = fill(&self.before, &raw, &places, next);
             // A hole that could not be filled starts a new piece.
             self.bridged[0] += if filled.is_empty() { 0 } else { holes };
             self.bridged[1] += filled.len() as u64;

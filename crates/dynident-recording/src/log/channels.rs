@@ -142,7 +142,7 @@ impl ChannelGroup {
                     match column {
                         ColumnRef::Index(index) => list.push(ColumnRef::Index(*index)),
                         ColumnRef::Name(name) => {
-                            list.extend(expand_pattern(&key, name)?.into_iter().map(ColumnRef::Name))
+                            list.extend(expand_pattern(&key, name)?.into_iter().map(ColumnRef::Name));
                         }
                     }
                 }

@@ -122,7 +122,7 @@ fn missing_files_folders_and_endless_lines_are_named() {
 
 #[test]
 fn absurd_filters_and_values_are_refused_and_large_ones_stay_finite() {
-    let file = file_with(&rows(200));
+    let file = file_with(rows(200));
     let format: LogFormat = toml::from_str(FORMAT).unwrap();
     for (settings, words) in [
         ("trim_s = -1.0", "trim_s"),
@@ -142,7 +142,7 @@ fn absurd_filters_and_values_are_refused_and_large_ones_stay_finite() {
         assert!(message.contains(words), "{message}");
     }
     let lines = (0..200).map(|i| format!("{},{}e59,-1e60,1e60,1e-300\n", f64::from(i) * 0.01, f64::from(i % 7)));
-    let large = file_with(&lines.fold("t,q1,q2,tau1,tau2\n".to_owned(), |text, line| text + &line));
+    let large = file_with(lines.fold("t,q1,q2,tau1,tau2\n".to_owned(), |text, line| text + &line));
     let format = FORMAT.replace("rev", "rad");
     assert!(import(large.path(), &format).is_ok());
 }
@@ -183,7 +183,7 @@ fn rows_with_missing_values_can_be_dropped() {
 
 #[test]
 fn selections_pick_rows_and_refuse_nothing() {
-    let file = file_with(&rows(100));
+    let file = file_with(rows(100));
     for (selection, expected, first) in [
         ("rows = [10, 60]", 50, 10),
         ("fraction = [0.0, 0.65]", 65, 0),
@@ -231,7 +231,7 @@ fn paired_files_must_contain_the_same_rows() {
 
 #[test]
 fn formats_are_checked_key_by_key() {
-    let file = file_with(&rows(50));
+    let file = file_with(rows(50));
     for (format, key) in [
         ("position = { columns = \"q{1..2}\" }\ntorque = { columns = \"tau{1..2}\" }", "`time`"),
         ("rate_hz = -5.0\nposition = { columns = \"q{1..2}\" }\ntorque = { columns = \"tau{1..2}\" }", "`rate_hz`"),

@@ -16,6 +16,9 @@ pub struct JointFilters {
 impl JointFilters {
     /// Filters for joints with this number of columns each (torque included) at `rate_hz`; without a filter every
     /// sample is a row.
+    ///
+    /// # Errors
+    /// Invalid settings of the filter for this rate.
     pub fn new(columns: &[usize], rate_hz: f64, filter: Option<&DecimationSettings>) -> Result<Self, FilterError> {
         // Designed once for all joints.
         let filter_of_all = filter.map(|settings| Decimator::new(settings, rate_hz, 0)).transpose()?;

@@ -219,6 +219,9 @@ impl LogPass<'_> {
     /// Passes the motion to `take` block by block, without its regressor, until the end or until `most_samples`. Uses
     /// the stored motion; otherwise reads the log and stores it if it fits. Returns the importer's report; `None` for a
     /// prepared motion.
+    ///
+    /// # Errors
+    /// A log that cannot be read, and errors of `take`.
     pub fn each_block(
         &self,
         take: &mut dyn FnMut(&MotionBlock) -> Result<(), LogError>,
@@ -268,6 +271,9 @@ impl LogPass<'_> {
     /// Selects pieces of the motion: about `samples` samples, in pieces of at most `piece` samples, each with a
     /// separate segment number. The pieces are spread over a stored log; otherwise they come from its beginning. Empty
     /// for a prepared motion. The second value is the number of samples from which the pieces were selected.
+    ///
+    /// # Errors
+    /// A log that cannot be read.
     pub fn some_pieces(&self, samples: usize, piece: usize) -> Result<(Vec<MotionBlock>, usize), LogError> {
         let piece = piece.max(1);
         let of = |blocks: &[MotionBlock]| {

@@ -19,6 +19,9 @@ impl RowBlock {
     }
 
     /// Adds `rows` rows (column-major); complete blocks go to `take`.
+    ///
+    /// # Errors
+    /// Errors of `take`.
     pub fn push<E>(
         &mut self,
         panel: &[f64],
@@ -42,6 +45,9 @@ impl RowBlock {
     }
 
     /// Passes the remaining rows to `take`.
+    ///
+    /// # Errors
+    /// Errors of `take`.
     pub fn finish<E>(mut self, take: impl FnOnce(&[f64], usize) -> Result<(), E>) -> Result<(), E> {
         if self.rows == 0 {
             return Ok(());

@@ -18,12 +18,11 @@ impl JointValues {
     pub(super) fn of(found: &Identification, class: TermClass) -> Self {
         let model = &found.model().parametric;
         let form = found.forms.iter().find(|form| form.class == class);
-        let values: Vec<(&TorqueTerm, f64)> = match form {
-            Some(form) => form.terms.iter().zip(form.values.iter().copied()).collect(),
-            None => {
-                let values = &found.consistent.parameters[model.model().inertial_count()..];
-                model.terms().iter().zip(values.iter().copied()).collect()
-            }
+        let values: Vec<(&TorqueTerm, f64)> = if let Some(form) = form {
+            form.terms.iter().zip(form.values.iter().copied()).collect()
+        } else {
+            let values = &found.consistent.parameters[model.model().inertial_count()..];
+            model.terms().iter().zip(values.iter().copied()).collect()
         };
         let mut changes: Vec<JointChange> = Vec::new();
         for (term, value) in values {
