@@ -1,8 +1,9 @@
 //! Errors of an identification; each message names the log or the place, and the fix.
 
 use crate::consistent::ConsistencyError;
-use crate::diagnosis::{DiagnosisError, InvalidLimit};
+use crate::diagnosis::DiagnosisError;
 use crate::estimators::EstimatorError;
+use crate::limits::InvalidLimit;
 use crate::payload::PayloadError;
 use crate::thresholds::ThresholdError;
 use dynident_dynamics::ParametricModelError;

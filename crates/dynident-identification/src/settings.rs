@@ -1,9 +1,9 @@
 //! Settings of an identification: filters, estimator, prior knowledge of bodies, selection of friction.
 
 use crate::consistent::{ConsistencyError, ConsistencySettings};
-use crate::diagnosis::DiagnosisSettings;
+use crate::diagnosis_settings::DiagnosisSettings;
 use crate::estimators::EstimationSettings;
-use crate::examination::ExaminationSettings;
+use crate::examination_settings::ExaminationSettings;
 use crate::friction::{FrictionSearch, JointFriction};
 use crate::log_noise::LogNoise;
 use crate::thresholds::DecisionThresholds;

@@ -3,9 +3,9 @@
 use super::friction_spans::FrictionSpans;
 use super::motion_rows::MotionRows;
 use super::nominal::nominal_torque;
-use super::settings::DescriptionSettings;
 use super::usual_errors::torques_of_likely_robots;
 use super::wrong_mass::{WrongMass, wrong_mass};
+use crate::diagnosis_settings::DescriptionSettings;
 use dynident_dynamics::ParametricModel;
 use nalgebra::DVector;
 

@@ -2,8 +2,8 @@
 
 use super::channels::Channels;
 use super::motion_rows::MotionRows;
-use super::settings::ChannelSettings;
 use super::span::dot;
+use crate::diagnosis_settings::ChannelSettings;
 
 /// Largest relative difference of duplicates: rounding of filters.
 const MAX_DIFFERENCE: f64 = 1.0e-6;

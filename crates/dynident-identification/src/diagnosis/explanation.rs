@@ -3,8 +3,8 @@
 
 use super::joint_fits::{JointFits, panels, score};
 use super::motion_rows::MotionRows;
-use super::settings::ScoreSettings;
 use crate::consistent::{ConsistencySettings, consistent_parameters};
+use crate::diagnosis_settings::ScoreSettings;
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::EstimationError;
 use dynident_rows::predicted_torque;

@@ -7,7 +7,7 @@ use super::lag_search::LagSearch;
 use super::mistakes::{Breadth, Mistake, Setup};
 use super::motion_rows::{INSTANTS, MotionRows};
 use super::plausibility::beyond_limits;
-use super::settings::DiagnosisSettings;
+use crate::diagnosis_settings::DiagnosisSettings;
 use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
 

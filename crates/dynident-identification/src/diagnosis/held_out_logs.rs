@@ -6,9 +6,9 @@ use super::held_out_hypothesis::{HeldOutHypothesis, KnownRobot, held_out_hypothe
 use super::hypothesis::Hypothesis;
 use super::lag_search::LagSearch;
 use super::motion_rows::{INSTANTS, MotionRows, MotionSamples};
-use super::settings::DiagnosisSettings;
 use super::unmodelled_payload::{UnmodelledPayload, unmodelled_payload};
 use crate::consistent::ConsistencySettings;
+use crate::diagnosis_settings::DiagnosisSettings;
 use dynident_rows::{Logs, RegressorModel, Role};
 
 #[derive(Clone, Debug, Default)]

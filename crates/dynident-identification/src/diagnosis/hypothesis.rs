@@ -5,10 +5,10 @@ use super::joint_fits::{JointFits, SharedMotion, score};
 use super::mistakes::{Mistake, Proof};
 use super::motion_rows::MotionRows;
 use super::plausibility::{BeyondLimit, beyond_limits, is_rate_of_a_recorder};
-use super::settings::{DiagnosisSettings, ScoreSettings};
 use super::span::norm;
 use super::step_width::with_fitted_steps;
 use crate::consistent::ConsistencySettings;
+use crate::diagnosis_settings::{DiagnosisSettings, ScoreSettings};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
 

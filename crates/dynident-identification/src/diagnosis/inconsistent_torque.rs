@@ -6,7 +6,7 @@ use super::explanation::Explanation;
 use super::further_friction::ratio_with_further_friction;
 use super::hypothesis::Hypothesis;
 use super::motion_rows::MotionRows;
-use super::settings::ChannelSettings;
+use crate::diagnosis_settings::ChannelSettings;
 use dynident_dynamics::ParametricModel;
 
 /// A torque that is inconsistent with the robot of the other joints.

@@ -9,7 +9,6 @@
 //! | --- | --- |
 //! | `mistakes` | the kinds of mistakes, one file each |
 //! | `motion_rows` | a few hundred instants of a recording |
-//! | `settings` | the limits behind all verdicts |
 //! | `joint_fits`, `explanation`, `nominal`, `plausibility` | the evidence: residuals of several fits, limits |
 //! | `step_width`, `friction_spans`, `further_friction`, `noise_torque`, `usual_errors`, `span` | other causes than mistakes: friction, noise, errors of descriptions |
 //! | `hypothesis`, `search`, `round`, `refinement` | the score, the best hypothesis, and its number |
@@ -42,7 +41,6 @@ mod plausibility;
 mod refinement;
 mod round;
 mod search;
-mod settings;
 mod span;
 mod step_width;
 mod training;
@@ -50,10 +48,15 @@ mod unmodelled_payload;
 mod usual_errors;
 mod wrong_mass;
 
+pub use crate::diagnosis_settings::{
+    AcceptanceSettings, ChannelSettings, DescriptionSettings, DiagnosisSettings, HeldOutSettings, LateChannelSettings,
+    MotionLimits, ScoreSettings,
+};
+pub use crate::limits::InvalidLimit;
 pub use channels::Channels;
 pub use description_fit::DescriptionFit;
 pub use duplicate_channels::DuplicateChannel;
-pub use error::{DiagnosisError, InvalidLimit};
+pub use error::DiagnosisError;
 pub use held_out_hypothesis::HeldOutHypothesis;
 pub use hypothesis::Hypothesis;
 pub use inconsistent_torque::InconsistentTorque;
@@ -61,15 +64,10 @@ pub use mistakes::{KeyChange, Mistake, StudyKeys};
 pub use motion_rows::MotionRows;
 pub use plausibility::BeyondLimit;
 pub use search::Search;
-pub use settings::{
-    AcceptanceSettings, ChannelSettings, DescriptionSettings, DiagnosisSettings, HeldOutSettings, LateChannelSettings,
-    MotionLimits, ScoreSettings,
-};
 pub use training::DiagnosisTask;
 pub use unmodelled_payload::UnmodelledPayload;
 pub use wrong_mass::WrongMass;
 
-pub(crate) use error::check_limits;
 pub(crate) use plausibility::{has_jumps, is_beyond_limits};
 
 use description_fit::description_fit;

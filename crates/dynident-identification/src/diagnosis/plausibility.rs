@@ -1,7 +1,7 @@
 //! Implausible motion: positions beyond stops, velocities beyond limits, a rate that no recorder has.
 
 use super::motion_rows::MotionRows;
-use super::settings::MotionLimits;
+use crate::diagnosis_settings::MotionLimits;
 use dynident_model::Model;
 use dynident_recording::ImportReport;
 use dynident_recording::log::Quantity;

@@ -2,7 +2,7 @@
 
 use super::explanation::predicted;
 use super::motion_rows::MotionRows;
-use super::settings::HeldOutSettings;
+use crate::diagnosis_settings::HeldOutSettings;
 use dynident_dynamics::{ParametricModel, Workspace, torque_regressor};
 use nalgebra::{DMatrix, DVector};
 

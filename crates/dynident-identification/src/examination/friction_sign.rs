@@ -3,7 +3,7 @@
 //! The least-squares estimate of the friction of a reversed joint is negative. [`sign_evidence`](super::sign_evidence)
 //! tests all joints together and does not detect a single joint.
 
-use super::settings::ExaminationSettings;
+use crate::examination_settings::ExaminationSettings;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_recording::{Finding, Level};

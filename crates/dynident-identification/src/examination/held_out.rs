@@ -3,9 +3,9 @@
 use super::motion_band::MotionBand;
 use super::nominal_agreement::{AgreementAccumulator, PriorAgreement};
 use super::residuals::{JointResiduals, ResidualAccumulator, Uncertainty};
-use super::settings::ExaminationSettings;
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
+use crate::examination_settings::ExaminationSettings;
 use crate::lag::{DelayCheck, TorqueLag, lags_after_pass};
 use dynident_estimation::{Validation, ValidationReport};
 use dynident_rows::{

@@ -5,12 +5,12 @@ mod held_out;
 mod motion_band;
 mod nominal_agreement;
 mod residuals;
-mod settings;
 mod stiction;
 mod torque_sign;
 mod torque_trace;
 mod training;
 
+pub use crate::examination_settings::ExaminationSettings;
 pub use crate::lag::{
     LagCandidates, LagChoice, LagFit, LagKind, LagRounds, TorqueLag, delay_findings, lag_fit, lags_of_recordings,
     pooled_delay,
@@ -19,7 +19,6 @@ pub use friction_sign::{FrictionSign, friction_sign_findings, friction_signs};
 pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, examine_held_out};
 pub use nominal_agreement::{PriorAgreement, agreement_findings};
 pub use residuals::{JointResiduals, TorqueBand, Uncertainty};
-pub use settings::ExaminationSettings;
 pub use stiction::Stiction;
 pub use torque_sign::{TorqueSignCheck, sign_evidence, sign_findings};
 pub use torque_trace::{JointTrace, LogTrace};

@@ -2,7 +2,7 @@
 //!
 //! Least squares fits either sign equally well, since all parameters change sign; a nominal model determines the sign.
 
-use super::settings::ExaminationSettings;
+use crate::examination_settings::ExaminationSettings;
 use dynident_dynamics::Column;
 use dynident_estimation::{
     EstimationError, FactorWorkspace, SegmentedFactor, TriangularFactor, nonnegative_least_squares,

@@ -3,8 +3,8 @@
 //! Least squares fits either sign equally well, since all parameters change sign. A physically consistent set has
 //! positive masses and inertias and dissipative friction, so it fits only one sign.
 
-use super::settings::ExaminationSettings;
 use crate::consistent::{ConsistencySettings, nearest_consistent_parameters};
+use crate::examination_settings::ExaminationSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_recording::{Finding, Level};

@@ -161,7 +161,7 @@ mod tests {
         assert!(message(&good.replace(",7,", ",nan,")).contains("column tau1"));
         assert!(message(&good.replace(",7,", ",")).contains("line 3: 5 fields"));
         assert!(message("t_s,q1,q2,tau1,tau2\n").contains("no rows"));
-        assert!(message("t_s;q1;q2;tau1;tau2\n0;1;2;3;4\n").contains("separated by commas; it is `t_s;q1"));
+        assert!(message("t_s;q1;q2;tau1;tau2\n0;1;2;3;4\n").contains("(`t_s;q1;q2;tau1;tau2`)"));
         let currents = "t_s,q1,q2,i1,i2\n0,1,2,3,4\n";
         assert!(message(currents).contains("no column tau1"));
         assert_eq!(parse(currents, &joints, 100.0, Some(&[10.0, -2.0])).unwrap().tau, [30.0, -8.0]);

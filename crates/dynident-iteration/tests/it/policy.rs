@@ -193,7 +193,7 @@ fn every_condition_counts_by_itself() {
     let message = with(&|record| record.estimate.as_mut().unwrap().joint_sigma[1] = 1.0);
     assert!(message.contains("9.9 %"), "{message}");
     let message = with(&|record| record.estimate.as_mut().unwrap().values[3] = 1.1);
-    assert!(message.contains("moved by 7.1 error bars"), "{message}");
+    assert!(message.contains("changed by 7.1 error bars"), "{message}");
     let message = with(&|record| record.controller.model = None);
     assert!(message.contains("newest model"), "{message}");
     let message = with(&|record| record.evidence = None);

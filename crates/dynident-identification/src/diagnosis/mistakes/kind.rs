@@ -5,7 +5,7 @@ use super::numbers::Number;
 use super::study_keys::{KeyChange, StudyKeys};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
-use crate::diagnosis::settings::DiagnosisSettings;
+use crate::diagnosis_settings::DiagnosisSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_model::Model;
 

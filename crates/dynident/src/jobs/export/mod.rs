@@ -65,7 +65,8 @@ pub fn export_stored(stored: &ResultFile, result_path: &Path, target: Target) ->
         return Err(Error::Result { path: result_path.to_owned(), message: message.to_owned() });
     }
     let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
-    written(stored, result_path, &model.robot().map_err(cannot)?, target)
+    let robot = model.robot().and_then(|robot| with_velocities(stored, robot)).map_err(cannot)?;
+    written(stored, result_path, &robot, target)
 }
 
 /// The identified robot in a form, with the terms that were fitted for the class of the form.
@@ -139,12 +140,16 @@ fn robot_model(
             violations.join("; ")
         )));
     }
-    // Results of earlier versions contain no velocities.
-    let training = stored.logs.iter().filter(|log| log.role == Role::Identify);
-    let velocities = recorded_velocities(training.map(|log| &log.velocities[..]), model.dof());
     let made = RobotModel::new(model, robot.terms().to_vec(), values);
-    made.and_then(|made| made.with_velocities(velocities))
+    made.and_then(|made| with_velocities(stored, made))
         .map_err(|source| Error::Export { path: path.to_owned(), source: Box::new(source) })
+}
+
+/// The robot with the velocities of the training logs; results of earlier versions contain none.
+fn with_velocities(stored: &ResultFile, robot: RobotModel) -> Result<RobotModel, ExportError> {
+    let training = stored.logs.iter().filter(|log| log.role == Role::Identify);
+    let velocities = recorded_velocities(training.map(|log| &log.velocities[..]), robot.model().dof());
+    robot.with_velocities(velocities)
 }
 
 /// Exports a payload of a `result.json` as a command for the controller of `reader`: the physically consistent body, in

@@ -1,6 +1,6 @@
 //! Limits behind the findings of the examination.
 
-use crate::diagnosis::{InvalidLimit, check_limits};
+use crate::limits::{InvalidLimit, check_limits};
 
 /// Limits behind the findings of the examination.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 //! "Unexplained share" is the residual of a joint's torque over this torque (root mean squares), 0 to 1. Scores are
 //! sums of its logarithm over all joints.
 
-use super::error::{InvalidLimit, check_limits};
+use crate::limits::{InvalidLimit, check_limits};
 
 /// Limits of the diagnosis by topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

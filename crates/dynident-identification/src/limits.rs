@@ -1,0 +1,19 @@
+//! Validation of limits in settings.
+
+use thiserror::Error;
+
+/// A limit that is not a finite value above zero.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[error("invalid {name}: {value}; use a finite value above zero")]
+pub struct InvalidLimit {
+    /// The field of the settings.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+}
+
+/// Checks that all limits are finite and above zero.
+pub(crate) fn check_limits(limits: &[(&'static str, f64)]) -> Result<(), InvalidLimit> {
+    let invalid = limits.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0));
+    invalid.map_or(Ok(()), |&(name, value)| Err(InvalidLimit { name, value }))
+}
