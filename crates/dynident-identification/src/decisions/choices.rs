@@ -32,6 +32,7 @@ pub(super) enum FrictionChoice {
 }
 
 /// Scope of a revision of the lag.
+#[allow(clippy::large_enum_variant, reason = "there is one value for each identification")]
 #[derive(Clone)]
 enum Origin {
     /// All other choices, because they were made from rows with the lag.
