@@ -19,7 +19,7 @@ pub struct LogFactors {
     /// if the noise is unknown.
     pub noise: Option<Vec<SegmentedFactor>>,
     /// Fit of the nominal values, if they are known and torque is in newton metres; for the model given to
-    /// [`training_rows`].
+    /// [`training_rows`](crate::training_rows).
     pub nominal_agreement: Option<PriorAgreement>,
 }
 

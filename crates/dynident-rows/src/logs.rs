@@ -147,7 +147,7 @@ impl<'a> Logs<'a> {
         self
     }
 
-    /// Adds [excerpts](crate::excerpt) for [passes over selected instants](Self::pass_for_instants).
+    /// Adds [excerpts](crate::excerpts) for [passes over selected instants](Self::pass_for_instants).
     #[must_use]
     pub fn with_excerpts(mut self, excerpts: Arc<Vec<Recording>>) -> Self {
         self.excerpts = excerpts;

@@ -91,13 +91,13 @@ impl RunEstimate {
     }
 }
 
-/// Identifies several runs together, as [`identify_run`](crate::estimation::identify_run) does for one. Each run is
+/// Identifies several runs together, as [`identify_run`](crate::identify_run) does for one. Each run is
 /// weighted by its own noise, joint by joint ([`LogNoise::Own`](dynident_identification::LogNoise::Own)), so a run with
 /// poor tracking has less weight. Residuals are those of the last run; delays are those of all runs. If the offset of a
 /// run differs from the others, each run gets its own offset ([`RunOffsets`](crate::RunOffsets)).
 ///
 /// # Errors
-/// As [`identify_run`](crate::estimation::identify_run).
+/// As [`identify_run`](crate::identify_run).
 pub fn identify_runs(
     task: &IterationTask,
     runs: &[RunLog<'_>],

@@ -63,7 +63,7 @@ pub struct Recording {
     pub whole: Option<Whole>,
 }
 
-/// Properties of the complete recording, stored with its [excerpt](crate::excerpt).
+/// Properties of the complete recording, stored with its [excerpt](crate::excerpts).
 #[derive(Clone, Debug)]
 pub struct Whole {
     /// Number of rows.
