@@ -163,7 +163,7 @@ mod tests {
         assert!(message("t_s,q1,q2,tau1,tau2\n").contains("no rows"));
         assert!(message("t_s;q1;q2;tau1;tau2\n0;1;2;3;4\n").contains("(`t_s;q1;q2;tau1;tau2`)"));
         let currents = "t_s,q1,q2,i1,i2\n0,1,2,3,4\n";
-        assert!(message(currents).contains("no column tau1"));
+        assert!(message(currents).contains("column tau1 is missing"));
         assert_eq!(parse(currents, &joints, 100.0, Some(&[10.0, -2.0])).unwrap().tau, [30.0, -8.0]);
     }
 }
