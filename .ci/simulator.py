@@ -4,6 +4,7 @@
 FOLDER contains train.csv and truth.json of the study. Damping and frictionloss are fitted independently to the true and the identified friction law, with numpy's least squares over
 the velocities of train.csv. Needs numpy, scipy, jsonschema."""
 import json
+import math
 import pathlib
 import subprocess
 import sys
@@ -75,7 +76,8 @@ def main():
         # The MJCF has the values that were fitted for it; those above approximate the identified law.
         own = of_mjcf[joint["name"]]
         for attribute, symbol in [("armature", "Ia"), ("damping", "fv"), ("frictionloss", "fc")]:
-            assert float(own.get(attribute)) == fitted[f"{symbol}{number}"], attribute
+            # The export solves for them once more.
+            assert math.isclose(float(own.get(attribute)), fitted[f"{symbol}{number}"], rel_tol=1e-9), attribute
         assert f"| {joint['name']} |" in table
     assert compared >= 14, compared
 
