@@ -163,7 +163,7 @@ def test_exceptions_say_where(planar: dynident.Robot, planar_logs: list[dynident
     with pytest.raises(dynident.StudyError) as raised:
         dynident.Study.load(bad)
     assert (str(raised.value.path), raised.value.line) == (str(bad), 2)
-    with pytest.raises(TypeError, match="sections already"):
+    with pytest.raises(TypeError, match="already contains its sections"):
         dynident.identify(dynident.study(planar, planar_logs), drive=DRIVE)
 
 
