@@ -110,8 +110,8 @@ fn headline(r: &ResultFile) -> String {
         );
     }
     text += &bands(r);
-    text += &super::forms::forms(r);
-    text + &beside(r)
+    text += &beside(r);
+    text + &super::forms::forms(r)
 }
 
 /// The frequency bands of fit and validation, if they differ.
