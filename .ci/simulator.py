@@ -65,7 +65,7 @@ def main():
         coulomb, viscous, _ = nearest(dq, law(true, np.tanh(dq / width)))
         for value, expected in [(joint["frictionloss"], coulomb), (joint["damping"], viscous), (joint["armature"], true[f"Ia{number}"])]:
             if value["half_width_95"] is None:
-                assert "told only in the sum" in value["note"], value
+                assert "identifiable only in the sum" in value["note"], value
                 continue
             print(f"  {value['value']:.4f} ± {value['half_width_95']:.4f} {value['unit']}, in truth {expected:.4f}")
             assert abs(value["value"] - expected) < BARS * value["half_width_95"]

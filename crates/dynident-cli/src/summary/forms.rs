@@ -13,8 +13,11 @@ pub(super) fn forms(r: &ResultFile) -> String {
         };
         let errors: Vec<String> = r.forms.iter().filter_map(of_form).collect();
         if !errors.is_empty() {
-            let line =
-                format!("error of exported files on [{}], each with the drives fitted for it: {}", number + 1, errors.join(", "));
+            let line = format!(
+                "error of exported files on [{}], each with the drives fitted for it: {}",
+                number + 1,
+                errors.join(", ")
+            );
             text += &wrapped(&line, 2);
         }
     }

@@ -17,6 +17,7 @@ pub(crate) enum Job<'w> {
 }
 
 impl<'w> Job<'w> {
+    /// The same job with a shorter lifetime, so that it can be combined with local data.
     pub(crate) fn shorter<'s>(self) -> Job<'s>
     where
         'w: 's,

@@ -95,7 +95,7 @@ fn note(stored: &ResultFile, term: &TermResult) -> Option<String> {
     if term.std.is_none() {
         let (value, bar) = (base.value, base.bar_95());
         return Some(format!(
-            "{} is told only in the sum {expression} = {value:.4} ± {bar:.4}; the values are those nearest to the robot description",
+            "{} is identifiable only in the sum {expression} = {value:.4} ± {bar:.4}; the values are those nearest to the robot description",
             term.symbol
         ));
     }
