@@ -106,7 +106,7 @@ def test_a_file_that_is_not_as_it_was_written_is_not_read(some: list[dynident.Fa
 
 def test_what_is_left_to_the_logs_is_refused_or_taken_from_a_model(planar: dynident.Robot) -> None:
     log = recorded(1, seconds=20.0)
-    with pytest.raises(dynident.StudyError, match="friction of joint .* is left to the logs"):
+    with pytest.raises(dynident.StudyError, match="friction of joint .* is automatic"):
         fleet.reduce(planar, log)
     with pytest.raises(dynident.StudyError, match="cut-off is left to the logs"):
         fleet.reduce(planar, log, friction="stated")

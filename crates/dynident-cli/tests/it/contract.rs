@@ -214,7 +214,8 @@ fn summaries_fit_eighty_columns_and_say_the_important_first() {
         assert!(line.starts_with("wrote ") || line.chars().count() <= 80, "{line}");
     }
     let at = |words: &str| ran.stdout.find(words).unwrap_or_else(|| panic!("no `{words}` in\n{}", ran.stdout));
-    assert!(at("held-out torque error") < at("torque error  fit %"));
+    assert!(at("held-out torque error") < at("error of exported files"));
+    assert!(at("error of exported files") < at("torque error  fit %"));
     assert!(
         at("all joints") < at("error bars:") && at("error bars:") < at("physics:") && at("physics:") < at("wrote ")
     );
