@@ -190,7 +190,7 @@ pub fn friction_figures(cell: &FrictionCell, runs: u64) -> Result<FrictionFigure
 
 /// Default drive terms of a study without keys; the width of the step is that of a usual arm, scaled to the robot.
 pub(crate) fn usual_drive(model: &Model, joint: usize) -> DriveChoice {
-    let width = model.own_scale().velocity(model.joints()[joint].turns(), CoulombShape::USUAL_WIDTH);
+    let width = model.characteristic_scale().velocity(model.joints()[joint].is_rotary(), CoulombShape::USUAL_WIDTH);
     let coulomb = Some(CoulombShape::Smooth { width });
     DriveChoice { viscous: true, coulomb, offset: true, ..DriveChoice::default() }
 }

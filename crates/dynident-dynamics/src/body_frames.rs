@@ -24,7 +24,7 @@ pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T
         let (inner, outer) = scratch.bodies.split_at_mut(index);
         let body = &outer[0];
         let map = &maps[index];
-        scratch.tau[index] = map.axis.splat().dot(if map.turns { body.moment } else { body.force });
+        scratch.tau[index] = map.axis.splat().dot(if map.is_rotary { body.moment } else { body.force });
         if let Some(parent) = map.parent {
             let Transform { rotation, translation } = &body.parent_from_body;
             let parent = &mut inner[parent];
@@ -74,7 +74,7 @@ pub(crate) fn moved<T: Scalar>(
         (Vec3::ZERO, Vec3::ZERO, rotation.transpose_mul_vec(gravity.splat()))
     };
     let own = axis.scale(dq);
-    if map.turns {
+    if map.is_rotary {
         body.omega = omega + own;
         body.alpha = axis.scale_add(ddq, omega.cross_add(own, alpha));
         body.acceleration = acceleration;
@@ -120,12 +120,12 @@ pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut Cor
         let (inner, outer) = scratch.composites.split_at_mut(index);
         let composite = &outer[0];
         // Force and moment that accelerate the composite along its joint's axis.
-        let (mut force, mut moment) = if map.turns {
+        let (mut force, mut moment) = if map.is_rotary {
             (axis.cross(composite.first_moment), composite.inertia_matrix().mul_vec(axis))
         } else {
             (axis.scale(composite.mass), composite.first_moment.cross(axis))
         };
-        matrix[index * dof + index] = axis.dot(if map.turns { moment } else { force });
+        matrix[index * dof + index] = axis.dot(if map.is_rotary { moment } else { force });
         let (mut at, mut link) = (index, map.parent);
         while let Some(parent) = link {
             let frame = &scratch.bodies[at].parent_from_body;
@@ -133,7 +133,7 @@ pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut Cor
             force = frame.rotation.mul_vec(force);
             moment = frame.translation.cross_add(force, frame.rotation.mul_vec(moment));
             let along: Vec3<T> = map.axis.splat();
-            let entry = along.dot(if map.turns { moment } else { force });
+            let entry = along.dot(if map.is_rotary { moment } else { force });
             matrix[index * dof + parent] = entry;
             matrix[parent * dof + index] = entry;
             (at, link) = (parent, map.parent);

@@ -110,12 +110,12 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
         let own = &mut outer_inertias[0];
         let ([j, m], h) = ([own.rotation, own.mass], own.coupling);
         // Column of the inertia along (about) the joint's axis z: moment, force.
-        let column = if step.turns {
+        let column = if step.is_rotary {
             (Vec3([j[2], j[4], j[5]]), Vec3(h.0[2]))
         } else {
             (Vec3([h.0[0][2], h.0[1][2], h.0[2][2]]), Vec3([m[2], m[4], m[5]]))
         };
-        let along = |moment: Vec3<T>, force: Vec3<T>| if step.turns { moment[2] } else { force[2] };
+        let along = |moment: Vec3<T>, force: Vec3<T>| if step.is_rotary { moment[2] } else { force[2] };
         own.inverse_inertia = along(column.0, column.1).recip();
         own.rest_torque = tau[index] - along(link.moment, link.force);
         let Some(parent) = step.parent else { continue };
@@ -192,7 +192,7 @@ fn joint_accelerations<T: Scalar>(
         };
         ddq[index] = (own.rest_torque - pull) * own.inverse_inertia;
         // From here on alpha and acceleration contain the contributions of the joint accelerations only.
-        let along = if step.turns { &mut alpha } else { &mut acceleration };
+        let along = if step.is_rotary { &mut alpha } else { &mut acceleration };
         along.0[2] += ddq[index];
         (link.alpha, link.acceleration) = (alpha, acceleration);
     }

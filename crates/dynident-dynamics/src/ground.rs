@@ -22,8 +22,8 @@ impl<T: Scalar> Spatial<T> {
 
     /// A joint's axis as a twist: `direction` in the base frame, through `point` for a revolute joint.
     #[inline(always)]
-    pub(crate) fn axis(turns: bool, direction: Vec3<T>, point: Vec3<T>) -> Self {
-        if turns {
+    pub(crate) fn axis(is_rotary: bool, direction: Vec3<T>, point: Vec3<T>) -> Self {
+        if is_rotary {
             Self { angular: direction, linear: point.cross(direction) }
         } else {
             Self { angular: Vec3::ZERO, linear: direction }

@@ -162,7 +162,7 @@ impl<T: Scalar> Hinges<T> {
             if step.parent.is_none() {
                 continue;
             }
-            if step.turns {
+            if step.is_rotary {
                 (sine[index], cosine[index]) = (*q + T::splat(step.offset)).sin_cos();
             } else {
                 position[index] = *q;
@@ -194,14 +194,14 @@ impl<T: Scalar> PlacedHinges<'_, T> {
     pub(crate) fn turned(&self, constant: &Mat3, step: &JointStep, index: usize) -> Turned<T> {
         let splat = |row: [f64; 3]| [T::splat(row[0]), T::splat(row[1]), T::splat(row[2])];
         let constant = Mat3([splat(constant.0[0]), splat(constant.0[1]), splat(constant.0[2])]);
-        Turned(if step.turns { self.about_z(index).after(&constant) } else { constant })
+        Turned(if step.is_rotary { self.about_z(index).after(&constant) } else { constant })
     }
 
     /// Origin of body `index` in its parent's frame.
     #[inline(always)]
     pub(crate) fn translation(&self, step: &JointStep, index: usize) -> Vec3<T> {
         let translation = step.translation.splat();
-        if step.turns { translation } else { step.slide.splat().scale_add(self.position[index], translation) }
+        if step.is_rotary { translation } else { step.slide.splat().scale_add(self.position[index], translation) }
     }
 }
 

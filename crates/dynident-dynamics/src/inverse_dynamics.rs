@@ -144,7 +144,7 @@ pub(crate) fn newton_euler_of<T: Scalar, B: Bodies<T>>(
         let (inner, outer) = wrenches.split_at_mut(index);
         let wrench = &outer[0];
         let (force, moment) = (wrench.force + next.force, wrench.moment + next.moment);
-        tau[index] = if step.turns { moment[2] } else { force[2] };
+        tau[index] = if step.is_rotary { moment[2] } else { force[2] };
         next = LinkWrench::ZERO;
         let Some(parent) = step.parent else { continue };
         let (force, moment) = with_hinge!(hinges, *step, index, |hinge| (hinge.up(force), hinge.up(moment)));
@@ -200,7 +200,7 @@ fn outward_of<T: Scalar, B: Bodies<T>>(
     for index in 0..joints {
         let step = &steps[index];
         match step.parent {
-            None if step.turns => {
+            None if step.is_rotary => {
                 let arriving = with_hinge!(hinges, *step, index, |hinge| hinge.down(base.acceleration));
                 (motion, wrenches[index]) = about_resting_axis(bodies, index, arriving, dq[index], ddq[index]);
             }
@@ -214,7 +214,7 @@ fn outward_of<T: Scalar, B: Bodies<T>>(
                     [hinge.down(motion.omega), hinge.down(motion.alpha), hinge.down(origin)]
                 });
                 motion = moved(step, arriving, dq[index], ddq[index]);
-                wrenches[index] = wrench(step.turns, bodies, index, &motion);
+                wrenches[index] = wrench(step.is_rotary, bodies, index, &motion);
             }
         }
         if step.branches {
@@ -248,7 +248,7 @@ fn about_resting_axis<T: Scalar>(
 fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T) -> LinkMotion<T> {
     let [mut omega, mut alpha, mut acceleration] = arriving;
     let [wx, wy, _] = omega.0;
-    if step.turns {
+    if step.is_rotary {
         // ω × z q̇
         alpha = Vec3([wy.mul_add(dq, alpha[0]), wx.neg_mul_add(dq, alpha[1]), alpha[2] + ddq]);
         omega.0[2] += dq;
@@ -270,7 +270,7 @@ fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T) -> 
 /// `f = m a + Γ h` and, about the frame's origin, `n = h × a + ∫ x × Γ x dm`, whose x entry is `Γ_z Σ_y - Γ_y Σ_z`
 /// (and so on) with the rows of Γ and Σ. Differences of Γ's diagonal are computed as sums that need no products.
 #[inline(always)]
-fn wrench<T: Scalar>(turns: bool, bodies: impl Bodies<T>, index: usize, motion: &LinkMotion<T>) -> LinkWrench<T> {
+fn wrench<T: Scalar>(is_rotary: bool, bodies: impl Bodies<T>, index: usize, motion: &LinkMotion<T>) -> LinkWrench<T> {
     let g = &motion.spin.0;
     let [ax, ay, az] = motion.acceleration.0;
     let [hx, hy, hz] = bodies.first(index).0;
@@ -284,7 +284,7 @@ fn wrench<T: Scalar>(turns: bool, bodies: impl Bodies<T>, index: usize, motion: 
     n.0[1] = g[2][1].neg_mul_add(xy, g[2][0].neg_mul_add(xx, g[0][1].mul_add(yz, y.mul_add(xz, n[1]))));
     n.0[2] = g[1][2].mul_add(xz, g[1][0].mul_add(xx, z.mul_add(xy, n[2])));
     n.0[2] = g[0][2].neg_mul_add(yz, g[0][1].neg_mul_add(yy, n[2]));
-    if !turns {
+    if !is_rotary {
         let along = Vec3([g[0][2], g[1][2], g[2][2]]);
         f = motion.acceleration.scale_add(bodies.mass(index), along.scale_add(hz, f));
         n.0[0] = g[1][2].neg_mul_add(zz, hz.neg_mul_add(ay, n[0]));

@@ -172,9 +172,9 @@ pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
         let step = &steps[index];
         let moments = gathered(step, bodies, index, kept, &next);
         let CompositeMoments { first: h, second: s } = &moments;
-        let diagonal = if step.turns { s[0] + s[3] } else { bodies.subtree_mass(index) };
+        let diagonal = if step.is_rotary { s[0] + s[3] } else { bodies.subtree_mass(index) };
         out.put(index * joints + index, at, diagonal);
-        let (mut f, mut n) = if step.turns {
+        let (mut f, mut n) = if step.is_rotary {
             (Vec3([-h[1], h[0], T::ZERO]), Vec3([-s[2], -s[4], diagonal]))
         } else {
             (Vec3([T::ZERO, T::ZERO, diagonal]), Vec3([h[1], -h[0], T::ZERO]))
@@ -192,7 +192,7 @@ pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
                 break;
             }
             (f, n) = (force, cross_shift(below.shift, translation, force, moment));
-            let work = if steps[parent].turns { n[2] } else { f[2] };
+            let work = if steps[parent].is_rotary { n[2] } else { f[2] };
             out.put(upper, at, work);
             out.put(lower, at, work);
             link = parent;
@@ -228,7 +228,7 @@ fn composite_rigid_bodies_in_bundles<T: Lane>(
         let CompositeMoments { first: h, second: s } = &moments;
         let (own, lane) = place[index];
         let (f, n) = (&mut force[own].0, &mut moment[own].0);
-        if step.turns {
+        if step.is_rotary {
             (-h[1]).add_at(&mut f[0], lane);
             h[0].add_at(&mut f[1], lane);
             (-s[2]).add_at(&mut n[0], lane);
@@ -241,7 +241,7 @@ fn composite_rigid_bodies_in_bundles<T: Lane>(
         }
         let (force, moment) = (&mut force[own..end[index]], &mut moment[own..end[index]]);
         let row = rows[(index * bundles + own) * lanes..].chunks_exact_mut(lanes);
-        for (column, to) in (if step.turns { &*moment } else { &*force }).iter().zip(row) {
+        for (column, to) in (if step.is_rotary { &*moment } else { &*force }).iter().zip(row) {
             column[2].store(to);
         }
         if step.parent.is_none() {

@@ -149,7 +149,7 @@ pub(crate) fn regressor_blocks<T: Lane>(
         let path = &axes.path[axes.path_start[index]..axes.path_start[index + 1]];
         let start = axes.bundle_start[index];
         let inherited = map.parent.map_or(0..0, |parent| axes.bundle_start[parent]..axes.bundle_start[parent + 1]);
-        let translation = if map.turns {
+        let translation = if map.is_rotary {
             map.translation.splat()
         } else {
             map.slide.splat().scale_add(q[index], map.translation.splat())
@@ -168,7 +168,7 @@ pub(crate) fn regressor_blocks<T: Lane>(
                 (*to_angular, *to_linear) = (bundled.down(*angular), bundled.down(linear));
             }
             let arriving = (turn.down(motion.omega), turn.down(motion.alpha), turn.down(origin));
-            if map.turns {
+            if map.is_rotary {
                 let (omega, alpha) = turn.rates(arriving.0, arriving.1, dq[index], ddq[index]);
                 (omega, alpha, arriving.2)
             } else {
@@ -177,7 +177,7 @@ pub(crate) fn regressor_blocks<T: Lane>(
         });
         motion = LinkMotion { omega, alpha, acceleration, spin: spin(omega, alpha) };
         let axis = map.axis.splat::<T>();
-        if !map.turns {
+        if !map.is_rotary {
             let coriolis = omega.cross(axis.scale(dq[index]));
             motion.acceleration = axis.scale_add(ddq[index], acceleration + coriolis + coriolis);
         }
@@ -190,14 +190,14 @@ pub(crate) fn regressor_blocks<T: Lane>(
             axes.angular[start + bundle] = Vec3::ZERO;
             axes.linear[start + bundle] = Vec3::ZERO;
         }
-        let own = if map.turns { &mut axes.angular } else { &mut axes.linear };
+        let own = if map.is_rotary { &mut axes.angular } else { &mut axes.linear };
         for k in 0..3 {
             axis[k].add_at(&mut own[start + bundle].0[k], place);
         }
         let wrench = WrenchBasis::new(&motion);
         sink.begin(index);
         let mut rest = axes.bundle_start[index + 1] - start;
-        if T::PER_BUNDLE == 1 && map.turns {
+        if T::PER_BUNDLE == 1 && map.is_rotary {
             // The joint's own axis passes through the frame's origin: no linear part.
             rest -= 1;
             macro_rules! along {

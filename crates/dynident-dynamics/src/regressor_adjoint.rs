@@ -211,7 +211,7 @@ fn reverse_sweep<T: Lane>(
                 let (by_angular, by_linear) = by_axes[start + k];
                 turned = by_angular.cross_add(angular, by_linear.cross_add(linear, turned));
                 let (outer_angular, outer_linear) = (rotation.mul_vec(by_angular), rotation.mul_vec(by_linear));
-                if !map.turns {
+                if !map.is_rotary {
                     slid += axes[to + k].0.cross(map.slide.splat()).dot(outer_linear);
                 }
                 let target = &mut by_axes[to + k];
@@ -220,8 +220,8 @@ fn reverse_sweep<T: Lane>(
             }
         }
         let joint = &mut joints[index];
-        let arriving_omega = if map.turns { body.omega - rate } else { body.omega };
-        if map.turns {
+        let arriving_omega = if map.is_rotary { body.omega - rate } else { body.omega };
+        if map.is_rotary {
             let arriving_alpha = body.alpha - axis.scale_add(core.ddq[index], arriving_omega.cross(rate));
             joint.dq = axis.dot(share.omega + share.alpha.cross(arriving_omega));
             joint.ddq = axis.dot(share.alpha);
@@ -243,7 +243,7 @@ fn reverse_sweep<T: Lane>(
         let outer = &core.bodies[parent];
         let (by_omega, by_alpha, by_swing) =
             (rotation.mul_vec(share.omega), rotation.mul_vec(share.alpha), rotation.mul_vec(share.acceleration));
-        if !map.turns {
+        if !map.is_rotary {
             let slide = map.slide.splat::<T>();
             let swing = outer.omega.cross_add(outer.omega.cross(slide), outer.alpha.cross(slide));
             joints[index].q += swing.dot(by_swing);
@@ -281,7 +281,7 @@ fn place_axes<T: Lane>(
             }
         }
         let axis = map.axis.splat::<T>();
-        axes[own] = if map.turns { (axis, Vec3::ZERO) } else { (Vec3::ZERO, axis) };
+        axes[own] = if map.is_rotary { (axis, Vec3::ZERO) } else { (Vec3::ZERO, axis) };
     }
 }
 

@@ -47,7 +47,7 @@ impl<T: Scalar> VariedBody<T> {
         self.placement.rotation = with_hinge!(hinges, *step, index, |hinge| hinge.after(&above.rotation));
         let Transform { rotation, translation } = &self.placement;
         let direction = Vec3([rotation.0[0][2], rotation.0[1][2], rotation.0[2][2]]);
-        self.axis = Spatial::axis(step.turns, direction, *translation);
+        self.axis = Spatial::axis(step.is_rotary, direction, *translation);
         self.moments = MassMoments::of(step, &self.placement);
     }
 

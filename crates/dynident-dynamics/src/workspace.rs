@@ -78,7 +78,7 @@ impl<T: Scalar> CoreScratch<T> {
 /// `parent_from_child` of a joint at position `q` with its sine and cosine.
 #[inline(always)]
 pub(crate) fn joint_transform<T: Scalar>(map: &JointMap, q: T, sine: T, cosine: T) -> Transform<T> {
-    if map.turns {
+    if map.is_rotary {
         // Loops instead of closures: a closure that is not inlined is compiled without vector instructions.
         let mut rotation = [[T::ZERO; 3]; 3];
         for i in 0..3 {

@@ -65,12 +65,12 @@ pub use factor::{
     SegmentSettings, SegmentShape, SegmentedFactor, TriangularFactor, Unexcited, unexcited_columns,
 };
 pub use linear::{
-    CrossProblem, EstimatorRows, FastMotion, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest,
-    HausmanVerdict, InstrumentReport, InstrumentalEstimate, InstrumentalSettings, JointGain, KnownColumns,
-    NoiseLevelSettings, NoiseWeightedEstimate, OrdinarySettings, OwnEstimate, RobustEstimate, RobustSettings, RowBlock,
-    RowVisitor, RowWeight, WeightedSettings, WeightedValues, estimate_by, fast_motion, generalized_least_squares,
-    hausman_test, instrumental_variables, joint_gains, noise_weighted_least_squares, ordinary_least_squares,
-    robust_least_squares, weighted_least_squares, weighted_least_squares_with_known, weighted_values,
+    CrossProblem, CustomEstimate, EstimatorRows, FastMotion, GainProblem, GeneralizedEstimate, HausmanSettings,
+    HausmanTest, HausmanVerdict, InstrumentReport, InstrumentalEstimate, InstrumentalSettings, JointGain, KnownColumns,
+    NoiseLevelSettings, NoiseWeightedEstimate, OrdinarySettings, RobustEstimate, RobustSettings, RowBlock, RowVisitor,
+    RowWeight, WeightedSettings, WeightedValues, estimate_by, fast_motion, generalized_least_squares, hausman_test,
+    instrumental_variables, joint_gains, noise_weighted_least_squares, ordinary_least_squares, robust_least_squares,
+    weighted_least_squares, weighted_least_squares_with_known, weighted_values,
 };
 pub use nonlinear::{
     ChannelNoise, ChannelRows, InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings,

@@ -91,7 +91,7 @@ impl DesignSettings {
         let least = if many_optima && family.is_linear() { MIN_SAMPLES_MULTIMODAL } else { MIN_SAMPLES };
         let each = family.parameters() / family.joints().max(1);
         let of_place = if limits.has_places() {
-            (limits.model().own_scale().round_hertz(PLACE_RATE_HZ) * family.duration_s()) as usize
+            (limits.model().characteristic_scale().round_hertz(PLACE_RATE_HZ) * family.duration_s()) as usize
         } else {
             0
         };
@@ -210,7 +210,7 @@ fn joint_scales(parameters: &[f64], joints: usize) -> Vec<f64> {
 /// Position ranges and velocity limits for random starts: those of the study where they are narrower than those of the
 /// robot description.
 pub(crate) fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
-    let free = |joint: &dynident_model::Joint| if joint.turns() { core::f64::consts::PI } else { 0.5 };
+    let free = |joint: &dynident_model::Joint| if joint.is_rotary() { core::f64::consts::PI } else { 0.5 };
     let mut ranges: Vec<[f64; 2]> = limits.model().joints().iter().map(|joint| [-free(joint), free(joint)]).collect();
     let mut speeds = vec![DEFAULT_START_SPEED; ranges.len()];
     for band in limits.bands() {

@@ -91,10 +91,10 @@ pub(crate) fn frictions(
                 "Joint {}: {coulomb} and {viscous} approximate its friction and offset {over} up to {:?} {}: off by {:.3} {unit} rms, {:.3} {unit} at most.",
                 joint.name,
                 found.most_speed,
-                if joint.turns() { "rad/s" } else { "m/s" },
+                if joint.is_rotary() { "rad/s" } else { "m/s" },
                 found.rms_error,
                 found.most_error,
-                unit = if joint.turns() { "Nm" } else { "N" },
+                unit = if joint.is_rotary() { "Nm" } else { "N" },
             ));
         }
     }
@@ -188,7 +188,7 @@ fn write_body(
     let pad = "  ".repeat(depth);
     let _ = writeln!(text, "{pad}<body name=\"{}\"{}>", body_name(body.name()), placement(&joint.placement));
     let _ = writeln!(text, "{pad}  {}", inertial(model, index)?);
-    let kind = if joint.turns() { "hinge" } else { "slide" };
+    let kind = if joint.is_rotary() { "hinge" } else { "slide" };
     let spring = spring(robot, index).map_or_else(String::new, |(stiffness, reference)| {
         format!(" stiffness=\"{stiffness:?}\" springref=\"{reference:?}\"")
     });

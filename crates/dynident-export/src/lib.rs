@@ -54,8 +54,8 @@ pub use exported::Exported;
 pub use model_file::{
     MODEL_SCHEMA, ModelBody, ModelConstant, ModelFile, ModelJoint, ModelLimits, ModelLink, ModelPlacement, ModelTerm,
 };
-pub use nearest_friction::{ComparedOver, NearestFriction, TermShare};
-pub use payload::{PayloadBody, PayloadReader, payload_command};
+pub use nearest_friction::{ComparedOver, NearestFriction, TermSensitivity};
+pub use payload::{ControllerBrand, PayloadBody, payload_command};
 pub use recorded_velocity::RecordedVelocity;
 pub use robot_model::RobotModel;
 pub use simulator::{DriveKnowledge, FrictionError, SIMULATOR_SCHEMA, SimulatorFile, SimulatorJoint, SimulatorValue};

@@ -228,14 +228,18 @@ impl ModelTerm {
             .map(|(term, value)| {
                 let felt: Vec<&Joint> = term.joints().into_iter().map(|joint| &joints[joint]).collect();
                 // The ratios of a coupling of a revolute and a prismatic joint have both units.
-                let turns = felt.iter().any(|joint| joint.turns());
+                let is_rotary = felt.iter().any(|joint| joint.is_rotary());
                 Self {
                     symbol: term.symbol(),
                     kind: term.kind_name().to_owned(),
                     joints: felt.iter().map(|joint| joint.name.clone()).collect(),
                     value,
-                    unit: unit(term.unit(), turns),
-                    constants: term.constants().into_iter().flat_map(|one| constants(one.0, one.1, turns)).collect(),
+                    unit: unit(term.unit(), is_rotary),
+                    constants: term
+                        .constants()
+                        .into_iter()
+                        .flat_map(|one| constants(one.0, one.1, is_rotary))
+                        .collect(),
                 }
             })
             .collect()
@@ -243,17 +247,17 @@ impl ModelTerm {
 }
 
 /// Unit at a revolute joint, or the corresponding unit at a prismatic joint.
-fn unit(revolute: &str, turns: bool) -> String {
-    if turns {
+fn unit(revolute: &str, is_rotary: bool) -> String {
+    if is_rotary {
         return revolute.to_owned();
     }
     revolute.replace("kg m^2", "kg").replace("Nm", "N").replace("rad", "m")
 }
 
 /// A constant with its unit in its name; a step becomes shape and width.
-fn constants(name: &'static str, value: TermConstant, turns: bool) -> Vec<(String, ModelConstant)> {
+fn constants(name: &'static str, value: TermConstant, is_rotary: bool) -> Vec<(String, ModelConstant)> {
     let with_unit = |name: &str, at_revolute: &str| {
-        let unit = if turns { at_revolute.to_owned() } else { at_revolute.replace("rad", "m") };
+        let unit = if is_rotary { at_revolute.to_owned() } else { at_revolute.replace("rad", "m") };
         format!("{name}{unit}")
     };
     let number = |name: String, value: f64| (name, ModelConstant::Number(value));

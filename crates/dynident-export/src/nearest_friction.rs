@@ -38,7 +38,7 @@ pub struct NearestFriction {
 
 /// Sensitivity of the nearest friction to the value of a term.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TermShare {
+pub struct TermSensitivity {
     /// Index of the term among the robot's terms.
     pub term: usize,
     /// `∂c/∂value`; zero if c is at its bound zero.
@@ -89,14 +89,14 @@ impl NearestFriction {
     ///
     /// # Panics
     /// If the model does not have the joint.
-    pub fn shares(robot: &RobotModel, joint: usize) -> Vec<TermShare> {
+    pub fn shares(robot: &RobotModel, joint: usize) -> Vec<TermSensitivity> {
         let (_, samples) = velocities(robot, joint);
         let law: Vec<f64> = samples.iter().map(|one| own_friction(robot, joint, one.velocity)).collect();
         let fit = Fit::of(&samples, &law);
         let share = |term: usize| {
             let unit = samples.iter().map(|one| own_friction_terms(robot, joint, one.velocity, Some(term)));
             let (coulomb, viscous) = fit.values(&samples, &unit.collect::<Vec<_>>());
-            TermShare { term, coulomb, viscous }
+            TermSensitivity { term, coulomb, viscous }
         };
         let terms = robot.terms().enumerate();
         let own = terms.filter(|(_, (term, _))| term.own_joint() == Some(joint) && !term.is_drive_inertia());

@@ -9,7 +9,7 @@ const MAX_RAPID_NAME_LENGTH: usize = 32;
 
 /// Manufacturer of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PayloadReader {
+pub enum ControllerBrand {
     /// Universal Robots: `set_target_payload` of URScript.
     UniversalRobots,
     /// Franka: JSON of the end effector in Desk, the numbers of `setLoad` of libfranka.
@@ -36,7 +36,7 @@ pub struct PayloadBody {
 /// axes of the flange (UR in the order xx, yy, zz, xy, xz, yz; Franka all nine entries). KUKA and ABB use the centre of
 /// mass in mm, principal moments, and their axes as angles A, B, C in degrees about Z, Y', X'' (KUKA) or as a
 /// quaternion (ABB).
-pub fn payload_command(payload: &PayloadBody, reader: PayloadReader) -> Option<String> {
+pub fn payload_command(payload: &PayloadBody, reader: ControllerBrand) -> Option<String> {
     let (mass, com) = (payload.inertial.mass_kg(), payload.inertial.com_m()?.0);
     let i = payload.inertial.inertia_at_com()?.0;
     let ([x, y, z], mut name) = (com, identifier(&payload.name));
@@ -46,15 +46,15 @@ pub fn payload_command(payload: &PayloadBody, reader: PayloadReader) -> Option<S
     }
     let mm = com.map(|x| 1e3 * x);
     Some(match reader {
-        PayloadReader::UniversalRobots => format!(
+        ControllerBrand::UniversalRobots => format!(
             "set_target_payload({mass:?}, [{x:?}, {y:?}, {z:?}], [{:?}, {:?}, {:?}, {:?}, {:?}, {:?}])\n",
             i[0][0], i[1][1], i[2][2], i[0][1], i[0][2], i[1][2]
         ),
-        PayloadReader::Franka => format!(
+        ControllerBrand::Franka => format!(
             "{{\"mass\": {mass:?}, \"centerOfMass\": [{x:?}, {y:?}, {z:?}], \"inertia\": [{:?}, {:?}, {:?}, {:?}, {:?}, {:?}, {:?}, {:?}, {:?}]}}\n",
             i[0][0], i[1][0], i[2][0], i[0][1], i[1][1], i[2][1], i[0][2], i[1][2], i[2][2]
         ),
-        PayloadReader::Kuka => {
+        ControllerBrand::Kuka => {
             let (moments, axes) = principal(&i);
             let [a, b, c] = z_y_x_angles(&axes).map(f64::to_degrees);
             format!(
@@ -62,7 +62,7 @@ pub fn payload_command(payload: &PayloadBody, reader: PayloadReader) -> Option<S
                 mm[0], mm[1], mm[2], moments[0], moments[1], moments[2]
             )
         }
-        PayloadReader::Abb => {
+        ControllerBrand::Abb => {
             let (moments, axes) = principal(&i);
             let [q1, q2, q3, q4] = quaternion(&axes);
             format!(
@@ -108,12 +108,12 @@ mod tests {
             // Rounding error of the parallel-axis theorem in both directions.
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{text}");
         };
-        let ur = payload_command(&box_(), PayloadReader::UniversalRobots).unwrap();
+        let ur = payload_command(&box_(), ControllerBrand::UniversalRobots).unwrap();
         close(
             ur.strip_prefix("set_target_payload").unwrap(),
             &[2.0, 0.01, -0.02, 0.08, 0.02, 0.03, 0.04, 0.001, -0.002, 0.003],
         );
-        let franka = payload_command(&box_(), PayloadReader::Franka).unwrap();
+        let franka = payload_command(&box_(), ControllerBrand::Franka).unwrap();
         let matrix = [0.02, 0.001, -0.002, 0.001, 0.03, 0.003, -0.002, 0.003, 0.04];
         let values = [&[2.0, 0.01, -0.02, 0.08][..], &matrix].concat();
         close(&franka.replace(|c: char| c.is_alphabetic(), " "), &values);
@@ -127,10 +127,10 @@ mod tests {
             let com = body.com_m().unwrap();
             let payload = PayloadBody { name: "p".to_owned(), inertial: body };
             let inertia = body.inertia_at_com().unwrap();
-            let kuka = payload_command(&payload, PayloadReader::Kuka).unwrap();
+            let kuka = payload_command(&payload, ControllerBrand::Kuka).unwrap();
             let n = numbers(kuka.strip_prefix("LOAD_DATA[1]").unwrap());
             let kuka_axes = Mat3::from_roll_pitch_yaw(n[6].to_radians(), n[5].to_radians(), n[4].to_radians());
-            let abb = payload_command(&payload, PayloadReader::Abb).unwrap();
+            let abb = payload_command(&payload, ControllerBrand::Abb).unwrap();
             let m = numbers(&abb);
             let abb_axes = Mat3::from_quaternion([m[5], m[6], m[7], m[4]]);
             for (axes, moments, numbers) in [(kuka_axes, &n[7..10], &n), (abb_axes, &m[8..11], &m)] {
@@ -149,9 +149,9 @@ mod tests {
     #[test]
     fn nothing_is_no_payload() {
         let nothing = PayloadBody { name: String::new(), inertial: InertialParameters::ZERO };
-        assert_eq!(payload_command(&nothing, PayloadReader::Abb), None);
+        assert_eq!(payload_command(&nothing, ControllerBrand::Abb), None);
         let mut huge = box_();
         huge.inertial.0[1] = 1e308;
-        assert_eq!(payload_command(&huge, PayloadReader::Abb), None);
+        assert_eq!(payload_command(&huge, ControllerBrand::Abb), None);
     }
 }

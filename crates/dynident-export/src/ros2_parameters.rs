@@ -41,7 +41,7 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
         let inertial = &model.inertials()[model.body_of(index)];
         let (com, inertia) = about_centre(inertial, body.name())?;
         let terms = ModelTerm::of(robot, |term| term.own_joint() == Some(index));
-        let (rotor, moment, damping, force) = if joint.turns() {
+        let (rotor, moment, damping, force) = if joint.is_rotary() {
             ("drive_inertia_kgm2", "coulomb_nm", "viscous_nm_s_per_rad", "torque")
         } else {
             ("drive_inertia_kg", "coulomb_n", "viscous_n_s_per_m", "force")

@@ -71,7 +71,7 @@ fn write_joint(
     let limits = &joint.limits;
     let stops = limits.lower.zip(limits.upper).filter(|(lower, upper)| lower < upper);
     let stops = stops.filter(|_| joint.kind != JointKind::Continuous);
-    let kind = match (joint.turns(), stops) {
+    let kind = match (joint.is_rotary(), stops) {
         (true, Some(_)) => "revolute",
         (true, None) => "continuous",
         (false, _) => "prismatic",

@@ -4,7 +4,7 @@ use crate::descriptions::omitted_terms;
 use crate::drive_torque::drive_inertia;
 use crate::error::ExportError;
 use crate::exported::Exported;
-use crate::nearest_friction::{ComparedOver, NearestFriction, TermShare};
+use crate::nearest_friction::{ComparedOver, NearestFriction, TermSensitivity};
 use crate::robot_model::RobotModel;
 use core::fmt::Write;
 use dynident_text::markdown;
@@ -123,11 +123,11 @@ impl SimulatorFile {
         same(actuator_gains.len(), model.dof())?;
         let rotors = drive_inertia(robot);
         let joints = (0..model.dof()).map(|joint| {
-            let turns = model.joints()[joint].turns();
-            let unit = |turning: &str, sliding: &str| if turns { turning.to_owned() } else { sliding.to_owned() };
+            let is_rotary = model.joints()[joint].is_rotary();
+            let unit = |turning: &str, sliding: &str| if is_rotary { turning.to_owned() } else { sliding.to_owned() };
             let nearest = NearestFriction::of(robot, joint);
             let shares = NearestFriction::shares(robot, joint);
-            let of_shares = |share: fn(&TermShare) -> f64| {
+            let of_shares = |share: fn(&TermSensitivity) -> f64| {
                 shares.iter().map(|one| (one.term, share(one))).filter(|(_, share)| *share != 0.0).collect::<Vec<_>>()
             };
             let drives =

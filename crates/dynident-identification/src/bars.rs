@@ -18,12 +18,12 @@ pub enum ErrorSource {
     /// Remaining uncertainty of the lag between motion and torque.
     Lag,
     /// Variation of the parameters from log to log.
-    BetweenLogs,
+    LogVariation,
     /// Uncertainty of the selected friction constants.
     FrictionConstants,
     /// Uncertainty of stated drive gains. Payloads only.
     Gains,
-    /// Uncertainty of the parameters that are held at nominal values ([`Conditional`](crate::Conditional)).
+    /// Uncertainty of the parameters that are held at nominal values ([`ConditionalEstimate`](crate::ConditionalEstimate)).
     NominalValues,
 }
 
@@ -103,7 +103,7 @@ mod tests {
         let bars = ErrorBars::default()
             .with(ErrorSource::Lag, Some(lag))
             .with(ErrorSource::FrictionConstants, None)
-            .with(ErrorSource::BetweenLogs, Some(logs));
+            .with(ErrorSource::LogVariation, Some(logs));
         let total = bars.total(&noise);
         assert_eq!(total.values, noise.values);
         assert!((total.covariance[(0, 0)] - noise.covariance[(0, 0)] - 13.0e-4).abs() < 1e-15);
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!((total.std[1], total.half_width_95[1]), (noise.std[1], noise.half_width_95[1]));
         let sources = bars.std_by_source(&noise, 0);
         let names: Vec<ErrorSource> = sources.iter().map(|(source, _)| *source).collect();
-        assert_eq!(names, [ErrorSource::Noise, ErrorSource::Lag, ErrorSource::BetweenLogs]);
+        assert_eq!(names, [ErrorSource::Noise, ErrorSource::Lag, ErrorSource::LogVariation]);
         let square: f64 = sources.iter().map(|(_, std)| std * std).sum();
         assert!((square.sqrt() - total.std[0]).abs() < 1e-12 * total.std[0], "{square} {}", total.std[0]);
         assert_eq!(bars.std_by_source(&noise, 1).len(), 1);

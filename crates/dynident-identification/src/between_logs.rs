@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 /// Differences of parameters between logs, in units of the logs' own error bars; 1 without variation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct BetweenLogs {
+pub struct LogVariation {
     /// Bodies and drive inertias; `None` if too few are determined by single logs.
     pub bodies: Option<f64>,
     /// Friction, offsets and other torques of the joints; `None` if too few are determined by single logs.
@@ -35,7 +35,7 @@ pub(crate) fn variation_of_logs(
     training: &Training,
     settings: &EstimationSettings,
     estimate: &Estimate,
-) -> Option<(DMatrix<f64>, BetweenLogs)> {
+) -> Option<(DMatrix<f64>, LogVariation)> {
     let problem = &training.problem;
     if problem.logs().len() < 2 || !training.columns.is_plain() {
         return None;
@@ -58,7 +58,7 @@ pub(crate) fn variation_of_logs(
     });
     let between = DMatrix::from_fn(count, count, |row, column| of_one[(row, column)] * apart(row) * apart(column));
     let of_mean = error_of_all(problem, estimate, &between).unwrap_or_else(|| &between / alone.len().max(1) as f64);
-    Some((of_mean + between, BetweenLogs { bodies, friction }))
+    Some((of_mean + between, LogVariation { bodies, friction }))
 }
 
 /// `Σ_l A_l T A_lᵀ` over the columns of T, `between`. `None` if the rows of all logs do not determine the free columns

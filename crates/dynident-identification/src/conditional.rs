@@ -21,7 +21,7 @@ pub struct Condition {
 
 /// Dependence of a base parameter on fixed parameters.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Conditional {
+pub struct ConditionalEstimate {
     /// Fixed parameters with a significant effect, strongest first; empty for an independent estimate.
     pub on: Vec<Condition>,
     /// Standard deviation from the error of the nominal values, in the parameter's unit; `None` if nominal values are
@@ -41,7 +41,7 @@ pub fn conditionals(
     estimate: &Estimate,
     noise_half_width_95: &[f64],
     knowledge: &ConsistencySettings,
-) -> Vec<Conditional> {
+) -> Vec<ConditionalEstimate> {
     let robot = &training.model.parametric;
     let count = training.columns.base();
     let fixed: Vec<_> = estimate.rank.fixed.iter().filter(|fixed| fixed.column < count).collect();
@@ -70,19 +70,19 @@ pub fn conditionals(
         let total = variance.map_or(f64::INFINITY, |variance| HALF_WIDTH_95 * variance.sqrt());
         let mut places: Vec<usize> = (0..fixed.len()).filter(|&place| part(place) > matters).collect();
         if total <= matters || places.is_empty() {
-            return Conditional::default();
+            return ConditionalEstimate::default();
         }
         let largest = places.iter().map(|&place| part(place)).fold(0.0, f64::max);
         places.retain(|&place| part(place) >= MIN_LISTED_RATIO * largest);
         places.sort_by(|a, b| part(*b).total_cmp(&part(*a)));
         let name = |&place: &usize| Condition { on: fixed[place].name.clone(), per_unit: answers[place] };
-        Conditional {
+        ConditionalEstimate {
             on: places.iter().map(name).collect(),
             nominal_std: variance.map(f64::sqrt),
             half_width_95: variance.map(|variance| own.hypot(HALF_WIDTH_95 * variance.sqrt())),
         }
     };
-    let of_fixed = |column: usize| Conditional {
+    let of_fixed = |column: usize| ConditionalEstimate {
         on: Vec::new(),
         nominal_std: spread.as_ref().map(|spread| spread[(column, column)].sqrt()),
         half_width_95: spread.as_ref().map(|spread| HALF_WIDTH_95 * spread[(column, column)].sqrt()),

@@ -131,7 +131,7 @@ pub struct MotionLimits {
     /// Largest ratio of a velocity to its limit; 1.5, since descriptions state rated velocities.
     pub max_velocity_ratio: f64,
     /// Lowest and highest rate of a recorder, Hz, for an arm of usual size
-    /// ([`OwnScale::hertz`](dynident_model::OwnScale::hertz)); 4 to 50,000.
+    /// ([`CharacteristicScale::hertz`](dynident_model::CharacteristicScale::hertz)); 4 to 50,000.
     pub recorder_rates_hz: [f64; 2],
     /// Largest interpolated share of a row's torque; 0.3. Rows with more are left out.
     pub max_interpolated: f64,
@@ -149,7 +149,7 @@ impl Default for MotionLimits {
 }
 
 /// Limits for channels that were logged too late or too early. Times are those of an arm of usual size
-/// ([`OwnScale::seconds`](dynident_model::OwnScale::seconds)), which moves at about 1 Hz.
+/// ([`CharacteristicScale::seconds`](dynident_model::CharacteristicScale::seconds)), which moves at about 1 Hz.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LateChannelSettings {
     /// Longest shift of all torques, s; 2.

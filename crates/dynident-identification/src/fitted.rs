@@ -1,7 +1,7 @@
 //! Estimate from recordings: decisions, the last fit, and the terms of its error bars.
 
 use crate::bars::{ErrorBars, ErrorSource};
-use crate::between_logs::{BetweenLogs, variation_of_logs};
+use crate::between_logs::{LogVariation, variation_of_logs};
 use crate::decisions::{Choices, DECISIONS, Job, Workspace, decide_all};
 use crate::error::IdentificationError;
 use crate::lag::{LagChoice, LagKind, gain_errors};
@@ -20,7 +20,7 @@ pub(crate) struct Fitted<'a> {
     pub(crate) fit: Fit<'a>,
     pub(crate) choices: Choices,
     pub(crate) lag: LagChoice,
-    pub(crate) between_logs: Option<BetweenLogs>,
+    pub(crate) between_logs: Option<LogVariation>,
     /// Terms of the estimate's covariance in addition to the noise.
     pub(crate) bars: ErrorBars,
     pub(crate) times: StageTimes,
@@ -63,7 +63,7 @@ pub(crate) fn fitted<'a>(
     let (bars, between_logs) = if is_model && fit.settings.estimation.estimator.reads_filtered_rows() {
         let variation = variation_of_logs(&fit.training, &fit.settings.estimation, &fit.estimation.estimate);
         let (covariance, between_logs) = variation.unzip();
-        (bars.with(ErrorSource::BetweenLogs, covariance), between_logs)
+        (bars.with(ErrorSource::LogVariation, covariance), between_logs)
     } else {
         (bars, None)
     };

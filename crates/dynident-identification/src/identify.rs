@@ -2,7 +2,7 @@
 
 use crate::bandwidth::CutoffByError;
 use crate::bars::{ErrorBars, ErrorSource};
-use crate::between_logs::BetweenLogs;
+use crate::between_logs::LogVariation;
 use crate::conditional::resting_joints;
 use crate::consistent::inertials;
 use crate::decisions::Job;
@@ -67,7 +67,7 @@ pub struct Identification {
     pub torque_lag: LagChoice,
     /// Variation between training logs beyond their own error bars, which is included in the error bars of the
     /// estimate; `None` for a single log.
-    pub between_logs: Option<BetweenLogs>,
+    pub between_logs: Option<LogVariation>,
     /// Time of the stages.
     pub times: StageTimes,
 }

@@ -154,10 +154,10 @@ mod training;
 
 pub use bandwidth::{CutoffByError, CutoffCandidate, choose_cutoff};
 pub use bars::{ErrorBars, ErrorSource};
-pub use between_logs::BetweenLogs;
+pub use between_logs::LogVariation;
 pub use check::{StudyExamination, examine_study};
 pub use chosen_friction::{ChosenFriction, choose_friction};
-pub use conditional::{Condition, Conditional, conditionals, resting_joints};
+pub use conditional::{Condition, ConditionalEstimate, conditionals, resting_joints};
 pub use drive_inertia::{DriveInertiaChoice, DriveInertiaEstimate, choose_drive_inertia};
 pub use dynident_rows as rows;
 pub use dynident_rows::{
@@ -166,7 +166,7 @@ pub use dynident_rows::{
 pub use error::{IdentificationError, ReduceError};
 pub use estimators::EstimationSettings;
 pub use identify::{Identification, identify, identify_payload, identify_with_instruments};
-pub use likelihood::schwarz;
+pub use likelihood::bic;
 pub use log_factors::{LogFactors, log_factors};
 pub use log_noise::LogNoise;
 pub use reduced::{ReducedLog, identify_reduced, reduce, reduced_errors};

@@ -26,7 +26,7 @@ impl JointScore {
     /// independent rows (Kish, *Survey Sampling*, 1965, 8.2). Smaller is better; 0 for a joint without rows.
     ///
     /// Source of the correction: Rao and Scott, Annals of Statistics 12 (1984) 46.
-    pub(crate) fn schwarz(&self, design_effect: f64) -> f64 {
+    pub(crate) fn bic(&self, design_effect: f64) -> f64 {
         let independent = (self.rows as f64 / design_effect).max(1.0);
         deviance_of_joint(self.rows, self.sigma) / design_effect + self.own as f64 * independent.ln()
     }
@@ -34,7 +34,7 @@ impl JointScore {
 
 /// Bayesian information criterion (BIC) of a fit with k free parameters and n rows, `deviance + k ln n`; smaller is
 /// better. Source: Schwarz, Annals of Statistics 6 (1978) 461.
-pub fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
+pub fn bic(problem: &LinearProblem, fit: &Estimate) -> f64 {
     let rows = problem.joint_rows().into_iter().sum::<usize>().max(1) as f64;
     let free = (fit.values.len() - fit.rank.fixed.len()) as f64;
     deviance(problem, &fit.joint_sigma) + free * rows.ln()
@@ -48,10 +48,10 @@ mod tests {
     #[test]
     fn repeated_rows_do_not_add_evidence() {
         let score = |rows: usize| JointScore { rows, sigma: 0.3, own: 5 };
-        let (once, repeated) = (score(250).schwarz(1.0), score(1000).schwarz(4.0));
+        let (once, repeated) = (score(250).bic(1.0), score(1000).bic(4.0));
         assert!((once - repeated).abs() < 1e-9 * once.abs(), "{once} {repeated}");
         // Without the correction, the evidence is four times as strong.
-        assert!(score(1000).schwarz(1.0) < 3.0 * once);
-        assert_eq!(JointScore::default().schwarz(1.0), 0.0);
+        assert!(score(1000).bic(1.0) < 3.0 * once);
+        assert_eq!(JointScore::default().bic(1.0), 0.0);
     }
 }

@@ -116,7 +116,7 @@ fn identified(
     let Estimation { estimate: noise, .. } = estimate(&training_rows.rows(&logs, settings, &training), None)?;
     let variation = variation_of_logs(&training_rows, &settings.estimation, &noise);
     let (covariance, between_logs) = variation.unzip();
-    let bars = ErrorBars::default().with(ErrorSource::BetweenLogs, covariance);
+    let bars = ErrorBars::default().with(ErrorSource::LogVariation, covariance);
     let estimate = bars.total(&noise);
     let consistent = consistent_stage(&logs, settings, &training_rows, &estimate)?;
     let dof = training_rows.model.dof();

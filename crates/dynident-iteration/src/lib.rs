@@ -14,7 +14,7 @@
 //! | a custom robot | a type that implements [`Robot`] |
 //! | identification of one run | [`identify_run`]: all joints at once, or joint by joint from tip to base as in the paper |
 //! | joint identification of several runs | [`identify_runs`], each weighted by its own noise |
-//! | unmet conditions | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`Shortfall`]) |
+//! | unmet conditions | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`UnmetCondition`]) |
 //! | the next run | [`Iteration::next`], a pure function of the records: controller and model, rejection of worse runs, convergence |
 //! | a next motion that excites the least known directions | a [`MotionPlanner`]: [`Redesign`], with [`Iteration::with_planner`] |
 //! | storage, and resuming with the same result | [`IterationStore`] |
@@ -90,7 +90,7 @@ pub use evidence::held_out_motion::{HeldOutMotion, HeldOutRun};
 pub use evidence::run_evidence::{Clipping, JointEvidence, Prediction, RunEvidence};
 pub use planning::planner::{BeforeRun, GoodRun, MotionPlanner, PlannedMotion};
 pub use planning::redesign::{Redesign, RedesignSettings};
-pub use policy::convergence::Shortfall;
+pub use policy::convergence::UnmetCondition;
 pub use policy::friction_chosen::friction_chosen;
 pub use policy::next_step::{Next, RunPlan};
 pub use policy::record::{RunRecord, UsedController};
@@ -100,22 +100,22 @@ pub use runs::course::{IterationOutcome, iterate, iterate_supervised};
 pub use runs::iteration::Iteration;
 pub use setup::error::IterationError;
 pub use setup::gains::{DerivedControllers, GainSettings, LoweredBandwidth, derived_controllers, lowered_bandwidths};
-pub use setup::home::{FoundWays, HomeError, HomeSettings};
+pub use setup::home::{FoundPaths, HomeError, HomeSettings};
 pub use setup::leg::{IterationTask, Leg};
 pub use setup::model_parameters::ModelParameters;
 pub use setup::rehearsal::{Rehearsal, RehearsalFailure, RehearsalSettings};
 pub use setup::safety::SafetySettings;
 pub use setup::settings::{
-    IterationSettings, RunIdentificationSettings, RunOffsets, Scheme, SettledSettings, StartWith,
+    ConvergenceSettings, IterationSettings, RunIdentificationSettings, RunOffsets, Scheme, StartWith,
 };
 pub use setup::status::IterationStatus;
 pub use setup::torque_check_settings::{CauseSettings, TorqueCheckSettings};
 pub use setup::typical_drives::with_typical_drives;
 pub use setup::verdict_settings::{LengthSettings, VerdictSettings};
 pub use setup::warm_up::WarmUp;
-pub use signals::near_rest::NearRest;
+pub use signals::near_rest::SamplesNearRest;
 pub use signals::oscillation::{Oscillation, OscillationLimits, OscillationSettings};
-pub use signals::rests::RestMargin;
+pub use signals::rests::StictionBand;
 pub use storage::fingerprint::other_settings;
 pub use storage::store::{IterationStore, RUN_SCHEMA, RunFile};
 pub use torque_check::{CommandSource, JointTorqueCheck, TorqueCandidate, TorqueCause, TorqueCheck};

@@ -116,7 +116,7 @@ pub struct JointMap {
     /// Index of the parent body, or `None` for the base.
     pub parent: Option<usize>,
     /// True for revolute and continuous joints.
-    pub turns: bool,
+    pub is_rotary: bool,
     /// Unit axis in the child frame.
     pub axis: Vec3,
     /// Part of the rotation that does not depend on `q`.
@@ -150,12 +150,12 @@ impl Joint {
     pub fn map(&self) -> JointMap {
         let placement = &self.placement.rotation;
         let (parent, axis, translation) = (self.parent, self.axis, self.placement.translation);
-        if self.turns() {
+        if self.is_rotary() {
             // Rodrigues: R(q) = P (a aᵀ + cos q (1 - a aᵀ) + sin q [a]×).
             let constant = placement.mul_mat(&Mat3::outer(axis, axis));
             JointMap {
                 parent,
-                turns: true,
+                is_rotary: true,
                 axis,
                 constant,
                 cosine: *placement - constant,
@@ -168,7 +168,7 @@ impl Joint {
         } else {
             JointMap {
                 parent,
-                turns: false,
+                is_rotary: false,
                 axis,
                 constant: *placement,
                 cosine: Mat3::ZERO,
@@ -195,7 +195,7 @@ impl Joint {
     }
 
     /// True for revolute and continuous joints.
-    pub fn turns(&self) -> bool {
+    pub fn is_rotary(&self) -> bool {
         self.kind != JointKind::Prismatic
     }
 }

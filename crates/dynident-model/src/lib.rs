@@ -13,7 +13,7 @@
 //! | masses, centres of mass, inertias | [`Model::inertials`], [`InertialParameters`] |
 //! | replace the inertials | [`Model::with_inertials`] |
 //! | friction, drive inertia, offsets of every joint | [`terms::terms_per_joint`]; single terms: [`terms::TorqueTerm`] |
-//! | characteristic time and length of the robot | [`Model::own_scale`] |
+//! | characteristic time and length of the robot | [`Model::characteristic_scale`] |
 //! | check physical consistency | [`audit()`], [`InertialParameters::pseudo_inertia`] |
 //! | write inertials into the user's robot description | [`link_changes`], [`rewrite_urdf`], [`rewrite_mjcf`], [`rewrite_sdf`], [`rewrite_dh`] |
 //! | write any model as URDF | [`write_urdf`] |
@@ -51,6 +51,7 @@
 #![forbid(unsafe_code)]
 
 pub mod audit;
+mod characteristic_scale;
 pub mod collision;
 mod coupling;
 pub mod dh;
@@ -60,7 +61,6 @@ mod inertial;
 mod joint;
 pub mod loops;
 pub mod mjcf;
-mod own_scale;
 mod place;
 mod read;
 pub mod sample;
@@ -75,9 +75,10 @@ mod xacro;
 mod xml;
 
 pub use audit::{
-    AuditFinding, AuditLevel, AuditSettings, Correction, Slip, SlipKind, SlipSettings, Slips, audit, audit_with, slips,
-    slips_with,
+    AuditFinding, AuditLevel, AuditSettings, Correction, DescriptionError, SlipKind, SlipSettings, Slips, audit,
+    audit_with, slips, slips_with,
 };
+pub use characteristic_scale::CharacteristicScale;
 pub use coupling::JointCoupling;
 pub use dh::{DhError, DhFault, DhWriteError, read_dh, rewrite_dh};
 pub use dh_convention::DhConvention;
@@ -86,7 +87,6 @@ pub use inertial::{INERTIAL_NAMES, InertialParameters};
 pub use joint::{Joint, JointKind, JointLimits, JointMap, JointSpring, Mimic, MimicSource};
 pub use loops::{LoopClosure, LoopError};
 pub use mjcf::{MjcfError, MjcfFault, MjcfNotice, MjcfRobot, MjcfWriteError, read_mjcf, read_mjcf_with, rewrite_mjcf};
-pub use own_scale::OwnScale;
 pub use place::{Located, line_and_column};
 pub use read::{
     DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, has_xacro_macros, load_robot, load_robot_with,
@@ -94,7 +94,7 @@ pub use read::{
 };
 pub use sdf::{SdfError, SdfFault, SdfLoss, SdfNotice, SdfRobot, SdfWriteError, read_sdf, rewrite_sdf};
 pub use spatial::{Mat3, Transform, Vec3};
-pub use steps::{Hang, JointStep, StepRotation};
+pub use steps::{JointStep, ParentRelation, StepRotation};
 pub use structure::Shift;
 pub use tree::{Body, Link, Model, STANDARD_GRAVITY};
 pub use urdf::{

@@ -146,7 +146,7 @@ impl<'a> Loops<'a> {
         for _ in 0..POSTURE_COUNT {
             for &joint in active {
                 let reach =
-                    if model.tree_joints()[joint].turns() { POSTURE_RANGE_RAD } else { 0.2 * POSTURE_RANGE_RAD };
+                    if model.tree_joints()[joint].is_rotary() { POSTURE_RANGE_RAD } else { 0.2 * POSTURE_RANGE_RAD };
                 q[joint] = random.uniform(-reach, reach);
             }
             for (row, &joint) in passive.iter().enumerate() {
@@ -251,7 +251,7 @@ fn jacobian(model: &Model, cuts: &[Cut], q: &[f64], by: &[usize]) -> DMatrix<f64
                 let Some(column) = by.iter().position(|own| *own == joint) else { continue };
                 let own = &model.tree_joints()[joint];
                 let axis = placement.rotation.mul_vec(own.axis);
-                let moves = if own.turns() { axis.cross(point - placement.translation) } else { axis };
+                let moves = if own.is_rotary() { axis.cross(point - placement.translation) } else { axis };
                 for (row, x) in moves.0.into_iter().enumerate() {
                     all[(3 * number + row, column)] += sign * x;
                 }

@@ -35,7 +35,7 @@ pub struct JointStep {
     /// Index of the parent body, or `None` for the base.
     pub parent: Option<usize>,
     /// True for revolute joints, false for prismatic joints.
-    pub turns: bool,
+    pub is_rotary: bool,
     /// Offset added to the position of a revolute joint, rad: angle between the x axes of the inner frame and the body
     /// frame.
     pub offset: f64,
@@ -60,12 +60,12 @@ pub struct JointStep {
     /// True if a body other than the next one is a child of this body, so that its state is needed later.
     pub branches: bool,
     /// Relation to the parent.
-    pub hang: Hang,
+    pub hang: ParentRelation,
 }
 
 /// Relation of a body to its parent; all false at the base.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Hang {
+pub struct ParentRelation {
     /// True if no sibling has a higher index: in a pass from the tips to the base, this body is the first to contribute
     /// to the parent.
     pub is_last_child: bool,
@@ -89,20 +89,21 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
         // W = Rz(γ) Rx(α) Rz(δ), third column: (sin γ sin α, -cos γ sin α, cos α).
         right.map_or(0.0, |w| w[0][2].atan2(-w[1][2]))
     };
-    let turns: Vec<f64> = (0..tree.len()).map(turn).collect();
-    let frames: Vec<Mat3> = plain.iter().zip(&turns).map(|(frame, angle)| frame.mul_mat(&about_z(*angle))).collect();
+    let is_rotary: Vec<f64> = (0..tree.len()).map(turn).collect();
+    let frames: Vec<Mat3> =
+        plain.iter().zip(&is_rotary).map(|(frame, angle)| frame.mul_mat(&about_z(*angle))).collect();
 
     let mut steps: Vec<JointStep> = Vec::with_capacity(tree.len());
     for (index, joint) in tree.iter().enumerate() {
         let parent_frame = joint.parent.map_or(Mat3::IDENTITY, |parent| frames[parent]);
         let w = relative(index, &parent_frame);
-        let (rotation, offset) = if joint.turns() {
+        let (rotation, offset) = if joint.is_rotary() {
             let (rotation, before) = constant_rotation(&w);
-            (rotation, before + turns[index])
+            (rotation, before + is_rotary[index])
         } else {
-            (StepRotation::General(w.mul_mat(&about_z(turns[index]))), 0.0)
+            (StepRotation::General(w.mul_mat(&about_z(is_rotary[index]))), 0.0)
         };
-        let slide = if joint.turns() { Vec3::ZERO } else { column(&w, 2) };
+        let slide = if joint.is_rotary() { Vec3::ZERO } else { column(&w, 2) };
         let translation = parent_frame.transpose_mul_vec(joint.placement.translation);
         let frame = &frames[index];
         let [mass, _, _, _, xx, xy, xz, yy, yz, zz] = inertials[index].0;
@@ -111,11 +112,11 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
         let second = frame.transpose().mul_mat(&second).mul_mat(frame).0;
         steps.push(JointStep {
             parent: joint.parent,
-            turns: joint.turns(),
+            is_rotary: joint.is_rotary(),
             offset,
             rotation,
             translation,
-            shift: if joint.turns() { Shift::of(translation) } else { Shift::Any },
+            shift: if joint.is_rotary() { Shift::of(translation) } else { Shift::Any },
             slide,
             mass,
             first: frame.transpose_mul_vec(inertials[index].first_moment()),
@@ -124,11 +125,11 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
             is_tip: tree.iter().all(|other| other.parent != Some(index)),
             branches: tree.iter().skip(index + 2).any(|other| other.parent == Some(index)),
             hang: joint.parent.map_or(
-                Hang { is_last_child: false, follows: false, on_resting_axis: false },
-                |parent| Hang {
+                ParentRelation { is_last_child: false, follows: false, on_resting_axis: false },
+                |parent| ParentRelation {
                     is_last_child: tree[index + 1..].iter().all(|other| other.parent != Some(parent)),
                     follows: parent + 1 == index,
-                    on_resting_axis: tree[parent].parent.is_none() && tree[parent].turns(),
+                    on_resting_axis: tree[parent].parent.is_none() && tree[parent].is_rotary(),
                 },
             ),
         });
@@ -142,7 +143,7 @@ fn regroup(steps: &mut [JointStep]) {
     for index in (0..steps.len()).rev() {
         let (inner, outer) = steps.split_at_mut(index);
         let step = &mut outer[0];
-        if step.turns {
+        if step.is_rotary {
             let (mass, along, second) = (step.mass, step.first[2], step.second[5]);
             (step.mass, step.first.0[2], step.second[5]) = (0.0, 0.0, 0.0);
             if let Some(parent) = step.parent {
@@ -222,7 +223,7 @@ mod tests {
                 StepRotation::Quarter => Mat3([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
                 StepRotation::General(rotation) => rotation,
             };
-            let own = if step.turns {
+            let own = if step.is_rotary {
                 Transform { rotation: constant.mul_mat(&about_z(q + step.offset)), translation: step.translation }
             } else {
                 Transform { rotation: constant, translation: step.slide.scale_add(*q, step.translation) }
@@ -286,11 +287,11 @@ mod tests {
     fn moments_on_an_axis_move_to_the_parent() {
         for seed in 0..20 {
             let model = random_tree(seed, 8);
-            for step in model.steps().iter().filter(|step| step.turns) {
+            for step in model.steps().iter().filter(|step| step.is_rotary) {
                 assert_eq!((step.mass, step.first[2], step.second[5]), (0.0, 0.0, 0.0));
             }
             // The remaining prismatic bodies carry all masses.
-            let masses = model.steps().iter().filter(|step| !step.turns).map(|step| step.mass).sum::<f64>();
+            let masses = model.steps().iter().filter(|step| !step.is_rotary).map(|step| step.mass).sum::<f64>();
             let whole: f64 =
                 model.steps().iter().filter(|step| step.parent.is_none()).map(|step| step.subtree_mass).sum();
             assert!((masses - whole).abs() <= 1e-12 * whole.max(1.0), "{masses} against {whole}");

@@ -46,7 +46,7 @@ pub struct Residuals {
 
 /// Time scale at which a contact was detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
+pub enum TimeScale {
     /// Short time constant.
     Collision,
     /// Long time constant.
@@ -59,7 +59,7 @@ pub struct Contact {
     /// The joint.
     pub joint: usize,
     /// Time scale of the detection.
-    pub look: Look,
+    pub look: TimeScale,
     /// Mean residual over the time constant, minus its level on undisturbed motion, Nm (N).
     pub residual_nm: f64,
     /// Threshold for the allowed false-alarm rate, Nm (N).
@@ -184,7 +184,7 @@ impl ContactMonitor {
         let gains = [self.settings.collision_s, self.settings.payload_s].map(|s| mean_gain(s, self.settings.rate_hz));
         let (mut strongest, mut most) = (None, 1.0);
         for (joint, residual) in residuals.iter().enumerate() {
-            for (place, look) in [Look::Collision, Look::Payload].into_iter().enumerate() {
+            for (place, look) in [TimeScale::Collision, TimeScale::Payload].into_iter().enumerate() {
                 let mean = &mut self.means[joint][place];
                 *mean += gains[place] * (residual - *mean);
                 let (off, threshold_nm) = (*mean - self.levels[joint][place], self.thresholds[joint][place]);

@@ -21,7 +21,7 @@ mod error;
 mod estimator;
 mod watch;
 
-pub use contact::{Contact, ContactMonitor, ContactSettings, Look, Residuals};
+pub use contact::{Contact, ContactMonitor, ContactSettings, Residuals, TimeScale};
 pub use derivatives::{DelayedDerivatives, DelayedSample};
 pub use drift::{DriftAlarm, DriftMonitor, DriftSettings};
 pub use error::OnlineError;

@@ -1,6 +1,6 @@
 //! The paper's planar arm, and studies that a user can run again.
 
-use dynident::{Error, write_whole};
+use dynident::{Error, write_atomically};
 use dynident_model::{Model, load_robot};
 use std::path::{Path, PathBuf};
 
@@ -25,8 +25,8 @@ impl Arm {
     /// Writes the robot description and the design study into `folder`, and loads them like a user's own.
     pub(crate) fn written(folder: &Path) -> Result<Self, Error> {
         let (description, design) = (folder.join(DESCRIPTION.0), folder.join(DESIGN.0));
-        write_whole(&description, DESCRIPTION.1.as_bytes())?;
-        write_whole(&design, DESIGN.1.as_bytes())?;
+        write_atomically(&description, DESCRIPTION.1.as_bytes())?;
+        write_atomically(&design, DESIGN.1.as_bytes())?;
         Ok(Self { model: load_robot(&description)?.model, description, design })
     }
 }

@@ -8,7 +8,7 @@ use crate::base_parameters::COLUMNS;
 use crate::joint_runs::{failed, prior, with_all_runs};
 use crate::literal_map::LiteralMap;
 use core::ops::ControlFlow;
-use dynident::{Error, RunOptions, Study, design_study, write_whole};
+use dynident::{Error, RunOptions, Study, design_study, write_atomically};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::{Iteration, IterationError, IterationSettings, IterationTask, Leg, iterate};
 use dynident_iteration::{Robot, SimulatedRobot};
@@ -170,7 +170,7 @@ fn designed(
         Method::Fourier => FOURIER,
     };
     let path = folder.join(name);
-    write_whole(&path, text.as_bytes())?;
+    write_atomically(&path, text.as_bytes())?;
     let mut study = Study::load(&path)?;
     study.design.get_or_insert_default().search.seed = seed;
     let outcome = design_study(&study, &path, options, |_| ControlFlow::Continue(()))?;

@@ -5,7 +5,7 @@
 
 use crate::arrays::{array, sample_major};
 use crate::errors;
-use dynident::estimation::{EstimatorRows as Rows, OwnEstimate};
+use dynident::estimation::{CustomEstimate, EstimatorRows as Rows};
 use dynident::excitation::Motion;
 use dynident::excitation::families::MotionFunction;
 use dynident::identification::estimators::EstimatorRule;
@@ -242,18 +242,18 @@ struct Rule {
 }
 
 impl EstimatorRule for Rule {
-    fn estimate(&self, rows: &Rows) -> OwnEstimate {
+    fn estimate(&self, rows: &Rows) -> CustomEstimate {
         let count = rows.names.len();
         call(|py| {
             let answer = self.function.bind(py).call1((EstimatorRows(rows.clone()),))?;
             let what = "the estimator";
             let Ok(pair) = answer.cast::<PyTuple>() else {
-                return Ok(OwnEstimate { values: numbers(&answer, what, &[count])?, covariance: None });
+                return Ok(CustomEstimate { values: numbers(&answer, what, &[count])?, covariance: None });
             };
             let [values, covariance]: [_; 2] = parts(pair, what, "values, or a pair of values and covariance")?;
             let covariance = numbers(&covariance, &format!("{what}, the covariance,"), &[count, count])?;
             let covariance = Some(DMatrix::from_row_slice(count, count, &covariance));
-            Ok(OwnEstimate { values: numbers(&values, what, &[count])?, covariance })
+            Ok(CustomEstimate { values: numbers(&values, what, &[count])?, covariance })
         })
     }
 }

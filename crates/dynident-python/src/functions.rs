@@ -13,7 +13,7 @@ use dynident::excitation::export::{ExportError, Sampled, trajectory_csv};
 use dynident::iteration::{RobotRun, RunRecord, StopSignal};
 use dynident::result::StudyChange;
 use dynident::{
-    Error, InspectSettings, IterationWatch, MendedDescription, NewStudy, OutputSet, ProgramPermission, RunOptions,
+    CorrectedDescription, Error, InspectSettings, IterationWatch, NewStudy, OutputSet, ProgramPermission, RunOptions,
     XacroSettings, check, design_study, identify, inspect_robot, iterate_study, iterate_with_robot, log_contents,
     mended_robot, new_study, simulate_study, validate_result,
 };
@@ -184,8 +184,8 @@ pub(crate) fn _inspect(
     let (description, settings) = (robot.get().description(), InspectSettings { total_mass_kg });
     let found = py.detach(|| {
         let text = match mended_robot(description, &settings)? {
-            MendedDescription::Urdf(text) => Some(text),
-            MendedDescription::NothingToMend | MendedDescription::NoUrdf => None,
+            CorrectedDescription::Urdf(text) => Some(text),
+            CorrectedDescription::NothingToMend | CorrectedDescription::NoUrdf => None,
         };
         Ok((json(&inspect_robot(description, &settings)?)?, text))
     });

@@ -5,7 +5,7 @@ use crate::callables::{Callables, guarded};
 use crate::errors;
 use crate::study::Study;
 use crate::watch::OnlineWatch;
-use dynident::export::{PayloadReader, Target};
+use dynident::export::{ControllerBrand, Target};
 use dynident::identification::examination::LogTrace;
 use dynident::model::terms::JointMotion;
 use dynident::online::WatchSettings;
@@ -220,11 +220,11 @@ impl FittedModel {
     /// A payload in the format of the controller `reader`: its text, and notes.
     #[pyo3(signature = (reader, name=None))]
     fn payload(&self, py: Python<'_>, reader: &str, name: Option<&str>) -> PyResult<(String, Vec<String>)> {
-        const KNOWN: [(&str, PayloadReader); 4] = [
-            ("ur", PayloadReader::UniversalRobots),
-            ("franka", PayloadReader::Franka),
-            ("kuka", PayloadReader::Kuka),
-            ("abb", PayloadReader::Abb),
+        const KNOWN: [(&str, ControllerBrand); 4] = [
+            ("ur", ControllerBrand::UniversalRobots),
+            ("franka", ControllerBrand::Franka),
+            ("kuka", ControllerBrand::Kuka),
+            ("abb", ControllerBrand::Abb),
         ];
         let wanted = KNOWN.into_iter().find(|(known, _)| *known == reader).ok_or_else(|| {
             let known = KNOWN.map(|(known, _)| known).join(", ");

@@ -5,7 +5,7 @@ use crate::callables::guarded;
 use crate::errors::Error;
 use dynident::identification::consistent::ConsistencySettings;
 use dynident::model::terms::TorqueTerm;
-use dynident::online::{Contact, DriftAlarm, Look, OnlineError, Residuals, Watch, WatchSettings};
+use dynident::online::{Contact, DriftAlarm, OnlineError, Residuals, TimeScale, Watch, WatchSettings};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -123,8 +123,8 @@ impl OnlineWatch {
 
     fn contact_into(&self, found: &Bound<'_, PyDict>, contact: Contact) -> PyResult<()> {
         let kind = match contact.look {
-            Look::Collision => "collision",
-            Look::Payload => "payload",
+            TimeScale::Collision => "collision",
+            TimeScale::Payload => "payload",
         };
         found.set_item("kind", kind)?;
         found.set_item("joint", &self.joints[contact.joint])?;

@@ -17,7 +17,7 @@
 //! | the mean period of a periodic record and its noise | [`averaged_periods`] |
 //!
 //! Data flow: [`LogSource`] → [`LogReader`] (units, signs, gears, ranges, missing values) → [`RawBlock`]s → outliers
-//! and held samples marked ([`SetAside`]) → pieces on a uniform clock ([`clock`]) → [`Differentiator`] →
+//! and held samples marked ([`RejectedSamples`]) → pieces on a uniform clock ([`clock`]) → [`Differentiator`] →
 //! [`MotionBlock`]s. Memory does not grow with the log. Joints are identified by name only.
 //!
 //! # A file
@@ -77,7 +77,7 @@ mod quantisation;
 pub mod reference;
 pub mod report;
 
-pub use cleaning::{CleaningSettings, Reason, SetAside};
+pub use cleaning::{CleaningSettings, Reason, RejectedSamples};
 pub use derivative::{Derivatives, Differentiator, DifferentiatorSettings, Place, SampleRanges};
 pub use error::{FilterError, FormatError, RecordingError};
 pub use filter::{AveragedPeriods, DecimationSettings, Decimator, averaged_periods, cutoff, position_noise};

@@ -80,7 +80,7 @@ impl<'a> Logs<'a> {
         execution: Execution<'a>,
     ) -> Result<Self, LogError> {
         let RowSettings { motion: settings, parallel_filter } = settings;
-        let longest_s = model.own_scale().seconds(MAX_STATED_LAG_S);
+        let longest_s = model.characteristic_scale().seconds(MAX_STATED_LAG_S);
         let stated = settings.torque_lag_s.as_ref();
         let mut stated = (0..model.dof()).filter_map(|joint| stated.and_then(|lags| lags.at(joint)));
         if let Some(value) = stated.find(|lag_s| lag_s.abs() > longest_s) {

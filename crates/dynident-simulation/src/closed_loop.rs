@@ -154,9 +154,9 @@ impl LoopStart {
     ) -> Result<Self, SimulationError> {
         let joints = plant.dof();
         settings.validate(joints)?;
-        let own = plant.model().own_scale();
+        let own = plant.model().characteristic_scale();
         let divergence_speed =
-            plant.model().joints().iter().map(|joint| own.velocity(joint.turns(), DIVERGENCE_SPEED)).collect();
+            plant.model().joints().iter().map(|joint| own.velocity(joint.is_rotary(), DIVERGENCE_SPEED)).collect();
         let limits = Limits { divergence_speed, ..settings.limits.values(joints)? };
         require_length("joints of the reference", joints, reference.joints())?;
         require_length("joints of the controller", joints, controller.joints())?;

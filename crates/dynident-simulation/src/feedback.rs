@@ -11,7 +11,7 @@ const RANDOM_STREAM: u64 = 0x5eed_feed_bacc_0001;
 #[derive(Debug)]
 pub(crate) struct Feedback<'a> {
     settings: &'a SensorSettings,
-    turns: Vec<bool>,
+    is_rotary: Vec<bool>,
     random: Random,
     /// Ring buffer of the last `delay + 1` readings, joint after joint.
     q: Vec<f64>,
@@ -36,7 +36,7 @@ impl<'a> Feedback<'a> {
         };
         Self {
             settings,
-            turns: plant.model().joints().iter().map(dynident_model::Joint::turns).collect(),
+            is_rotary: plant.model().joints().iter().map(dynident_model::Joint::is_rotary).collect(),
             random: Random::new(settings.seed ^ RANDOM_STREAM),
             q: vec![0.0; joints * slots],
             dq: vec![0.0; joints * slots],
@@ -57,7 +57,7 @@ impl<'a> Feedback<'a> {
         self.place = self.after(self.place);
         let own = self.place * joints;
         for joint in 0..joints {
-            let reading = self.settings.position(joint, q[joint], self.turns[joint], &mut self.random);
+            let reading = self.settings.position(joint, q[joint], self.is_rotary[joint], &mut self.random);
             self.q[own + joint] = reading;
             self.dq[own + joint] = match self.settings.speed {
                 VelocitySource::True => dq[joint],

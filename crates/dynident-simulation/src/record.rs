@@ -85,14 +85,14 @@ impl SensorSettings {
         let (mut q, mut tau) = (Vec::with_capacity(joints * samples), Vec::with_capacity(joints * samples));
         for joint in 0..joints {
             let own = run.of(joint);
-            let turns = model.joints()[joint].turns();
+            let is_rotary = model.joints()[joint].is_rotary();
             let (delay_q, delay_tau) = (self.position_delay_s.of(joint), self.torque_delay_s.of(joint));
             if same_instants && delay_q == 0.0 && self.feedback_delay_samples == 0 {
                 q.extend_from_slice(&run.measured_q[own.clone()]);
             } else {
                 q.extend(true_times.iter().map(|time| {
                     let at = interpolate(&run.q[own.clone()], &run.dq[own.clone()], run.rate_hz, time - delay_q);
-                    self.position(joint, at, turns, &mut position)
+                    self.position(joint, at, is_rotary, &mut position)
                 }));
             }
             let (std, correlation) = (self.torque_std.of(joint), self.torque_correlation);

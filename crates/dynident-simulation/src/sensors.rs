@@ -140,12 +140,12 @@ impl SensorSettings {
     }
 
     #[inline]
-    pub(crate) fn position(&self, joint: usize, q: f64, turns: bool, random: &mut Random) -> f64 {
+    pub(crate) fn position(&self, joint: usize, q: f64, is_rotary: bool, random: &mut Random) -> f64 {
         let std = self.position_std.of(joint);
         let q = if std > 0.0 { q + std * random.normal() } else { q };
         match &self.encoder_steps {
             Some(steps) => {
-                let step = if turns { core::f64::consts::TAU } else { 1.0 } / steps.of(joint);
+                let step = if is_rotary { core::f64::consts::TAU } else { 1.0 } / steps.of(joint);
                 (q / step).round() * step
             }
             None => q,

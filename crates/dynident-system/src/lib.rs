@@ -7,7 +7,7 @@
 //! | run a permitted program to its end within a time limit and take its output | [`run_to_end`] |
 //! | list a folder, remove a folder with its contents | [`names`], [`remove_folder`] |
 //! | a folder that is removed when it is no longer needed | [`TemporaryFolder`] |
-//! | write a file that appears whole or not at all | [`write_whole`], [`check_writable`] |
+//! | write a file that appears whole or not at all | [`write_atomically`], [`check_writable`] |
 //!
 //! No other crate of Dynident starts a program: [`ProcessGroup::start`] is the only place, and it takes a
 //! [`PermittedProgram`], which only [`ProgramPermission::permit`] makes.
@@ -34,4 +34,4 @@ pub use programs::{
     RunError, RunLimits, run_to_end,
 };
 pub use temporary_folder::TemporaryFolder;
-pub use whole_file::{check_writable, write_whole};
+pub use whole_file::{check_writable, write_atomically};

@@ -23,7 +23,7 @@ const ATTEMPTS: usize = 100;
 /// # Errors
 /// Error of the operating system, and [`io::ErrorKind::InvalidInput`] for a device, a pipe or a socket, which the file
 /// would replace: a superuser would lose `/dev/null` or `/dev/stdout`.
-pub fn write_whole(path: &Path, contents: &[u8]) -> io::Result<()> {
+pub fn write_atomically(path: &Path, contents: &[u8]) -> io::Result<()> {
     if is_special(path) {
         let problem = "it is a device, a pipe or a socket, which would be replaced: give the name of a regular file";
         return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
@@ -121,7 +121,7 @@ mod tests {
             fs::write(folder.path().join(name), "").unwrap();
         }
         fs::create_dir(folder.path().join(".model.json.dynident-folder")).unwrap();
-        write_whole(&path, b"text").unwrap();
+        write_atomically(&path, b"text").unwrap();
         let mut expected: Vec<_> = others.iter().map(|name| OsStr::new(name).to_owned()).collect();
         expected.extend([".model.json.dynident-folder", "model.json"].map(|name| OsStr::new(name).to_owned()));
         expected.push(running.path().file_name().unwrap().to_owned());
@@ -138,7 +138,7 @@ mod tests {
         std::thread::scope(|scope| {
             for writer in 0..4_u8 {
                 let path = &path;
-                scope.spawn(move || (0..50).for_each(|_| write_whole(path, &[writer; 1000]).unwrap()));
+                scope.spawn(move || (0..50).for_each(|_| write_atomically(path, &[writer; 1000]).unwrap()));
             }
         });
         let written = fs::read(&path).unwrap();
@@ -153,7 +153,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         let refused =
-            |path: &Path| assert_eq!(write_whole(path, b"text").unwrap_err().kind(), io::ErrorKind::InvalidInput);
+            |path: &Path| assert_eq!(write_atomically(path, b"text").unwrap_err().kind(), io::ErrorKind::InvalidInput);
         assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap().success());
         symlink("/dev/null", at("device")).unwrap();
         symlink("/proc/self/fd/1", at("stdout")).unwrap();
@@ -163,7 +163,7 @@ mod tests {
         assert!(!fs::metadata(at("pipe")).unwrap().is_file() && at("device").is_symlink());
         fs::write(at("other"), "old").unwrap();
         symlink(at("other"), at("link")).unwrap();
-        write_whole(&at("link"), b"text").unwrap();
+        write_atomically(&at("link"), b"text").unwrap();
         assert_eq!(
             (fs::read(at("link")).unwrap(), fs::read(at("other")).unwrap()),
             (b"text".to_vec(), b"old".to_vec())
@@ -175,7 +175,7 @@ mod tests {
     fn long_names_are_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("λ".repeat(127));
-        write_whole(&path, b"text").unwrap();
+        write_atomically(&path, b"text").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"text");
         assert_eq!(names(folder.path()).unwrap().len(), 1);
     }

@@ -86,7 +86,7 @@ pub use jobs::export::{
 };
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{
-    InspectSettings, MendedDescription, inspect, inspect_robot, inspect_with, mended, mended_robot,
+    CorrectedDescription, InspectSettings, inspect, inspect_robot, inspect_with, mended, mended_robot,
 };
 pub use jobs::iterate::{IterationWatch, RobotMaker, iterate_study, iterate_with_robot};
 pub use jobs::log::log_contents;
@@ -96,7 +96,7 @@ pub use jobs::predict::{PredictedTorque, TorquePredictor};
 pub use jobs::reduce::{ReduceSettings, factors_errors, identify_factors, reduce};
 pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::validate::{validate, validate_result};
-pub use output::{check_writable, write_whole};
+pub use output::{check_writable, write_atomically};
 pub use output_set::OutputSet;
 pub use pages::identification::identification_report;
 pub use result::{

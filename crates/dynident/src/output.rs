@@ -8,11 +8,11 @@ use std::path::Path;
 ///
 /// # Errors
 /// [`Error::Output`] with the reason from the operating system.
-pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Error> {
-    dynident_system::write_whole(path, contents).map_err(|source| Error::Output { path: path.to_owned(), source })
+pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), Error> {
+    dynident_system::write_atomically(path, contents).map_err(|source| Error::Output { path: path.to_owned(), source })
 }
 
-/// Checks before a long job whether [`write_whole`] can write into `folder`, which may not exist yet. Leaves no files.
+/// Checks before a long job whether [`write_atomically`] can write into `folder`, which may not exist yet. Leaves no files.
 ///
 /// # Errors
 /// [`Error::Output`] with the reason from the operating system.

@@ -54,7 +54,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         let mut table = Vec::new();
         let rows = dynident::evaluate(&robot.model, &options.states, quantity, &mut table).map_err(message_of)?;
         if let Some(path) = &options.out {
-            dynident::write_whole(path, &table).map_err(message_of)?;
+            dynident::write_atomically(path, &table).map_err(message_of)?;
         }
         if context.json {
             let table = String::from_utf8_lossy(&table);

@@ -2,7 +2,7 @@ use super::permission::ProgramOptions;
 use super::{Context, json, known_in, message_of};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
-use dynident::export::{Exported, PayloadReader, Target};
+use dynident::export::{ControllerBrand, Exported, Target};
 use dynident::result::{EXPORT_SCHEMA, ExportFile};
 use dynident::{ResultFile, export_payload_of, export_result, export_simulator_of, export_stored, study_inputs};
 use std::path::PathBuf;
@@ -73,7 +73,7 @@ enum Kind {
     Model(Target),
     SimulatorJson,
     SimulatorTable,
-    Payload(PayloadReader),
+    Payload(ControllerBrand),
 }
 
 impl Form {
@@ -91,10 +91,10 @@ impl Form {
             Self::Json => Kind::Model(Target::Json),
             Self::Simulator => Kind::SimulatorJson,
             Self::SimulatorTable => Kind::SimulatorTable,
-            Self::PayloadUr => Kind::Payload(PayloadReader::UniversalRobots),
-            Self::PayloadFranka => Kind::Payload(PayloadReader::Franka),
-            Self::PayloadKuka => Kind::Payload(PayloadReader::Kuka),
-            Self::PayloadAbb => Kind::Payload(PayloadReader::Abb),
+            Self::PayloadUr => Kind::Payload(ControllerBrand::UniversalRobots),
+            Self::PayloadFranka => Kind::Payload(ControllerBrand::Franka),
+            Self::PayloadKuka => Kind::Payload(ControllerBrand::Kuka),
+            Self::PayloadAbb => Kind::Payload(ControllerBrand::Abb),
         }
     }
 }
@@ -140,7 +140,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
 fn write(options: &Options, context: &Context, exported: Exported) -> Result<Verdict, String> {
     let Exported { text, notes } = exported;
     if let Some(path) = &options.out {
-        dynident::write_whole(path, text.as_bytes()).map_err(message_of)?;
+        dynident::write_atomically(path, text.as_bytes()).map_err(message_of)?;
     }
     if context.json {
         let target = options.to.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned());

@@ -2,7 +2,7 @@
 
 use super::{Context, json};
 use crate::{summary, terminal};
-use dynident::{Factors, write_whole};
+use dynident::{Factors, write_atomically};
 use std::path::{Path, PathBuf};
 
 /// Reads factors; error messages contain the file name.
@@ -18,7 +18,7 @@ pub(super) fn read_all(paths: &[PathBuf]) -> Result<Factors, String> {
 
 pub(super) fn write(factors: &Factors, out: &Path, context: &Context) -> Result<(), String> {
     let bytes = factors.to_bytes().map_err(|error| format!("{}: {error}", out.display()))?;
-    write_whole(out, &bytes).map_err(super::message_of)?;
+    write_atomically(out, &bytes).map_err(super::message_of)?;
     let file = factors.file(out, bytes.len() as u64);
     if context.json {
         terminal::print_document(&json(&file)?)

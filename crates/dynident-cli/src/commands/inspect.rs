@@ -2,7 +2,7 @@ use super::permission::XacroOptions;
 use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};
 use dynident::{
-    InspectSettings, Inspection, MendedDescription, inspect_robot, inspect_with, mended_robot, write_whole,
+    CorrectedDescription, InspectSettings, Inspection, inspect_robot, inspect_with, mended_robot, write_atomically,
 };
 use std::path::PathBuf;
 
@@ -40,22 +40,22 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     let Some(out) = &options.fix else { return Ok(verdict(&inspection)) };
     match mended_robot(&robot, &settings).map_err(message_of)? {
-        MendedDescription::Urdf(text) => {
-            write_whole(out, text.as_bytes()).map_err(message_of)?;
+        CorrectedDescription::Urdf(text) => {
+            write_atomically(out, text.as_bytes()).map_err(message_of)?;
             let left = inspect_with(out, &settings).map_err(message_of)?;
             if !context.quiet {
                 terminal::remark(&summary::mended(&inspection, &left, out));
             }
             Ok(verdict(&left))
         }
-        MendedDescription::NothingToMend => {
+        CorrectedDescription::NothingToMend => {
             terminal::remark(&format!(
                 "{} was not written: no mistake with known correct numbers was found",
                 out.display()
             ));
             Ok(verdict(&inspection))
         }
-        MendedDescription::NoUrdf => Err(format!("{}: --fix supports only URDF files", options.robot.display())),
+        CorrectedDescription::NoUrdf => Err(format!("{}: --fix supports only URDF files", options.robot.display())),
     }
 }
 

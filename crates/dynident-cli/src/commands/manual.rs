@@ -22,7 +22,7 @@ pub(crate) fn run(options: &Options, command: clap::Command, _: &Context) -> Res
         let page = clap_mangen::Man::new(command);
         let mut text = Vec::new();
         page.render(&mut text).map_err(cannot)?;
-        dynident::write_whole(&folder.join(page.get_filename()), &text).map_err(message_of)
+        dynident::write_atomically(&folder.join(page.get_filename()), &text).map_err(message_of)
     };
     for one in command.get_subcommands().filter(|one| !one.is_hide_set()) {
         one_page(one.clone())?;

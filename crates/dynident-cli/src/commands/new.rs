@@ -59,7 +59,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if !request.stated.is_empty() {
         found = new_study(&request, &run).map_err(message_of)?;
     }
-    dynident::write_whole(&options.out, found.text.as_bytes()).map_err(message_of)?;
+    dynident::write_atomically(&options.out, found.text.as_bytes()).map_err(message_of)?;
 
     if context.json {
         terminal::print_document(&json(&found)?)?;

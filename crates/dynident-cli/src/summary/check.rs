@@ -26,7 +26,7 @@ pub(crate) fn check(file: &CheckFile) -> String {
         let best = check.best.as_ref();
         text.push_str("\nTorque not explained by any physically consistent model:\n");
         let rows = check.joints.iter().enumerate().map(|(joint, joint_name)| {
-            let percent = |reading: &dynident::result::ReadingResult| format!("{:.1}", reading.left_percent[joint]);
+            let percent = |reading: &dynident::result::HypothesisResult| format!("{:.1}", reading.left_percent[joint]);
             vec![name(joint_name), percent(written), best.map_or_else(|| "-".to_owned(), percent)]
         });
         text += &table(&["joint", "as written %", "corrected %"].map(str::to_owned), 1..3, rows.collect());

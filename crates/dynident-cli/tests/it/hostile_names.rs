@@ -4,7 +4,7 @@
 use super::common::{repository, run_in};
 use dynident::excitation::Motion;
 use dynident::excitation::export::{Sampled, ros2_joint_trajectory, trajectory_csv, waypoints_csv};
-use dynident::export::{Exported, PayloadBody, PayloadReader, RobotModel, Target, export, payload_command};
+use dynident::export::{ControllerBrand, Exported, PayloadBody, RobotModel, Target, export, payload_command};
 use dynident::model::terms::{Declared, DeclaredLaw, Expression, JointNames, Offset, TorqueTerm, Viscous};
 use dynident::model::{
     InertialParameters, JointChange, LinkChange, Model, link_changes, load_robot, read_mjcf, read_sdf, read_urdf,
@@ -442,7 +442,9 @@ fn tables_and_json_hold_names_as_names() {
         assert!(table.lines().filter(|line| line.starts_with('|')).all(|line| cells(&line) == 8), "{table}");
 
         let body = PayloadBody { name: name.clone(), inertial: model.inertials()[0] };
-        for reader in [PayloadReader::UniversalRobots, PayloadReader::Franka, PayloadReader::Kuka, PayloadReader::Abb] {
+        for reader in
+            [ControllerBrand::UniversalRobots, ControllerBrand::Franka, ControllerBrand::Kuka, ControllerBrand::Abb]
+        {
             let command = payload_command(&body, reader).unwrap();
             assert_visible("payload", &command);
             assert_eq!((command.lines().count(), command.matches([';', '"']).count() <= 7), (1, true), "{command}");

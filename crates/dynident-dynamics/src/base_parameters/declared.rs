@@ -108,17 +108,17 @@ impl States {
     fn inside_limits(model: &Model, samples: usize) -> Self {
         let mut random = Random::new(SEED);
         let mut states = Self { samples, q: Vec::new(), dq: Vec::new(), ddq: Vec::new() };
-        let own = model.own_scale();
+        let own = model.characteristic_scale();
         for joint in model.joints() {
-            let usual = if joint.turns() { core::f64::consts::PI } else { own.metres(1.0) };
+            let usual = if joint.is_rotary() { core::f64::consts::PI } else { own.metres(1.0) };
             let limits = joint.limits.lower.zip(joint.limits.upper).filter(|(lower, upper)| lower < upper);
             let (lower, upper) = limits.unwrap_or((-usual, usual));
             let most = joint
                 .limits
                 .velocity
                 .filter(|most| *most > 0.0 && most.is_finite())
-                .unwrap_or(own.velocity(joint.turns(), 2.0));
-            let quickest = own.acceleration(joint.turns(), 5.0);
+                .unwrap_or(own.velocity(joint.is_rotary(), 2.0));
+            let quickest = own.acceleration(joint.is_rotary(), 5.0);
             for _ in 0..samples {
                 states.q.push(match random.uniform(0.0, 8.0) as usize {
                     0 => lower,

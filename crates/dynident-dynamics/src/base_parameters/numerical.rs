@@ -50,12 +50,12 @@ impl ScaledRegressors {
         let (dof, count) = (model.dof(), columns.len());
         let samples = 2 * count / dof.max(1) + 10;
         let length = longest_link_m(model);
-        let reach = |joint: usize| if model.joints()[joint].turns() { 1.0 } else { length };
+        let reach = |joint: usize| if model.joints()[joint].is_rotary() { 1.0 } else { length };
         let mut random = Random::new(seed);
         let mut states = |range: &dyn Fn(usize) -> f64| -> Vec<f64> {
             (0..dof * samples).map(|k| random.uniform(-1.0, 1.0) * range(k / samples)).collect()
         };
-        let q = states(&|joint| if model.joints()[joint].turns() { core::f64::consts::PI } else { length });
+        let q = states(&|joint| if model.joints()[joint].is_rotary() { core::f64::consts::PI } else { length });
         let (dq, ddq) = (states(&|joint| 2.0 * reach(joint)), states(&|joint| 5.0 * reach(joint)));
         let still = vec![0.0; dof * samples];
         let weightless = model.clone().with_gravity(Vec3::ZERO).unwrap_or_else(|_| model.clone());
@@ -100,7 +100,7 @@ impl ScaledRegressors {
 
 /// Additional length factor of the torque of a revolute joint compared with a force.
 fn reach_of_torque(model: &Model, joint: usize, length: f64) -> f64 {
-    if model.joints()[joint].turns() { length } else { 1.0 }
+    if model.joints()[joint].is_rotary() { length } else { 1.0 }
 }
 
 /// Longest distance between consecutive joints, m; 1 if all are at one point. The position of the first joint is

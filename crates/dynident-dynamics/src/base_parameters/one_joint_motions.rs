@@ -76,7 +76,7 @@ fn random_motion(
     parent: Option<&BodyState<f64>>,
     random: &mut Random,
 ) -> BodyState<f64> {
-    let q = random.uniform(-1.0, 1.0) * if map.turns { core::f64::consts::PI } else { 1.0 };
+    let q = random.uniform(-1.0, 1.0) * if map.is_rotary { core::f64::consts::PI } else { 1.0 };
     let (dq, ddq) = (random.uniform(-2.0, 2.0), random.uniform(-5.0, 5.0));
     let mut body = BodyState { parent_from_body: joint_transform(map, q, q.sin(), q.cos()), ..BodyState::REST };
     moved(map, parent, -model.gravity(), dq, ddq, &mut body);
@@ -93,7 +93,7 @@ struct Wrench {
 impl Wrench {
     /// Torque or force on the joint of its frame.
     fn on(&self, map: &JointMap) -> f64 {
-        map.axis.dot(if map.turns { self.moment } else { self.force })
+        map.axis.dot(if map.is_rotary { self.moment } else { self.force })
     }
 
     fn to_parent(self, parent_from_body: &Transform) -> Self {

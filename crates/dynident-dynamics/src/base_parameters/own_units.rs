@@ -24,8 +24,8 @@ impl OwnUnits {
     }
 
     /// Unit of a joint's position, m (rad); also the lever of its torque row.
-    pub(super) fn reach(&self, turns: bool) -> f64 {
-        if turns { 1.0 } else { self.length_m }
+    pub(super) fn reach(&self, is_rotary: bool) -> f64 {
+        if is_rotary { 1.0 } else { self.length_m }
     }
 
     pub(super) fn placement(&self, Transform { rotation, translation }: Transform) -> Transform {
@@ -62,7 +62,7 @@ impl OwnUnits {
 
     /// Torques have one more length factor than forces.
     fn lever(&self, model: &Model, joint: usize) -> f64 {
-        if model.joints()[joint].turns() { self.length_m } else { 1.0 }
+        if model.joints()[joint].is_rotary() { self.length_m } else { 1.0 }
     }
 }
 

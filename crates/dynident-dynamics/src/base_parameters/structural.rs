@@ -168,8 +168,8 @@ struct Harmonics {
 
 impl Harmonics {
     fn of(joint: &Joint, units: &OwnUnits) -> Self {
-        let placement = |q: f64| units.placement(joint.transform(units.reach(joint.turns()) * q));
-        if joint.turns() {
+        let placement = |q: f64| units.placement(joint.transform(units.reach(joint.is_rotary()) * q));
+        if joint.is_rotary() {
             // Five equidistant angles resolve the harmonics 1, cos, sin, cos 2q, sin 2q exactly.
             let angles: [f64; 5] = core::array::from_fn(|k| core::f64::consts::TAU * k as f64 / 5.0);
             let twists = angles.map(|q| twist_to_child(&placement(q)));
@@ -235,7 +235,7 @@ fn arriving_twists(
         stacked.push(DVector::from_iterator(7 + slots, twist.iter().copied().chain(source.iter().copied())));
     };
     let axis = joint.axis;
-    let own = if joint.turns() {
+    let own = if joint.is_rotary() {
         [axis[0], axis[1], axis[2], 0.0, 0.0, 0.0]
     } else {
         [0.0, 0.0, 0.0, axis[0], axis[1], axis[2]]
@@ -280,7 +280,7 @@ fn power(model: &Model, j: usize, w: &ArrivingTwist) -> Vector10 {
     Vector10::from_fn(|k, _| {
         let unit = InertialParameters(core::array::from_fn(|i| f64::from(i == k)));
         let (force, moment) = inertial_wrench(&unit, Vec3::ZERO, alpha, acceleration);
-        joint.axis.dot(if joint.turns() { moment } else { force })
+        joint.axis.dot(if joint.is_rotary() { moment } else { force })
     })
 }
 

@@ -225,7 +225,7 @@ fn scaled(model: &Model, length: f64, mass: f64) -> Model {
         body
     };
     let tree = model.tree_joints();
-    let reach = |joint: &Joint| if joint.turns() { 1.0 } else { length };
+    let reach = |joint: &Joint| if joint.is_rotary() { 1.0 } else { length };
     let joints = tree.iter().map(|joint| {
         let mut joint = Joint { placement: placed(joint.placement), ..joint.clone() };
         let own = reach(&joint);
@@ -262,7 +262,7 @@ fn base_parameters_of_coupled_joints_do_not_depend_on_size() {
             Column::Body { parameter: 0, .. } => 1.0,
             Column::Body { parameter: 1..=3, .. } => length,
             Column::Body { .. } => length * length,
-            Column::Term(term) if model.joints()[term.own_joint().unwrap()].turns() => length * length,
+            Column::Term(term) if model.joints()[term.own_joint().unwrap()].is_rotary() => length * length,
             Column::Term(_) => 1.0,
         };
         for (length, mass) in [(1e-3, 1.0), (1e3, 1.0), (1.0, 1e-3), (1.0, 1e3), (1e-3, 1e-3), (1e3, 1e3)] {

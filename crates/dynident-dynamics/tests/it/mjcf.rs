@@ -26,7 +26,7 @@ fn every_model_has_the_joints_and_torques_of_mujoco() {
                 assert_eq!(joint.name, theirs, "{name}");
             }
             let what = format!("{name}: {}", joint.name);
-            assert_eq!(joint.turns(), file["turns"][k].as_bool().unwrap(), "{what}");
+            assert_eq!(joint.is_rotary(), file["turns"][k].as_bool().unwrap(), "{what}");
             let stops = joint.limits.lower.zip(joint.limits.upper);
             assert_eq!(stops.is_some(), file["limited"][k].as_bool().unwrap(), "{what}");
             if let Some((lower, upper)) = stops {

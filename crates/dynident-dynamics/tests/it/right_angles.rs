@@ -43,14 +43,14 @@ fn robot(seed: u64) -> Model {
                 let at = random.bits() as usize % 3;
                 Vec3(core::array::from_fn(|k| f64::from(u8::from(k == at))))
             };
-            let turns = [unit(), unit(), unit()];
-            joint.axis = turns[0].scale(if random.bits().is_multiple_of(2) { 1.0 } else { -1.0 });
+            let is_rotary = [unit(), unit(), unit()];
+            joint.axis = is_rotary[0].scale(if random.bits().is_multiple_of(2) { 1.0 } else { -1.0 });
             // As in a URDF: roll, pitch and yaw by multiples of 90°, rounded.
             let mut quarter = |axis| {
                 let quarters = f64::from(random.bits() as u8 % 4);
                 Mat3::from_axis_angle(axis, core::f64::consts::FRAC_PI_2 * quarters)
             };
-            joint.placement.rotation = quarter(turns[1]).mul_mat(&quarter(turns[2]));
+            joint.placement.rotation = quarter(is_rotary[1]).mul_mat(&quarter(is_rotary[2]));
         }
         if random.uniform(0.0, 1.0) < 0.2 {
             // A rotation about the joint's own axis changes none of the joint's zeros.

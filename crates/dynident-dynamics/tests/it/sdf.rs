@@ -31,7 +31,7 @@ fn every_model_has_the_joints_and_torques_of_drake() {
         assert_eq!(model.dof(), names.len(), "{name}");
         for joint in model.joints() {
             let k = place(&names, joint);
-            assert_eq!(joint.turns(), file["turns"][k].as_bool().unwrap(), "{name}: {}", joint.name);
+            assert_eq!(joint.is_rotary(), file["turns"][k].as_bool().unwrap(), "{name}: {}", joint.name);
             let limits = [joint.limits.lower, joint.limits.upper, joint.limits.velocity];
             let theirs = ["lower", "upper", "velocity"].map(|key| file[key][k].as_f64());
             assert_eq!(limits, theirs, "{name}: {}", joint.name);

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Prior uncertainty of the truth.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Belief {
+pub struct MassPrior {
     /// Relative standard deviation of a body about its reference: of its mass, its inertia, and its extent for the
     /// centre of mass.
     pub body_share: f64,
@@ -33,7 +33,7 @@ pub fn expected_error(
     problem: &PhysicalProblem,
     settings: &PhysicalSettings,
     covariance: &DMatrix<f64>,
-    belief: &Belief,
+    belief: &MassPrior,
 ) -> Result<Vec<f64>, PhysicalError> {
     settings.validate()?;
     let (base, parameters) = problem.base.matrix().shape();

@@ -29,7 +29,7 @@ mod stacked;
 pub use description::{BaseMap, Ellipsoid, Limits, PhysicalBody, PhysicalProblem, PhysicalScalar, rough_body};
 pub use difference::ConsistencyTest;
 pub use error::PhysicalError;
-pub use expected_error::{Belief, expected_error};
+pub use expected_error::{MassPrior, expected_error};
 pub use fit::{PhysicalBodyFit, PhysicalFit, PhysicalStatus, physical_fit};
 pub use intervals::{ConsistentInterval, ConsistentIntervals, IntervalEnd, IntervalSettings};
 pub use priors::PhysicalPrior;

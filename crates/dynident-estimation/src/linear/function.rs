@@ -31,7 +31,7 @@ pub struct EstimatorRows {
 
 /// Output of a custom estimator.
 #[derive(Clone, Debug, PartialEq)]
-pub struct OwnEstimate {
+pub struct CustomEstimate {
     /// One value for each column of the rows.
     pub values: Vec<f64>,
     /// Covariance of the values; if `None`, error bars are those of ordinary least squares with the residuals of
@@ -48,7 +48,7 @@ pub fn estimate_by(
     problem: &LinearProblem,
     settings: &OrdinarySettings,
     name: &str,
-    rule: impl FnOnce(&EstimatorRows) -> OwnEstimate,
+    rule: impl FnOnce(&EstimatorRows) -> CustomEstimate,
 ) -> Result<Estimate, EstimationError> {
     settings.validate()?;
     if problem.prior().is_some() {
@@ -130,7 +130,7 @@ fn estimator_rows(
     })
 }
 
-fn check(name: &str, own: &OwnEstimate, columns: usize) -> Result<(), EstimationError> {
+fn check(name: &str, own: &CustomEstimate, columns: usize) -> Result<(), EstimationError> {
     let wrong = |problem: String| EstimationError::Own { name: name.to_owned(), problem };
     expect("values of a caller's own estimator", columns, own.values.len())?;
     if let Some(place) = own.values.iter().position(|value| !value.is_finite()) {

@@ -30,7 +30,7 @@ mod robust;
 mod weighted;
 
 pub use fast_motion::{FastMotion, fast_motion};
-pub use function::{EstimatorRows, OwnEstimate, estimate_by};
+pub use function::{CustomEstimate, EstimatorRows, estimate_by};
 pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squares};
 pub use hausman::{HausmanColumn, HausmanSettings, HausmanTest, HausmanVerdict, hausman_test};
 pub use instrumental::{InstrumentReport, InstrumentalEstimate, InstrumentalSettings, instrumental_variables};

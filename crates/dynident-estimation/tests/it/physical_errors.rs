@@ -3,7 +3,7 @@
 use super::common::Random;
 use dynident_estimation::TriangularFactor;
 use dynident_estimation::consistent::{
-    BaseMap, Belief, PhysicalBody, PhysicalPrior, PhysicalProblem, PhysicalScalar, PhysicalSettings, expected_error,
+    BaseMap, MassPrior, PhysicalBody, PhysicalPrior, PhysicalProblem, PhysicalScalar, PhysicalSettings, expected_error,
     physical_fit, rough_body,
 };
 use nalgebra::{DMatrix, DVector, Matrix4};
@@ -67,7 +67,7 @@ fn errors_of_many_fits_are_as_expected() {
         base_count,
         sigma.iter().map(|sigma| (inflation * sigma).powi(2)),
     ));
-    let belief = Belief { body_share: SHARE, scalar_std: vec![SHARE * FRICTION] };
+    let belief = MassPrior { body_share: SHARE, scalar_std: vec![SHARE * FRICTION] };
     for prior in [PhysicalPrior::Entropic, PhysicalPrior::Pullback, PhysicalPrior::Euclidean] {
         // Weights of the prior are in units of a whole body, not of the belief: as strong as the belief, and a fifth
         // of that.

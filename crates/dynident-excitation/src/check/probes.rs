@@ -165,7 +165,7 @@ fn points(model: &Model, points: &[LinkPoint]) -> Vec<(String, Point)> {
 fn arm_length_m(model: &Model) -> f64 {
     let stroke = |body: usize| {
         let limits = model.tree_joints()[body].limits;
-        let ends = limits.lower.zip(limits.upper).filter(|_| !model.tree_joints()[body].turns());
+        let ends = limits.lower.zip(limits.upper).filter(|_| !model.tree_joints()[body].is_rotary());
         ends.map_or(0.0, |(lower, upper)| lower.abs().max(upper.abs()))
     };
     let to = |body: usize| -> f64 {

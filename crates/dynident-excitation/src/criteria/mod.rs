@@ -12,7 +12,7 @@ pub use condition_number::ConditionNumber;
 pub use d_optimal::DOptimal;
 pub use e_optimal::EOptimal;
 pub use prediction::Prediction;
-pub use worst_directions::WorstDirections;
+pub use worst_directions::KieferPhiP;
 
 use nalgebra::DMatrix;
 

@@ -14,12 +14,12 @@ use nalgebra::DMatrix;
 /// D-optimality (`-log det`) gains as much from doubling the information of a well determined direction as from
 /// doubling that of a poorly determined one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WorstDirections {
+pub struct KieferPhiP {
     units: DMatrix<f64>,
     order: f64,
 }
 
-impl WorstDirections {
+impl KieferPhiP {
     /// Creates the criterion with T = `units` and the order of the norm (positive). The columns of T are steps of θ of
     /// equal importance; T is square and regular, with one row for each column of the information matrix.
     pub fn new(units: DMatrix<f64>, order: f64) -> Self {
@@ -27,7 +27,7 @@ impl WorstDirections {
     }
 }
 
-impl Criterion for WorstDirections {
+impl Criterion for KieferPhiP {
     fn name(&self) -> &'static str {
         "worst-directions"
     }
@@ -67,13 +67,13 @@ mod tests {
         let mut random = Random::new(3);
         let (information, task) = (random_definite(&mut random, 9), random_definite(&mut random, 9));
         let units = task.clone().cholesky().unwrap().l().try_inverse().unwrap().transpose();
-        let value = |order| WorstDirections::new(units.clone(), order).value_and_derivative(&information).unwrap().0;
+        let value = |order| KieferPhiP::new(units.clone(), order).value_and_derivative(&information).unwrap().0;
         let expected = Prediction::new(task).value_and_derivative(&information).unwrap().0;
         assert!((value(1.0) - expected).abs() < 1e-10, "{} {expected}", value(1.0));
         let expected = EOptimal::default().value_and_derivative(&(units.tr_mul(&information) * &units)).unwrap().0;
         assert!((value(40.0) - expected).abs() < 1e-10, "{} {expected}", value(40.0));
-        assert!(WorstDirections::new(units, 2.0).value_and_derivative(&DMatrix::zeros(9, 9)).is_none());
-        assert!(WorstDirections::new(DMatrix::identity(8, 8), 2.0).figure(&information).is_none());
+        assert!(KieferPhiP::new(units, 2.0).value_and_derivative(&DMatrix::zeros(9, 9)).is_none());
+        assert!(KieferPhiP::new(DMatrix::identity(8, 8), 2.0).figure(&information).is_none());
     }
 
     #[test]
@@ -81,6 +81,6 @@ mod tests {
         let mut random = Random::new(8);
         let information = random_definite(&mut random, 7);
         let units = DMatrix::from_fn(7, 7, |_, _| random.normal());
-        check_derivative(&WorstDirections::new(units, 2.0), &information, &mut random);
+        check_derivative(&KieferPhiP::new(units, 2.0), &information, &mut random);
     }
 }

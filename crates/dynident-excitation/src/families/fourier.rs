@@ -116,8 +116,8 @@ impl Basis for FourierBasis {
         for k in 1..=self.harmonics {
             let speed = k as f64 * self.omega;
             // Reduced to one turn, so that both ends have the same angle and rest is exact.
-            let turns = (time_s * speed / core::f64::consts::TAU).fract();
-            let (sin, cos) = (turns * core::f64::consts::TAU).sin_cos();
+            let is_rotary = (time_s * speed / core::f64::consts::TAU).fract();
+            let (sin, cos) = (is_rotary * core::f64::consts::TAU).sin_cos();
             let sine = [sin / speed, cos, -speed * sin, -speed * speed * cos];
             let cosine = [cos / speed, -sin, -speed * cos, speed * speed * sin];
             match &self.rest {

@@ -64,8 +64,8 @@ impl FrictionLadderSettings {
 
     /// Time at constant velocity of one joint, s.
     fn cruising_s(&self, joints: usize, duration_s: f64) -> f64 {
-        let turns = if self.one_by_one { joints } else { 1 };
-        duration_s / turns as f64 - 4.0 * self.rungs as f64 * self.ramp_s
+        let is_rotary = if self.one_by_one { joints } else { 1 };
+        duration_s / is_rotary as f64 - 4.0 * self.rungs as f64 * self.ramp_s
     }
 }
 

@@ -13,24 +13,24 @@ const NAME: &str = "given";
 /// polynomial.
 ///
 /// ```
-/// use dynident_excitation::{Family, Motion, families::Given};
+/// use dynident_excitation::{Family, Motion, families::SampledMotion};
 /// // A parabola from three samples: q = t².
 /// let samples = Motion {
 ///     samples: 3, joints: 1, q: vec![0.0, 0.25, 4.0], dq: vec![0.0, 1.0, 4.0], ddq: vec![2.0; 3], dddq: Vec::new(),
 /// };
-/// let given = Given::new(vec![0.0, 0.5, 2.0], samples)?;
+/// let given = SampledMotion::new(vec![0.0, 0.5, 2.0], samples)?;
 /// let mut motion = Motion::default();
 /// given.motion(&[], &[1.0], &mut motion);
 /// assert!((motion.q[0] - 1.0).abs() < 1e-14 && (motion.dq[0] - 2.0).abs() < 1e-14);
 /// # Ok::<(), dynident_excitation::families::FamilyError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Given {
+pub struct SampledMotion {
     times_s: Vec<f64>,
     samples: Motion,
 }
 
-impl Given {
+impl SampledMotion {
     /// Creates the motion with q, q̇ and q̈ of `samples` at `times_s`, which are shifted to start at 0; the jerk is not
     /// used.
     ///
@@ -75,7 +75,7 @@ impl Given {
     }
 }
 
-impl Family for Given {
+impl Family for SampledMotion {
     fn name(&self) -> &'static str {
         NAME
     }
@@ -138,7 +138,7 @@ mod tests {
         let own: Vec<f64> = (0..=160).map(|k| f64::from(k) * 0.05 - 0.02 * f64::from(k % 2)).collect();
         let mut samples = Motion::default();
         series.motion(&parameters, &own, &mut samples);
-        let given = Given::new(own.iter().map(|time| time + 3.0).collect(), samples.clone()).unwrap();
+        let given = SampledMotion::new(own.iter().map(|time| time + 3.0).collect(), samples.clone()).unwrap();
         let mut back = Motion::default();
         given.motion(&[], given.times_s(), &mut back);
         for (found, expected) in [(&back.q, &samples.q), (&back.dq, &samples.dq), (&back.ddq, &samples.ddq)] {
@@ -164,13 +164,13 @@ mod tests {
             ddq: vec![0.0; values],
             dddq: Vec::new(),
         };
-        assert!(Given::new(vec![0.0, 1.0], motion(2)).is_ok());
-        assert!(Given::new(vec![0.0, 1.0], motion(3)).is_err());
+        assert!(SampledMotion::new(vec![0.0, 1.0], motion(2)).is_ok());
+        assert!(SampledMotion::new(vec![0.0, 1.0], motion(3)).is_err());
         for times in [vec![0.0], vec![0.0, 0.0], vec![1.0, 0.0], vec![0.0, f64::NAN], vec![0.0, f64::INFINITY]] {
-            assert!(Given::new(times, motion(2)).is_err());
+            assert!(SampledMotion::new(times, motion(2)).is_err());
         }
         let mut broken = motion(2);
         broken.ddq[1] = f64::NAN;
-        assert!(Given::new(vec![0.0, 1.0], broken).is_err());
+        assert!(SampledMotion::new(vec![0.0, 1.0], broken).is_err());
     }
 }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 const NAME: &str = "joined";
 
-/// Connections between the members of a [`JoinedFamily`].
+/// Connections between the members of a [`FamilySequence`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct JoinedSettings {
@@ -36,7 +36,7 @@ impl Default for JoinedSettings {
 ///
 /// Parameters: those of the first member (all its joints), of the second, and so on.
 #[derive(Debug)]
-pub struct JoinedFamily {
+pub struct FamilySequence {
     members: Vec<Box<dyn Family>>,
     settings: JoinedSettings,
     joints: usize,
@@ -56,7 +56,7 @@ fn ends_of(member: &dyn Family, parameters: &[f64]) -> Motion {
     ends
 }
 
-impl JoinedFamily {
+impl FamilySequence {
     /// Creates the sequence.
     ///
     /// # Errors
@@ -158,7 +158,7 @@ impl JoinedFamily {
     }
 }
 
-impl Family for JoinedFamily {
+impl Family for FamilySequence {
     fn name(&self) -> &'static str {
         NAME
     }
@@ -291,7 +291,7 @@ mod tests {
         ]
     }
 
-    fn at(seed: u64, family: &JoinedFamily) -> Vec<f64> {
+    fn at(seed: u64, family: &FamilySequence) -> Vec<f64> {
         family.random(&[[-1.0, 1.0], [-2.0, 0.5]], &[1.0, 2.0], &mut Random::new(seed))
     }
 
@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn joins_are_smooth() {
         let settings = JoinedSettings { move_s: 1.5, start: Some(vec![0.1, 0.2]), end: Some(vec![-0.3, 0.4]) };
-        let family = JoinedFamily::new(members(), &settings).unwrap();
+        let family = FamilySequence::new(members(), &settings).unwrap();
         let parameters = at(1, &family);
         let duration = family.duration_s();
         assert!((duration - (5.0 + 6.0 + 20.0 + 4.0 * 1.5)).abs() < 1e-12);
@@ -330,7 +330,7 @@ mod tests {
 
     #[test]
     fn rejects_inconsistent_members() {
-        let make = |members, settings: &JoinedSettings| JoinedFamily::new(members, settings);
+        let make = |members, settings: &JoinedSettings| FamilySequence::new(members, settings);
         assert!(make(vec![], &JoinedSettings::default()).is_err());
         assert!(make(members(), &JoinedSettings { move_s: 0.0, ..Default::default() }).is_err());
         assert!(make(members(), &JoinedSettings { start: Some(vec![0.0]), ..Default::default() }).is_err());
@@ -348,7 +348,7 @@ mod tests {
             if let Some(member) = list.get_mut(1) {
                 *member = Box::new(Fourier::new(2, 6.0, &FourierSettings::default()).unwrap());
             }
-            let family = JoinedFamily::new(list, &JoinedSettings { move_s: 6.0, start: end.clone(), end }).unwrap();
+            let family = FamilySequence::new(list, &JoinedSettings { move_s: 6.0, start: end.clone(), end }).unwrap();
             check::derivatives(&family, seed);
             check::gradient(&family, seed);
             check::rest(&family, seed);
@@ -357,7 +357,7 @@ mod tests {
         /// Members in motion at their ends have a gradient through the moves too.
         #[test]
         fn gradient_through_moves_in_motion(seed in any::<u64>()) {
-            let family = JoinedFamily::new(members(), &JoinedSettings { move_s: 9.0, ..Default::default() }).unwrap();
+            let family = FamilySequence::new(members(), &JoinedSettings { move_s: 9.0, ..Default::default() }).unwrap();
             check::gradient_at(&family, &at(seed, &family), seed);
         }
     }

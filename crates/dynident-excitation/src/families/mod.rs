@@ -11,9 +11,9 @@
 //! | [`FrictionLadder`]: constant-velocity sweeps | 2 | exactly |
 //! | [`StaticPostures`]: K held postures | K | exactly |
 //! | [`StepWiseLogistic`]: spliced logistic functions, one joint after another | 2 | nearly (e^-10) |
-//! | [`JoinedFamily`]: a sequence of families | sum | as its members |
-//! | [`StartingAt`]: a family shifted to a start posture | as the family | as the family |
-//! | [`Given`]: a known motion | 0 | as the motion |
+//! | [`FamilySequence`]: a sequence of families | sum | as its members |
+//! | [`WithStartPosture`]: a family shifted to a start posture | as the family | as the family |
+//! | [`SampledMotion`]: a known motion | 0 | as the motion |
 //! | [`FunctionFamily`]: a user's function | as the function | as the function |
 
 mod b_spline;
@@ -44,14 +44,14 @@ pub use error::FamilyError;
 pub use fourier::{Fourier, FourierSettings};
 pub use friction_ladder::{FrictionLadder, FrictionLadderSettings, LadderPace};
 pub use function::{FunctionFamily, FunctionFamilySettings, MotionFunction};
-pub use given::Given;
-pub use joined::{JoinedFamily, JoinedSettings};
+pub use given::SampledMotion;
+pub use joined::{FamilySequence, JoinedSettings};
 pub use linear::{Basis, LinearFamily};
 pub use logistic_stroke::LogisticStroke;
 pub use logistic_strokes::{LogisticStrokes, LogisticStrokesSettings, StrokeOrder};
 pub use multisine::{Multisine, MultisineSettings};
 pub use quintic::{Quintic, QuinticSettings};
 pub use spliced_logistic::{SplicedLogistic, SplicedLogisticSettings};
-pub use starting_at::StartingAt;
+pub use starting_at::WithStartPosture;
 pub use static_postures::{StaticPostures, StaticPosturesSettings};
 pub use step_wise::{Step, StepWiseLogistic};

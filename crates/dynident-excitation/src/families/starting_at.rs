@@ -14,12 +14,12 @@ const MIN_RANGE_SHARE: f64 = 0.3;
 /// those of the family; a parameter that only shifts a joint has no effect if the start of that joint is given. A
 /// family with a fixed posture, such as a joined one with its own start posture, is shifted as a whole.
 #[derive(Debug)]
-pub struct StartingAt {
+pub struct WithStartPosture {
     inner: Box<dyn Family>,
     start: Vec<Option<f64>>,
 }
 
-impl StartingAt {
+impl WithStartPosture {
     /// Creates the family. `start` is the position of each joint at the beginning, rad (m); for `None` the family
     /// determines it.
     ///
@@ -41,7 +41,7 @@ impl StartingAt {
     }
 }
 
-impl Family for StartingAt {
+impl Family for WithStartPosture {
     fn name(&self) -> &'static str {
         self.inner.name()
     }
@@ -131,7 +131,7 @@ mod tests {
             let mut plain = Motion::default();
             let times = [0.0, 1.3, 3.5, 7.0];
             inner.motion(&parameters, &times, &mut plain);
-            let moved = StartingAt::new(inner, vec![Some(0.7), None, Some(-1.1)]).unwrap();
+            let moved = WithStartPosture::new(inner, vec![Some(0.7), None, Some(-1.1)]).unwrap();
             let (mut whole, mut later) = (Motion::default(), Motion::default());
             moved.motion(&parameters, &times, &mut whole);
             moved.motion(&parameters, &times[1..], &mut later);
@@ -149,7 +149,7 @@ mod tests {
     fn gradient_is_exact() {
         for (seed, inner) in families().into_iter().enumerate() {
             let parameters = check::start(&*inner, seed as u64);
-            let moved = StartingAt::new(inner, vec![Some(0.2), Some(-0.4), None]).unwrap();
+            let moved = WithStartPosture::new(inner, vec![Some(0.2), Some(-0.4), None]).unwrap();
             check::gradient_at(&moved, &parameters, 3);
             check::gradient_on(&moved, &parameters, &[0.0, 0.9, 6.0], 4);
         }
@@ -159,7 +159,7 @@ mod tests {
     fn rejects_invalid_postures() {
         for start in [vec![None; 2], vec![Some(f64::NAN), None, None]] {
             let [inner, _] = families();
-            assert!(StartingAt::new(inner, start).is_err());
+            assert!(WithStartPosture::new(inner, start).is_err());
         }
     }
 }

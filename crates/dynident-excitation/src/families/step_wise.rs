@@ -48,7 +48,7 @@ impl StepWiseLogistic {
     /// If a step contains a joint without offset.
     pub fn new(offsets: &[f64], steps: &[Step], settings: &SplicedLogisticSettings) -> Result<Self, FamilyError> {
         let mut start_s = 0.0;
-        let mut turns = Vec::with_capacity(steps.len());
+        let mut is_rotary = Vec::with_capacity(steps.len());
         for step in steps {
             let lasts_s = step.period_s * settings.repetitions as f64;
             let own = SplicedLogisticSettings {
@@ -56,10 +56,10 @@ impl StepWiseLogistic {
                 offsets: Some(vec![offsets[step.joint]]),
                 ..settings.clone()
             };
-            turns.push(Turn { joint: step.joint, start_s, family: SplicedLogistic::new(1, lasts_s, &own)? });
+            is_rotary.push(Turn { joint: step.joint, start_s, family: SplicedLogistic::new(1, lasts_s, &own)? });
             start_s += lasts_s;
         }
-        Ok(Self { offsets: offsets.to_vec(), steps: turns, duration_s: start_s })
+        Ok(Self { offsets: offsets.to_vec(), steps: is_rotary, duration_s: start_s })
     }
 }
 

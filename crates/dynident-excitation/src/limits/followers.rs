@@ -28,7 +28,7 @@ fn follower_bands(model: &Model) -> Vec<FollowerBand> {
         }
         let limits = &joint.limits;
         let stops = limits.lower.zip(limits.upper).map(|(lower, upper)| [lower, upper]);
-        let units = if joint.turns() { ["rad", "rad/s"] } else { ["m", "m/s"] };
+        let units = if joint.is_rotary() { ["rad", "rad/s"] } else { ["m", "m/s"] };
         let of_kind = [
             (LimitKind::Position, coupling.offset(index), stops, units[0]),
             (LimitKind::Speed, 0.0, limits.velocity.map(|most| [-most, most]), units[1]),

@@ -26,7 +26,7 @@ impl JointMotionLimits {
         for (index, joint) in model.joints().iter().enumerate() {
             let Some(limit) = limits.iter().find(|limit| limit.joint == joint.name) else { continue };
             let units =
-                if joint.turns() { ["rad", "rad/s", "rad/s^2", "rad/s^3"] } else { ["m", "m/s", "m/s^2", "m/s^3"] };
+                if joint.is_rotary() { ["rad", "rad/s", "rad/s^2", "rad/s^3"] } else { ["m", "m/s", "m/s^2", "m/s^3"] };
             let magnitude = |size: Option<f64>| size.map(|size| (0.0, size));
             let ranges = [
                 (LimitKind::Position, limit.position.map(middle_and_half)),

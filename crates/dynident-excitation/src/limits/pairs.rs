@@ -38,7 +38,7 @@ const MIN_RELATIVE_SIZE: f64 = 0.05;
 pub(crate) fn arm_length_m(model: &Model) -> f64 {
     let mut lengths: Vec<f64> = Vec::with_capacity(model.body_count());
     for joint in model.tree_joints() {
-        let stroke = if joint.turns() {
+        let stroke = if joint.is_rotary() {
             0.0
         } else {
             joint.limits.lower.zip(joint.limits.upper).map_or(0.0, |(lower, upper)| lower.abs().max(upper.abs()))
@@ -67,7 +67,7 @@ pub(crate) fn random_postures(model: &Model, count: usize) -> Vec<Vec<f64>> {
     let mut random = Random::new(1);
     let mut posture = || {
         let position = |joint: &dynident_model::Joint| {
-            let reach = if joint.turns() { core::f64::consts::PI } else { 0.5 };
+            let reach = if joint.is_rotary() { core::f64::consts::PI } else { 0.5 };
             let (lower, upper) = joint.limits.lower.zip(joint.limits.upper).unwrap_or((-reach, reach));
             random.uniform(lower, upper)
         };

@@ -22,7 +22,7 @@ impl TorqueLimits {
                 subject: joint.name.clone(),
                 middle: 0.0,
                 size: torque * (1.0 - limit.torque_margin),
-                unit: if joint.turns() { "Nm" } else { "N" },
+                unit: if joint.is_rotary() { "Nm" } else { "N" },
             };
             rows.push((index, constraint));
         }

@@ -62,14 +62,14 @@ struct Step {
 
 impl SmoothTorque {
     pub(crate) fn new(known: &KnownTorque, model: &Model) -> Self {
-        let own = model.own_scale();
+        let own = model.characteristic_scale();
         let terms = known.terms().iter().map(|(term, value)| {
             let joints = term.joints();
             let step = match term.action() {
                 TermAction::Friction(friction) => match friction.curve {
                     VelocityCurve::Step { forward, backward } => {
                         let usual =
-                            |joint: usize| own.velocity(model.joints()[joint].turns(), CoulombShape::USUAL_WIDTH);
+                            |joint: usize| own.velocity(model.joints()[joint].is_rotary(), CoulombShape::USUAL_WIDTH);
                         let widths =
                             joints.iter().zip(friction.ratios).map(|(&joint, ratio)| ratio.abs() * usual(joint));
                         Some(Step {

@@ -36,7 +36,7 @@ pub(crate) fn apply_wrenches(
         }
         let Transform { rotation, translation } = &placements[body];
         let axis = rotation.mul_vec(map.axis);
-        let along = if map.turns { moment - translation.cross(force) } else { force };
+        let along = if map.is_rotary { moment - translation.cross(force) } else { force };
         for (joint, share) in model.drivers(body) {
             by_position[joint] += share * axis.dot(along);
         }

@@ -55,7 +55,7 @@ pub enum StepWiseError {
 /// If the joint does not exist or `rest` has another length.
 pub fn gravity_across(model: &Model, joint: usize, rest: &[f64]) -> Result<f64, StepWiseError> {
     let name = || model.joints()[joint].name.clone();
-    if !model.joints()[joint].turns() {
+    if !model.joints()[joint].is_rotary() {
         return Err(StepWiseError::Slides { joint: name() });
     }
     let mut workspace = Workspace::new(model);

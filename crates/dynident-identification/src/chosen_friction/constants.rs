@@ -194,7 +194,7 @@ pub(crate) fn better_of_joints(
     let (first, second) = (of_joints(model, joints)?, of_joints(of_others, others)?);
     let is_possible = |one: &JointFriction| one.terms.as_deref().is_none_or(is_one_friction);
     let is_better = |place: usize| {
-        let counted = |effect: f64| second[place].schwarz(effect) < first[place].schwarz(effect);
+        let counted = |effect: f64| second[place].bic(effect) < first[place].bic(effect);
         is_other[place] && is_possible(&others[place]) && counted(1.0) && counted(design_effects[place])
     };
     Ok((0..joints.len()).map(is_better).collect())

@@ -5,7 +5,7 @@ use super::nominal_spread::term_spreads;
 use super::problem::{MASS_STD_RATIO, consistent_body, described_problem};
 use super::settings::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
-use dynident_estimation::consistent::{Belief, expected_error};
+use dynident_estimation::consistent::{MassPrior, expected_error};
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_model::Body;
 
@@ -24,7 +24,7 @@ pub fn parameter_std(
     settings: &ConsistencySettings,
 ) -> Result<Vec<Option<f64>>, ConsistencyError> {
     let physical = described_problem(robot, problem, &estimate.joint_sigma, settings)?;
-    let belief = Belief { body_share: MASS_STD_RATIO, scalar_std: term_spreads(robot, problem) };
+    let belief = MassPrior { body_share: MASS_STD_RATIO, scalar_std: term_spreads(robot, problem) };
     let count = robot.base().count();
     let covariance = estimate.covariance.view((0, 0), (count, count)).into_owned();
     let std = expected_error(&physical, &settings.fit(), &covariance, &belief)?;

@@ -16,7 +16,7 @@ use super::workspace::Workspace;
 use crate::chosen_friction::{GridTerms, is_friction_open, stated_friction};
 use crate::error::IdentificationError;
 use crate::lag::{LagCandidates, LagRounds};
-use crate::likelihood::schwarz;
+use crate::likelihood::bic;
 use crate::training::TrainingPasses;
 
 pub(super) struct LagBeforeFriction;
@@ -80,5 +80,5 @@ fn shows_lag(work: &mut Workspace<'_, '_>) -> Result<bool, IdentificationError> 
 
 fn criterion(work: &mut Workspace<'_, '_>) -> Result<f64, IdentificationError> {
     let fit = work.fit()?;
-    Ok(schwarz(&fit.training.problem, &fit.estimation.estimate))
+    Ok(bic(&fit.training.problem, &fit.estimation.estimate))
 }

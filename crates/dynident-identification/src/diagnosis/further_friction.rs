@@ -8,7 +8,7 @@ use dynident_dynamics::ParametricModel;
 use nalgebra::{DMatrix, DVector};
 
 /// Stribeck velocities, rad/s for an arm of usual size
-/// ([`OwnScale::velocity`](dynident_model::OwnScale::velocity)).
+/// ([`CharacteristicScale::velocity`](dynident_model::CharacteristicScale::velocity)).
 const STRIBECK_RAD_S: [f64; 3] = [0.03, 0.1, 0.3];
 
 /// Ratio of a joint's residual with further friction laws to its residual by base parameters `theta`, at most 1: load
@@ -24,8 +24,8 @@ pub(super) fn ratio_with_further_friction(
     let bodies = of(&without_terms(robot, theta));
     let left: Vec<f64> = rows.tau[joint].iter().zip(of(theta)).map(|(tau, explained)| tau - explained).collect();
     let (left, step) = (DVector::from_vec(left), step_of_joint(robot, joint));
-    let turns = robot.model().joints()[joint].turns();
-    let own_velocity = |usual: f64| robot.model().own_scale().velocity(turns, usual);
+    let is_rotary = robot.model().joints()[joint].is_rotary();
+    let own_velocity = |usual: f64| robot.model().characteristic_scale().velocity(is_rotary, usual);
     let column = |row: usize, k: usize| {
         let dq = rows.dq[joint][row];
         let step = step.step(dq);

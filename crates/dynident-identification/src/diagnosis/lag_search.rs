@@ -46,7 +46,7 @@ impl<'a> LagSearch<'a> {
         compensated_s: Vec<f64>,
         settings: &'a DiagnosisSettings,
     ) -> Option<Self> {
-        let (own, limits) = (robot.model().own_scale(), &settings.late_channel);
+        let (own, limits) = (robot.model().characteristic_scale(), &settings.late_channel);
         let longest_s = samples.iter().map(MotionSamples::longest_s).fold(0.0, f64::max);
         let [reach_s, step_s, max_compensated_s, reach_of_joint_s] =
             [limits.max_lag_s, limits.lag_step_s, LONGEST_DELAY_S, limits.max_lag_of_joint_s]

@@ -70,7 +70,7 @@ pub(crate) fn has_jumps(report: &ImportReport) -> bool {
 
 /// Whether a recorder of such a robot has this rate.
 pub(super) fn is_rate_of_a_recorder(model: &Model, rate_hz: f64, settings: &MotionLimits) -> bool {
-    let [lowest, highest] = settings.recorder_rates_hz.map(|usual_hz| model.own_scale().hertz(usual_hz));
+    let [lowest, highest] = settings.recorder_rates_hz.map(|usual_hz| model.characteristic_scale().hertz(usual_hz));
     (lowest..=highest).contains(&rate_hz)
 }
 

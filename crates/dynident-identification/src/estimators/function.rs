@@ -2,13 +2,13 @@
 
 use super::{EstimatorError, TrainingRows};
 use core::fmt::Debug;
-use dynident_estimation::{Estimate, EstimatorRows, OwnEstimate, estimate_by};
+use dynident_estimation::{CustomEstimate, Estimate, EstimatorRows, estimate_by};
 use std::sync::Arc;
 
 /// A custom estimator on the rows of all joints. It returns values and an optional covariance.
 pub trait EstimatorRule: Debug + Send + Sync {
     /// Returns one value for each column of the rows.
-    fn estimate(&self, rows: &EstimatorRows) -> OwnEstimate;
+    fn estimate(&self, rows: &EstimatorRows) -> CustomEstimate;
 }
 
 /// An [`EstimatorRule`] with its name. Settings that were read from a file only have the name.

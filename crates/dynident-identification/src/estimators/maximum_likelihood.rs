@@ -161,13 +161,13 @@ fn torque_covariance(means: &[MeanPeriod], mean_covariance: &DMatrix<f64>, dof: 
 /// Minimum step of the differences by a variable of the motion: positions of all joints, velocities, accelerations.
 fn min_step(model: &RegressorModel, variable: usize) -> f64 {
     let (model, dof) = (model.model(), model.model().dof());
-    let own = model.own_scale();
-    let turns = model.joints()[variable % dof].turns();
+    let own = model.characteristic_scale();
+    let is_rotary = model.joints()[variable % dof].is_rotary();
     let [position, velocity, acceleration] = MIN_STEPS;
     match variable / dof {
-        0 => own.position(turns, position),
-        1 => own.velocity(turns, velocity),
-        _ => own.acceleration(turns, acceleration),
+        0 => own.position(is_rotary, position),
+        1 => own.velocity(is_rotary, velocity),
+        _ => own.acceleration(is_rotary, acceleration),
     }
 }
 

@@ -72,7 +72,7 @@ pub(super) fn spline_motion(
     let settings = SplineMotionSettings {
         rank: estimation.rank,
         covariance: estimation.covariance,
-        own_second_s: rows.model.model().own_scale().seconds(1.0),
+        own_second_s: rows.model.model().characteristic_scale().seconds(1.0),
         ..settings.clone()
     };
     let pilot = torque_sigma(problem, &start.values)?;

@@ -130,7 +130,7 @@ impl ResidualAccumulator {
             }),
             stiction: Stiction::of(model, joint, theta),
             speed,
-            usual_speed: model.model().own_scale().velocity(model.model().joints()[joint].turns(), 1.0),
+            usual_speed: model.model().characteristic_scale().velocity(model.model().joints()[joint].is_rotary(), 1.0),
             whiteness: Whiteness::default(),
             normality: Normality::default(),
             regimes: SpeedRanges::default(),

@@ -37,7 +37,7 @@ impl Stiction {
                 Column::Term(_) | Column::Body { .. } => None,
             })
             .collect();
-        let usual = model.model().own_scale().velocity(model.model().joints()[joint].turns(), 1.0);
+        let usual = model.model().characteristic_scale().velocity(model.model().joints()[joint].is_rotary(), 1.0);
         let speed = |k: usize| {
             let share = k as f64 / (SPEEDS - 1) as f64;
             usual * SpeedRanges::REST_BELOW.powf(1.0 - share) * SpeedRanges::REVERSAL_BELOW.powf(share)

@@ -200,7 +200,7 @@ impl<'a> WideModel<'a> {
     /// up to that of a typical motion. Other terms keep their values.
     fn approximated(&self, joint: usize, terms: &[TorqueTerm]) -> Vec<f64> {
         let model = self.robot.model();
-        let most = model.own_scale().velocity(model.joints()[joint].turns(), TYPICAL_VELOCITY);
+        let most = model.characteristic_scale().velocity(model.joints()[joint].is_rotary(), TYPICAL_VELOCITY);
         let zeros = vec![0.0; model.dof()];
         let torque = |term: &TorqueTerm, dq: f64| {
             let mut velocities = zeros.clone();

@@ -99,8 +99,8 @@ impl JointScale {
     }
 
     pub(crate) fn of(model: &Model, joint: usize) -> Self {
-        let (own, turns) = (model.own_scale(), model.joints()[joint].turns());
-        Self { joint, velocity: own.velocity(turns, 1.0), position: own.position(turns, 1.0) }
+        let (own, is_rotary) = (model.characteristic_scale(), model.joints()[joint].is_rotary());
+        Self { joint, velocity: own.velocity(is_rotary, 1.0), position: own.position(is_rotary, 1.0) }
     }
 }
 

@@ -115,7 +115,7 @@ fn fitted(
     let (logs, settings) = with;
     let cutoff_hz = logs.motion.differentiator.cutoff_hz();
     let dof = model.model().dof();
-    let own = model.model().own_scale();
+    let own = model.model().characteristic_scale();
     let longest_s = own.seconds(settings.thresholds.lag.max_lag_s);
     let start = |joint: usize| {
         let coarse = |check: &DelayCheck<'_>| Some(check.coarse(joint, cutoff_hz, longest_s)? / check.rate_hz());

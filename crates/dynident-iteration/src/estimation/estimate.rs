@@ -6,8 +6,8 @@ use crate::setup::error::IterationError;
 use crate::setup::leg::IterationTask;
 use crate::setup::model_parameters::ModelParameters;
 use crate::setup::settings::{RunIdentificationSettings, Scheme};
-use crate::signals::near_rest::NearRest;
-use crate::signals::rests::RestMargin;
+use crate::signals::near_rest::SamplesNearRest;
+use crate::signals::rests::StictionBand;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
@@ -15,8 +15,8 @@ use dynident_identification::estimators::estimate;
 use dynident_identification::examination::{LagChoice, LagKind, LagRounds, TorqueLag, lag_fit, lags_of_recordings};
 use dynident_identification::friction::JointFriction;
 use dynident_identification::{
-    ErrorBars, ErrorSource, Execution, IdentificationSettings, Logs, OffsetChoice, Recording, Training,
-    choose_friction, consistent_stage, schwarz, training_rows,
+    ErrorBars, ErrorSource, Execution, IdentificationSettings, Logs, OffsetChoice, Recording, Training, bic,
+    choose_friction, consistent_stage, training_rows,
 };
 use serde::{Deserialize, Serialize};
 
@@ -56,7 +56,7 @@ pub struct RunEstimate {
     /// Joints whose dry friction rows near rest are excluded, because these rows increase the residual; one entry per
     /// joint. Empty if no rows are excluded, and for runs that are fitted together.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub near_rest: Vec<Option<NearRest>>,
+    pub near_rest: Vec<Option<SamplesNearRest>>,
     /// Deviation of each run's torque offset from the mean, if runs that are fitted together have separate offsets; the
     /// base parameters contain the mean. Empty if they share an offset.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -76,8 +76,9 @@ impl RunEstimate {
 
     /// Returns the distance from rest above which the rows of each joint are used; empty if only rows at rest are
     /// excluded.
-    pub fn rest_margins(&self) -> Vec<RestMargin> {
-        let margin = |near_rest: &Option<NearRest>| near_rest.as_ref().map(|found| found.margin).unwrap_or_default();
+    pub fn rest_margins(&self) -> Vec<StictionBand> {
+        let margin =
+            |near_rest: &Option<SamplesNearRest>| near_rest.as_ref().map(|found| found.margin).unwrap_or_default();
         self.near_rest.iter().map(margin).collect()
     }
 
@@ -122,7 +123,7 @@ pub fn identify_runs(
 /// Friction that is selected from rows with a lag can compensate the lag, differently at each joint, so that the common
 /// lag becomes insignificant. Therefore, if friction was selected and no lag was compensated, the fit is repeated with
 /// the lag of the stated friction, whatever its error bar, and the fit with the smaller Bayesian information criterion
-/// ([`schwarz`]) is kept.
+/// ([`bic`]) is kept.
 fn fitted(
     task: &IterationTask,
     runs: &[RunLog<'_>],
@@ -148,12 +149,12 @@ fn fitted(
     let first = LagChoice { kind: LagKind::Common, lag_s: vec![lag_s; task.robot.dof()], ..LagChoice::default() };
     // If that fit fails, the first one is kept.
     let other = fit.rounds(&identification, LagRounds::of(identification.lags).after(first));
-    Ok(other.ok().filter(|other| other.schwarz < found.schwarz).unwrap_or(found).estimate)
+    Ok(other.ok().filter(|other| other.bic < found.bic).unwrap_or(found).estimate)
 }
 
 struct RunsEstimate {
     estimate: RunEstimate,
-    schwarz: f64,
+    bic: f64,
 }
 
 struct RunsFit<'a> {
@@ -186,19 +187,19 @@ impl RunsFit<'_> {
             }
             if settings.scheme == Scheme::StepByStep {
                 let estimate = joint_by_joint(task, &logs, &training, settings, &run_weights(task, runs))?;
-                return Ok(RunsEstimate { estimate, schwarz: 0.0 });
+                return Ok(RunsEstimate { estimate, bic: 0.0 });
             }
             let found = estimate(&training.rows(&logs, &identification, &all), None)?.estimate;
             let fit = lag_fit(&logs, &identification, &training.model, &training.columns, &found.values, &[], &all)?;
             if !rounds.again(fit.as_ref(), &found) {
-                let schwarz = schwarz(&training.problem, &found);
+                let bic = bic(&training.problem, &found);
                 let of_constants = chosen.error_of_constants(training.problem.columns(), &found);
                 let bars = ErrorBars::default()
                     .with(ErrorSource::Lag, rounds.error(fit.as_ref(), &found))
                     .with(ErrorSource::FrictionConstants, of_constants);
                 let total = bars.total(&found);
                 let estimate = all_joints(&logs, &identification, training, &all, &total, rounds.choice(), runs)?;
-                return Ok(RunsEstimate { estimate, schwarz });
+                return Ok(RunsEstimate { estimate, bic });
             }
         }
     }

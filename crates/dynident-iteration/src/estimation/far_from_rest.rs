@@ -11,8 +11,8 @@ use crate::estimation::run_logs::{RunLog, recordings};
 use crate::setup::error::IterationError;
 use crate::setup::leg::IterationTask;
 use crate::setup::settings::{RunIdentificationSettings, Scheme};
-use crate::signals::near_rest::NearRest;
-use crate::signals::rests::{RestMargin, has_dry_friction};
+use crate::signals::near_rest::SamplesNearRest;
+use crate::signals::rests::{StictionBand, has_dry_friction};
 use dynident_identification::examination::Stiction;
 use dynident_identification::friction::chosen_model;
 use dynident_identification::{Recording, RegressorModel, Samples};
@@ -20,11 +20,11 @@ use dynident_simulation::Record;
 
 /// Candidate margins, widest first: a slowly accelerating joint sticks up to a fifth of its speed, and the smoothed
 /// breakaway lasts one period of the smoother's cut-off.
-const MARGINS: [RestMargin; 4] = [
-    RestMargin { speed_share: 0.2, smoothing_periods: 1.0 },
-    RestMargin { speed_share: 0.1, smoothing_periods: 1.0 },
-    RestMargin { speed_share: 0.1, smoothing_periods: 0.75 },
-    RestMargin { speed_share: 0.1, smoothing_periods: 0.5 },
+const MARGINS: [StictionBand; 4] = [
+    StictionBand { speed_share: 0.2, smoothing_periods: 1.0 },
+    StictionBand { speed_share: 0.1, smoothing_periods: 1.0 },
+    StictionBand { speed_share: 0.1, smoothing_periods: 0.75 },
+    StictionBand { speed_share: 0.1, smoothing_periods: 0.5 },
 ];
 
 /// Smallest share of a run's samples that a margin leaves a joint; otherwise its friction near rest would not be
@@ -53,21 +53,21 @@ pub(crate) fn without_near_rest(
     let Some(far) = run.identified(&widest).ok().filter(|far| far.impossible.is_none()) else { return Ok(all) };
     let is_excluded = |joint: usize| {
         let (near, far) = (all.joint_sigma[joint], far.joint_sigma[joint]);
-        widest[joint] != RestMargin::REST && far > 0.0 && near > MIN_RESIDUAL_RATIO * far
+        widest[joint] != StictionBand::REST && far > 0.0 && near > MIN_RESIDUAL_RATIO * far
     };
     let excluded: Vec<bool> = (0..widest.len()).map(is_excluded).collect();
     if !excluded.contains(&true) {
         return Ok(all);
     }
-    let margin = |joint: usize| if excluded[joint] { widest[joint] } else { RestMargin::REST };
-    let margins: Vec<RestMargin> = (0..widest.len()).map(margin).collect();
+    let margin = |joint: usize| if excluded[joint] { widest[joint] } else { StictionBand::REST };
+    let margins: Vec<StictionBand> = (0..widest.len()).map(margin).collect();
     let found = if margins == widest { far } else { run.identified(&margins)? };
     let friction = run.dry_friction_nm(&found)?;
     let near_rest = (0..widest.len()).map(|joint| {
         let (share, dry_friction_nm) = (shares[joint], friction[joint]);
         let [all, far] = [&all, &found].map(|fit| fit.joint_sigma[joint] * fit.joint_sigma[joint]);
         let residual_nm = ((all - (1.0 - share) * far) / share).max(0.0).sqrt();
-        excluded[joint].then_some(NearRest { margin: margins[joint], share, residual_nm, dry_friction_nm })
+        excluded[joint].then_some(SamplesNearRest { margin: margins[joint], share, residual_nm, dry_friction_nm })
     });
     let near_rest = near_rest.collect();
     Ok(RunEstimate { near_rest, ..found })
@@ -80,38 +80,38 @@ struct OneRun<'a> {
 }
 
 impl OneRun<'_> {
-    fn log<'l>(&'l self, rest_margins: &'l [RestMargin]) -> RunLog<'l> {
+    fn log<'l>(&'l self, rest_margins: &'l [StictionBand]) -> RunLog<'l> {
         let (legs, records) = (&self.task.legs, self.records);
         RunLog { run: 1, legs, records, joint_sigma: &[], differentiator: None, rest_margins }
     }
 
     /// The estimate with these margins. Friction that needs rows near rest is not selected without them.
-    fn identified(&self, rest_margins: &[RestMargin]) -> Result<RunEstimate, IterationError> {
+    fn identified(&self, rest_margins: &[StictionBand]) -> Result<RunEstimate, IterationError> {
         let mut settings = self.settings.clone();
         for search in &mut settings.friction {
             let joint = self.task.robot.model().joint_index(&search.joint);
             let margin = joint.and_then(|joint| rest_margins.get(joint)).copied().unwrap_or_default();
-            search.rows_near_rest &= margin == RestMargin::REST;
+            search.rows_near_rest &= margin == StictionBand::REST;
         }
         identify_runs(self.task, &[self.log(rest_margins)], &settings)
     }
 
     /// The widest margin that leaves each joint enough samples (for a joint without dry friction: samples at rest
     /// only), and the share of the samples that it excludes.
-    fn widest_margins(&self) -> Result<(Vec<RestMargin>, Vec<f64>), IterationError> {
+    fn widest_margins(&self) -> Result<(Vec<StictionBand>, Vec<f64>), IterationError> {
         let dry = has_dry_friction(&self.task.robot, &self.settings.friction);
-        let count = |margin: RestMargin| -> Result<Vec<f64>, IterationError> {
+        let count = |margin: StictionBand| -> Result<Vec<f64>, IterationError> {
             let margins = vec![margin; dry.len()];
             Ok(counted(&recordings(self.task, &[self.log(&margins)], self.settings)?, dry.len()))
         };
-        let moving = count(RestMargin::REST)?;
+        let moving = count(StictionBand::REST)?;
         let samples = self.records.iter().map(|record| record.samples).sum::<usize>() as f64;
-        let (mut widest, mut shares) = (vec![RestMargin::REST; dry.len()], vec![0.0; dry.len()]);
+        let (mut widest, mut shares) = (vec![StictionBand::REST; dry.len()], vec![0.0; dry.len()]);
         for margin in MARGINS {
             let left = count(margin)?;
             for joint in (0..dry.len()).filter(|&joint| dry[joint] && moving[joint] > 0.0) {
                 let is_enough = left[joint] >= MIN_SAMPLES_SHARE * samples && left[joint] < moving[joint];
-                if widest[joint] == RestMargin::REST && is_enough {
+                if widest[joint] == StictionBand::REST && is_enough {
                     (widest[joint], shares[joint]) = (margin, 1.0 - left[joint] / moving[joint]);
                 }
             }

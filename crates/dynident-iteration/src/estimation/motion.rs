@@ -1,7 +1,7 @@
 use crate::setup::error::IterationError;
 use crate::setup::leg::Leg;
 use crate::setup::settings::RunIdentificationSettings;
-use crate::signals::rests::RestMargin;
+use crate::signals::rests::StictionBand;
 use core::ops::Range;
 use dynident_identification::MotionRecord;
 use dynident_recording::log::JointSamples;
@@ -26,7 +26,7 @@ pub fn measured_motion(
     record: &Record,
     leg: &Leg,
     settings: &RunIdentificationSettings,
-    margins: &[Option<RestMargin>],
+    margins: &[Option<StictionBand>],
 ) -> Result<MotionRecord, IterationError> {
     let joints = record.joints.len();
     let wrong = |problem: String| IterationError::Record { joints: record.joints.clone(), problem };
@@ -109,7 +109,7 @@ fn zeros(count: usize) -> MotionBlock {
     MotionBlock { q: zeros(), dq: zeros(), ddq: zeros(), tau: zeros(), ..MotionBlock::default() }
 }
 
-fn set_rests_aside(motion: &mut MotionBlock, joint: usize, margin: RestMargin, smoothing: usize) {
+fn set_rests_aside(motion: &mut MotionBlock, joint: usize, margin: StictionBand, smoothing: usize) {
     let own = joint * motion.rows..(joint + 1) * motion.rows;
     for rest in margin.samples(&motion.dq[own.clone()], smoothing) {
         motion.set_aside.resize(motion.joints * motion.rows, false);

@@ -2,7 +2,7 @@ use crate::estimation::motion::measured_motion;
 use crate::setup::error::IterationError;
 use crate::setup::leg::{IterationTask, Leg};
 use crate::setup::settings::RunIdentificationSettings;
-use crate::signals::rests::{RestMargin, has_dry_friction};
+use crate::signals::rests::{StictionBand, has_dry_friction};
 use dynident_identification::examination::LagCandidates;
 use dynident_identification::friction::FrictionSearch;
 use dynident_identification::rows::ParallelFilterSettings;
@@ -27,7 +27,7 @@ pub struct RunLog<'a> {
     pub differentiator: Option<&'a DifferentiatorSettings>,
     /// Distance from rest above which the torque of each joint with dry friction is used, as selected by the run;
     /// without an entry, only samples at rest are excluded.
-    pub rest_margins: &'a [RestMargin],
+    pub rest_margins: &'a [StictionBand],
 }
 
 /// The records as recordings with computed motions, run by run and leg by leg.
@@ -45,7 +45,7 @@ pub(crate) fn recordings(
         let settings = own.as_ref().unwrap_or(settings);
         for (number, (leg, record)) in log.legs.iter().zip(log.records).enumerate() {
             let margin = |joint: usize| log.rest_margins.get(joint).copied().unwrap_or_default();
-            let margins: Vec<Option<RestMargin>> =
+            let margins: Vec<Option<StictionBand>> =
                 (0..dry.len()).map(|joint| dry[joint].then(|| margin(joint))).collect();
             let motion = measured_motion(record, leg, settings, &margins)?;
             let of_leg = if legs > 1 { format!(", leg {}", number + 1) } else { String::new() };

@@ -9,7 +9,7 @@ use crate::setup::error::IterationError;
 use crate::setup::leg::{IterationTask, Leg};
 use crate::setup::settings::{IterationSettings, RunIdentificationSettings};
 use crate::signals::oscillation::{OscillationSettings, Search};
-use crate::signals::rests::RestMargin;
+use crate::signals::rests::StictionBand;
 use dynident_identification::friction::JointFriction;
 use dynident_identification::payload::known_payloads;
 use dynident_identification::{Execution, Logs, RegressorModel};
@@ -39,7 +39,7 @@ pub(crate) fn examined(
     settings: &RunIdentificationSettings,
     oscillation: &OscillationSettings,
     known: Option<&RunEstimate>,
-    rest_margins: &[RestMargin],
+    rest_margins: &[StictionBand],
 ) -> Result<RunEvidence, IterationError> {
     let dof = task.robot.dof();
     let noise = torque_noises(records, dof);
@@ -108,7 +108,7 @@ fn predict(
     records: &[Record],
     settings: &RunIdentificationSettings,
     known: &RunEstimate,
-    rest_margins: &[RestMargin],
+    rest_margins: &[StictionBand],
 ) -> Result<(), IterationError> {
     let log = RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None, rest_margins };
     let recordings = recordings(task, &[log], settings)?;

@@ -44,7 +44,7 @@ pub(crate) fn largest_torque(
     let (mut workspace, mut panels) = (BatchWorkspace::new(robot.model()), Panels::default());
     let mut largest = LargestTorque { of_all: vec![0.0; dof], beyond_search: vec![0.0; dof] };
     let whole = reference.motion();
-    let step = ((reference.rate_hz() / robot.model().own_scale().round_hertz(RATE_HZ)) as usize).max(1);
+    let step = ((reference.rate_hz() / robot.model().characteristic_scale().round_hertz(RATE_HZ)) as usize).max(1);
     let samples: Vec<usize> = (0..whole.samples).step_by(step).collect();
     for some in samples.chunks(SAMPLES_AT_ONCE) {
         let part = samples_of(whole, some);

@@ -89,7 +89,7 @@ fn floor_with(
         .then(one_late)
         .flatten()
         .and_then(|one_late| delay_in_samples(record, &plain, &one_late))
-        .filter(|late| *late <= samples(known.robot.model().own_scale().seconds(MAX_FEEDBACK_DELAY_S)));
+        .filter(|late| *late <= samples(known.robot.model().characteristic_scale().seconds(MAX_FEEDBACK_DELAY_S)));
     if let Some(late) = late
         && let Some(run) = simulated(reference, known, friction.0, friction.1, of_log + late)
         && squared_error(record, &run) <= MAX_SQUARED_ERROR_RATIO * squared_error(record, &plain)

@@ -10,8 +10,8 @@ use crate::setup::run_information::{RunNoise, run_information};
 use core::ops::ControlFlow;
 use dynident_dynamics::{ParametricModel, Workspace, inverse_dynamics};
 use dynident_excitation::check::{CHECK_RATE_HZ, check_limits};
-use dynident_excitation::criteria::{Criterion, WorstDirections};
-use dynident_excitation::families::{FamilyError, StartingAt};
+use dynident_excitation::criteria::{Criterion, KieferPhiP};
+use dynident_excitation::families::{FamilyError, WithStartPosture};
 use dynident_excitation::limits::{JointLimit, KnownTorque, LimitError, LimitSet, Limits};
 use dynident_excitation::optimisers::OptimiserError;
 use dynident_excitation::{Design, DesignSettings, DesignTask, Family, Information, Motion, design};
@@ -95,7 +95,7 @@ enum NotRedesigned {
 }
 
 /// Designs the next motion from the current estimate. The information of the new motion adds to that of all good runs,
-/// `D = Σ Wᵀ Σ⁻¹ W` with the estimated noise, and the criterion is [`WorstDirections`] of the sum. Directions are
+/// `D = Σ Wᵀ Σ⁻¹ W` with the estimated noise, and the criterion is [`KieferPhiP`] of the sum. Directions are
 /// scaled by the torque error that they cause over random states within the limits of position, velocity and
 /// acceleration, in units of the joint noise. The torque limits hold for every model in the uncertainty (95 % ellipsoid
 /// of the parameters): the search uses the estimated bodies, friction and drives with limits reduced by the effect of
@@ -103,7 +103,7 @@ enum NotRedesigned {
 /// motion begins where the first motion began.
 #[derive(Debug)]
 pub struct Redesign {
-    family: StartingAt,
+    family: WithStartPosture,
     rate_hz: f64,
     returns: bool,
     limits: Limits,
@@ -130,7 +130,8 @@ impl Redesign {
         let end = |joint: usize| motion.q[(joint + 1) * motion.samples - 1];
         let returns = (0..motion.joints).all(|joint| (end(joint) - start(joint)).abs() <= RETURN_TOLERANCE);
         let posture = (0..motion.joints).map(|joint| Some(start(joint))).collect();
-        let family = StartingAt::new(family, posture).map_err(|error: FamilyError| SimulationError::Family(error))?;
+        let family =
+            WithStartPosture::new(family, posture).map_err(|error: FamilyError| SimulationError::Family(error))?;
         Ok(Self { family, rate_hz: reference.rate_hz(), returns, limits, search, settings })
     }
 
@@ -208,7 +209,7 @@ impl Redesign {
         noise: &RunNoise,
         set: &LimitSet,
     ) -> Result<Design, NotRedesigned> {
-        let criterion = WorstDirections::new(information.units.clone(), CRITERION_ORDER);
+        let criterion = KieferPhiP::new(information.units.clone(), CRITERION_ORDER);
         let criteria: [&dyn Criterion; 1] = [&criterion];
         let task = DesignTask {
             family: &self.family,
@@ -240,7 +241,7 @@ impl Redesign {
                 let values = own.flat_map(|motion| &of(motion)[motion.of(place)]);
                 values.fold(0.0_f64, |most, value| most.max(value.abs()))
             };
-            let free = if joint.turns() { core::f64::consts::PI } else { 0.5 };
+            let free = if joint.is_rotary() { core::f64::consts::PI } else { 0.5 };
             let [lower, upper] = limit.and_then(|limit| limit.position).unwrap_or([-free, free]);
             // A range without overlap with that interval is used unchanged.
             let overlaps = lower < free && upper > -free;
@@ -266,7 +267,7 @@ impl Redesign {
         names: &[String],
     ) -> Result<(), NotRedesigned> {
         let motion_at = |times: &[f64], out: &mut Motion| self.family.motion(&found.parameters, times, out);
-        let rate_hz = model.own_scale().round_hertz(CHECK_RATE_HZ);
+        let rate_hz = model.characteristic_scale().round_hertz(CHECK_RATE_HZ);
         let reports = check_limits(limits, model, self.family.duration_s(), rate_hz, motion_at)?;
         let worst = reports.iter().filter(|report| report.violated);
         if let Some(worst) = worst.max_by(|a, b| a.worst_ratio.total_cmp(&b.worst_ratio)) {

@@ -2,7 +2,7 @@ use crate::estimation::estimate::RunEstimate;
 use crate::estimation::lengths::OtherLength;
 use crate::evidence::run_evidence::{Clipping, JointEvidence};
 use crate::policy::record::RunRecord;
-use crate::setup::settings::{IterationSettings, SettledSettings};
+use crate::setup::settings::{ConvergenceSettings, IterationSettings};
 use crate::torque_check::TorqueCause;
 use dynident_identification::examination::{LagChoice, TorqueLag};
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use thiserror::Error;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "condition", rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum Shortfall {
+pub enum UnmetCondition {
     /// Fewer than two good runs, so no comparison is possible.
     #[error("{good} good runs, 2 are needed for a comparison")]
     TooFewRuns {
@@ -190,7 +190,7 @@ fn clipping_words(stated: bool) -> &'static str {
     if stated { "its limit" } else { "probably saturation of its drive" }
 }
 
-impl Shortfall {
+impl UnmetCondition {
     fn is_cause(&self) -> bool {
         matches!(self, Self::Lag { .. } | Self::LongLag { .. } | Self::LagChanges { .. } | Self::Length(_))
     }
@@ -255,14 +255,14 @@ pub(crate) struct Names {
 }
 
 /// Returns the conditions that the last of `records` does not meet; empty if the iteration has converged.
-pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<Shortfall> {
-    let Some(last) = records.last() else { return vec![Shortfall::TooFewRuns { good: 0 }] };
-    let wrong_torque = last.torque_causes().iter().cloned().map(Shortfall::Torque);
+pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<UnmetCondition> {
+    let Some(last) = records.last() else { return vec![UnmetCondition::TooFewRuns { good: 0 }] };
+    let wrong_torque = last.torque_causes().iter().cloned().map(UnmetCondition::Torque);
     // All other findings are consequences of a wrong torque log.
     if last.torque_causes().iter().any(TorqueCause::is_determined) {
         return wrong_torque.collect();
     }
-    let mut found: Vec<Shortfall> = wrong_torque.collect();
+    let mut found: Vec<UnmetCondition> = wrong_torque.collect();
     // With torque that is wrong for an unknown reason, no other cause is reliable.
     let may_claim = found.is_empty();
     found.extend(unmet(records, settings, names).into_iter().filter(|own| may_claim || !own.is_cause()));
@@ -270,22 +270,22 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
 }
 
 /// Unmet condition of a compensated lag that exceeds the limit by more than its 95 % interval.
-fn long_lag(lag: &LagChoice, allowed_s: f64) -> Option<Shortfall> {
-    (lag.certain_s() > allowed_s).then(|| Shortfall::LongLag { lag_s: lag.longest_s(), allowed_s })
+fn long_lag(lag: &LagChoice, allowed_s: f64) -> Option<UnmetCondition> {
+    (lag.certain_s() > allowed_s).then(|| UnmetCondition::LongLag { lag_s: lag.longest_s(), allowed_s })
 }
 
-fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<Shortfall> {
+fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<UnmetCondition> {
     let good: Vec<&RunRecord> = records.iter().filter(|record| record.accepted).collect();
     let Some(last) = records.last() else { return Vec::new() };
     if !last.accepted {
         let reason = last.reason.clone().unwrap_or_else(|| last.outcome.clone());
-        return vec![Shortfall::LastRunRejected { reason }];
+        return vec![UnmetCondition::LastRunRejected { reason }];
     }
-    let [.., before, _] = good[..] else { return vec![Shortfall::TooFewRuns { good: good.len() }] };
-    let Some(evidence) = &last.evidence else { return vec![Shortfall::NoEvidence { run: last.run }] };
+    let [.., before, _] = good[..] else { return vec![UnmetCondition::TooFewRuns { good: good.len() }] };
+    let Some(evidence) = &last.evidence else { return vec![UnmetCondition::NoEvidence { run: last.run }] };
     let mut found = Vec::new();
     if last.controller.model.is_none() || last.controller.damping != 1.0 {
-        found.push(Shortfall::NoModel);
+        found.push(UnmetCondition::NoModel);
     }
     let limits = &settings.settled;
     let joint = |place: usize| names.joints[place].clone();
@@ -293,7 +293,7 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
         let (tolerance_rad, floor_rad) = (limits.tracking_tolerance, shown.tracking_floor_rad);
         let explained = floor_rad.map_or(0.0, |floor| limits.floor_ratio * floor);
         if error_rad > tolerance_rad.max(explained) {
-            found.push(Shortfall::Tracking { joint: joint(place), error_rad, tolerance_rad, floor_rad });
+            found.push(UnmetCondition::Tracking { joint: joint(place), error_rad, tolerance_rad, floor_rad });
         }
     }
     if let (Some(old), Some(new)) = (before.knowledge(), last.knowledge()) {
@@ -301,18 +301,18 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
     }
     let own = last.estimate.as_ref();
     if let Some(lag) = own.and_then(|own| unexplained_lag(&own.lag, &evidence.log_rates_hz)) {
-        found.push(Shortfall::Lag { lag_s: lag.lag_s, half_width_95_s: lag.half_width_95_s });
+        found.push(UnmetCondition::Lag { lag_s: lag.lag_s, half_width_95_s: lag.half_width_95_s });
     }
     found.extend(last.knowledge().and_then(|known| long_lag(&known.lag, names.most_lag_s)));
     for (place, shown) in evidence.joints.iter().enumerate() {
         if let Some((now, then)) = changed_lag(&good, place, limits.verdict.min_lag_change_ratio) {
             let half_width_95_s = now.half_width_95_s.hypot(then.half_width_95_s);
             let (lag_s, before_s) = (now.lag_s, then.lag_s);
-            found.push(Shortfall::LagChanges { joint: joint(place), lag_s, before_s, half_width_95_s });
+            found.push(UnmetCondition::LagChanges { joint: joint(place), lag_s, before_s, half_width_95_s });
         }
         of_joint(&mut found, last, shown, place, limits, names);
     }
-    found.extend(evidence.other_length.clone().map(Shortfall::Length));
+    found.extend(evidence.other_length.clone().map(UnmetCondition::Length));
     if names.held_out {
         held_out(&mut found, last, limits.verdict.min_inside_share, names);
     }
@@ -321,11 +321,11 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
 
 /// Clipping, prediction and unexplained torque of one joint of the last run.
 fn of_joint(
-    found: &mut Vec<Shortfall>,
+    found: &mut Vec<UnmetCondition>,
     last: &RunRecord,
     shown: &JointEvidence,
     place: usize,
-    limits: &SettledSettings,
+    limits: &ConvergenceSettings,
     names: &Names,
 ) {
     let joint = || names.joints[place].clone();
@@ -336,12 +336,12 @@ fn of_joint(
         // Without a stated limit, constant peak torque indicates saturation only if the joint does not follow and no
         // larger torque was commanded.
         if stated || beyond && !last.has_commanded_torque(place) {
-            found.push(Shortfall::Clipping { joint: joint(), percent: 100.0 * share, torque, stated });
+            found.push(UnmetCondition::Clipping { joint: joint(), percent: 100.0 * share, torque, stated });
         }
     }
     let of_run = shown.prediction.filter(|_| !names.held_out);
     if let Some(prediction) = of_run.filter(|prediction| prediction.inside < limits.verdict.min_inside_share) {
-        found.push(Shortfall::Prediction {
+        found.push(UnmetCondition::Prediction {
             joint: joint(),
             inside_percent: 100.0 * prediction.inside,
             rms_error_nm: prediction.rms_error,
@@ -356,24 +356,24 @@ fn of_joint(
     let beyond_noise = (sigma * sigma - shown.row_noise * shown.row_noise).max(0.0).sqrt();
     let (percent, allowed_percent) = (100.0 * beyond_noise / shown.torque_rms, limits.most_unexplained_percent);
     if shown.torque_rms > 0.0 && percent > allowed_percent {
-        found.push(Shortfall::Unexplained { joint: joint(), percent, allowed_percent });
+        found.push(UnmetCondition::Unexplained { joint: joint(), percent, allowed_percent });
     }
 }
 
-fn held_out(found: &mut Vec<Shortfall>, last: &RunRecord, min_inside_share: f64, names: &Names) {
+fn held_out(found: &mut Vec<UnmetCondition>, last: &RunRecord, min_inside_share: f64, names: &Names) {
     let Some(run) = &last.held_out else {
-        found.push(Shortfall::NotHeldOut);
+        found.push(UnmetCondition::NotHeldOut);
         return;
     };
     let Some(evidence) = &run.evidence else {
         let reason = run.reason.clone().unwrap_or_else(|| run.outcome.clone());
-        found.push(Shortfall::HeldOutFailed { reason });
+        found.push(UnmetCondition::HeldOutFailed { reason });
         return;
     };
     for (place, shown) in evidence.joints.iter().enumerate() {
         let Some(prediction) = shown.prediction else { continue };
         if prediction.inside < min_inside_share {
-            found.push(Shortfall::HeldOutPrediction {
+            found.push(UnmetCondition::HeldOutPrediction {
                 joint: names.joints[place].clone(),
                 inside_percent: 100.0 * prediction.inside,
                 rms_error_nm: prediction.rms_error,
@@ -410,7 +410,7 @@ fn changed_lag(good: &[&RunRecord], joint: usize, min_ratio: f64) -> Option<(Tor
 /// Reports the parameter that changed most, if it changed too much, and the parameter with the widest error bar, if it
 /// is too wide.
 fn parameters(
-    found: &mut Vec<Shortfall>,
+    found: &mut Vec<UnmetCondition>,
     old: &RunEstimate,
     new: &RunEstimate,
     settings: &IterationSettings,
@@ -430,12 +430,12 @@ fn parameters(
     let most = (0..count).map(|k| (k, moved(k))).max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((k, bars)) = most.filter(|(_, bars)| *bars > limits.parameter_sigmas) {
         let (parameter, allowed) = (name(k), limits.parameter_sigmas);
-        found.push(Shortfall::ParameterMoves { parameter, bars, allowed });
+        found.push(UnmetCondition::ParameterMoves { parameter, bars, allowed });
     }
     let widest = (0..count).map(|k| (k, share(k) * new.std[k].max(old.std[k]))).max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((k, bar)) = widest.filter(|(_, bar)| *bar > limits.most_uncertain * largest) {
         let (percent, allowed_percent) = (100.0 * bar / largest.max(f64::MIN_POSITIVE), 100.0 * limits.most_uncertain);
-        found.push(Shortfall::ParameterUncertain { parameter: name(k), percent, allowed_percent });
+        found.push(UnmetCondition::ParameterUncertain { parameter: name(k), percent, allowed_percent });
     }
 }
 
@@ -471,7 +471,7 @@ mod tests {
     fn a_lag_is_long_only_beyond_its_interval() {
         assert_eq!(long_lag(&lag(-15.0e-3, 5.02e-3), 10.0e-3), None);
         let named = long_lag(&lag(-25.0e-3, 1.0e-3), 10.0e-3);
-        assert_eq!(named, Some(Shortfall::LongLag { lag_s: 25.0e-3, allowed_s: 10.0e-3 }));
+        assert_eq!(named, Some(UnmetCondition::LongLag { lag_s: 25.0e-3, allowed_s: 10.0e-3 }));
         assert_eq!(long_lag(&LagChoice::default(), 10.0e-3), None);
         // A lag that the study states has no interval.
         let stated = LagChoice { kind: LagKind::Stated, lag_s: vec![12.0e-3], ..LagChoice::default() };

@@ -2,7 +2,7 @@ use crate::estimation::estimate::RunEstimate;
 use crate::estimation::run_logs::RunLog;
 use crate::policy::record::RunRecord;
 use crate::setup::leg::Leg;
-use crate::signals::rests::RestMargin;
+use crate::signals::rests::StictionBand;
 use dynident_recording::DifferentiatorSettings;
 use dynident_simulation::Record;
 
@@ -13,7 +13,7 @@ pub(crate) struct GoodLog {
     records: Vec<Record>,
     joint_sigma: Vec<f64>,
     differentiator: Option<DifferentiatorSettings>,
-    rest_margins: Vec<RestMargin>,
+    rest_margins: Vec<StictionBand>,
 }
 
 impl GoodLog {

@@ -74,8 +74,8 @@ impl EnvelopeSettings {
             Ok::<Vec<Option<f64>>, SimulationError>(values.into_iter().map(Some).collect())
         };
         let limits = |joint: usize| &joints[joint].limits;
-        let own = model.own_scale();
-        let path = |joint: usize| Some(if joints[joint].turns() { TRACKING_RAD } else { own.metres(TRACKING_M) });
+        let own = model.characteristic_scale();
+        let path = |joint: usize| Some(if joints[joint].is_rotary() { TRACKING_RAD } else { own.metres(TRACKING_M) });
         Ok(Envelope {
             lower: each("lower", &self.lower, false, &|joint| limits(joint).lower)?,
             upper: each("upper", &self.upper, false, &|joint| limits(joint).upper)?,

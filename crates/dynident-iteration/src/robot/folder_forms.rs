@@ -1,7 +1,7 @@
 //! Additional formats of a motion for robots without a Dynident program: ROS 2, URScript, waypoints, torques and
 //! currents.
 
-use super::handover::{model_torques, write_whole};
+use super::handover::{model_torques, write_atomically};
 use super::{RobotFault, RunRequest};
 use core::fmt::Write as _;
 use dynident_excitation::Motion;
@@ -53,7 +53,7 @@ pub(super) fn write_forms(
             let text = text(*form, reference, request.model, joints, settings);
             let fault = |error: ExportError| RobotFault::File { path: path.clone(), reason: error.to_string() };
             match text.map_err(fault)? {
-                Some(text) => write_whole(&path, &text)?,
+                Some(text) => write_atomically(&path, &text)?,
                 // Remove the file of an earlier call whose controller had a model.
                 None if path.exists() => {
                     let fault =

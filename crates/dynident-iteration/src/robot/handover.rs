@@ -82,7 +82,7 @@ fn model_json(model: &ControllerModel) -> Value {
         .map(|(place, (joint, inertial))| {
             let mut out = json!({
                 "name": joint.name,
-                "turns": joint.turns(),
+                "turns": joint.is_rotary(),
                 "parent": joint.parent.map(|parent| &robot.tree_joints()[parent].name),
                 "rotation": joint.placement.rotation.0,
                 "translation_m": joint.placement.translation.0,
@@ -128,8 +128,8 @@ fn files(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[
 
 pub(super) fn write(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[PathBuf; 2], RobotFault> {
     let [trajectory, controller] = files(request, joints, folder)?;
-    write_whole(&trajectory.0, &trajectory.1)?;
-    write_whole(&controller.0, &controller.1)?;
+    write_atomically(&trajectory.0, &trajectory.1)?;
+    write_atomically(&controller.0, &controller.1)?;
     Ok([trajectory.0, controller.0])
 }
 
@@ -138,7 +138,7 @@ pub(super) fn write_ways(request: &RunRequest<'_>, folder: &Path) -> Result<Opti
     let Some(ways) = request.ways else { return Ok(None) };
     let paths = ["approach.csv", "return.csv"].map(|name| folder.join(name));
     for (path, way) in paths.iter().zip([&ways.approach, &ways.back]) {
-        write_whole(path, &trajectory_csv(way, fed_forward(request)))?;
+        write_atomically(path, &trajectory_csv(way, fed_forward(request)))?;
     }
     Ok(Some(paths))
 }
@@ -163,10 +163,10 @@ fn of_the_run(text: &str) -> Result<Value, &str> {
 
 const MAX_FILE_BYTES: u64 = 1 << 30;
 
-pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), RobotFault> {
+pub(super) fn write_atomically(path: &Path, text: &str) -> Result<(), RobotFault> {
     if dynident_files::read_text(path, MAX_FILE_BYTES).is_ok_and(|there| there == text) {
         return Ok(());
     }
-    dynident_system::write_whole(path, text.as_bytes())
+    dynident_system::write_atomically(path, text.as_bytes())
         .map_err(|error| RobotFault::File { path: path.to_owned(), reason: error.to_string() })
 }

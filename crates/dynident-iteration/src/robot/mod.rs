@@ -40,7 +40,7 @@ pub use protocol::{LoggedTorque, PROTOCOL, ToClient, ToHost, WayFiles};
 pub use simulated::SimulatedRobot;
 pub use stop_reason::{Breach, EnvelopeQuantity, JointOscillation, Stopping};
 pub use stop_signal::StopSignal;
-pub use ways::{RunPart, WayRecords, Ways};
+pub use ways::{ApproachPaths, RunPart, WayRecords};
 pub use workspace::{WatchedPoint, WorkspaceBox, WorkspaceSettings};
 
 use crate::signals::oscillation::OscillationLimits;
@@ -90,7 +90,7 @@ pub struct RunRequest<'a> {
     /// Purpose of the motion.
     pub purpose: RunPurpose,
     /// Paths from home to the motion and back. Without them the robot has to be at the begin of the motion.
-    pub ways: Option<&'a Ways>,
+    pub ways: Option<&'a ApproachPaths>,
 }
 
 impl<'a> RunRequest<'a> {

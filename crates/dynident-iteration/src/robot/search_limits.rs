@@ -19,7 +19,7 @@ impl EnvelopeSettings {
     pub fn narrow(&self, mut limits: Limits, model: &Model, margin: f64) -> Result<Limits, SimulationError> {
         let envelope = self.envelope(model)?;
         let errors: Vec<f64> = envelope.tracking_error.iter().map(|error| margin * error.unwrap_or(0.0)).collect();
-        let own = model.own_scale();
+        let own = model.characteristic_scale();
         let known = model.bodies_without_prior().is_empty();
         // Defaults from the robot description already have a margin: `LIMIT_FACTOR` of the envelope.
         let kept = |stated: bool| if stated { 1.0 - margin } else { 1.0 };
@@ -29,7 +29,7 @@ impl EnvelopeSettings {
                 limits.joints.len() - 1
             });
             let limit = &mut limits.joints[at];
-            let far = if joint.turns() { UNREACHABLE_DISTANCE } else { own.metres(UNREACHABLE_DISTANCE) };
+            let far = if joint.is_rotary() { UNREACHABLE_DISTANCE } else { own.metres(UNREACHABLE_DISTANCE) };
             let range = match (envelope.lower[place], envelope.upper[place]) {
                 (Some(lower), Some(upper)) => {
                     let room = errors[place].min(0.5 * margin * (upper - lower));
@@ -61,7 +61,7 @@ impl WorkspaceBox {
     /// The box with the watched points, each kept inside by the effect of the tracking errors; `None` if no axis is
     /// bounded.
     fn limit(&self, model: &Model, errors: &[f64], margin: f64) -> Option<BoxLimit> {
-        let far = model.own_scale().metres(UNREACHABLE_DISTANCE);
+        let far = model.characteristic_scale().metres(UNREACHABLE_DISTANCE);
         let bounds = (0..3).map(|axis| match (self.lower[axis], self.upper[axis]) {
             (Some(lower), Some(upper)) => Some([lower, upper]),
             (Some(lower), None) => Some([lower, lower.max(0.0) + far]),
@@ -96,7 +96,7 @@ impl WatchedPoint {
         let (mut square, mut body) = (0.0, Some(self.body));
         while let Some(at) = body {
             let joint = &model.tree_joints()[at];
-            let lever = if joint.turns() { length_m } else { 1.0 };
+            let lever = if joint.is_rotary() { length_m } else { 1.0 };
             let error: f64 = model.drivers(at).map(|(driver, share)| (share * errors[driver]).abs()).sum();
             square += (error * lever).powi(2);
             length_m += joint.placement.translation.norm();

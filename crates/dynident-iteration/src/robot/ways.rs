@@ -40,14 +40,14 @@ impl RunPart {
 
 /// The paths of one run, each from rest to rest.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ways {
+pub struct ApproachPaths {
     /// From home to the first posture of the motion.
     pub approach: Reference,
     /// From the last posture of the motion to home.
     pub back: Reference,
 }
 
-impl Ways {
+impl ApproachPaths {
     /// Checks that they fit a motion: same joints and rate, and no steps between the parts.
     ///
     /// # Errors
@@ -166,14 +166,14 @@ mod tests {
     /// Each shared sample appears once.
     #[test]
     fn three_parts_are_one() {
-        let ways = Ways { approach: line(0.0, 1.0, 3), back: line(4.0, 0.0, 2) };
+        let ways = ApproachPaths { approach: line(0.0, 1.0, 3), back: line(4.0, 0.0, 2) };
         let whole = ways.around(&line(1.0, 4.0, 4)).unwrap();
         assert_eq!(whole.samples(), 2 + 4 + 1);
         assert_eq!(whole.motion().q[..7], [0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 0.0]);
         assert_eq!(whole.motion().dq[..7], [1.0, 1.0, 3.0, 3.0, 3.0, 3.0, -4.0]);
         assert_eq!(whole.motion().q[7..], [0.0; 7]);
         // If the robot is already there, the path has one sample.
-        let there = Ways { approach: line(1.0, 1.0, 1), back: line(4.0, 4.0, 1) };
+        let there = ApproachPaths { approach: line(1.0, 1.0, 1), back: line(4.0, 4.0, 1) };
         assert_eq!(there.around(&line(1.0, 4.0, 4)).unwrap().motion().q[..4], [1.0, 2.0, 3.0, 4.0]);
         // A step between the parts is an error.
         assert!(ways.around(&line(1.1, 4.0, 4)).is_err());

@@ -43,7 +43,7 @@ impl WorkspaceSettings {
             let joint = &model.tree_joints()[body];
             let away = offset - joint.axis.scale(joint.axis.dot(offset));
             // A point on the axis of a revolute joint on the base does not move.
-            if joint.parent.is_some() || !joint.turns() || away.norm() > MAX_AXIS_DISTANCE_M {
+            if joint.parent.is_some() || !joint.is_rotary() || away.norm() > MAX_AXIS_DISTANCE_M {
                 points.push(WatchedPoint {
                     link: link.to_owned(),
                     joint: joint.name.clone(),

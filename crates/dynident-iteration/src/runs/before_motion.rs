@@ -3,8 +3,8 @@
 use crate::policy::next_step::RunPlan;
 use crate::policy::record::RunRecord;
 use crate::policy::supervision::{NextMotion, NextWays};
-use crate::robot::{RunPurpose, Ways};
-use crate::setup::home::{FoundWays, HomeError};
+use crate::robot::{ApproachPaths, RunPurpose};
+use crate::setup::home::{FoundPaths, HomeError};
 use crate::setup::leg::{IterationTask, Leg};
 use crate::setup::model_parameters::ModelParameters;
 use crate::setup::rehearsal::{Rehearsal, RehearsalFailure, Rehearsed};
@@ -71,7 +71,7 @@ pub(crate) fn ways_of(
     task: &IterationTask,
     settings: &IterationSettings,
     stop: &dyn Fn() -> bool,
-) -> Result<Vec<Option<FoundWays>>, HomeError> {
+) -> Result<Vec<Option<FoundPaths>>, HomeError> {
     let envelope = settings.safety.envelope.as_ref();
     let of_leg = |leg: &Leg| {
         let home = settings.safety.home.as_ref();
@@ -86,7 +86,7 @@ pub(crate) fn rehearsed<'a>(
     settings: &IterationSettings,
     robot: &ParametricModel,
     (plan, controller, model): (&RunPlan, &ControllerSettings, Option<&ControllerModel>),
-    (ways, stop): (&[Option<FoundWays>], &dyn Fn() -> bool),
+    (ways, stop): (&[Option<FoundPaths>], &dyn Fn() -> bool),
     before: &[RunRecord],
 ) -> Result<Result<Option<Rehearsal>, RehearsalFailure>, SimulationError> {
     let Some(rehearsal) = &settings.safety.rehearsal else { return Ok(Ok(None)) };
@@ -101,7 +101,7 @@ pub(crate) fn rehearsed<'a>(
     let typical = with_typical_drives(robot).unwrap_or_else(|| robot.nominal().to_vec());
     let lightest = rehearsal.lightest_drive();
     let light = (lightest < 1.0).then(|| with_light_drives(robot, lightest)).flatten();
-    let whole = |(leg, found): (&'a Leg, &Option<FoundWays>)| {
+    let whole = |(leg, found): (&'a Leg, &Option<FoundPaths>)| {
         let reference = leg.reference();
         let around = found.as_ref().map(|found| found.ways.around(reference)).transpose()?;
         Ok(around.map_or(Cow::Borrowed(reference), Cow::Owned))
@@ -131,7 +131,7 @@ pub(crate) fn next_motion(
     controller: &ControllerSettings,
     motion: &Commanded<'_>,
     reference: &Reference,
-    ways: Option<(&Ways, &FoundWays)>,
+    ways: Option<(&ApproachPaths, &FoundPaths)>,
 ) -> NextMotion {
     let largest = |of: &[&Reference]| -> Vec<(String, f64)> {
         let names = task.robot.joint_names().into_iter().enumerate();

@@ -5,7 +5,7 @@ use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
 use crate::runs::before_motion::{Commanded, next_motion, rehearsed, ways_of};
 use crate::runs::iteration::Iteration;
 use crate::setup::error::IterationError;
-use crate::setup::home::{FoundWays, HomeError};
+use crate::setup::home::{FoundPaths, HomeError};
 use crate::setup::leg::IterationTask;
 use crate::setup::rehearsal::{Rehearsal, RehearsalFailure};
 use crate::setup::status::IterationStatus;
@@ -17,7 +17,7 @@ use std::time::Instant;
 pub(crate) struct Prepared {
     pub(crate) controller: ControllerSettings,
     pub(crate) model: Option<ControllerModel>,
-    pub(crate) ways: Vec<Option<FoundWays>>,
+    pub(crate) ways: Vec<Option<FoundPaths>>,
     pub(crate) rehearsal: Option<Rehearsal>,
 }
 

@@ -1,6 +1,6 @@
 use crate::estimation::forecast::MotionForecast;
 use crate::evidence::held_out_motion::HeldOutMotion;
-use crate::policy::convergence::Shortfall;
+use crate::policy::convergence::UnmetCondition;
 use crate::policy::good_log::GoodLog;
 use crate::policy::next_step::{Next, RunPlan};
 use crate::policy::record::RunRecord;
@@ -21,7 +21,7 @@ pub struct IterationOutcome {
     /// How it ended.
     pub status: IterationStatus,
     /// Conditions of convergence that are not met; empty if it has converged.
-    pub shortfalls: Vec<Shortfall>,
+    pub shortfalls: Vec<UnmetCondition>,
     /// Every run.
     pub runs: Vec<RunRecord>,
     /// Forecast for a further run, if all conditions are met and its gain was too small.

@@ -2,7 +2,7 @@ use crate::estimation::estimate::RunEstimate;
 use crate::evidence::held_out_motion::{HeldOutMotion, HeldOutRun};
 use crate::evidence::run_evidence::RunEvidence;
 use crate::evidence::run_examination::examined;
-use crate::policy::convergence::Shortfall;
+use crate::policy::convergence::UnmetCondition;
 use crate::policy::next_step::RunPlan;
 use crate::policy::record::RunRecord;
 use crate::policy::supervision::Supervisor;
@@ -53,7 +53,7 @@ impl Iteration {
             return Ok(None);
         }
         let in_turn = held_out.every.is_some_and(|every| last.run.is_multiple_of(every));
-        let due = in_turn || self.shortfalls(records)? == [Shortfall::NotHeldOut];
+        let due = in_turn || self.shortfalls(records)? == [UnmetCondition::NotHeldOut];
         Ok(due.then_some(held_out))
     }
 

@@ -2,7 +2,7 @@ use crate::estimation::estimate::RunEstimate;
 use crate::estimation::run_motion::legs_along;
 use crate::evidence::held_out_motion::HeldOutMotion;
 use crate::planning::planner::MotionPlanner;
-use crate::policy::convergence::{Names, Shortfall, shortfalls};
+use crate::policy::convergence::{Names, UnmetCondition, shortfalls};
 use crate::policy::friction_chosen::friction_chosen;
 use crate::policy::next_step::{self, Next};
 use crate::policy::record::RunRecord;
@@ -94,7 +94,7 @@ impl Iteration {
     ///
     /// # Errors
     /// Records of another robot.
-    pub fn shortfalls(&self, records: &[RunRecord]) -> Result<Vec<Shortfall>, IterationError> {
+    pub fn shortfalls(&self, records: &[RunRecord]) -> Result<Vec<UnmetCondition>, IterationError> {
         let robot = self.robot(records)?;
         Ok(shortfalls(records, &self.settings, &self.names(&robot, records)?))
     }

@@ -250,10 +250,10 @@ fn stiff_enough(
     left: f64,
     tracking_error: Option<&[f64]>,
 ) -> Vec<f64> {
-    let own = robot.model().own_scale();
+    let own = robot.model().characteristic_scale();
     let of_joint = |(joint, description): (usize, &dynident_model::Joint)| {
         let Some(effort) = description.limits.effort else { return 0.0 };
-        let default = if description.turns() { TRACKING_RAD } else { own.metres(TRACKING_M) };
+        let default = if description.is_rotary() { TRACKING_RAD } else { own.metres(TRACKING_M) };
         let error = 0.8 * tracking_error.map_or(default, |stated| stated[joint]);
         let least = matrices.iter().fold(f64::INFINITY, |least, matrix| least.min(matrix[(joint, joint)]));
         (2.0 * FRICTION * effort / (left * least * error)).sqrt()

@@ -1,6 +1,6 @@
 //! The home posture between runs, and the approach and return paths between home and a motion.
 
-use crate::robot::{Envelope, Ways};
+use crate::robot::{ApproachPaths, Envelope};
 use dynident_excitation::Motion;
 use dynident_excitation::check::{CHECK_RATE_HZ, LimitReport, check_limits};
 use dynident_excitation::limits::{LimitError, LimitKind, LimitSet, Limits};
@@ -112,9 +112,9 @@ pub enum HomeError {
 
 /// The paths to a motion and back, with their via postures.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FoundWays {
+pub struct FoundPaths {
     /// The paths.
-    pub ways: Ways,
+    pub ways: ApproachPaths,
     /// Via postures of each path, rad (m), in order from home; empty for a direct path.
     pub over: [Vec<Vec<f64>>; 2],
 }
@@ -142,7 +142,12 @@ impl HomeSettings {
     ///
     /// # Errors
     /// No path exists; nothing has moved.
-    pub fn ways(&self, model: &Model, motion: &Reference, envelope: Option<&Envelope>) -> Result<FoundWays, HomeError> {
+    pub fn ways(
+        &self,
+        model: &Model,
+        motion: &Reference,
+        envelope: Option<&Envelope>,
+    ) -> Result<FoundPaths, HomeError> {
         self.ways_until(model, motion, envelope, &|| false)
     }
 
@@ -156,7 +161,7 @@ impl HomeSettings {
         motion: &Reference,
         envelope: Option<&Envelope>,
         stop: &dyn Fn() -> bool,
-    ) -> Result<FoundWays, HomeError> {
+    ) -> Result<FoundPaths, HomeError> {
         self.validate(model.dof())?;
         require_length("joints of the motion", model.dof(), motion.joints())?;
         let planner = Planner::new(self, model, motion, (envelope, stop))?;
@@ -180,7 +185,7 @@ impl HomeSettings {
         };
         let approach = Reference::new(motion.rate_hz(), there)?;
         let back = Reference::new(motion.rate_hz(), backwards(&home))?;
-        Ok(FoundWays { ways: Ways { approach, back }, over: [over_there, over_home] })
+        Ok(FoundPaths { ways: ApproachPaths { approach, back }, over: [over_there, over_home] })
     }
 }
 
@@ -335,7 +340,7 @@ impl<'a> Planner<'a> {
         let reach = (tried + 1) as f64 / POSTURES_TRIED as f64;
         let joints = self.model.joints().iter().enumerate();
         let one = |(place, joint): (usize, &dynident_model::Joint)| {
-            let free = if joint.turns() { core::f64::consts::PI } else { 1.0 };
+            let free = if joint.is_rotary() { core::f64::consts::PI } else { 1.0 };
             let position = self.limits.of(&joint.name).and_then(|limit| limit.position);
             let [low, high] = [from[place].min(to[place]), from[place].max(to[place])];
             let [lowest, highest] = position.unwrap_or([low - free, high + free]);
@@ -405,7 +410,7 @@ impl<'a> Planner<'a> {
     /// the path, but at least the sample rate.
     fn broken(&self, way: &Motion) -> Result<Option<LimitReport>, HomeError> {
         self.check_stop()?;
-        let check_hz = self.home.speed * self.model.own_scale().round_hertz(CHECK_RATE_HZ);
+        let check_hz = self.home.speed * self.model.characteristic_scale().round_hertz(CHECK_RATE_HZ);
         let rate_hz = check_hz.max(self.rate_hz);
         // A posture is checked once.
         let duration_s = ((way.samples - 1) as f64 / self.rate_hz).max(1.0 / rate_hz);

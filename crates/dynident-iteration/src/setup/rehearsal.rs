@@ -85,7 +85,7 @@ impl RehearsalSettings {
 
     /// Largest delay of the controller of this robot, s.
     pub fn delay_s(&self, model: &Model) -> f64 {
-        self.delay_s.unwrap_or_else(|| model.own_scale().seconds(DELAY_S))
+        self.delay_s.unwrap_or_else(|| model.characteristic_scale().seconds(DELAY_S))
     }
 }
 
@@ -343,7 +343,7 @@ impl Rehearsed<'_> {
     fn postures(&self, count: usize, random: &mut Random) -> Vec<Vec<f64>> {
         let joints = self.robot.model().joints();
         let mut range = |joint: usize| {
-            let most = if joints[joint].turns() { core::f64::consts::PI } else { 1.0 };
+            let most = if joints[joint].is_rotary() { core::f64::consts::PI } else { 1.0 };
             let lower = self.envelope.and_then(|own| own.lower[joint]).unwrap_or(-most);
             let upper = self.envelope.and_then(|own| own.upper[joint]).unwrap_or(most);
             random.uniform(lower, upper.max(lower))

@@ -54,7 +54,7 @@ pub struct RunIdentificationSettings {
     /// sample is then the mean of the values before and after it. Default true.
     pub held_torque: bool,
     /// Whether rows near rest are excluded where the dry friction model of a joint does not fit there
-    /// ([`NearRest`](crate::NearRest)). Default true. Rows at rest are always excluded.
+    /// ([`SamplesNearRest`](crate::SamplesNearRest)). Default true. Rows at rest are always excluded.
     pub set_aside_near_rest: bool,
     /// Estimator, excitation thresholds and sources of error bars. Default weighted least squares. The joint-by-joint
     /// scheme supports ordinary and weighted least squares.
@@ -115,14 +115,14 @@ pub enum StartWith {
     Prior,
 }
 
-/// When an iteration has converged; [`Shortfall`](crate::Shortfall) lists the conditions. Parameters have converged if
+/// When an iteration has converged; [`UnmetCondition`](crate::UnmetCondition) lists the conditions. Parameters have converged if
 /// `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and `s ≤ most_uncertain ·
 /// max|θ|`, where θ_k is the estimate after run k and s its standard deviation. To compare parameters of different
 /// units, each is weighted by its torque along the motion as a share of the joint torque.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
-pub struct SettledSettings {
+pub struct ConvergenceSettings {
     /// Largest change of a parameter, in error bars. Default 3.
     pub parameter_sigmas: f64,
     /// Largest change of a parameter as a share of the largest parameter (both by torque). Default 1e-6.
@@ -153,13 +153,13 @@ pub struct SettledSettings {
 /// Default of the longest accepted lag, seconds, for arms of up to 1.2 m.
 const MOST_LAG_S: f64 = 0.01;
 
-impl SettledSettings {
+impl ConvergenceSettings {
     pub(crate) fn most_lag_s(&self, model: &Model) -> f64 {
-        self.most_lag_s.unwrap_or_else(|| model.own_scale().seconds(MOST_LAG_S).max(MOST_LAG_S))
+        self.most_lag_s.unwrap_or_else(|| model.characteristic_scale().seconds(MOST_LAG_S).max(MOST_LAG_S))
     }
 }
 
-impl Default for SettledSettings {
+impl Default for ConvergenceSettings {
     fn default() -> Self {
         Self {
             parameter_sigmas: 3.0,
@@ -207,7 +207,7 @@ pub struct IterationSettings {
     /// Largest number of runs. Default 8.
     pub max_runs: usize,
     /// When the iteration has converged.
-    pub settled: SettledSettings,
+    pub settled: ConvergenceSettings,
     /// When a difference between logged and commanded torque is reported; `None` disables the check.
     pub torque_check: Option<TorqueCheckSettings>,
     /// Safety of the runs.
@@ -230,7 +230,7 @@ impl Default for IterationSettings {
             stiffen: 2.0,
             most_model_free: 4,
             max_runs: 8,
-            settled: SettledSettings::default(),
+            settled: ConvergenceSettings::default(),
             torque_check: Some(TorqueCheckSettings::default()),
             safety: SafetySettings::default(),
         }
@@ -306,11 +306,12 @@ mod tests {
             let (m, first, second) = (1.0, 0.5 * length_m, length_m * length_m / 3.0);
             InertialParameters([m, first, 0.0, 0.0, 0.01 * second, 0.0, 0.0, second, 0.0, second])
         };
-        let allowed =
-            |length_m: f64| SettledSettings::default().most_lag_s(&planar_2r(length_m, rod(length_m), rod(length_m)));
+        let allowed = |length_m: f64| {
+            ConvergenceSettings::default().most_lag_s(&planar_2r(length_m, rod(length_m), rod(length_m)))
+        };
         assert_eq!(allowed(0.2), MOST_LAG_S);
         assert!(allowed(5.0) > 1.5 * MOST_LAG_S, "{}", allowed(5.0));
-        let stated = SettledSettings { most_lag_s: Some(2e-3), ..SettledSettings::default() };
+        let stated = ConvergenceSettings { most_lag_s: Some(2e-3), ..ConvergenceSettings::default() };
         assert_eq!(stated.most_lag_s(&planar_2r(5.0, rod(5.0), rod(5.0))), 2e-3);
     }
 }

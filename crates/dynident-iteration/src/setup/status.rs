@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "end", rename_all = "kebab-case")]
 pub enum IterationStatus {
-    /// All conditions are met: no [`Shortfall`](crate::Shortfall) is left.
+    /// All conditions are met: no [`UnmetCondition`](crate::UnmetCondition) is left.
     Converged,
     /// Tracking and parameters no longer change, but a condition is not met: a further run of the same motion would not
     /// help.

@@ -36,22 +36,22 @@ fn filled_in(
 ) -> Option<Vec<f64>> {
     let mut parameters = robot.nominal().to_vec();
     let bodies = robot.model().inertial_count();
-    let own = robot.model().own_scale();
+    let own = robot.model().characteristic_scale();
     let mut is_filled = false;
     for (place, term) in robot.terms().iter().enumerate() {
         let Some(joint) = term.own_joint().filter(|_| parameters[bodies + place] == 0.0) else { continue };
-        let (limits, turns) = (&robot.model().joints()[joint].limits, robot.model().joints()[joint].turns());
+        let (limits, is_rotary) = (&robot.model().joints()[joint].limits, robot.model().joints()[joint].is_rotary());
         let Some(effort) = limits.effort else { continue };
         if term.property().is_some_and(|property| !is_wanted(property)) {
             continue;
         }
         let typical = match (term.property(), term.action()) {
             (Some(JointProperty::DriveInertia), _) => {
-                inertia_share * effort / own.acceleration(turns, DRIVE_ACCELERATION)
+                inertia_share * effort / own.acceleration(is_rotary, DRIVE_ACCELERATION)
             }
             (Some(JointProperty::Friction), _) => FRICTION * effort,
             (Some(JointProperty::Damping), _) => {
-                FRICTION * effort / limits.velocity.unwrap_or(own.velocity(turns, SPEED))
+                FRICTION * effort / limits.velocity.unwrap_or(own.velocity(is_rotary, SPEED))
             }
             // A spring keeps the value of the robot description.
             (

@@ -1,6 +1,6 @@
 //! Warm-up: repeats the motion before a run, so that friction reaches its working temperature, and records the change.
 
-use crate::setup::home::FoundWays;
+use crate::setup::home::FoundPaths;
 use crate::setup::leg::Leg;
 use crate::setup::safety::SafetySettings;
 use core::fmt::Write as _;
@@ -74,7 +74,7 @@ impl WarmUp {
 pub(crate) fn passes(
     safety: &SafetySettings,
     legs: &[Leg],
-    ways: &[Option<FoundWays>],
+    ways: &[Option<FoundPaths>],
     last_motion: Option<Instant>,
 ) -> usize {
     let wanted_s = safety.warm_up_s;
@@ -84,7 +84,7 @@ pub(crate) fn passes(
     (wanted_s / pass_s(legs, ways).max(f64::MIN_POSITIVE)).ceil().max(1.0) as usize
 }
 
-fn pass_s(legs: &[Leg], ways: &[Option<FoundWays>]) -> f64 {
+fn pass_s(legs: &[Leg], ways: &[Option<FoundPaths>]) -> f64 {
     let motions: f64 = legs.iter().map(|leg| leg.reference().duration_s()).sum();
     let ways = ways.iter().flatten().map(|found| &found.ways);
     motions + ways.map(|ways| ways.approach.duration_s() + ways.back.duration_s()).sum::<f64>()
@@ -104,7 +104,7 @@ struct Pass {
 }
 
 impl WarmUpWatch {
-    pub(crate) fn new(legs: &[Leg], ways: &[Option<FoundWays>]) -> Self {
+    pub(crate) fn new(legs: &[Leg], ways: &[Option<FoundPaths>]) -> Self {
         Self { pass_s: pass_s(legs, ways), passes: Vec::new() }
     }
 

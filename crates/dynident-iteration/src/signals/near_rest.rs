@@ -1,12 +1,12 @@
-use crate::signals::rests::RestMargin;
+use crate::signals::rests::StictionBand;
 use serde::{Deserialize, Serialize};
 
 /// A joint whose rows near rest are excluded from a run, and its residual there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct NearRest {
+pub struct SamplesNearRest {
     /// Distance from rest above which its rows are used.
-    pub margin: RestMargin,
+    pub margin: StictionBand,
     /// Share of the joint's samples that is excluded in addition to those at rest.
     pub share: f64,
     /// Approximate root mean square of the residual near rest in a fit to all rows, Nm (N).
@@ -16,7 +16,7 @@ pub struct NearRest {
     pub dry_friction_nm: f64,
 }
 
-impl NearRest {
+impl SamplesNearRest {
     /// Standard deviation of the residual of all rows of a joint, Nm (N), if the residual near rest is larger than its
     /// dry friction; `sigma` is that of the rows in use.
     pub(crate) fn unexplained_nm(&self, sigma: f64) -> Option<f64> {
@@ -31,8 +31,8 @@ mod tests {
 
     #[test]
     fn what_friction_cannot_hold_is_unexplained() {
-        let margin = RestMargin { speed_share: 0.2, smoothing_periods: 1.0 };
-        let near_rest = |residual_nm| NearRest { margin, share: 0.25, residual_nm, dry_friction_nm: 2.0 };
+        let margin = StictionBand { speed_share: 0.2, smoothing_periods: 1.0 };
+        let near_rest = |residual_nm| SamplesNearRest { margin, share: 0.25, residual_nm, dry_friction_nm: 2.0 };
         assert_eq!(near_rest(1.9).unexplained_nm(0.1), None);
         // A quarter of the rows with 3 Nm, the others with 0.1 Nm.
         let all = near_rest(3.0).unexplained_nm(0.1).unwrap_or(0.0);

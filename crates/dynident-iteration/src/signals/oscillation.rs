@@ -87,7 +87,7 @@ impl OscillationSettings {
 
     /// Returns the lowest frequency of an oscillation for this robot, Hz.
     pub fn lowest_hz(&self, model: &Model) -> f64 {
-        self.lowest_hz.unwrap_or_else(|| model.own_scale().hertz(LOWEST_HZ))
+        self.lowest_hz.unwrap_or_else(|| model.characteristic_scale().hertz(LOWEST_HZ))
     }
 }
 

@@ -17,14 +17,14 @@ pub(crate) const MOVING: f64 = 0.02;
 /// speed are excluded, and `smoothing_periods` periods of the smoother's cut-off before and after them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct RestMargin {
+pub struct StictionBand {
     /// Share of the joint's highest speed in the run.
     pub speed_share: f64,
     /// Periods of the smoother's cut-off on either side.
     pub smoothing_periods: f64,
 }
 
-impl RestMargin {
+impl StictionBand {
     /// Samples at rest only: slower than 2 % of the highest speed, plus half a smoothing period around rests that last
     /// longer than one period.
     pub const REST: Self = Self { speed_share: MOVING, smoothing_periods: 0.0 };
@@ -48,7 +48,7 @@ impl RestMargin {
     }
 }
 
-impl Default for RestMargin {
+impl Default for StictionBand {
     fn default() -> Self {
         Self::REST
     }
@@ -82,9 +82,9 @@ fn rests(dq: &[f64], smoothing: usize) -> Vec<Range<usize>> {
 /// Ranges of samples at which `dq` is at most this share of its maximum, or changes its sign.
 fn slower(dq: &[f64], share: f64) -> Vec<Range<usize>> {
     let fastest = dq.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
-    let turns = |sample: usize| share > MOVING && dq.get(sample + 1).is_some_and(|next| next * dq[sample] < 0.0);
+    let is_rotary = |sample: usize| share > MOVING && dq.get(sample + 1).is_some_and(|next| next * dq[sample] < 0.0);
     let mut found: Vec<Range<usize>> = Vec::new();
-    for (sample, _) in dq.iter().enumerate().filter(|(sample, dq)| dq.abs() <= share * fastest || turns(*sample)) {
+    for (sample, _) in dq.iter().enumerate().filter(|(sample, dq)| dq.abs() <= share * fastest || is_rotary(*sample)) {
         match found.last_mut() {
             Some(last) if last.end == sample => last.end += 1,
             _ => found.push(sample..sample + 1),
@@ -123,11 +123,11 @@ mod tests {
     fn what_is_near_rest_is_left_as_wide_as_smoothing_reaches() {
         // From 1 to -1 rad/s in 100 steps: within 0.11 from sample 45 to 55, plus half a period of ten samples.
         let dq: Vec<f64> = (0..=100).map(|k| 1.0 - f64::from(k) / 50.0).collect();
-        let margin = |speed_share, smoothing_periods| RestMargin { speed_share, smoothing_periods };
+        let margin = |speed_share, smoothing_periods| StictionBand { speed_share, smoothing_periods };
         let one = |run: Range<usize>| vec![run; 1];
         assert_eq!(margin(0.11, 0.5).samples(&dq, 10), one(40..61));
         assert_eq!(margin(0.11, 0.0).samples(&dq, 10), one(45..56));
-        assert_eq!(RestMargin::REST.samples(&dq, 10), rests(&dq, 10));
+        assert_eq!(StictionBand::REST.samples(&dq, 10), rests(&dq, 10));
         // A joint that turns between two samples is at rest in between, at any speed.
         let turned: Vec<f64> = (0..20).map(|k| if k < 10 { 1.0 } else { -1.0 }).collect();
         assert_eq!(margin(0.1, 0.5).samples(&turned, 4), one(7..12));

@@ -324,7 +324,7 @@ fn law_of<'a>(run: &CheckedRun<'a>) -> CommandLaw<'a> {
 /// is higher, so that enough rows are left.
 fn cutoff_hz(task: &IterationTask, identification: &RunIdentificationSettings, run: &CheckedRun<'_>) -> f64 {
     let stated = identification.parallel_filter.as_ref().and_then(|filter| filter.cutoff_hz);
-    let usual = stated.unwrap_or_else(|| task.robot.model().own_scale().hertz(USUAL_CUTOFF_HZ));
+    let usual = stated.unwrap_or_else(|| task.robot.model().characteristic_scale().hertz(USUAL_CUTOFF_HZ));
     let duration = |record: &Record| record.times_s.last().zip(record.times_s.first()).map_or(0.0, |(a, b)| a - b);
     let longest = run.records.iter().map(duration).fold(0.0, f64::max);
     if longest > 0.0 { usual.max(MIN_CYCLES_PER_RUN / longest) } else { usual }

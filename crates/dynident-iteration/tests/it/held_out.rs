@@ -5,7 +5,7 @@ use dynident_excitation::Motion;
 use dynident_identification::{Execution, Role, identify};
 use dynident_iteration::{
     HeldOutMotion, Iteration, IterationStatus, IterationStore, Leg, Robot, RobotRun, RobotStatus, RunPurpose,
-    RunRequest, Shortfall, SimulatedRobot, iterate,
+    RunRequest, SimulatedRobot, UnmetCondition, iterate,
 };
 use dynident_simulation::{Reference, SimulationError};
 
@@ -112,14 +112,14 @@ fn a_model_that_predicts_no_other_motion_has_not_converged() {
     let mut robot = Noted { on_held_out: Some(heavier.robot()), ..Noted::new() };
     let outcome = iterate(&iteration(None), &mut [&mut robot], None, &mut |_, _| {}).unwrap();
     assert!(!outcome.status.is_converged(), "{}", outcome.status);
-    let Some(Shortfall::HeldOutPrediction { inside_percent, .. }) =
-        outcome.shortfalls.iter().find(|own| matches!(own, Shortfall::HeldOutPrediction { .. }))
+    let Some(UnmetCondition::HeldOutPrediction { inside_percent, .. }) =
+        outcome.shortfalls.iter().find(|own| matches!(own, UnmetCondition::HeldOutPrediction { .. }))
     else {
         panic!("{:?}", outcome.shortfalls)
     };
     assert!(*inside_percent < 50.0, "{inside_percent}");
     // No other condition is unmet, and each further run was validated again.
-    assert!(outcome.shortfalls.iter().all(|own| matches!(own, Shortfall::HeldOutPrediction { .. })));
+    assert!(outcome.shortfalls.iter().all(|own| matches!(own, UnmetCondition::HeldOutPrediction { .. })));
     assert!(robot.commanded.iter().filter(|own| own.1 == RunPurpose::HeldOut).count() >= 2);
     assert!(outcome.shortfalls[0].to_string().starts_with("held-out motion: "));
 }
@@ -166,7 +166,9 @@ fn a_held_out_run_that_ends_early() {
     let outcome = iterate(&iteration, &mut [&mut robot], Some(&store), &mut |_, _| {}).unwrap();
     let IterationStatus::Waiting { reason } = &outcome.status else { panic!("{}", outcome.status) };
     assert!(reason.contains("held-out run after run") && reason.contains("Check the robot"), "{reason}");
-    assert!(matches!(&outcome.shortfalls[..], [Shortfall::HeldOutFailed { reason }] if reason.contains("protective")));
+    assert!(
+        matches!(&outcome.shortfalls[..], [UnmetCondition::HeldOutFailed { reason }] if reason.contains("protective"))
+    );
     // With several legs there is no single held-out motion.
     let mut task = simulated_arm::task();
     task.legs.push(task.legs[0].clone());

@@ -5,8 +5,8 @@ use super::simulated_arm::{self, Simulated};
 use dynident_excitation::Motion;
 use dynident_excitation::limits::{FloorLimit, JointLimit, LimitKind, Limits, LinkPoint};
 use dynident_iteration::robot::{
-    Breach, ControlledRun, Envelope, EnvelopeQuantity, FolderRobot, FolderSettings, FunctionRobot, ProcessLimits,
-    ProcessMode, ProcessRobot, ProcessSettings, RunPart, Stopping, Ways,
+    ApproachPaths, Breach, ControlledRun, Envelope, EnvelopeQuantity, FolderRobot, FolderSettings, FunctionRobot,
+    ProcessLimits, ProcessMode, ProcessRobot, ProcessSettings, RunPart, Stopping,
 };
 use dynident_iteration::{
     HomeError, HomeSettings, Iteration, IterationStatus, IterationStore, NextMotion, RehearsalSettings, Robot,
@@ -50,7 +50,7 @@ fn home(posture: [f64; 2]) -> HomeSettings {
     }
 }
 
-fn ways() -> Ways {
+fn ways() -> ApproachPaths {
     home([0.2, -0.1]).ways(&model(), &motion(START, END), None).unwrap().ways
 }
 
@@ -68,7 +68,7 @@ fn process(mode: ProcessMode, options: &[&str], folder: &Path) -> ProcessRobot {
     process_robot(ProcessSettings { command, mode, limits, folder: Some(folder.to_owned()) }, joints()).unwrap()
 }
 
-fn run(robot: &mut dyn Robot, ways: Option<&Ways>, envelope: Option<&Envelope>) -> RobotRun {
+fn run(robot: &mut dyn Robot, ways: Option<&ApproachPaths>, envelope: Option<&Envelope>) -> RobotRun {
     let (reference, controller) = (motion(START, END), pd());
     robot.run(&RunRequest { ways, envelope, ..RunRequest::new(1, &reference, &controller) }).unwrap()
 }

@@ -140,7 +140,7 @@ fn the_first_model_has_typical_drives() {
     let derived = derived_controllers(&robot, &[&reference], &gains).unwrap();
     assert!(matches!(derived.first, ControllerSettings::ComputedTorque(_)), "{:?}", derived.first);
     let terms = &derived.first_model.unwrap()[robot.model().inertial_count()..];
-    let own = robot.model().own_scale();
+    let own = robot.model().characteristic_scale();
     for (joint, pair) in terms.chunks_exact(2).enumerate() {
         let effort = robot.model().joints()[joint].limits.effort.unwrap();
         let typical = effort / own.acceleration(true, 300.0);

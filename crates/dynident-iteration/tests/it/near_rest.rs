@@ -4,7 +4,7 @@ use crate::simulated_arm::{Simulated, arm, friction, reference, settings};
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_iteration::robot::RunRequest;
 use dynident_iteration::{
-    IterationTask, RestMargin, Robot, RunEstimate, RunIdentificationSettings, SimulatedRobot, identify_run,
+    IterationTask, Robot, RunEstimate, RunIdentificationSettings, SimulatedRobot, StictionBand, identify_run,
 };
 use dynident_model::terms::{Coulomb, CoulombShape, Stribeck, TorqueTerm, Viscous};
 use dynident_simulation::controllers::JointPdSettings;
@@ -72,7 +72,7 @@ fn what_is_set_aside_near_rest_is_said() {
     let (_, found) = identified(&record(1), true);
     assert_eq!(found.near_rest.len(), 2, "{:?}", found.near_rest);
     for near_rest in found.near_rest.iter().flatten() {
-        assert!(near_rest.margin != RestMargin::REST && (0.02..0.5).contains(&near_rest.share), "{near_rest:?}");
+        assert!(near_rest.margin != StictionBand::REST && (0.02..0.5).contains(&near_rest.share), "{near_rest:?}");
         assert!(near_rest.residual_nm < near_rest.dry_friction_nm, "{near_rest:?}");
     }
     assert!(found.near_rest.iter().any(Option::is_some));

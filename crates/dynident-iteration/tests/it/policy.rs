@@ -3,7 +3,7 @@ use dynident_excitation::Motion;
 use dynident_identification::examination::{LagChoice, TorqueLag};
 use dynident_iteration::{
     Clipping, Iteration, IterationSettings, IterationStatus, IterationTask, JointEvidence, ModelParameters, Next,
-    Prediction, RunEstimate, RunEvidence, RunPlan, RunRecord, Shortfall, UsedController,
+    Prediction, RunEstimate, RunEvidence, RunPlan, RunRecord, UnmetCondition, UsedController,
 };
 use dynident_model::InertialParameters;
 use dynident_model::sample::planar_2r;
@@ -133,7 +133,7 @@ fn good_pair() -> [RunRecord; 2] {
     [1, 2].map(|number| run(number, Some(1.0), 1e-4, true, estimate(1.0, 0.01)))
 }
 
-fn shortfalls(records: &[RunRecord]) -> Vec<Shortfall> {
+fn shortfalls(records: &[RunRecord]) -> Vec<UnmetCondition> {
     iteration().shortfalls(records).unwrap()
 }
 
@@ -147,7 +147,7 @@ fn standing_still_is_not_success() {
     assert_eq!(iteration().next(&three).unwrap(), Next::Finished(IterationStatus::Settled));
     let unmet = shortfalls(&three);
     assert_eq!(unmet.len(), 2);
-    let Shortfall::Tracking { error_rad, floor_rad, .. } = &unmet[0] else { panic!("{unmet:?}") };
+    let UnmetCondition::Tracking { error_rad, floor_rad, .. } = &unmet[0] else { panic!("{unmet:?}") };
     assert_eq!((*error_rad, *floor_rad), (1.17, None));
 }
 

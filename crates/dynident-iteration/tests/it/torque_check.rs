@@ -4,8 +4,8 @@
 use super::simulated_arm::{self, Simulated, arm};
 use dynident_dynamics::{Workspace, gravity_torque};
 use dynident_iteration::{
-    Iteration, IterationOutcome, IterationSettings, Next, Robot, RobotRun, RunRequest, Shortfall, SimulatedRobot,
-    TorqueCause, iterate,
+    Iteration, IterationOutcome, IterationSettings, Next, Robot, RobotRun, RunRequest, SimulatedRobot, TorqueCause,
+    UnmetCondition, iterate,
 };
 use dynident_simulation::controllers::PositionLoopSettings;
 use dynident_simulation::{ControllerSettings, Record, SensorSettings, SimulationError};
@@ -90,7 +90,8 @@ fn cut(record: &mut Record) {
 }
 
 fn causes(outcome: &IterationOutcome) -> Vec<TorqueCause> {
-    let of = |unmet: &Shortfall| if let Shortfall::Torque(cause) = unmet { Some(cause.clone()) } else { None };
+    let of =
+        |unmet: &UnmetCondition| if let UnmetCondition::Torque(cause) = unmet { Some(cause.clone()) } else { None };
     outcome.shortfalls.iter().filter_map(of).collect()
 }
 

@@ -5,14 +5,14 @@ use crate::simulated_arm::{Simulated, described, friction, iterated, settings, s
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::robot::EnvelopeSettings;
 use dynident_iteration::{
-    Iteration, IterationOutcome, IterationStatus, IterationTask, Shortfall, TorqueCause, iterate,
+    Iteration, IterationOutcome, IterationStatus, IterationTask, TorqueCause, UnmetCondition, iterate,
 };
 use dynident_model::terms::CoulombShape;
 use dynident_simulation::controllers::JointPdSettings;
 use dynident_simulation::{ControllerSettings, RunLimits, SensorSettings};
 
 fn words(outcome: &IterationOutcome) -> String {
-    let unmet: Vec<String> = outcome.shortfalls.iter().map(Shortfall::to_string).collect();
+    let unmet: Vec<String> = outcome.shortfalls.iter().map(UnmetCondition::to_string).collect();
     let runs: Vec<String> = outcome
         .runs
         .iter()
@@ -151,9 +151,9 @@ fn a_long_lag_is_no_success() {
     let words = words(&outcome);
     assert!(!outcome.status.is_converged(), "{words}");
     let lags = outcome.shortfalls.iter().filter_map(|unmet| match unmet {
-        Shortfall::LongLag { lag_s, .. }
-        | Shortfall::Lag { lag_s, .. }
-        | Shortfall::Torque(TorqueCause::Delay { lag_s }) => Some(lag_s.abs()),
+        UnmetCondition::LongLag { lag_s, .. }
+        | UnmetCondition::Lag { lag_s, .. }
+        | UnmetCondition::Torque(TorqueCause::Delay { lag_s }) => Some(lag_s.abs()),
         _ => None,
     });
     assert!(lags.into_iter().any(|lag_s| (lag_s - 25e-3).abs() < 1e-3), "{words}");
@@ -195,7 +195,7 @@ fn a_length_that_is_a_little_off_never_converges_and_is_named() {
         let words = words(&outcome);
         assert!(!outcome.status.is_converged(), "{length_m} m: {words}");
         let lengths = outcome.shortfalls.iter().filter_map(|unmet| match unmet {
-            Shortfall::Length(other) => Some((other.joint.clone(), other.factor)),
+            UnmetCondition::Length(other) => Some((other.joint.clone(), other.factor)),
             _ => None,
         });
         let found: Vec<_> = lengths.collect();

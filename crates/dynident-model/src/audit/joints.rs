@@ -41,8 +41,8 @@ pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, 
 fn check_limits(joint: &Joint, follows: bool, settings: &AuditSettings, findings: &mut Findings) {
     let mut add = |level, check, message: String| findings.add(level, check, format!("joint {}", joint.name), message);
     let limits = &joint.limits;
-    let turns = joint.turns();
-    let unit = if turns { "rad" } else { "m" };
+    let is_rotary = joint.is_rotary();
+    let unit = if is_rotary { "rad" } else { "m" };
     if joint.kind != JointKind::Continuous {
         match (limits.lower, limits.upper) {
             (Some(lower), Some(upper)) if lower > upper => {
@@ -63,11 +63,11 @@ fn check_limits(joint: &Joint, follows: bool, settings: &AuditSettings, findings
             }
         }
         let largest = limits.lower.into_iter().chain(limits.upper).map(f64::abs).fold(0.0, f64::max);
-        if turns && largest > settings.max_position_limit_rad {
+        if is_rotary && largest > settings.max_position_limit_rad {
             let has = format!("has a limit of {largest} rad: if that is degrees, write {:.6}", largest.to_radians());
             add(Warning, "limit-unit", has);
         }
-        if !turns && largest > settings.max_position_limit_m {
+        if !is_rotary && largest > settings.max_position_limit_m {
             let has = format!("has a limit of {largest} m: if that is millimetres, write {}", largest / 1000.0);
             add(Warning, "limit-unit", has);
         }
@@ -78,7 +78,7 @@ fn check_limits(joint: &Joint, follows: bool, settings: &AuditSettings, findings
                 format!("has a velocity limit of {velocity} {unit}/s, so that it cannot move: give the real limit");
             add(Warning, "velocity-limit", has);
         }
-        Some(velocity) if turns && velocity > settings.max_velocity_limit_rad_s => {
+        Some(velocity) if is_rotary && velocity > settings.max_velocity_limit_rad_s => {
             let degrees = velocity.to_radians();
             let has = format!("has a velocity limit of {velocity} rad/s: if that is degrees, write {degrees:.6}");
             add(Warning, "limit-unit", has);

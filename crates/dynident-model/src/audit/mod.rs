@@ -9,7 +9,7 @@ mod settings;
 mod slips;
 
 pub use settings::AuditSettings;
-pub use slips::{Correction, Slip, SlipKind, SlipSettings, Slips, slips, slips_with};
+pub use slips::{Correction, DescriptionError, SlipKind, SlipSettings, Slips, slips, slips_with};
 
 use crate::error::ModelError;
 use crate::tree::Model;

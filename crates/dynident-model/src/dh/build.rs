@@ -241,20 +241,20 @@ impl Source<'_> {
     }
 
     fn limits(&self, kind: JointKind, limits: &Limits) -> Result<JointLimits, DhError> {
-        let turns = kind != JointKind::Prismatic;
+        let is_rotary = kind != JointKind::Prismatic;
         let quantity =
             |angle_keys: [&'static str; 2], angles: [&Number; 2], length_key: &'static str, length: &Number| {
-                let misfit = if turns {
+                let misfit = if is_rotary {
                     length.as_ref().map(|number| (length_key, number))
                 } else {
                     let at = angles.iter().position(|angle| angle.is_some());
                     at.and_then(|at| Some((angle_keys[at], angles[at].as_ref()?)))
                 };
                 if let Some((key, number)) = misfit {
-                    let fix = if turns { "the keys in rad, deg and Nm" } else { "the keys in m and N" };
+                    let fix = if is_rotary { "the keys in rad, deg and Nm" } else { "the keys in m and N" };
                     return Err(self.fault(number.span().start, DhFault::WrongUnit { key, kind: kind.name(), fix }));
                 }
-                if !turns {
+                if !is_rotary {
                     return self.number(length_key, length);
                 }
                 let [radians, degrees] = self.one_of(angle_keys, angles)?;

@@ -7,7 +7,7 @@ use super::fault::{MjcfError, MjcfFault};
 use super::geoms::{Geom, GeomMass, Meshes, geom};
 use super::inertials::{corrected, inertial};
 use super::joints::{JointElement, floating, joint};
-use super::notices::{Loss, Notices};
+use super::notices::{MjcfLoss, Notices};
 use super::orientation::place;
 use crate::collision::{CollisionGeometry, CollisionShape};
 use crate::inertial::InertialParameters;
@@ -178,7 +178,7 @@ impl<'t> Reader<'t> {
         let name = self.body_name(element)?;
         self.note_unread(&stated, &IN_BODY);
         if stated.number("gravcomp")?.is_some_and(|part| part != 0.0) {
-            self.notices.note(&stated, Loss::GravityCompensation { body: name.clone() });
+            self.notices.note(&stated, MjcfLoss::GravityCompensation { body: name.clone() });
         }
         let class = self.classes.named(self.document, element, "childclass")?.unwrap_or(childclass);
         let mut contents = self.contents(element, &name, class, false)?;
@@ -341,7 +341,7 @@ impl<'t> Reader<'t> {
                 }
                 tag if NON_DYNAMIC_ELEMENTS.contains(&tag) => {}
                 tag => {
-                    let loss = Loss::Unread { element: shortened(tag), attribute: None };
+                    let loss = MjcfLoss::Unread { element: shortened(tag), attribute: None };
                     self.notices.note_at(self.document, element.place, loss);
                 }
             }
@@ -374,7 +374,7 @@ impl<'t> Reader<'t> {
                     GeomMass::Unknown(why) => {
                         self.unknown.insert(name.to_owned(), (why, element.place));
                         if moves {
-                            let loss = Loss::UnknownMass { body: name.to_owned(), why };
+                            let loss = MjcfLoss::UnknownMass { body: name.to_owned(), why };
                             self.notices.note_at(self.document, element.place, loss);
                         }
                         return Ok(None);
@@ -426,7 +426,7 @@ impl<'t> Reader<'t> {
 
     fn note_unread(&mut self, stated: &Stated<'_>, known: &[&str]) {
         for attribute in stated.own_attributes().filter(|attribute| !known.contains(&&*attribute.name)) {
-            let loss = Loss::Unread { element: stated.tag.to_owned(), attribute: Some(shortened(&attribute.name)) };
+            let loss = MjcfLoss::Unread { element: stated.tag.to_owned(), attribute: Some(shortened(&attribute.name)) };
             self.notices.note_at(self.document, attribute.place, loss);
         }
     }

@@ -7,7 +7,7 @@ use super::bodies::LinkPlace;
 use super::classes::Stated;
 use super::expanded::Expanded;
 use super::fault::{MjcfError, MjcfFault};
-use super::notices::{Loss, Notices};
+use super::notices::{MjcfLoss, Notices};
 use crate::error::ModelError;
 use crate::loops::{self, LoopClosure, LoopError};
 use crate::spatial::{Transform, Vec3};
@@ -42,7 +42,7 @@ pub(super) fn closed(
 ) -> Result<Model, MjcfError> {
     let mut left = |connect: &Connect<'_>, why: String| {
         let [first, second] = &connect.bodies;
-        notices.note(&connect.stated, Loss::Chain { between: format!("`{first}` and `{second}`"), why });
+        notices.note(&connect.stated, MjcfLoss::Chain { between: format!("`{first}` and `{second}`"), why });
     };
     let mut held = Vec::new();
     for (number, connect) in connects.iter().enumerate() {

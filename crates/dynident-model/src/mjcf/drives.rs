@@ -6,7 +6,7 @@ use super::chains::Connect;
 use super::classes::{Classes, MAIN, Stated};
 use super::expanded::{Element, Expanded};
 use super::fault::{MjcfError, MjcfFault};
-use super::notices::{Loss, Notices};
+use super::notices::{MjcfLoss, Notices};
 use crate::joint::Mimic;
 use crate::spatial::Vec3;
 use crate::tree::STANDARD_GRAVITY;
@@ -20,7 +20,7 @@ pub(super) fn gravity(document: &Expanded, notices: &mut Notices) -> Result<Vec3
         gravity = stated.vector("gravity")?.unwrap_or(gravity);
         let medium = [stated.number("density")?, stated.number("viscosity")?];
         if medium.iter().flatten().any(|&number| number != 0.0) {
-            notices.note(&stated, Loss::Medium);
+            notices.note(&stated, MjcfLoss::Medium);
         }
         for flag in document.children(option).filter(|child| child.tag == "flag") {
             if let Some(word) =
@@ -56,7 +56,7 @@ pub(super) fn efforts(
             Some([low, high]) if low == -high && high > 0.0 => Some(high * gear.abs()),
             Some([low, high]) => {
                 let joint = format!("`{}`", shortened(&name.value));
-                notices.note(&stated, Loss::OneSidedEffort { joint, low: low * gear, high: high * gear });
+                notices.note(&stated, MjcfLoss::OneSidedEffort { joint, low: low * gear, high: high * gear });
                 None
             }
             None => None,
@@ -107,7 +107,7 @@ pub(super) fn couplings<'t>(
         let named = |key: &str| element.attribute(key).map(|name| format!("`{}`", shortened(&name.value)));
         let keys = ["joint1", "joint2", "body1", "body2", "site1", "site2", "tendon1", "tendon2", "flex"];
         let between: Vec<String> = keys.iter().filter_map(|key| named(key)).collect();
-        let constraint = || Loss::Constraint { element: shortened(&element.tag), between: between.join(" and ") };
+        let constraint = || MjcfLoss::Constraint { element: shortened(&element.tag), between: between.join(" and ") };
         if let ("connect", Some(body), Some(anchor)) =
             (&*element.tag, element.attribute("body1"), stated.vector("anchor")?)
         {
@@ -135,7 +135,7 @@ pub(super) fn couplings<'t>(
         let given = law.len();
         law.extend_from_slice(&[0.0, 1.0, 0.0, 0.0, 0.0][given..]);
         if law[2..].iter().any(|&number| number != 0.0) {
-            notices.note(&stated, Loss::CouplingPolynomial { joint: tree.joints[follower].name.clone() });
+            notices.note(&stated, MjcfLoss::CouplingPolynomial { joint: tree.joints[follower].name.clone() });
             continue;
         }
         // MuJoCo relates the distances from `ref`: q1 - ref1 = c0 + c1 (q2 - ref2).
@@ -159,7 +159,7 @@ pub(super) fn tendons(document: &Expanded, notices: &mut Notices) -> Result<(), 
             let name = element
                 .attribute("name")
                 .map_or("without a name".to_owned(), |name| format!("`{}`", shortened(&name.value)));
-            notices.note(&stated, Loss::Tendon { tendon: name });
+            notices.note(&stated, MjcfLoss::Tendon { tendon: name });
         }
     }
     Ok(())

@@ -4,7 +4,7 @@ use super::classes::Stated;
 use super::compiler::Compiler;
 use super::expanded::Place;
 use super::fault::{MjcfError, MjcfFault};
-use super::notices::{Loss, Notices};
+use super::notices::{MjcfLoss, Notices};
 use crate::joint::{JointKind, JointLimits, JointSpring};
 use crate::spatial::{Transform, Vec3};
 use crate::xml::shortened;
@@ -36,7 +36,7 @@ pub(super) fn joint(
     let kind = stated.word("type", &["hinge", "slide", "ball", "free"], "hinge or slide")?.unwrap_or("hinge");
     let name = stated.get("name").map(|name| name.value.clone()).filter(|name| !name.trim().is_empty());
     let label = name.as_deref().map_or_else(|| "without a name".to_owned(), |name| format!("`{}`", shortened(name)));
-    let turns = match kind {
+    let is_rotary = match kind {
         "hinge" => true,
         "slide" => false,
         "ball" => {
@@ -46,9 +46,9 @@ pub(super) fn joint(
         }
         _ => return Err(stated.fault(floating(&label))),
     };
-    let angle = |value: f64| if turns { compiler.radians(value) } else { value };
+    let angle = |value: f64| if is_rotary { compiler.radians(value) } else { value };
     let axis = stated.direction("axis")?.unwrap_or(Vec3([0.0, 0.0, 1.0]));
-    let anchor = turns.then_some(body_from_frame.point(stated.vector("pos")?.unwrap_or(Vec3::ZERO)));
+    let anchor = is_rotary.then_some(body_from_frame.point(stated.vector("pos")?.unwrap_or(Vec3::ZERO)));
     let range = stated.range("range")?;
     let is_limited = match stated.flag("limited")? {
         Some(is_limited) => is_limited && range.is_some(),
@@ -56,7 +56,7 @@ pub(super) fn joint(
     };
     let stops = range.filter(|_| is_limited).map(|range| range.map(angle));
     let effort = effort(stated, notices, &label)?;
-    let kind = match (turns, stops) {
+    let kind = match (is_rotary, stops) {
         (true, Some(_)) => JointKind::Revolute,
         (true, None) => JointKind::Continuous,
         (false, _) => JointKind::Prismatic,
@@ -67,11 +67,11 @@ pub(super) fn joint(
     };
     let (damping, is_polynomial) = first("damping")?;
     if is_polynomial {
-        notices.note(stated, Loss::DampingPolynomial { joint: label.clone() });
+        notices.note(stated, MjcfLoss::DampingPolynomial { joint: label.clone() });
     }
     let (stiffness, is_polynomial) = first("stiffness")?;
     if is_polynomial {
-        notices.note(stated, Loss::SpringPolynomial { joint: label });
+        notices.note(stated, MjcfLoss::SpringPolynomial { joint: label });
     }
     let reference = angle(stated.number("springref")?.unwrap_or(0.0));
     let spring = stiffness.filter(|stiffness| *stiffness != 0.0);
@@ -111,6 +111,6 @@ fn effort(stated: &Stated<'_>, notices: &mut Notices, label: &str) -> Result<Opt
     if low == -high {
         return Ok(Some(high));
     }
-    notices.note(stated, Loss::OneSidedEffort { joint: label.to_owned(), low, high });
+    notices.note(stated, MjcfLoss::OneSidedEffort { joint: label.to_owned(), low, high });
     Ok(None)
 }

@@ -42,7 +42,7 @@ pub use expanded::Include;
 pub(crate) use expanded::is_mjcf;
 pub use fault::{MjcfError, MjcfFault};
 pub use files::included_from;
-pub use notices::{Loss, MjcfNotice};
+pub use notices::{MjcfLoss, MjcfNotice};
 pub use write::{MjcfWriteError, rewrite_mjcf};
 
 use crate::tree::Model;

@@ -12,14 +12,14 @@ pub struct MjcfNotice {
     /// Line, from 1.
     pub line: u32,
     /// The part.
-    pub loss: Loss,
+    pub loss: MjcfLoss,
 }
 
 /// Kind of the part that is not represented.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages describe variants and fields")]
-pub enum Loss {
+pub enum MjcfLoss {
     #[error(
         "the mass of body `{body}` {why}, which is not supported, so that it is unknown: give the body an <inertial>"
     )]
@@ -54,7 +54,7 @@ pub enum Loss {
     },
 }
 
-impl Loss {
+impl MjcfLoss {
     /// Short name.
     pub fn name(&self) -> &'static str {
         match self {
@@ -81,11 +81,11 @@ pub(super) struct Notices {
 impl Notices {
     const MAX_NOTICES: usize = 200;
 
-    pub(super) fn note(&mut self, stated: &Stated<'_>, loss: Loss) {
+    pub(super) fn note(&mut self, stated: &Stated<'_>, loss: MjcfLoss) {
         self.note_at(stated.document, stated.place, loss);
     }
 
-    pub(super) fn note_at(&mut self, document: &Expanded, place: Place, loss: Loss) {
+    pub(super) fn note_at(&mut self, document: &Expanded, place: Place, loss: MjcfLoss) {
         if self.list.len() < Self::MAX_NOTICES {
             let (file, line) = document.line(place);
             self.list.push(MjcfNotice { file, line, loss });

@@ -45,8 +45,8 @@ impl TermClass {
                     return vec![kept];
                 }
                 // Friction with memory is Coulomb friction until the joint reverses; friction under load has its sign.
-                let turns = model.joints()[joint].turns();
-                let widths = STEP_WIDTHS.map(|width| model.own_scale().velocity(turns, width));
+                let is_rotary = model.joints()[joint].is_rotary();
+                let widths = STEP_WIDTHS.map(|width| model.characteristic_scale().velocity(is_rotary, width));
                 let with_step = |width: f64| {
                     let shape = CoulombShape::Smooth { width };
                     kept.iter().cloned().chain([TorqueTerm::Coulomb(Coulomb { joint, shape })]).collect()

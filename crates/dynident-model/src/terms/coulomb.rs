@@ -29,7 +29,7 @@ pub enum CoulombShape {
 
 impl CoulombShape {
     /// Default width of a smooth step, rad/s or m/s of a typical arm
-    /// ([`OwnScale::velocity`](crate::OwnScale::velocity)).
+    /// ([`CharacteristicScale::velocity`](crate::CharacteristicScale::velocity)).
     pub const USUAL_WIDTH: f64 = 0.02;
 
     /// Value of the step at velocity `dq`.

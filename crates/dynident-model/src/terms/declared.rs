@@ -65,7 +65,7 @@ impl Declared {
                 name: format!("k_{}", letters.take(50).collect::<String>()),
                 joint,
                 law: DeclaredLaw::Expression(Expression::parse(&law, &names).ok()?),
-                unit: if described.turns() { "Nm/rad" } else { "N/m" }.to_owned(),
+                unit: if described.is_rotary() { "Nm/rad" } else { "N/m" }.to_owned(),
                 nominal: Some(stiffness),
                 is_spring: model.joint_of(place).is_some(),
             })

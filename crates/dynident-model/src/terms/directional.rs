@@ -10,7 +10,7 @@ use super::kind::{
     VelocityFriction, halves,
 };
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedJoint, StatedLaw};
+use super::stated::{StatedJoint, StudyLaw};
 use super::{Coulomb, CoulombShape, FrictionTerm, TorqueTerm, Viscous};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -99,7 +99,7 @@ impl Law for DirectionalViscous {
 #[serde(deny_unknown_fields)]
 pub struct AsymmetricViscous {}
 
-impl StatedLaw for AsymmetricViscous {
+impl StudyLaw for AsymmetricViscous {
     fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
         DirectionalViscous::both(own.joint)
     }
@@ -188,7 +188,7 @@ impl Law for DirectionalCoulomb {
 #[serde(deny_unknown_fields)]
 pub struct AsymmetricCoulomb {}
 
-impl StatedLaw for AsymmetricCoulomb {
+impl StudyLaw for AsymmetricCoulomb {
     fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
         DirectionalCoulomb::both(own.joint, own.step)
     }

@@ -7,7 +7,7 @@
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedFault, StatedJoint, StatedLaw, VALID_VELOCITIES, check, step_or, width_of};
+use super::stated::{StatedFault, StatedJoint, StudyLaw, VALID_VELOCITIES, check, step_or, width_of};
 use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,7 @@ pub struct StatedLoad {
     pub width: Option<f64>,
 }
 
-impl StatedLaw for StatedLoad {
+impl StudyLaw for StatedLoad {
     fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
         vec![TorqueTerm::Load(LoadFriction { joint: own.joint, shape: step_or(self.width, own) })]
     }

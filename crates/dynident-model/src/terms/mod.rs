@@ -47,7 +47,7 @@ pub use order::sort_terms;
 pub use power::{CubeRoot, Power, PowerExponent, Quadratic};
 pub use sigmoid::{Sigmoid, StatedSigmoid};
 pub use slip::{HysteresisState, MaxwellSlip, StatedMaxwellSlip};
-pub use stated::{StatedFault, StatedJoint, StatedLaw};
+pub use stated::{StatedFault, StatedJoint, StudyLaw};
 pub use stribeck::{StatedStribeck, Stribeck};
 pub use temperature::{StatedTemperature, TemperatureCoulomb, TemperatureViscous};
 pub use torque_table::{TablePiece, TorqueTable, TorqueTableError};
@@ -198,14 +198,14 @@ macro_rules! friction_terms {
 
         impl FrictionTerm {
             /// The law with the stated constants.
-            pub fn law(&self) -> &dyn StatedLaw {
+            pub fn law(&self) -> &dyn StudyLaw {
                 match self {
                     $(Self::$law(law) => law,)*
                 }
             }
 
             /// Mutable access to [`law`](Self::law).
-            pub fn law_mut(&mut self) -> &mut dyn StatedLaw {
+            pub fn law_mut(&mut self) -> &mut dyn StudyLaw {
                 match self {
                     $(Self::$law(law) => law,)*
                 }

@@ -7,7 +7,7 @@
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedJoint, StatedLaw};
+use super::stated::{StatedJoint, StudyLaw};
 use super::{FrictionTerm, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -26,11 +26,11 @@ pub struct Power {
 
 impl Power {
     /// Default rounding, below the velocity that a differentiated encoder distinguishes from rest, rad/s or m/s of a
-    /// typical arm ([`OwnScale::velocity`](crate::OwnScale::velocity)).
+    /// typical arm ([`CharacteristicScale::velocity`](crate::CharacteristicScale::velocity)).
     pub const ROUNDING: f64 = 1.0e-3;
 
     fn usual(own: &StatedJoint, exponent: PowerExponent) -> Vec<TorqueTerm> {
-        let rounding = own.scale.velocity(own.turns, Self::ROUNDING);
+        let rounding = own.scale.velocity(own.is_rotary, Self::ROUNDING);
         vec![TorqueTerm::Power(Self { joint: own.joint, exponent, rounding })]
     }
 
@@ -95,7 +95,7 @@ impl Law for Power {
 #[serde(deny_unknown_fields)]
 pub struct CubeRoot {}
 
-impl StatedLaw for CubeRoot {
+impl StudyLaw for CubeRoot {
     fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
         Power::usual(own, PowerExponent::CubeRoot)
     }
@@ -107,7 +107,7 @@ impl StatedLaw for CubeRoot {
 #[serde(deny_unknown_fields)]
 pub struct Quadratic {}
 
-impl StatedLaw for Quadratic {
+impl StudyLaw for Quadratic {
     fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
         Power::usual(own, PowerExponent::Quadratic)
     }

@@ -7,7 +7,7 @@
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, clamped_velocity};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
+use super::stated::{StatedFault, StatedJoint, StudyLaw, check};
 use super::{Coulomb, CoulombShape, FrictionTerm, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -76,7 +76,7 @@ pub struct StatedSigmoid {
     pub offset_speed: f64,
 }
 
-impl StatedLaw for StatedSigmoid {
+impl StudyLaw for StatedSigmoid {
     fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
         let &Self { steepness, offset_speed } = self;
         vec![TorqueTerm::Sigmoid(Sigmoid { joint: own.joint, steepness, offset_speed })]

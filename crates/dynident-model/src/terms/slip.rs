@@ -10,7 +10,7 @@
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
+use super::stated::{StatedFault, StatedJoint, StudyLaw, check};
 use super::{FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -72,7 +72,7 @@ pub struct StatedMaxwellSlip {
     pub yield_displacements: Vec<f64>,
 }
 
-impl StatedLaw for StatedMaxwellSlip {
+impl StudyLaw for StatedMaxwellSlip {
     fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
         let of = |&yield_displacement| TorqueTerm::MaxwellSlip(MaxwellSlip { joint: own.joint, yield_displacement });
         self.yield_displacements.iter().map(of).collect()

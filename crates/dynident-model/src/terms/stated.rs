@@ -1,7 +1,7 @@
 //! Friction laws as stated in a study.
 
 use super::{CoulombShape, FrictionTerm, TorqueTerm};
-use crate::OwnScale;
+use crate::CharacteristicScale;
 use core::fmt::Debug;
 
 /// The joint for which a law is stated.
@@ -12,9 +12,9 @@ pub struct StatedJoint {
     /// Its Coulomb step.
     pub step: CoulombShape,
     /// Whether it is revolute.
-    pub turns: bool,
+    pub is_rotary: bool,
     /// The robot's scale.
-    pub scale: OwnScale,
+    pub scale: CharacteristicScale,
 }
 
 /// An invalid constant of a stated law.
@@ -39,7 +39,7 @@ pub(super) fn check(key: &'static str, value: f64, range: [f64; 2]) -> Result<()
 }
 
 /// A law with the constants stated in a study.
-pub trait StatedLaw: Debug {
+pub trait StudyLaw: Debug {
     /// Terms of the law at a joint.
     fn terms(&self, joint: &StatedJoint) -> Vec<TorqueTerm>;
 

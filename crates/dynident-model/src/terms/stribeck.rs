@@ -6,7 +6,7 @@
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, clamped_exp, clamped_velocity};
 use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedFault, StatedJoint, StatedLaw, VALID_VELOCITIES, check, step_or, width_of};
+use super::stated::{StatedFault, StatedJoint, StudyLaw, VALID_VELOCITIES, check, step_or, width_of};
 use super::{CoulombShape, FrictionTerm, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -77,7 +77,7 @@ pub struct StatedStribeck {
     pub width: Option<f64>,
 }
 
-impl StatedLaw for StatedStribeck {
+impl StudyLaw for StatedStribeck {
     fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
         let (speed, exponent, shape) = (self.speed, self.exponent, step_or(self.width, own));
         vec![TorqueTerm::Stribeck(Stribeck { joint: own.joint, speed, exponent, shape })]

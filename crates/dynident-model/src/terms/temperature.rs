@@ -9,7 +9,7 @@
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
+use super::stated::{StatedFault, StatedJoint, StudyLaw, check};
 use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use serde::{Deserialize, Serialize};
 
@@ -81,7 +81,7 @@ fn yes() -> bool {
     true
 }
 
-impl StatedLaw for StatedTemperature {
+impl StudyLaw for StatedTemperature {
     fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
         let (joint, reference_c, shape) = (own.joint, self.reference_c, own.step);
         let viscous = TorqueTerm::TemperatureViscous(TemperatureViscous { joint, reference_c });

@@ -1,6 +1,6 @@
 //! Friction laws compared with differences, limits and known values.
 use dynident_lanes::Dual;
-use dynident_model::OwnScale;
+use dynident_model::CharacteristicScale;
 use dynident_model::terms::{
     CandidateJoint, CandidateLaw, Coulomb, CoulombShape, Coupling, CouplingEffect, Direction, DirectionalCoulomb,
     DirectionalViscous, DriveInertia, HysteresisState, JointMotion, LoadFriction, MaxwellSlip, Offset, Power,
@@ -312,7 +312,12 @@ fn every_candidate_can_be_stated() {
                 continue;
             };
             assert_eq!(stated.law().check(), Ok(()));
-            let own = StatedJoint { joint: 0, step: term.step().unwrap_or(STEP), turns: true, scale: OwnScale::USUAL };
+            let own = StatedJoint {
+                joint: 0,
+                step: term.step().unwrap_or(STEP),
+                is_rotary: true,
+                scale: CharacteristicScale::USUAL,
+            };
             assert!(stated.law().terms(&own).contains(&term), "{term:?}");
         }
     }

@@ -2,7 +2,7 @@
 //! `dynident-dynamics`.
 
 use crate::common::{assert_truncations_are_refused, mutate, mutations};
-use dynident_model::mjcf::Loss;
+use dynident_model::mjcf::MjcfLoss;
 use dynident_model::{
     DescriptionFormat, JointKind, JointSpring, Mimic, audit, load_robot, read_mjcf, read_mjcf_with, rewrite_mjcf,
 };
@@ -140,7 +140,7 @@ fn symmetric_effort_limits_are_read() {
     // range.
     assert_eq!(efforts, [Some(60.0), Some(5.0), None, Some(7.0), None, Some(1.5), Some(6.0)]);
     assert!(
-        matches!(&robot.notices[0].loss, Loss::OneSidedEffort { joint, high, .. } if joint == "`one-sided`" && *high == 3.0)
+        matches!(&robot.notices[0].loss, MjcfLoss::OneSidedEffort { joint, high, .. } if joint == "`one-sided`" && *high == 3.0)
     );
     assert_eq!((robot.notices.len(), robot.notices[0].line), (1, 6));
 }
@@ -209,7 +209,7 @@ fn mesh_mass_is_unknown_with_a_notice() {
     let robot = read_mjcf(&text).unwrap();
     let body = &robot.model.bodies()[0];
     assert!(body.links[0].inertial.is_none() && body.links[1].inertial.is_some());
-    assert!(matches!(&robot.notices[0].loss, Loss::UnknownMass { body, .. } if body == "b"));
+    assert!(matches!(&robot.notices[0].loss, MjcfLoss::UnknownMass { body, .. } if body == "b"));
     // Massless, of an excluded group, or in addition to an <inertial>: the mass is known.
     for geom in ["mass=\"0\"", "density=\"0\"", "group=\"7\""] {
         let text = with_body(&format!("<geom type=\"mesh\" mesh=\"m\" {geom}/><geom size=\"1\"/>"));

@@ -3,7 +3,7 @@
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_model::sample::Random;
 use dynident_model::{InertialParameters, Mat3, Model, Vec3, load_robot};
-use dynident_online::{ContactMonitor, ContactSettings, Look, OnlineError, Residuals};
+use dynident_online::{ContactMonitor, ContactSettings, OnlineError, Residuals, TimeScale};
 use dynident_testing::repository;
 
 const RATE_HZ: f64 = 125.0;
@@ -164,7 +164,7 @@ fn half_a_kilogram_and_a_push_at_the_wrist_are_seen() {
     let carried: Vec<[f64; 6]> = unexplained(&carrying(&model, 0.5), &model);
     let mut noise = Noise::new(4);
     // Time from the start of a load or push until its detection, s, and the time scale.
-    let mut detected = |from_s: f64, push: Option<f64>, look: Look| {
+    let mut detected = |from_s: f64, push: Option<f64>, look: TimeScale| {
         let mut monitor = monitor.clone();
         let from = (from_s * RATE_HZ) as usize;
         for sample in from - (20.0 * RATE_HZ) as usize..off.len() {
@@ -186,13 +186,13 @@ fn half_a_kilogram_and_a_push_at_the_wrist_are_seen() {
         panic!("not seen")
     };
     let moments: Vec<f64> = (0..40).map(|k| 30.0 + 13.7 * f64::from(k)).collect();
-    let mut latest = |push: Option<f64>, look: Look| {
+    let mut latest = |push: Option<f64>, look: TimeScale| {
         let mut all: Vec<f64> = moments.iter().map(|&from_s| detected(from_s, push, look)).collect();
         all.sort_by(f64::total_cmp);
         (all[all.len() / 2], all[all.len() - 1])
     };
-    let push = latest(Some(3.0), Look::Collision);
-    let (up, payload) = (latest(Some(-3.0), Look::Collision), latest(None, Look::Payload));
+    let push = latest(Some(3.0), TimeScale::Collision);
+    let (up, payload) = (latest(Some(-3.0), TimeScale::Collision), latest(None, TimeScale::Payload));
     println!("3 Nm seen after {push:?} and {up:?} s, 0.5 kg after {payload:?} s: median and longest of forty");
     // A time constant of 20 ms detects a push of twice the threshold within 14 ms; five time constants suffice for
     // both.

@@ -12,7 +12,7 @@ mod set_aside;
 mod settings;
 mod spikes;
 
-pub use set_aside::{Reason, SetAside};
+pub use set_aside::{Reason, RejectedSamples};
 pub use settings::CleaningSettings;
 pub(crate) use spikes::replace_spikes;
 
@@ -86,7 +86,7 @@ impl CleanRows {
         &self.reader
     }
 
-    pub(crate) fn set_aside(&self) -> Vec<SetAside> {
+    pub(crate) fn set_aside(&self) -> Vec<RejectedSamples> {
         self.tally.all()
     }
 

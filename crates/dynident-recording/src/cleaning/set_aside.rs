@@ -32,7 +32,7 @@ impl Reason {
 /// Rejected samples of one channel of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct SetAside {
+pub struct RejectedSamples {
     /// Channel.
     pub channel: Quantity,
     /// Joint name.
@@ -56,7 +56,7 @@ pub struct SetAside {
     pub expected: f64,
 }
 
-impl SetAside {
+impl RejectedSamples {
     pub(crate) fn sentence(&self) -> String {
         let Self { samples, places, row, time_s, value, expected, .. } = self;
         let share = 100.0 * self.share;
@@ -86,7 +86,7 @@ impl SetAside {
 pub(super) struct Tally {
     joints: Vec<String>,
     pub(super) rows: u64,
-    found: Vec<(usize, SetAside)>,
+    found: Vec<(usize, RejectedSamples)>,
 }
 
 impl Tally {
@@ -120,8 +120,18 @@ impl Tally {
         let known = self.found.iter_mut().find(|(of, known)| *of == joint && known.reason == reason);
         let Some((_, known)) = known else {
             let (channel, name) = (reason.channel(), self.joints[joint].clone());
-            let first =
-                SetAside { channel, joint: name, reason, samples, places, share: 0.0, row, time_s, value, expected };
+            let first = RejectedSamples {
+                channel,
+                joint: name,
+                reason,
+                samples,
+                places,
+                share: 0.0,
+                row,
+                time_s,
+                value,
+                expected,
+            };
             self.found.push((joint, first));
             return;
         };
@@ -132,10 +142,10 @@ impl Tally {
         }
     }
 
-    pub(super) fn all(&self) -> Vec<SetAside> {
+    pub(super) fn all(&self) -> Vec<RejectedSamples> {
         let mut all = self.found.clone();
         all.sort_by_key(|(joint, found)| (*joint, found.reason as u8));
         let rows = self.rows.max(1) as f64;
-        all.into_iter().map(|(_, found)| SetAside { share: found.samples as f64 / rows, ..found }).collect()
+        all.into_iter().map(|(_, found)| RejectedSamples { share: found.samples as f64 / rows, ..found }).collect()
     }
 }

@@ -25,7 +25,7 @@ pub struct MotionSettings {
     pub trim_s: f64,
     /// Whether to keep all samples as logged. By default single torque samples far from their neighbours and torque
     /// that is repeated while its joint moves are ignored, and single spikes of a position are replaced; see
-    /// [`SetAside`](crate::SetAside).
+    /// [`RejectedSamples`](crate::RejectedSamples).
     pub keep_outliers: bool,
     /// Delay of the torque relative to the motion, s, one value for all joints or one for each; the torque is shifted
     /// by it. Negative if the torque is early. `identify` allows 2.5 times the time scale of the robot (2.5 s for an

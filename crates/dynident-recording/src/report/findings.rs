@@ -1,7 +1,7 @@
 //! Writes the findings of an [`ImportReport`] as sentences.
 
 use super::{ChannelReport, DerivativeComparison, Finding, ImportReport, Jump, Level, ReportSettings};
-use crate::cleaning::{Reason, SetAside};
+use crate::cleaning::{Reason, RejectedSamples};
 use crate::log::Quantity;
 
 /// `2nd`, `3rd`, `4th`, ..
@@ -167,7 +167,7 @@ impl ImportReport {
             let message = format!("mostly dead: {:.1} % of the samples are exactly zero", 100.0 * channel.zero_share);
             findings.add(if measured { Level::Problem } else { Level::Warning }, &name, message);
         }
-        let of_channel = |found: &SetAside, reason: Reason| {
+        let of_channel = |found: &RejectedSamples, reason: Reason| {
             found.channel == channel.channel && found.joint == channel.joint && found.reason == reason
         };
         let is_left_out = self.set_aside.iter().any(|found| of_channel(found, Reason::Saturated));

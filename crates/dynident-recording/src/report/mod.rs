@@ -20,7 +20,7 @@ pub use jumps::{Jump, LoneSample};
 pub use lag::{Lag, best_lag};
 pub use settings::ReportSettings;
 
-use crate::cleaning::{Reason, SetAside};
+use crate::cleaning::{Reason, RejectedSamples};
 use crate::clock::Clock;
 use crate::filter::CutoffChoice;
 use crate::log::LinesDropped;
@@ -117,7 +117,7 @@ pub struct ImportReport {
     pub rows_to_a_torque: Option<u64>,
     /// Samples whose torque is ignored, and replaced positions, by joint.
     #[serde(default)]
-    pub set_aside: Vec<SetAside>,
+    pub set_aside: Vec<RejectedSamples>,
     /// Number of gaps that were filled because they are short compared with the motion, and of samples in them; these
     /// are not used as rows.
     #[serde(default)]

@@ -117,7 +117,7 @@ impl JointDisturbance {
                 while let Some(body) = at {
                     let map = &model.maps()[body];
                     let axis = placements[body].rotation.mul_vec(map.axis);
-                    let own = if map.turns {
+                    let own = if map.is_rotary {
                         axis.dot((point + -placements[body].translation).cross(force))
                     } else {
                         axis.dot(force)

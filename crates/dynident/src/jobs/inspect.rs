@@ -7,8 +7,8 @@ use crate::result::{
 use crate::robot_file::{LoadSettings, load_robot};
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, numerical_rank_by_body};
 use dynident_model::{
-    Body, DescriptionFormat, InertialParameters, Joint, Model, ReadError, Robot, Slip, Slips, UrdfIrregularity, audit,
-    rewrite_inertials, slips,
+    Body, DescriptionError, DescriptionFormat, InertialParameters, Joint, Model, ReadError, Robot, Slips,
+    UrdfIrregularity, audit, rewrite_inertials, slips,
 };
 use std::path::Path;
 
@@ -29,7 +29,7 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
 
 /// Correction of a robot description.
 #[derive(Clone, Debug, PartialEq)]
-pub enum MendedDescription {
+pub enum CorrectedDescription {
     /// The URDF with all corrections; all other bytes are unchanged.
     Urdf(String),
     /// No error with a known correction was found.
@@ -42,7 +42,7 @@ pub enum MendedDescription {
 ///
 /// # Errors
 /// If the description cannot be read.
-pub fn mended(path: &Path, settings: &InspectSettings) -> Result<MendedDescription, Error> {
+pub fn mended(path: &Path, settings: &InspectSettings) -> Result<CorrectedDescription, Error> {
     mended_robot(&load_robot(path, &LoadSettings::default())?, settings)
 }
 
@@ -50,13 +50,13 @@ pub fn mended(path: &Path, settings: &InspectSettings) -> Result<MendedDescripti
 ///
 /// # Errors
 /// A URDF in which the numbers to correct are ambiguous.
-pub fn mended_robot(robot: &Robot, settings: &InspectSettings) -> Result<MendedDescription, Error> {
-    let Some(slips) = slips_of(robot, settings)? else { return Ok(MendedDescription::NoUrdf) };
+pub fn mended_robot(robot: &Robot, settings: &InspectSettings) -> Result<CorrectedDescription, Error> {
+    let Some(slips) = slips_of(robot, settings)? else { return Ok(CorrectedDescription::NoUrdf) };
     if slips.stated == slips.corrected {
-        return Ok(MendedDescription::NothingToMend);
+        return Ok(CorrectedDescription::NothingToMend);
     }
     rewrite_inertials(&robot.text, &slips.stated, &slips.corrected)
-        .map(MendedDescription::Urdf)
+        .map(CorrectedDescription::Urdf)
         .map_err(|error| Error::Result { path: robot.path.clone(), message: error.to_string() })
 }
 
@@ -176,7 +176,7 @@ fn audit_entries(robot: &Robot) -> Vec<AuditEntry> {
     entries
 }
 
-fn slip_entry(slip: &Slip) -> SlipEntry {
+fn slip_entry(slip: &DescriptionError) -> SlipEntry {
     let corrections = slip.corrections.iter().map(|one| CorrectionEntry {
         link: one.link.clone(),
         number: one.number.to_owned(),

@@ -1,6 +1,6 @@
 //! Page section of the study examination: findings and unexplained torque.
 
-use crate::result::{CheckFinding, ReadingResult, StudyCheck};
+use crate::result::{CheckFinding, HypothesisResult, StudyCheck};
 use dynident_recording::Level;
 use dynident_report::{BarPlot, Heading, Report, Text, Tone};
 
@@ -32,7 +32,7 @@ fn tone(finding: &CheckFinding) -> Tone {
 }
 
 /// Unexplained torque of each joint, as written and with the correction.
-fn unexplained_torque(joints: &[String], as_written: &ReadingResult, best: Option<&ReadingResult>) -> BarPlot {
+fn unexplained_torque(joints: &[String], as_written: &HypothesisResult, best: Option<&HypothesisResult>) -> BarPlot {
     let title = "Unexplained torque with the best physically consistent fit";
     let label = "unexplained torque of the joint, %";
     let shown = best.unwrap_or(as_written);

@@ -1,7 +1,7 @@
 //! Remarks on runs, motions and logs for the page of an iteration.
 
 use super::run_figures::{last_good, run_name};
-use crate::result::{IterationRun, IterationsFile, UnmetCondition};
+use crate::result::{IterationRun, IterationsFile, UnmetConditionEntry};
 use dynident_report::{Cell, Heading, Report, Table, Text, Tone, short};
 
 /// Explains held-out runs.
@@ -12,7 +12,7 @@ const FORECASTS: &str = "Largest error bars: root mean square of the error bars 
 
 /// Adds unmet conditions of convergence, with remedies.
 pub(super) fn unmet_conditions(page: &mut Report, file: &IterationsFile) {
-    let point = |unmet: &UnmetCondition| (Tone::Warning, format!("{}. Remedy: {}.", unmet.message, unmet.remedy));
+    let point = |unmet: &UnmetConditionEntry| (Tone::Warning, format!("{}. Remedy: {}.", unmet.message, unmet.remedy));
     section(page, "Unmet conditions", file.unmet.iter().map(point).collect());
 }
 

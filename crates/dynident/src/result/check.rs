@@ -28,9 +28,9 @@ pub struct StudyCheck {
     /// Names of the joints, in the order of the hypothesis results.
     pub joints: Vec<String>,
     /// The study as written; null if the hypotheses could not be compared.
-    pub as_written: Option<ReadingResult>,
+    pub as_written: Option<HypothesisResult>,
     /// The hypothesis that explains the logs clearly better, if there is one.
-    pub best: Option<ReadingResult>,
+    pub best: Option<HypothesisResult>,
     /// Number of tested hypotheses.
     pub tried: usize,
 }
@@ -67,7 +67,7 @@ pub struct StudyChange {
 /// Score of one hypothesis: the best physically consistent fit to the logs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct ReadingResult {
+pub struct HypothesisResult {
     /// Torque of each joint without explanation by a physically consistent robot, percent (root mean squares).
     pub left_percent: Vec<f64>,
     /// Joints that exceed their limits.

@@ -22,7 +22,7 @@ impl ErrorTermResult {
         match self.source {
             ErrorSource::Noise => "noise",
             ErrorSource::Lag => "lag",
-            ErrorSource::BetweenLogs => "differences between logs",
+            ErrorSource::LogVariation => "differences between logs",
             ErrorSource::FrictionConstants => "friction constants",
             ErrorSource::Gains => "drive gains",
             ErrorSource::NominalValues => "nominal values",

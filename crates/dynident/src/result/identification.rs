@@ -18,7 +18,7 @@ use dynident_identification::examination::{
 use dynident_identification::friction::{FrictionCandidate, FrictionConstant};
 use dynident_identification::payload::{DriveGain, PayloadResult};
 use dynident_identification::rows::VelocityHistogram;
-use dynident_identification::{BetweenLogs, Condition, CutoffByError, DriveInertiaChoice, Role};
+use dynident_identification::{Condition, CutoffByError, DriveInertiaChoice, LogVariation, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -181,7 +181,7 @@ pub struct MethodSummary {
     /// Parameter differences between training logs relative to their error bars; the error bars of `base_parameters`
     /// include the excess. Null for a single log.
     #[serde(default)]
-    pub between_logs: Option<BetweenLogs>,
+    pub between_logs: Option<LogVariation>,
     /// Held-out figures are for torque below 0.7 times this frequency, the cut-off from the spectrum of the motion, Hz;
     /// null if they use the band of the fit.
     #[serde(default)]

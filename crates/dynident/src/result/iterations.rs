@@ -6,8 +6,8 @@ use crate::error::Error;
 use crate::inputs::read_result;
 use dynident_identification::examination::TorqueLag;
 use dynident_iteration::{
-    CommandSource, DifferentiatorChoice, HeldOutRun, LoweredBandwidth, Oscillation, RunEvidence, RunOffset, Shortfall,
-    TorqueCheck, WarmUp,
+    CommandSource, DifferentiatorChoice, HeldOutRun, LoweredBandwidth, Oscillation, RunEvidence, RunOffset,
+    TorqueCheck, UnmetCondition, WarmUp,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -38,7 +38,7 @@ pub struct IterationsFile {
     pub reason: String,
     /// Unmet conditions after the last run; empty if the iteration has converged, and in files of earlier versions.
     #[serde(default)]
-    pub unmet: Vec<UnmetCondition>,
+    pub unmet: Vec<UnmetConditionEntry>,
     /// Forecast of a further run that was not worthwhile, if motions are redesigned and all conditions are met.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub declined: Option<RunForecast>,
@@ -208,10 +208,10 @@ impl RunForecast {
 /// An unmet condition of convergence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct UnmetCondition {
+pub struct UnmetConditionEntry {
     /// The condition with its numbers.
     #[serde(flatten)]
-    pub shortfall: Shortfall,
+    pub shortfall: UnmetCondition,
     /// Message.
     pub message: String,
     /// Remedy.

@@ -22,7 +22,7 @@ mod sound;
 pub(crate) mod stored;
 mod validation;
 
-pub use check::{CHECK_SCHEMA, CheckFile, CheckFinding, ReadingResult, StudyChange, StudyCheck};
+pub use check::{CHECK_SCHEMA, CheckFile, CheckFinding, HypothesisResult, StudyChange, StudyCheck};
 pub use design::{
     DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast, StrokeFile, StrokeLimitFile, WindowedFile,
 };
@@ -40,7 +40,7 @@ pub use inspection::{
     AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
 };
 pub use iterations::{
-    INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, RunForecast, UnmetCondition,
+    INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, RunForecast, UnmetConditionEntry,
 };
 pub use log::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};

@@ -75,7 +75,7 @@ mod tests {
         let wide = CoulombShape::Smooth { width: 0.07 };
         let stribeck = vec![TorqueTerm::Stribeck(Stribeck { joint, speed: 0.28, exponent: 2.0, shape: wide })];
         let sigmoid = vec![TorqueTerm::Sigmoid(Sigmoid { joint, steepness: 21.0, offset_speed: 0.03 })];
-        let rounding = model.own_scale().velocity(true, Power::ROUNDING);
+        let rounding = model.characteristic_scale().velocity(true, Power::ROUNDING);
         let powers = [PowerExponent::CubeRoot, PowerExponent::Quadratic]
             .map(|exponent| TorqueTerm::Power(Power { joint, exponent, rounding }))
             .to_vec();

@@ -175,8 +175,8 @@ pub(super) fn torque_terms(
     let mut terms = terms_per_joint(model, |joint| drive_choice(drive, model, joint));
     for (joint, description) in model.joints().iter().enumerate() {
         let own = drive.joints.get(&description.name);
-        let (step, turns) = (friction_step(drive, model, joint), description.turns());
-        let stated = StatedJoint { joint, step, turns, scale: model.own_scale() };
+        let (step, is_rotary) = (friction_step(drive, model, joint), description.is_rotary());
+        let stated = StatedJoint { joint, step, is_rotary, scale: model.characteristic_scale() };
         let further = own.and_then(|own| own.terms.as_ref()).unwrap_or(&drive.terms);
         terms.extend(further.iter().flat_map(|term| term.law().terms(&stated)));
     }
@@ -221,7 +221,7 @@ pub(crate) fn friction_step(drive: &DriveSection, model: &Model, joint: usize) -
 
 /// Width of a joint's smooth step, rad/s (m/s): the stated value, or the default of a 1.2 m arm scaled to this robot.
 fn width(drive: &DriveSection, own: &JointDrive, model: &Model, joint: usize) -> f64 {
-    let usual = || model.own_scale().velocity(model.joints()[joint].turns(), CoulombShape::USUAL_WIDTH);
+    let usual = || model.characteristic_scale().velocity(model.joints()[joint].is_rotary(), CoulombShape::USUAL_WIDTH);
     own.coulomb_width.or(drive.coulomb_width).unwrap_or_else(usual)
 }
 

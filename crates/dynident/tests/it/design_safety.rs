@@ -207,7 +207,7 @@ fn a_design_ends_in_every_part_of_it() {
         assert!(ended.load(Ordering::SeqCst), "{round} was never reached");
         assert!(outcome.file.stopped, "{round}: design.json does not record that it was stopped");
         assert!(asked.load(Ordering::SeqCst) <= 20, "{round}: {asked:?}");
-        let whole_hz = outcome.robot.model().own_scale().round_hertz(10_000.0);
+        let whole_hz = outcome.robot.model().characteristic_scale().round_hertz(10_000.0);
         let rate_hz = if round == "changes of limits" { whole_hz } else { 0.1 * whole_hz };
         assert!((outcome.file.check_rate_hz - rate_hz).abs() < 1e-6, "{round}: {}", outcome.file.check_rate_hz);
         assert!(

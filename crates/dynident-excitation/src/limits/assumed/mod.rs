@@ -214,7 +214,7 @@ fn bound_accelerations(under: &mut Limits, given: &Limits, model: &Model, thresh
 
 /// Distance within which a joint reaches its full speed, rad (m).
 fn run_up(joint: &Joint, range: Option<[f64; 2]>, thresholds: &AssumptionThresholds) -> Option<f64> {
-    if joint.turns() {
+    if joint.is_rotary() {
         return Some(thresholds.run_up_rad);
     }
     range.map(|[lower, upper]| thresholds.run_up_stroke_share * (upper - lower)).filter(|run_up| *run_up > 0.0)

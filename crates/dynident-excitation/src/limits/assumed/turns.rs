@@ -30,7 +30,7 @@ pub(super) fn bound_turns(
     for (place, joint) in model.joints().iter().enumerate() {
         let Some(limit) = under.joints.iter_mut().find(|limit| limit.joint == joint.name) else { continue };
         let is_given = given.of(&joint.name).is_some_and(|own| own.position.is_some());
-        if !joint.turns() || is_given || limit.position.is_some() {
+        if !joint.is_rotary() || is_given || limit.position.is_some() {
             continue;
         }
         let known = |of: &[Option<f64>]| of.get(place).copied().flatten();

@@ -23,12 +23,12 @@ pub struct Coupled {
 impl MistakeKind for Coupled {
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
         let Breadth::Rare = breadth else { return Vec::new() };
-        let turns = |joint: usize| setup.model().joints()[joint].turns();
+        let is_rotary = |joint: usize| setup.model().joints()[joint].is_rotary();
         let neighbours = (1..setup.robot.dof()).flat_map(|joint| [(joint, joint - 1), (joint - 1, joint)]);
         let ways =
             [(Channels::Position, 1.0), (Channels::Position, -1.0), (Channels::Both, 1.0), (Channels::Both, -1.0)];
         neighbours
-            .filter(|&(joint, with)| turns(joint) && turns(with))
+            .filter(|&(joint, with)| is_rotary(joint) && is_rotary(with))
             .flat_map(|(joint, with)| ways.map(|(channels, sign)| Self { joint, with, sign, channels }))
             .collect()
     }

@@ -34,7 +34,7 @@ impl Setup<'_> {
 
     /// Numbers of the revolute joints.
     pub(super) fn turning(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.robot.dof()).filter(|&joint| self.model().joints()[joint].turns())
+        (0..self.robot.dof()).filter(|&joint| self.model().joints()[joint].is_rotary())
     }
 }
 

@@ -49,9 +49,9 @@ impl PositionUnit {
     /// Units of the position of one joint. Units that are far too small are tried only if the joint travels too far.
     fn of_one(setup: Setup<'_>, joint: usize) -> impl Iterator<Item = Self> {
         let description = &setup.model().joints()[joint];
-        let units: &[f64] = if description.turns() { &UNITS_OF_ONE } else { &UNITS_OF_ONE_LENGTH };
+        let units: &[f64] = if description.is_rotary() { &UNITS_OF_ONE } else { &UNITS_OF_ONE_LENGTH };
         let range = description.limits.lower.zip(description.limits.upper).map_or(0.0, |(lower, upper)| upper - lower);
-        let range = if range > 0.0 || !description.turns() { range } else { 2.0 * TAU };
+        let range = if range > 0.0 || !description.is_rotary() { range } else { 2.0 * TAU };
         let q = setup.rows.q[joint].iter().copied();
         let travel = q.clone().fold(f64::NEG_INFINITY, f64::max) - q.fold(f64::INFINITY, f64::min);
         let all = units.iter().map(move |&factor| Self { joints: vec![joint], factor });

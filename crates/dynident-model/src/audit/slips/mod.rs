@@ -66,7 +66,7 @@ impl SlipKind {
 
 /// A mistake in a URDF, its evidence, and the corrected numbers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Slip {
+pub struct DescriptionError {
     /// Kind of mistake.
     pub kind: SlipKind,
     /// Affected links.
@@ -96,7 +96,7 @@ pub struct Correction {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slips {
     /// Mistakes, in the order of the search.
-    pub found: Vec<Slip>,
+    pub found: Vec<DescriptionError>,
     /// Inertials in the file.
     pub stated: Vec<StatedInertial>,
     /// Inertials with all corrections.
@@ -140,7 +140,7 @@ struct Search {
     /// Size of each link's body, m; `None` if all joints are implausibly far apart, so that no length is available for
     /// comparison.
     lengths: Option<Vec<f64>>,
-    found: Vec<Slip>,
+    found: Vec<DescriptionError>,
 }
 
 impl Search {
@@ -152,12 +152,12 @@ impl Search {
             corrections.extend(differences(&self.now[place], &new));
             self.now[place] = new;
         }
-        self.found.push(Slip { kind, links, message, evidence, corrections });
+        self.found.push(DescriptionError { kind, links, message, evidence, corrections });
     }
 
     fn note_uncorrected(&mut self, kind: SlipKind, places: &[usize], message: String, evidence: String) {
         let links = places.iter().map(|&place| self.now[place].link.clone()).collect();
-        self.found.push(Slip { kind, links, message, evidence, corrections: Vec::new() });
+        self.found.push(DescriptionError { kind, links, message, evidence, corrections: Vec::new() });
     }
 
     /// Indices of the links with a nonzero inertial and a centre of mass.

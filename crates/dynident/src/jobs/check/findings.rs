@@ -4,7 +4,7 @@ use super::CheckSettings;
 use super::changes::{changes, keys_of_log, keys_of_study};
 use super::description::{another_robot, torque_unit, wrong_mass};
 use super::wording::{FindingContext, alternative, evidence, finding};
-use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
+use crate::result::{CheckFinding, HypothesisResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{
@@ -291,9 +291,9 @@ fn unmodelled_payload(study: &Study, robot: &StudyRobot, payload: &UnmodelledPay
     found
 }
 
-fn hypothesis_result(hypothesis: &Hypothesis, joints: &[String]) -> ReadingResult {
+fn hypothesis_result(hypothesis: &Hypothesis, joints: &[String]) -> HypothesisResult {
     let beyond = |beyond: &BeyondLimit| format!("{} of {}", beyond.quantity, joints[beyond.joint]);
-    ReadingResult {
+    HypothesisResult {
         left_percent: hypothesis.left.iter().map(|left| 100.0 * left).collect(),
         beyond_limits: hypothesis.beyond.iter().map(beyond).collect(),
         score: hypothesis.score(),

@@ -9,7 +9,7 @@ use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::{motion_provenance, relative_path};
 use crate::study::{DesignSection, Folders, Study, StudyInput, StudyLogSource, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
-use dynident_excitation::families::Given;
+use dynident_excitation::families::SampledMotion;
 use dynident_excitation::{Family, Motion, grid};
 use dynident_identification::{Execution, IdentificationSettings, Logs};
 use dynident_recording::MotionBlock;
@@ -55,7 +55,7 @@ pub fn check_trajectory(
     setup.notes.extend(table.note);
     setup.notes.extend(not_at_rest(&given, &joints));
     let motion_at = |times: &[f64], out: &mut Motion| given.motion(&[], times, out);
-    let check_rate_hz = setup.robot.model().own_scale().round_hertz(CHECK_RATE_HZ);
+    let check_rate_hz = setup.robot.model().characteristic_scale().round_hertz(CHECK_RATE_HZ);
     let check = LimitCheck::of(&setup, study_path, (duration_s, check_rate_hz), SPLINE, &motion_at, NO_SEARCH)?;
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
@@ -144,7 +144,7 @@ fn pieces(
     folders: &Folders,
     index: usize,
     source: &StudyLogSource,
-) -> Result<(Vec<Given>, f64), Error> {
+) -> Result<(Vec<SampledMotion>, f64), Error> {
     let log = study.log_name(index);
     let failed = |source| Error::recording(&log, source);
     let recording = study.recording(robot, folders, index, source)?;
@@ -186,7 +186,7 @@ fn pieces(
         let samples = piece[0].len();
         let [q, dq, ddq] = core::array::from_fn(|order| piece[order * dof..(order + 1) * dof].concat());
         let times = (0..samples).map(|sample| sample as f64 / rate_hz).collect();
-        Given::new(times, Motion { samples, joints: dof, q, dq, ddq, dddq: Vec::new() })
+        SampledMotion::new(times, Motion { samples, joints: dof, q, dq, ddq, dddq: Vec::new() })
     };
     let whole = found.into_iter().filter(|piece| piece[0].len() >= 2).map(given).collect::<Result<Vec<_>, _>>();
     let wrong = |message: String| Error::States { path: source.path(), line: 1, message };
@@ -198,7 +198,7 @@ fn pieces(
 }
 
 /// Note about joints that do not start and end at rest, which a robot cannot execute.
-fn not_at_rest(given: &Given, joints: &[String]) -> Option<String> {
+fn not_at_rest(given: &SampledMotion, joints: &[String]) -> Option<String> {
     let motion = given.samples();
     let moving: Vec<&str> = joints
         .iter()

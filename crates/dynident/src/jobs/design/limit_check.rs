@@ -83,8 +83,8 @@ fn sentences(
     single: Vec<Relaxation>,
     stop: &dyn Fn() -> bool,
 ) -> Vec<String> {
-    let rate_hz =
-        set.model().own_scale().round_hertz(DIAGNOSIS_RATE_HZ) / if stop() { STOPPED_RATE_DIVISOR } else { 1.0 };
+    let rate_hz = set.model().characteristic_scale().round_hertz(DIAGNOSIS_RATE_HZ)
+        / if stop() { STOPPED_RATE_DIVISOR } else { 1.0 };
     let times = grid(duration_s, (duration_s * rate_hz).ceil() as usize + 1);
     let mut motion = Motion::default();
     motion_at(&times, &mut motion);

@@ -75,7 +75,7 @@ pub fn design_study(
 
     // The limit check is independent of the search.
     let duration_s = found.family.duration_s();
-    let check_rate_hz = setup.robot.model().own_scale().round_hertz(CHECK_RATE_HZ);
+    let check_rate_hz = setup.robot.model().characteristic_scale().round_hertz(CHECK_RATE_HZ);
     let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
     let single = || match found.windowed {
         Some(_) => Ok(Vec::new()),

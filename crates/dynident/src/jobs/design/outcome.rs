@@ -11,7 +11,7 @@ use crate::result::{DESIGN_SCHEMA, DesignFile, Provenance, WindowedFile};
 use crate::study::{FamilyChoice, StudyRobot};
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
-use dynident_excitation::families::Given;
+use dynident_excitation::families::SampledMotion;
 use dynident_excitation::limits::Limits;
 use dynident_excitation::optimisers::Generation;
 use dynident_excitation::{Family, Motion};
@@ -59,7 +59,7 @@ impl MotionOrigin {
     }
 
     /// The given trajectory or log with this name.
-    pub(super) fn given(setup: &DesignSetup, name: String, motion: Given, known: &MotionInformation) -> Self {
+    pub(super) fn given(setup: &DesignSetup, name: String, motion: SampledMotion, known: &MotionInformation) -> Self {
         Self {
             family: "given".to_owned(),
             family_settings: None,
@@ -164,7 +164,7 @@ impl DesignOutcome {
     }
 
     fn plot_rate_hz(&self) -> f64 {
-        self.robot.model().own_scale().round_hertz(PLOT_RATE_HZ)
+        self.robot.model().characteristic_scale().round_hertz(PLOT_RATE_HZ)
     }
 
     /// Samples the motion at `0, 1/rate, ..` and at its end; for a log with gaps its longest piece.

@@ -5,7 +5,7 @@ use crate::error::{Error, StudyError};
 use crate::result::WindowedFile;
 use core::ops::ControlFlow;
 use dynident_excitation::criteria::Criterion;
-use dynident_excitation::families::StartingAt;
+use dynident_excitation::families::WithStartPosture;
 use dynident_excitation::limits::Relaxation;
 use dynident_excitation::optimisers::{Generation, OptimiserError};
 use dynident_excitation::{DesignProgress, DesignTask, Family, design, design_without_gradients, single_changes};
@@ -57,7 +57,7 @@ pub(super) fn search(
     let mut start_posture = Vec::new();
     if let Some(start) = &section.start_posture {
         start_posture = start.of_joints(model, limits).map_err(Error::section(study_path, "design"))?;
-        let starting = StartingAt::new(family, start_posture.clone());
+        let starting = WithStartPosture::new(family, start_posture.clone());
         family = Box::new(starting.map_err(Error::section(study_path, "design"))?);
     }
     let criteria: Vec<&dyn Criterion> = setup.criteria.iter().map(|criterion| &**criterion).collect();

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use dynident_excitation::Motion;
-use dynident_excitation::families::Given;
+use dynident_excitation::families::SampledMotion;
 use dynident_files::quoted;
 use dynident_recording::{Derivatives, MotionSettings, cutoff};
 use std::path::Path;
@@ -17,7 +17,7 @@ const MAX_RELATIVE_DISAGREEMENT: f64 = 0.05;
 const MIN_ALLOWED_DISAGREEMENT: f64 = 1e-3;
 
 pub(crate) struct Trajectory {
-    pub(crate) given: Given,
+    pub(crate) given: SampledMotion,
     /// Method of velocity and acceleration if they are not in the table.
     pub(crate) note: Option<String>,
 }
@@ -75,7 +75,7 @@ pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettin
     let mut arrays = groups.into_iter().map(|group| group.concat());
     (motion.q, motion.dq, motion.ddq) =
         (arrays.next().unwrap_or_default(), arrays.next().unwrap_or_default(), arrays.next().unwrap_or_default());
-    let given = Given::new(times_s, motion).map_err(|error| wrong(1, error.to_string()))?;
+    let given = SampledMotion::new(times_s, motion).map_err(|error| wrong(1, error.to_string()))?;
     Ok(Trajectory { given, note })
 }
 

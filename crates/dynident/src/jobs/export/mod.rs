@@ -10,7 +10,7 @@ use crate::jobs::violations::violations;
 use crate::result::ResultFile;
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_export::{
-    ExportError, Exported, PayloadBody, PayloadReader, RobotModel, Target, export, notes_on_omitted, payload_command,
+    ControllerBrand, ExportError, Exported, PayloadBody, RobotModel, Target, export, notes_on_omitted, payload_command,
 };
 use dynident_identification::Role;
 use dynident_model::terms::TorqueTerm;
@@ -157,7 +157,7 @@ fn with_velocities(stored: &ResultFile, robot: RobotModel) -> Result<RobotModel,
 ///
 /// # Errors
 /// A result without payloads or without this one, a payload without a physically consistent body.
-pub fn export_payload(result_path: &Path, name: Option<&str>, reader: PayloadReader) -> Result<Exported, Error> {
+pub fn export_payload(result_path: &Path, name: Option<&str>, reader: ControllerBrand) -> Result<Exported, Error> {
     export_payload_of(&ResultFile::read(result_path)?, result_path, name, reader)
 }
 
@@ -169,7 +169,7 @@ pub fn export_payload_of(
     stored: &ResultFile,
     result_path: &Path,
     name: Option<&str>,
-    reader: PayloadReader,
+    reader: ControllerBrand,
 ) -> Result<Exported, Error> {
     let wrong = |message: String| Error::Result { path: result_path.to_owned(), message };
     let names = stored.payloads.iter().map(|payload| format!("`{}`", payload.name)).collect::<Vec<_>>().join(", ");

@@ -68,7 +68,7 @@ fn drive_knowledge(stored: &ResultFile, robot: &RobotModel) -> DriveKnowledge {
         actuator_gains: joints
             .iter()
             .zip(robot.model().joints())
-            .map(|(name, j)| gain(stored, name, j.turns()))
+            .map(|(name, j)| gain(stored, name, j.is_rotary()))
             .collect(),
     }
 }
@@ -127,8 +127,8 @@ fn common_delay(stored: &ResultFile) -> Option<SimulatorValue> {
     }
 }
 
-fn gain(stored: &ResultFile, joint: &str, turns: bool) -> SimulatorValue {
-    let unit = format!("{} per unit logged", if turns { "Nm" } else { "N" });
+fn gain(stored: &ResultFile, joint: &str, is_rotary: bool) -> SimulatorValue {
+    let unit = format!("{} per unit logged", if is_rotary { "Nm" } else { "N" });
     let found = stored.drive_gains.iter().flatten().find(|gain| gain.joint == joint);
     match found {
         Some(found) => SimulatorValue {

@@ -7,7 +7,7 @@ use core::fmt::Write;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::HALF_WIDTH_95;
 use dynident_identification::Identification;
-use dynident_model::mjcf::{Loss, included_from};
+use dynident_model::mjcf::{MjcfLoss, included_from};
 use dynident_model::terms::{JointProperty, TermClass};
 use dynident_model::{
     Body, DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, LinkChange, Model, Robot, link_changes,
@@ -99,7 +99,7 @@ fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) 
         let (own, behind): (Vec<_>, Vec<_>) = body.links.drain(..).partition(|link| is_own(&link.name));
         body.links = own;
         for link in &behind {
-            let is_unknown = |loss: &Loss| matches!(loss, Loss::UnknownMass { body, .. } if *body == link.name);
+            let is_unknown = |loss: &MjcfLoss| matches!(loss, MjcfLoss::UnknownMass { body, .. } if *body == link.name);
             if robot.robot.notices.iter().any(|notice| is_unknown(&notice.loss)) {
                 return Err(format!("unknown mass of `{}` behind a locked joint: add an <inertial>", link.name));
             }

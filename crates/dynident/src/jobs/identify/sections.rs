@@ -14,7 +14,9 @@ use dynident_identification::consistent::typical_length_m;
 use dynident_identification::estimators::Estimator;
 use dynident_identification::examination::TorqueLag;
 use dynident_identification::friction::JointFriction;
-use dynident_identification::{Conditional, ErrorSource, Identification, Recording, RegressorModel, resting_joints};
+use dynident_identification::{
+    ConditionalEstimate, ErrorSource, Identification, Recording, RegressorModel, resting_joints,
+};
 use dynident_model::terms::{StateFunction, TorqueTerm};
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
 
@@ -85,7 +87,10 @@ fn coincident(model: &RegressorModel) -> Vec<String> {
 }
 
 /// The base parameters. Error terms are listed only for the estimator's estimate without fixed parameters.
-pub(super) fn base_parameters(found: &Identification, conditionals: &[Conditional]) -> Vec<BaseParameterResult> {
+pub(super) fn base_parameters(
+    found: &Identification,
+    conditionals: &[ConditionalEstimate],
+) -> Vec<BaseParameterResult> {
     let (model, estimate, physical) = (found.model(), found.estimate(), found.consistent_base_values());
     let expressions = model.base().expressions();
     let columns = model.layout().columns();

@@ -4,11 +4,13 @@ use super::bound::cramer_rao;
 use crate::jobs::options::study_name;
 use crate::result::{
     INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance, RunForecast,
-    UnmetCondition,
+    UnmetConditionEntry,
 };
 use crate::study::{Study, StudyRobot};
 use dynident_dynamics::ParametricModel;
-use dynident_iteration::{IterationStatus, Leg, LoweredBandwidth, MotionForecast, RunEstimate, RunRecord, Shortfall};
+use dynident_iteration::{
+    IterationStatus, Leg, LoweredBandwidth, MotionForecast, RunEstimate, RunRecord, UnmetCondition,
+};
 use dynident_simulation::SensorSettings;
 use std::path::Path;
 
@@ -42,7 +44,7 @@ pub(super) struct Stage<'a> {
     pub(super) robot: &'a ParametricModel,
     pub(super) records: &'a [RunRecord],
     pub(super) status: &'a IterationStatus,
-    pub(super) shortfalls: &'a [Shortfall],
+    pub(super) shortfalls: &'a [UnmetCondition],
     /// Forecast of a further run that was not worthwhile.
     pub(super) declined: Option<&'a MotionForecast>,
     /// Error bar of each base parameter from an earlier leg, if determined there.
@@ -190,7 +192,7 @@ fn run_forecast(forecast: &MotionForecast, reached_gain_percent: Option<f64>) ->
 }
 
 /// The status, with the first unmet condition or the gain of a declined run.
-fn in_words(status: &IterationStatus, shortfalls: &[Shortfall], declined: Option<&MotionForecast>) -> String {
+fn in_words(status: &IterationStatus, shortfalls: &[UnmetCondition], declined: Option<&MotionForecast>) -> String {
     if let Some(forecast) = declined {
         return format!(
             "{status}: a further run would reduce the largest error bars by only {:.0} %",
@@ -207,17 +209,17 @@ fn in_words(status: &IterationStatus, shortfalls: &[Shortfall], declined: Option
 }
 
 /// Missing runs are not reported if something else ended the iteration, because more runs would not help.
-fn is_irrelevant(shortfall: &Shortfall, status: &IterationStatus) -> bool {
+fn is_irrelevant(shortfall: &UnmetCondition, status: &IterationStatus) -> bool {
     let ended = matches!(
         status,
         IterationStatus::Interrupted { .. } | IterationStatus::Waiting { .. } | IterationStatus::Refused { .. }
     );
-    ended && matches!(shortfall, Shortfall::TooFewRuns { .. })
+    ended && matches!(shortfall, UnmetCondition::TooFewRuns { .. })
 }
 
-fn unmet(shortfall: &Shortfall) -> UnmetCondition {
+fn unmet(shortfall: &UnmetCondition) -> UnmetConditionEntry {
     let (message, remedy) = (shortfall.to_string(), shortfall.remedy().to_owned());
-    UnmetCondition { shortfall: shortfall.clone(), message, remedy }
+    UnmetConditionEntry { shortfall: shortfall.clone(), message, remedy }
 }
 
 /// Merges sequential iterations of legs: converged if all are, with the status of the last.

@@ -7,7 +7,7 @@ use super::trajectory::Trajectory;
 use super::watch::IterationWatch;
 use crate::error::Error;
 use crate::inputs::read_result;
-use crate::output::write_whole;
+use crate::output::write_atomically;
 use dynident_iteration::other_settings;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -65,6 +65,6 @@ pub(super) fn load_or_make(
     }
     let kept = TrajectoryFile { fingerprint: fingerprint.to_owned(), all: make()? };
     let bytes = dynident_text::json::to_string(&kept).map_err(|error| wrong(error.to_string()))?;
-    write_whole(path, bytes.as_bytes())?;
+    write_atomically(path, bytes.as_bytes())?;
     Ok(kept.all)
 }

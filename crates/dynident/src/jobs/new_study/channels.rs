@@ -11,9 +11,13 @@ pub(super) struct LoggedJoints {
     pub(super) is_sure: bool,
 }
 
-/// Assigns the columns of `family` to the joints; `free` are the indices of joints that do not follow others, `turns`
+/// Assigns the columns of `family` to the joints; `free` are the indices of joints that do not follow others, `is_rotary`
 /// whether a joint is revolute. `None` if there are more columns than joints.
-pub(super) fn logged_joints(family: &Family, free: &[usize], turns: impl Fn(usize) -> bool) -> Option<LoggedJoints> {
+pub(super) fn logged_joints(
+    family: &Family,
+    free: &[usize],
+    is_rotary: impl Fn(usize) -> bool,
+) -> Option<LoggedJoints> {
     let of_name = |(key, _): &(JointKey, String)| match key {
         JointKey::Joint(place) => Some(*place),
         JointKey::Name(_) | JointKey::Number(_) | JointKey::Alone => None,
@@ -23,7 +27,7 @@ pub(super) fn logged_joints(family: &Family, free: &[usize], turns: impl Fn(usiz
         return Some(LoggedJoints { joints, reason: "joints from the column names".to_owned(), is_sure: true });
     }
     let count = family.columns.len();
-    let turning: Vec<usize> = free.iter().copied().filter(|&joint| turns(joint)).collect();
+    let turning: Vec<usize> = free.iter().copied().filter(|&joint| is_rotary(joint)).collect();
     let of_all = format!("{count} columns for the {count} joints, in the order of the robot description");
     let of_turning = format!("{count} columns for the {count} revolute joints, in the order of the robot description");
     let of_first =

@@ -151,8 +151,8 @@ impl RecognisedColumns {
         };
         let position = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions"))?;
         let free: Vec<usize> = (0..model.dof()).filter(|&joint| model.joints()[joint].mimic.is_none()).collect();
-        let turns = |joint: usize| model.joints()[joint].kind != JointKind::Prismatic;
-        let logged = logged_joints(position, &free, turns)
+        let is_rotary = |joint: usize| model.joints()[joint].kind != JointKind::Prismatic;
+        let logged = logged_joints(position, &free, is_rotary)
             .ok_or(NewStudyError::MoreColumnsThanJoints { columns: position.columns.len(), joints: free.len() })?;
         let ordered = |family: &Family| in_order(family, position, &logged.joints);
 

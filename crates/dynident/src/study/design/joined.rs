@@ -1,7 +1,7 @@
 //! `family = { kind = "joined", .. }`: several families in sequence within the duration.
 
 use super::FamilyChoice;
-use dynident_excitation::families::{FamilyError, JoinedFamily, JoinedSettings};
+use dynident_excitation::families::{FamilyError, FamilySequence, JoinedSettings};
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "joined";
@@ -37,7 +37,7 @@ impl JoinedChoice {
     ///
     /// # Errors
     /// If a setting is invalid, or the transitions leave no time for the parts.
-    pub fn family(&self, joints: usize, duration_s: f64) -> Result<JoinedFamily, FamilyError> {
+    pub fn family(&self, joints: usize, duration_s: f64) -> Result<FamilySequence, FamilyError> {
         let setting = |setting, value, fix| FamilyError::Setting { family: NAME, setting, value, fix };
         let count = self.parts.len();
         let shares = self.shares.clone().unwrap_or_else(|| vec![1.0; count]);
@@ -63,6 +63,6 @@ impl JoinedChoice {
         let all: f64 = shares.iter().sum();
         let members = self.parts.iter().zip(&shares).map(|(part, share)| part.family(joints, left_s * share / all));
         let settings = JoinedSettings { move_s: self.move_s, start: self.start.clone(), end: self.end.clone() };
-        JoinedFamily::new(members.collect::<Result<_, _>>()?, &settings)
+        FamilySequence::new(members.collect::<Result<_, _>>()?, &settings)
     }
 }

@@ -257,7 +257,7 @@ pub enum TorqueNoise {
 impl DesignSection {
     /// Longest motion that can be checked for `model`, s.
     pub(crate) fn longest_s(model: &Model) -> f64 {
-        model.own_scale().seconds(MAX_DURATION_S)
+        model.characteristic_scale().seconds(MAX_DURATION_S)
     }
 
     /// Start position of each joint that the family's settings fix, rad (m); empty if they fix none.

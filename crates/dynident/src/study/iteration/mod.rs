@@ -20,8 +20,8 @@ use dynident_identification::estimators::Estimator;
 use dynident_identification::{IdentificationSettings, OffsetChoice};
 use dynident_iteration::robot::{EnvelopeSettings, FolderSettings, ProcessSettings};
 use dynident_iteration::{
-    IterationSettings, OscillationSettings, RehearsalSettings, RunIdentificationSettings, RunOffsets, SafetySettings,
-    Scheme, SettledSettings, StartWith, TorqueCheckSettings,
+    ConvergenceSettings, IterationSettings, OscillationSettings, RehearsalSettings, RunIdentificationSettings,
+    RunOffsets, SafetySettings, Scheme, StartWith, TorqueCheckSettings,
 };
 use dynident_recording::DecimationSettings;
 use dynident_simulation::{ControllerSettings, PerJoint};
@@ -155,7 +155,7 @@ pub struct IterationSection {
     /// Maximum number of runs.
     pub max_runs: usize,
     /// Convergence thresholds.
-    pub settled: SettledSettings,
+    pub settled: ConvergenceSettings,
     /// Thresholds for the difference between logged and commanded torque.
     pub torque_check: TorqueCheckSettings,
 }

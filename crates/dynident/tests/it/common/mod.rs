@@ -70,8 +70,8 @@ impl Truth {
     }
 
     pub(crate) fn coulomb_width(&self, joint: usize) -> f64 {
-        let turns = self.model.joints()[joint].turns();
-        self.model.own_scale().velocity(turns, CoulombShape::USUAL_WIDTH)
+        let is_rotary = self.model.joints()[joint].is_rotary();
+        self.model.characteristic_scale().velocity(is_rotary, CoulombShape::USUAL_WIDTH)
     }
 
     pub(crate) fn torque(&self, workspace: &mut Workspace, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {

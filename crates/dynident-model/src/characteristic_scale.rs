@@ -16,14 +16,14 @@ const TIME_SCALE_SQUARED: f64 = 8.0;
 /// data of a robot description that determine a time. The factors also make the result independent of the units of
 /// length and time in the description.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OwnScale {
+pub struct CharacteristicScale {
     /// Scale of time; 1 for an arm of 1.2 m.
     time: f64,
     /// Scale of length; 1 for an arm of 1.2 m.
     length: f64,
 }
 
-impl OwnScale {
+impl CharacteristicScale {
     /// Scale of an arm of 1.2 m.
     pub const USUAL: Self = Self { time: 1.0, length: 1.0 };
 
@@ -62,18 +62,18 @@ impl OwnScale {
     }
 
     /// Scales a joint position of the typical arm, rad (m for a prismatic joint).
-    pub fn position(self, turns: bool, usual: f64) -> f64 {
-        if turns { usual } else { self.metres(usual) }
+    pub fn position(self, is_rotary: bool, usual: f64) -> f64 {
+        if is_rotary { usual } else { self.metres(usual) }
     }
 
     /// Scales a joint velocity of the typical arm, rad/s (m/s for a prismatic joint).
-    pub fn velocity(self, turns: bool, usual: f64) -> f64 {
-        self.position(turns, usual) / self.time
+    pub fn velocity(self, is_rotary: bool, usual: f64) -> f64 {
+        self.position(is_rotary, usual) / self.time
     }
 
     /// Scales a joint acceleration of the typical arm, rad/s² (m/s² for a prismatic joint).
-    pub fn acceleration(self, turns: bool, usual: f64) -> f64 {
-        self.velocity(turns, usual) / self.time
+    pub fn acceleration(self, is_rotary: bool, usual: f64) -> f64 {
+        self.velocity(is_rotary, usual) / self.time
     }
 }
 
@@ -93,8 +93,8 @@ impl Model {
     }
 
     /// Characteristic time and length of the robot.
-    pub fn own_scale(&self) -> OwnScale {
-        OwnScale::of(self)
+    pub fn characteristic_scale(&self) -> CharacteristicScale {
+        CharacteristicScale::of(self)
     }
 }
 
@@ -119,14 +119,15 @@ mod tests {
     fn typical_arm_has_unit_scale() {
         let usual = arm(TYPICAL_ARM_M);
         assert_eq!(usual.arm_m(), TYPICAL_ARM_M);
-        assert_eq!(usual.own_scale(), OwnScale::USUAL);
-        assert_eq!(usual.with_gravity(Vec3::ZERO).unwrap().own_scale(), OwnScale::USUAL);
+        assert_eq!(usual.characteristic_scale(), CharacteristicScale::USUAL);
+        assert_eq!(usual.with_gravity(Vec3::ZERO).unwrap().characteristic_scale(), CharacteristicScale::USUAL);
     }
 
     #[test]
     fn defaults_scale_with_length_and_time() {
-        let (usual, long) = (arm(1.5).own_scale(), arm(1.5 * 1024.0));
-        let gravity = |times: f64| long.clone().with_gravity(STANDARD_GRAVITY.scale(times)).unwrap().own_scale();
+        let (usual, long) = (arm(1.5).characteristic_scale(), arm(1.5 * 1024.0));
+        let gravity =
+            |times: f64| long.clone().with_gravity(STANDARD_GRAVITY.scale(times)).unwrap().characteristic_scale();
         // Gravity scaled like the length changes only lengths.
         let same_time = gravity(1024.0);
         assert_eq!(same_time.seconds(0.1), usual.seconds(0.1));
@@ -143,8 +144,8 @@ mod tests {
 
     #[test]
     fn scale_is_typical_without_lengths_and_always_finite() {
-        assert_eq!(arm(0.0).own_scale(), OwnScale::USUAL);
-        let heavy = arm(1e-300).with_gravity(STANDARD_GRAVITY.scale(1e200)).unwrap().own_scale();
+        assert_eq!(arm(0.0).characteristic_scale(), CharacteristicScale::USUAL);
+        let heavy = arm(1e-300).with_gravity(STANDARD_GRAVITY.scale(1e200)).unwrap().characteristic_scale();
         assert!(heavy.seconds(1.0).is_normal() && heavy.metres(1.0).is_normal());
     }
 }
