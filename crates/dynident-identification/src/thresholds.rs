@@ -178,7 +178,8 @@ pub struct LagThresholds {
     /// unmodelled friction looks like a lag but explains less.
     pub min_own_share: f64,
     /// Prior standard deviation of a lag of a drive or a bus, in seconds for an arm of usual size
-    /// ([`CharacteristicScale`](dynident_model::CharacteristicScale)). 5 ms by default: drives and buses are as fast as their machine needs.
+    /// ([`CharacteristicScale`](dynident_model::CharacteristicScale)). 5 ms by default: drives and buses are as fast as
+    /// their machine needs.
     pub prior_std_s: f64,
     /// Maximum lag in the search, in seconds for an arm of usual size. 0.1 s by default; drives and buses stay below.
     pub max_lag_s: f64,
