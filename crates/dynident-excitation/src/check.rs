@@ -18,8 +18,8 @@ use serde::{Deserialize, Serialize};
 /// Excess of a ratio above 1 that is a violation.
 pub const VIOLATION: f64 = 1e-6;
 
-/// Rate at which motions of usual arms are checked, Hz. For other sizes use [`CharacteristicScale::round_hertz`], so that a very
-/// small or very large robot is sampled as densely relative to its motion.
+/// Rate at which motions of usual arms are checked, Hz. For other sizes use [`CharacteristicScale::round_hertz`], so
+/// that a very small or very large robot is sampled as densely relative to its motion.
 ///
 /// [`CharacteristicScale::round_hertz`]: dynident_model::CharacteristicScale::round_hertz
 pub const CHECK_RATE_HZ: f64 = 10_000.0;

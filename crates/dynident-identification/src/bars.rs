@@ -23,7 +23,8 @@ pub enum ErrorSource {
     FrictionConstants,
     /// Uncertainty of stated drive gains. Payloads only.
     Gains,
-    /// Uncertainty of the parameters that are held at nominal values ([`ConditionalEstimate`](crate::ConditionalEstimate)).
+    /// Uncertainty of the parameters that are held at nominal values
+    /// ([`ConditionalEstimate`](crate::ConditionalEstimate)).
     NominalValues,
 }
 

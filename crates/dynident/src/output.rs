@@ -12,7 +12,8 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), Error> {
     dynident_system::write_atomically(path, contents).map_err(|source| Error::Output { path: path.to_owned(), source })
 }
 
-/// Checks before a long job whether [`write_atomically`] can write into `folder`, which may not exist yet. Leaves no files.
+/// Checks before a long job whether [`write_atomically`] can write into `folder`, which may not exist yet. Leaves no
+/// files.
 ///
 /// # Errors
 /// [`Error::Output`] with the reason from the operating system.

@@ -116,9 +116,9 @@ pub enum StartWith {
 }
 
 /// When an iteration has converged; [`UnmetCondition`](crate::UnmetCondition) lists the conditions. Parameters have
-/// converged if `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and `s ≤ most_uncertain ·
-/// max|θ|`, where θ_k is the estimate after run k and s its standard deviation. To compare parameters of different
-/// units, each is weighted by its torque along the motion as a share of the joint torque.
+/// converged if `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and
+/// `s ≤ most_uncertain · max|θ|`, where θ_k is the estimate after run k and s its standard deviation. To compare
+/// parameters of different units, each is weighted by its torque along the motion as a share of the joint torque.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]

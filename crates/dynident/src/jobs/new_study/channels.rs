@@ -11,8 +11,8 @@ pub(super) struct LoggedJoints {
     pub(super) is_sure: bool,
 }
 
-/// Assigns the columns of `family` to the joints; `free` are the indices of joints that do not follow others, `is_rotary`
-/// whether a joint is revolute. `None` if there are more columns than joints.
+/// Assigns the columns of `family` to the joints; `free` are the indices of joints that do not follow others,
+/// `is_rotary` whether a joint is revolute. `None` if there are more columns than joints.
 pub(super) fn logged_joints(
     family: &Family,
     free: &[usize],
