@@ -98,7 +98,7 @@ pub enum EstimationError {
     PriorWithoutNoiseLevel,
     /// The estimate overflows because the magnitudes of columns and torque differ too much.
     #[error(
-        "the estimate of {name} overflows: columns and torque differ by too many powers of ten; check units and scales"
+        "the estimate of {name} overflows: its regressor column and the torque differ by too many powers of ten; check the units and scales of position and torque"
     )]
     Overflow {
         /// The column.

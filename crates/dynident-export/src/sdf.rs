@@ -21,7 +21,7 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
     }
     if model.gravity() != STANDARD_GRAVITY {
         notes.push(format!(
-            "An SDF model has no gravity (it belongs to the world): it is {:?} m/s² in the base frame.",
+            "SDF states gravity in the world, not in the model: set the gravity of the world to {:?} m/s² (in the base frame).",
             model.gravity().0
         ));
     }

@@ -69,7 +69,7 @@ pub(crate) fn mended(before: &Inspection, after: &Inspection, out: &Path) -> Str
     let numbers: usize = before.slips.iter().map(|slip| slip.corrections.len()).sum();
     let problems = |i: &Inspection| i.audit.iter().filter(|entry| entry.level == "problem").count();
     format!(
-        "{}: {numbers} numbers changed, all other bytes unchanged; problems before {} and now {}, slips before {} and now {}",
+        "{}: {numbers} numbers changed, all other bytes unchanged; problems: {} before, {} now; suspected export errors: {} before, {} now",
         out.display(),
         problems(before),
         problems(after),

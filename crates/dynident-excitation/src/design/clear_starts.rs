@@ -30,7 +30,7 @@ impl<'a> Starts<'a> {
     pub(super) fn new(task: &'a DesignTask<'a>, times: &'a [f64]) -> Self {
         let (positions, speeds) = ranges(task.limits);
         let mut workspace = task.limits.workspace();
-        workspace.sweep();
+        workspace.test_between_samples();
         Self { task, times, positions, speeds, workspace, motion: Motion::default(), values: Vec::new() }
     }
 

@@ -57,7 +57,7 @@ impl<'a> Problem<'a> {
             information: Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior),
             workspace: {
                 let mut workspace = task.limits.workspace();
-                workspace.sweep();
+                workspace.test_between_samples();
                 workspace
             },
             scales: task

@@ -67,7 +67,7 @@ impl AllowedRegion {
 /// Place of a point at a sample, and at the next one if samples are consecutive.
 fn path(inputs: &Inputs<'_>, point: &BodyPoint, sample: usize) -> (Vec3, Option<Vec3>) {
     let at = |sample| inputs.placement(point.body, sample).point(point.at);
-    let follows = inputs.swept && sample + 1 < inputs.motion.samples;
+    let follows = inputs.is_continuous && sample + 1 < inputs.motion.samples;
     (at(sample), follows.then(|| at(sample + 1)))
 }
 

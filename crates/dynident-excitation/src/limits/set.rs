@@ -47,14 +47,15 @@ pub struct LimitWorkspace {
     wrenches: Vec<Wrench>,
     q: Vec<f64>,
     by_position: Vec<f64>,
-    swept: bool,
+    is_continuous: bool,
 }
 
 impl LimitWorkspace {
-    /// Declares samples as consecutive times of one motion. Columns are then also tested on the straight path from one
-    /// sample to the next, so that an arm cannot pass through a thin column between samples.
-    pub fn sweep(&mut self) {
-        self.swept = true;
+    /// Declares the samples as consecutive times of one motion. Distances to columns of the cell are then also tested
+    /// on the straight path in joint space from one sample to the next, so that an arm cannot pass through a thin column
+    /// between two samples.
+    pub fn test_between_samples(&mut self) {
+        self.is_continuous = true;
     }
 }
 
@@ -135,7 +136,7 @@ impl LimitSet {
             wrenches: Vec::new(),
             q: vec![0.0; self.model.dof()],
             by_position: Vec::new(),
-            swept: false,
+            is_continuous: false,
         }
     }
 
@@ -151,8 +152,9 @@ impl LimitSet {
         if samples == 0 {
             return;
         }
-        let LimitWorkspace { torque, placements, swept, .. } = workspace;
-        let inputs = Inputs { motion, torque, placements, bodies: self.model.body_count(), swept: *swept };
+        let LimitWorkspace { torque, placements, is_continuous, .. } = workspace;
+        let inputs =
+            Inputs { motion, torque, placements, bodies: self.model.body_count(), is_continuous: *is_continuous };
         let mut rest = out.as_mut_slice();
         for (term, rows) in self.terms.iter().zip(&self.rows_of) {
             let (own, others) = rest.split_at_mut(rows * samples);
@@ -182,13 +184,22 @@ impl LimitSet {
         }
         self.prepare(workspace, motion);
         let LimitWorkspace {
-            single, tau, torque, placements, by_torque, by_range, wrenches, by_position, swept, ..
+            single,
+            tau,
+            torque,
+            placements,
+            by_torque,
+            by_range,
+            wrenches,
+            by_position,
+            is_continuous,
+            ..
         } = workspace;
         by_range.reset(if self.torque { dof * samples } else { 0 });
         wrenches.clear();
         let bodies = self.model.body_count();
         wrenches.resize(if self.placements { bodies * samples } else { 0 }, Wrench::ZERO);
-        let inputs = Inputs { motion, torque, placements, bodies, swept: *swept };
+        let inputs = Inputs { motion, torque, placements, bodies, is_continuous: *is_continuous };
         let mut rest = weights;
         for (term, rows) in self.terms.iter().zip(&self.rows_of) {
             let (own, others) = rest.split_at(rows * samples);

@@ -16,7 +16,7 @@ pub(crate) struct Inputs<'a> {
     pub(crate) placements: &'a [Transform],
     pub(crate) bodies: usize,
     /// Whether samples are consecutive times of one motion, so that obstacles are also tested between them.
-    pub(crate) swept: bool,
+    pub(crate) is_continuous: bool,
 }
 
 impl Inputs<'_> {

@@ -20,7 +20,7 @@ fn cost(set: &LimitSet, motion: &Motion, weights: &[f64], swept: bool) -> f64 {
 fn workspace(set: &LimitSet, swept: bool) -> LimitWorkspace {
     let mut workspace = set.workspace();
     if swept {
-        workspace.sweep();
+        workspace.test_between_samples();
     }
     workspace
 }

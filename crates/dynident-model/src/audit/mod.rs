@@ -74,7 +74,7 @@ fn findings(model: &Model, settings: &AuditSettings) -> Vec<AuditFinding> {
     let lengths = Lengths::of(model);
     let mut findings = Findings(Vec::new());
     let summary = format!(
-        "{} joints; the moving bodies have {mass:.4} kg in total; joint origins reach {:.3} m from the base",
+        "{} joints; the moving bodies have {mass:.4} kg in total; link lengths from the base to the farthest joint add up to {:.3} m",
         model.dof(),
         lengths.reach
     );

@@ -10,7 +10,7 @@
 use super::MeshFault;
 use super::mesh::TriangleMesh;
 use crate::spatial::Vec3;
-use crate::xml::{MAX_NODES, flood, parse_number, shortened};
+use crate::xml::{MAX_NODES, first_excess, parse_number, shortened};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::HashMap;
 
@@ -27,7 +27,7 @@ type Affine = [[f64; 4]; 3];
 const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 pub(super) fn read(text: &str) -> Result<TriangleMesh, MeshFault> {
-    if flood(text).is_some() {
+    if first_excess(text).is_some() {
         return Err(MeshFault::Collada("too many attributes in one element, or too many nested namespaces"));
     }
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };

@@ -2,7 +2,7 @@
 
 use super::fault::{MjcfError, MjcfFault};
 use crate::place::{Located, line_and_column};
-use crate::xml::{MAX_NODES, Malformed, flood, malformed, root_name, shortened};
+use crate::xml::{MAX_NODES, Malformed, first_excess, malformed, root_name, shortened};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::HashSet;
 
@@ -105,7 +105,7 @@ impl Expanded {
     }
 
     fn parse(&mut self, text: &str, source: usize, is_included: bool) -> Result<usize, (usize, MjcfFault)> {
-        if let Some(at) = flood(text) {
+        if let Some(at) = first_excess(text) {
             return Err((at, MjcfFault::Flood));
         }
         let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };

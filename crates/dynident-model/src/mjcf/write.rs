@@ -42,7 +42,7 @@ pub enum MjcfWriteError {
     )]
     NotPhysical { body: String },
     #[error(
-        "`{link}` is between two joints of one MJCF body and cannot have mass there: write the joints into separate bodies"
+        "`{link}` is between two joints of one MJCF body and cannot have mass there: in the MJCF, give each joint its own body"
     )]
     Between { link: String },
     #[error("`{setting}` of <compiler> changes the masses that are written: {fix}")]

@@ -45,7 +45,7 @@ pub use write::{SdfWriteError, rewrite_sdf};
 use crate::place::line_and_column;
 use crate::spatial::Vec3;
 use crate::tree::{Model, STANDARD_GRAVITY};
-use crate::xml::{MAX_NODES, flood, root_name};
+use crate::xml::{MAX_NODES, first_excess, root_name};
 use fault::fault_at;
 use frames::Frames;
 use roxmltree::{Document, Node, ParsingOptions};
@@ -75,7 +75,7 @@ pub(super) struct Version(pub(super) [u32; 2]);
 /// Malformed XML, not an SDF, or no tree of links on one fixed base; with line and column.
 #[doc(alias("gazebo"))]
 pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
-    if let Some(at) = flood(text) {
+    if let Some(at) = first_excess(text) {
         return Err(SdfError::at(text, at, SdfFault::Flood));
     }
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };

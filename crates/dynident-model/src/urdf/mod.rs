@@ -41,7 +41,7 @@ pub use write::{JointChange, LinkChange, UrdfWriteError, link_changes, rewrite_u
 use crate::error::ModelError;
 use crate::place::{Located, line_and_column};
 use crate::tree::Model;
-use crate::xml::{MAX_NODES, Malformed, flood, malformed};
+use crate::xml::{MAX_NODES, Malformed, first_excess, malformed};
 use roxmltree::{Document, Node, ParsingOptions};
 use thiserror::Error;
 
@@ -203,7 +203,7 @@ pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
 }
 
 fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
-    if let Some(at) = flood(text) {
+    if let Some(at) = first_excess(text) {
         return Err(Located::at(text, at, UrdfFault::Flood));
     }
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };

@@ -1,12 +1,12 @@
 //! Shared parts of the XML readers and writers: guards, numbers, and edits that keep all other bytes.
 
 pub(crate) mod edit;
-mod flood;
+mod limits;
 mod malformed;
 mod number;
 mod tags;
 
-pub(crate) use flood::flood;
+pub(crate) use limits::first_excess;
 pub(crate) use malformed::{Malformed, malformed};
 pub(crate) use number::{parse_number, shortened};
 pub(crate) use tags::{outside_quotes, start_tag_length, tags};

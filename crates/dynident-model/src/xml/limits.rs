@@ -8,9 +8,9 @@ const MAX_ATTRIBUTES: usize = 1000;
 /// Maximum number of namespace declarations in a document.
 const MAX_NAMESPACES: usize = 5000;
 
-/// Byte position at which a document exceeds the limits, if any. Needs one pass and no memory; malformed markup is left
-/// to the parser.
-pub(crate) fn flood(text: &str) -> Option<usize> {
+/// Byte position at which a document exceeds the limits of attributes and namespaces, if any. Needs one pass and
+/// allocates nothing. The parser finds errors of the markup.
+pub(crate) fn first_excess(text: &str) -> Option<usize> {
     if let Some((at, _)) = text.match_indices("xmlns").nth(MAX_NAMESPACES) {
         return Some(at);
     }
@@ -20,18 +20,18 @@ pub(crate) fn flood(text: &str) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::flood;
+    use super::first_excess;
 
     #[test]
     fn a_flood_is_seen_behind_comments_and_quotes() {
         let attributes = r#" a="x>'""#.repeat(1001);
         for before in ["", "<!-- it's <a \" -->", "<?xml it's?>", "<![CDATA[ ' ]]>", "<a b='\"'>"] {
-            assert_eq!(flood(&format!("{before}<c{attributes}/>")), Some(before.len()), "{before}");
-            assert_eq!(flood(&format!("{before}<c{}/>", &attributes[8..])), None, "{before}");
+            assert_eq!(first_excess(&format!("{before}<c{attributes}/>")), Some(before.len()), "{before}");
+            assert_eq!(first_excess(&format!("{before}<c{}/>", &attributes[8..])), None, "{before}");
         }
-        assert_eq!(flood(&"<a xmlns:b='c'>".repeat(5001)), Some(5000 * 15 + 3));
+        assert_eq!(first_excess(&"<a xmlns:b='c'>".repeat(5001)), Some(5000 * 15 + 3));
         // A missing end is left to the parser.
-        assert_eq!(flood("<!-- <"), None);
-        assert_eq!(flood("<a b='"), None);
+        assert_eq!(first_excess("<!-- <"), None);
+        assert_eq!(first_excess("<a b='"), None);
     }
 }
