@@ -52,8 +52,8 @@ pub struct LimitWorkspace {
 
 impl LimitWorkspace {
     /// Declares the samples as consecutive times of one motion. Distances to columns of the cell are then also tested
-    /// on the straight path in joint space from one sample to the next, so that an arm cannot pass through a thin column
-    /// between two samples.
+    /// on the straight path in joint space from one sample to the next, so that an arm cannot pass through a thin
+    /// column between two samples.
     pub fn test_between_samples(&mut self) {
         self.is_continuous = true;
     }
