@@ -216,8 +216,8 @@ class Recorder:
         else:
             sys.exit(f"{file}: no recorder for this log; add one to docs/recordings.py")
 
-    def test(self, page, text, folder):
-        """One study of a page: the held-out error, %."""
+    def test(self, text, folder):
+        """Tests one study and returns its first validation (`result.json`)."""
         folder.mkdir(parents=True, exist_ok=True)
         study = folder / "study.toml"
         study.write_text(text, encoding="utf-8")
@@ -225,11 +225,11 @@ class Recorder:
         (folder / robot).write_text(self.robots[robot].text, encoding="utf-8")
         for file in dict.fromkeys(re.findall(r'^\[\[log\]\]\nfile = "(.*)"', text, re.MULTILINE)):
             self.write(folder, robot, file)
-        findings = json.loads(self.run(0, "check", study, "--json"))
+        self.run(0, "check", study)
         most = MOST_ERROR_SERVOS_PERCENT if "so101" in robot else MOST_ERROR_PERCENT
         self.run(0, "identify", study, "--out", folder / "result", "--max-validation-error", most)
         result = json.loads((folder / "result/result.json").read_text(encoding="utf-8"))
-        return findings, result["validation"][0]
+        return result["validation"][0]
 
 
 def named(pattern, values, first):
@@ -317,7 +317,7 @@ def main():
         if wanted and page.stem not in wanted:
             continue
         for number, study in enumerate(studies):
-            _, held_out = recorder.test(page.name, study, pathlib.Path(scratch) / f"{page.stem}-{number + 1}")
+            held_out = recorder.test(study, pathlib.Path(scratch) / f"{page.stem}-{number + 1}")
             name = re.search(r'^name = "(.*)"', study).group(1)
             print(f"| {page.stem} | {name} | {held_out['physical']['relative_error_percent']:.2f} | {held_out['prior']['relative_error_percent']:.2f} |", flush=True)
             tested += 1
