@@ -59,6 +59,9 @@ run 0 "$dynident" simulate examples/palletizer.toml --out "$out/palletizer_run"
 run 0 "$dynident" check examples/palletizer.toml
 run 0 "$venv/bin/python" .ci/coupled.py "$dynident" "$out/palletizer"
 
+# The studies of the pages of common robots, on simulated recordings with the columns of the vendors' recorders.
+run 0 "$venv/bin/python" docs/recordings.py "$dynident" "$out/recordings"
+
 # A designed motion, its evaluation, and its torques.
 run 0 "$dynident" design examples/design_ur10.toml --out "$out/motion" --to ros2
 run 0 "$dynident" design examples/design_ur10.toml --check "$out/motion/trajectory.csv" --out "$out/checked"

@@ -44,7 +44,7 @@ program=$scratch/python/bin
 "$program/python" -m pytest -q -p no:cacheprovider python/tests
 (cd "$scratch" && "$program/mypy" --config-file "$here/pyproject.toml" -p dynident)
 (cd "$scratch" && "$program/stubtest" --mypy-config-file "$here/pyproject.toml" --allowlist "$here/python/tests/allowed.txt" dynident)
-"$program/python" .ci/python_pages.py docs/src/python.md docs/src/fleets.md docs/src/online.md
+"$program/python" .ci/python_pages.py docs/src/python.md docs/src/python-functions.md docs/src/fleets.md docs/src/online.md
 "$program/python" benchmarks/fleet.py --quick
 [ "${2:-}" = --long ] || exit 0
 

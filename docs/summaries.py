@@ -304,7 +304,8 @@ def growth_picture():
 ARMS = ["ur10", "panda", "iiwa14"]
 TABLES = {
     "estimators-compared.md": [estimators],
-    "default-compared.md": [default_goals, default_cases, default_estimators],
+    "default-compared.md": [default_goals, default_estimators],
+    "default-cases.md": [default_cases],
     "differentiators.md": [differentiators],
     "designs-compared.md": [lambda: designs(ARMS, ""), lambda: designs(ARMS, ", cell"), lambda: designs(ARMS, ", friction")],
 }

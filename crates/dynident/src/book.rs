@@ -12,6 +12,7 @@ macro_rules! chapters {
 chapters! {
     introduction: "introduction.md",
     first_identification: "first-identification.md",
+    how_to: "how-to.md",
     robots: "robots.md",
     robot_formats: "robot-formats.md",
     logs: "logs.md",

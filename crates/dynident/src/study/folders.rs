@@ -42,7 +42,7 @@ impl Folders {
     }
 }
 
-/// Whether `path` is the folder of a rosbag2 recording.
+/// Whether `path` is the folder of a rosbag2 recording or of a `LeRobot` data set.
 fn is_recording(path: &Path) -> bool {
-    path.join("metadata.yaml").is_file()
+    ["metadata.yaml", "meta/info.json"].iter().any(|file| path.join(file).is_file())
 }

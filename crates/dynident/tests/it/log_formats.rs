@@ -1,6 +1,6 @@
 //! A recording gives the same result in every format.
 use crate::common::{Job, repository};
-use dynident::{LogContents, identify, log_contents};
+use dynident::{Folders, LogContents, Study, identify, log_contents};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -163,4 +163,16 @@ fn what_a_recording_holds_is_said_and_leads_to_a_study() {
         let joints: Vec<String> = (0..joints).map(|joint| joint.to_string()).collect();
         table["format"].validate(&joints).unwrap_or_else(|error| panic!("{file}: {error}\n{proposed}"));
     }
+}
+
+#[test]
+fn a_study_names_the_folder_of_a_recording() {
+    let study = Study::parse("[robot]\nfile = \"arm.urdf\"\n[design]\n", Path::new("study.toml")).unwrap();
+    let folders = Folders::new(&study, &repository("golden/formats/study.toml"), None);
+    for recording in ["bag", "lerobot_v2", "lerobot_v3"] {
+        let found = folders.find(Path::new(recording), None).unwrap();
+        assert_eq!(found, repository(&format!("golden/formats/{recording}")));
+    }
+    // A folder without a recording.
+    assert!(folders.find(Path::new("trace"), None).is_err());
 }
