@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # archive.sh FOLDER TARGET OUT: packs the program in FOLDER (built with `--profile dist`) as OUT/dynident-VERSION-TARGET.tar.gz (.zip for Windows), with completions,
-# manual pages and licences. Before packing it checks the size of the program and identifies the robot of README.
+# manual pages, licences and the built book (`mdbook build docs`). Before packing it checks the size of the program and identifies the robot of README.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=$1
@@ -29,7 +29,11 @@ version=$("$binary" --version | tr -d '\r')
 name=dynident-${version#dynident }-$target
 packed=$scratch/$name
 mkdir -p "$packed/completions" "$packed/man/man1"
-cp "$binary" README.md CHANGELOG.md CITATION.cff LICENSE-MIT LICENSE-APACHE "$packed"
+[ -f target/book/index.html ] || { echo 'target/book is missing: run mdbook build docs' >&2; exit 1; }
+cp -R target/book "$packed/book"
+# The archive does not contain the files that README links to.
+sed -E "s#\]\(([^):]*)\)#](https://github.com/dynident/dynident/blob/v${version#dynident }/\1)#g" README.md >"$packed/README.md"
+cp "$binary" CHANGELOG.md CITATION.cff LICENSE-MIT LICENSE-APACHE "$packed"
 "$binary" completions bash >"$packed/completions/dynident.bash"
 "$binary" completions zsh >"$packed/completions/_dynident"
 "$binary" completions fish >"$packed/completions/dynident.fish"

@@ -112,3 +112,4 @@ run 0 "$venv/bin/python" benchmarks/bench_commands.py "$dynident" "$out/panda_ar
 run 0 "$venv/bin/python" benchmarks/growth.py "$dynident" target/debug/dynident-benchmark "$out/growth" --logs 1 --joints 2 --only logs identify --out "$out/growth.csv"
 run 0 "$venv/bin/python" benchmarks/generated.py target/debug/dynident-benchmark "$examples/description" "$out/generated" robots/ur10.urdf --rounds 1
 run 0 python3 docs/summaries.py --check
+run 0 python3 docs/claims.py
