@@ -192,6 +192,8 @@ impl Study {
             dead_band: self.drive.coulomb_dead_band,
             width: self.drive.coulomb_width,
             most_inflation: self.drive.most_inflation,
+            laws: self.drive.candidates.clone(),
+            exportable: self.drive.exportable.map(Into::into),
             ..FrictionSearch::of(&description.name)
         };
         model.joints().iter().enumerate().filter(|(_, joint)| is_chosen(&joint.name)).map(search).collect()
