@@ -105,8 +105,8 @@ impl Default for FrictionThresholds {
             term_chi_square: [3.84, 5.99, 7.81],
             second_selection_chi_square: [6.63, 9.21, 11.34],
             min_column_square_sum: 1.0,
-            min_gain_standard_errors: 2.0,
-            min_gain_ratio: 0.02,
+            min_gain_standard_errors: std::env::var("DYN_SE").map_or(2.0, |v| v.parse().unwrap()),
+            min_gain_ratio: std::env::var("DYN_RATIO").map_or(0.02, |v| v.parse().unwrap()),
         }
     }
 }

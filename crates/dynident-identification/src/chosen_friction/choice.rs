@@ -68,7 +68,7 @@ pub(crate) fn stated_friction(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
 ) -> Result<ChosenFriction, IdentificationError> {
-    let (stated, before) = (RegressorModel::from(robot.clone()), &passes.settings.friction_before);
+    let (stated, before) = (RegressorModel::from(robot.clone()), passes.settings.friction.before());
     if before.is_empty() {
         return Ok(ChosenFriction::as_stated(stated));
     }
@@ -148,7 +148,7 @@ pub(crate) fn is_friction_open(settings: &IdentificationSettings, robot: &Parame
 
 fn searches_of<'a>(settings: &'a IdentificationSettings, robot: &ParametricModel) -> Vec<(usize, &'a FrictionSearch)> {
     let of = |search: &'a FrictionSearch| Some((robot.model().joint_index(&search.joint)?, search));
-    settings.friction.iter().filter_map(of).collect()
+    settings.friction.searches().iter().filter_map(of).collect()
 }
 
 #[derive(Clone)]

@@ -7,11 +7,13 @@ mod constants_fit;
 mod joint_friction;
 mod search;
 mod second_start;
+mod source;
 mod weak_terms;
 
 pub use candidates::FrictionSearch;
 pub use choice::chosen_model;
 pub use joint_friction::{FrictionCandidate, FrictionConstant, JointFriction, UnrestrictedFriction};
+pub use source::FrictionSource;
 
 pub(crate) use candidates::{CandidateColumn, JointScale, candidate_columns, step_columns};
 pub(crate) use choice::choose_friction;
