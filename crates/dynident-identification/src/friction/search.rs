@@ -270,9 +270,7 @@ impl Selection {
             return all;
         }
         let simple = Self::new(folds, columns, max_inflation, &|kind| is_permitted(kind) && is_simple(kind));
-        let [gain, standard_error] = simple.best().errors.excess_over(&best.errors);
-        let is_clear = gain > thresholds.min_gain_standard_errors * standard_error
-            && best.errors.rms() < (1.0 - thresholds.min_gain_ratio) * simple.best().errors.rms();
+        let is_clear = best.errors.rms() < (1.0 - thresholds.min_gain_ratio) * simple.best().errors.rms();
         if is_clear { all } else { simple }
     }
 
