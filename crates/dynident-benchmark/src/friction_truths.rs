@@ -250,7 +250,7 @@ impl Made {
         task.settings.diagnosis = DiagnosisChoice::Never;
         task.settings.consistency = None;
         if chosen {
-            task.settings.friction = usual_searches(robot.model());
+            task.settings.friction = usual_searches(robot.model()).into();
         }
         identify(&task, Execution::default())
     }

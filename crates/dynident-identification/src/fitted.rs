@@ -91,7 +91,7 @@ fn choices_of_excerpt(
         return Ok(None);
     }
     let started = Instant::now();
-    let has_choices = !settings.friction.is_empty() || !settings.drive_inertia.is_empty();
+    let has_choices = settings.friction.is_selected() || !settings.drive_inertia.is_empty();
     let Some(recordings) = excerpts(recordings, settings.row_settings(), has_choices, training, execution)? else {
         return Ok(None);
     };

@@ -137,7 +137,7 @@ pub fn identify_payload(
     arm: &KnownArm,
     execution: Execution<'_>,
 ) -> Result<Identification, IdentificationError> {
-    if !task.settings.friction.is_empty() {
+    if task.settings.friction.is_selected() {
         return Err(PayloadError::FrictionOfKnownArm.into());
     }
     if !task.settings.drive_inertia.is_empty() {

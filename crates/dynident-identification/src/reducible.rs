@@ -6,7 +6,7 @@ use crate::settings::{GainChoice, IdentificationSettings, OffsetChoice};
 use dynident_rows::RegressorModel;
 
 pub(crate) fn is_reducible(model: &RegressorModel, settings: &IdentificationSettings) -> Result<(), ReduceError> {
-    if let Some(search) = settings.friction.first() {
+    if let Some(search) = settings.friction.searches().first() {
         return Err(ReduceError::Friction { joint: search.joint.clone() });
     }
     if settings.motion.differentiator.wants_cutoff() {

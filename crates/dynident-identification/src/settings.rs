@@ -4,7 +4,7 @@ use crate::consistent::{ConsistencyError, ConsistencySettings};
 use crate::diagnosis_settings::DiagnosisSettings;
 use crate::estimators::EstimationSettings;
 use crate::examination_settings::ExaminationSettings;
-use crate::friction::{FrictionSearch, JointFriction};
+use crate::friction::FrictionSource;
 use crate::log_noise::LogNoise;
 use crate::thresholds::DecisionThresholds;
 use dynident_dynamics::ParametricModel;
@@ -79,12 +79,8 @@ pub struct IdentificationSettings {
     /// Joints whose drive inertia is tested, all together; it is added to the model if the test is positive. Empty by
     /// default. Joints with a stated drive inertia are skipped.
     pub drive_inertia: Vec<String>,
-    /// Joints whose friction is selected from the training logs; empty by default.
-    pub friction: Vec<FrictionSearch>,
-    /// Friction that other recordings selected and that is already among the robot's terms. The uncertainty of its
-    /// constants, as found by these recordings, enters the error bars. Empty by default; ignored if friction is
-    /// selected.
-    pub friction_before: Vec<JointFriction>,
+    /// Source of the joints' friction; the terms of the robot by default.
+    pub friction: FrictionSource,
     /// Whether training logs share their offsets; they do by default.
     pub offsets: OffsetChoice,
     /// Whether training logs share the noise of their joints; they do by default.
@@ -115,8 +111,7 @@ impl Default for IdentificationSettings {
             consistency: Some(ConsistencySettings::default()),
             intervals: false,
             drive_inertia: Vec::new(),
-            friction: Vec::new(),
-            friction_before: Vec::new(),
+            friction: FrictionSource::default(),
             offsets: OffsetChoice::default(),
             log_noise: LogNoise::default(),
             lags: LagCandidates::default(),
@@ -143,7 +138,7 @@ impl IdentificationSettings {
     pub fn check_names(&self, robot: &ParametricModel) -> Result<(), ConsistencyError> {
         let Some(knowledge) = &self.consistency else { return Ok(()) };
         let mut named = knowledge.clone();
-        if !self.friction.is_empty() {
+        if self.friction.is_selected() {
             // Terms that will be selected do not exist yet.
             named.terms.clear();
         }

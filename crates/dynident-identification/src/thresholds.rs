@@ -92,6 +92,11 @@ pub struct FrictionThresholds {
     /// Minimum sum of squares of a Stribeck term's column, `Σ e^{-2|q̇/v_s|^δ}`, for supporting rows. 1.0 by default,
     /// the value of one row at rest.
     pub min_column_square_sum: f64,
+    /// Minimum gain of a law with memory or with load-dependent friction: the decrease of the joint's root mean square
+    /// error in cross-validation, as a share of the error with the best laws without memory and load. 0.02 by default:
+    /// smaller gains disappear in the differences between logs, and not every controller and simulator can hold these
+    /// laws.
+    pub min_gain_ratio: f64,
 }
 
 impl Default for FrictionThresholds {
@@ -100,6 +105,7 @@ impl Default for FrictionThresholds {
             term_chi_square: [3.84, 5.99, 7.81],
             second_selection_chi_square: [6.63, 9.21, 11.34],
             min_column_square_sum: 1.0,
+            min_gain_ratio: 0.02,
         }
     }
 }
@@ -139,6 +145,7 @@ impl DecisionThresholds {
             ("cutoff.instruments_ratio", cutoff.instruments_ratio, 1.0),
             ("cutoff.max_lowered_ratio", cutoff.max_lowered_ratio, 0.0),
             ("friction.min_column_square_sum", friction.min_column_square_sum, 0.0),
+            ("friction.min_gain_ratio", friction.min_gain_ratio, 0.0),
             ("doubt.max_log_residual_ratio", doubt.max_log_residual_ratio, 0.0),
             ("doubt.min_rows_per_parameter", doubt.min_rows_per_parameter, 1.0),
             ("doubt.max_held_out_ratio", doubt.max_held_out_ratio, 0.0),

@@ -61,6 +61,8 @@ pub(super) struct RunFigures {
     pub(super) friction: Covered,
     pub(super) tellable: usize,
     pub(super) told: usize,
+    pub(super) unneeded: usize,
+    pub(super) without_need: usize,
     pub(super) lag_found_s: Option<f64>,
     pub(super) lag_is_held: bool,
     pub(super) instruments: bool,
@@ -104,6 +106,10 @@ pub struct CaseFigures {
     pub tellable: usize,
     /// Number of these joints for which the law was selected.
     pub told: usize,
+    /// Number of joints, over all runs, whose true friction has neither memory nor load.
+    pub without_need: usize,
+    /// Number of these joints for which a law with memory or under load was selected.
+    pub unneeded: usize,
     /// Estimated lag, mean over the runs, s.
     pub lag_found_s: Option<f64>,
     /// Runs in which the 95 % interval of the lag contains the truth.
@@ -173,6 +179,8 @@ pub(super) fn summed(runs: &[RunFigures], best: (usize, f64), of_best: &[f64]) -
         friction: runs.iter().map(|run| run.friction).sum(),
         tellable: runs.iter().map(|run| run.tellable).sum(),
         told: runs.iter().map(|run| run.told).sum(),
+        without_need: runs.iter().map(|run| run.without_need).sum(),
+        unneeded: runs.iter().map(|run| run.unneeded).sum(),
         lag_found_s: (!lags.is_empty()).then(|| lags.iter().sum::<f64>() / lags.len() as f64),
         lag_held: runs.iter().filter(|run| run.lag_is_held).count(),
         instruments: runs.iter().filter(|run| run.instruments).count(),

@@ -23,7 +23,7 @@ const MAX_SAMPLES_FOR_MOTION: f64 = 75_000.0;
 /// Settings of `identify` for a study of this robot with files and columns only.
 pub fn default_settings(robot: &ParametricModel) -> IdentificationSettings {
     let mut settings = with_friction_stated();
-    settings.friction = usual_searches(robot.model());
+    settings.friction = usual_searches(robot.model()).into();
     settings.drive_inertia = robot.joint_names();
     settings
 }

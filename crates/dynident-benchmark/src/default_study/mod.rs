@@ -24,6 +24,7 @@ use dynident_dynamics::Column;
 use dynident_estimation::EstimationError;
 use dynident_identification::Identification;
 use dynident_identification::estimators::Estimator;
+use dynident_model::terms::TorqueTerm;
 use figures::{NamedRun, RunFigures, summed};
 use fits::CUTOFF_MULTIPLES;
 use rayon::prelude::*;
@@ -95,6 +96,12 @@ fn run_figures(
         tellable[*joint]
             && terms_of(*joint).is_some_and(|terms| terms.iter().any(|term| truth.is_distinguished_by(term)))
     };
+    // No truth has memory.
+    let needs_load = |joint: usize| case.friction.of(joint).terms(joint).iter().any(TorqueTerm::needs_load);
+    let is_unneeded = |joint: usize| {
+        let terms = terms_of(joint).unwrap_or_default();
+        !needs_load(joint) && terms.iter().any(|term| term.has_memory() || term.needs_load())
+    };
     let covered = |place: usize, truth: f64| {
         let estimate = default.estimate();
         let is_free = estimate.rank.fixed.iter().all(|fixed| fixed.column != place);
@@ -121,6 +128,8 @@ fn run_figures(
         friction: of_friction.into_iter().map(|(place, truth)| covered(place, truth)).sum(),
         tellable: tellable.iter().filter(|tellable| **tellable).count(),
         told: (0..tellable.len()).filter(is_law_selected).count(),
+        unneeded: (0..tellable.len()).filter(|&joint| is_unneeded(joint)).count(),
+        without_need: (0..tellable.len()).filter(|&joint| !needs_load(joint)).count(),
         lag_found_s: default.torque_lag.common.map(|common| common.lag_s),
         lag_is_held: default.torque_lag.common.is_some_and(|lag| (lag.lag_s - case.lag_s).abs() <= lag.half_width_95_s),
         instruments: default.estimator.name() == "instrumental",

@@ -14,11 +14,13 @@ const MAX_ERROR_OVER_TRUE_LAWS: f64 = 1.3;
 const MAX_ERROR_OVER_BOUND: f64 = 1.2;
 /// Goal for the coverage of the 95 % intervals, percent.
 const COVERAGE_PERCENT: [f64; 2] = [93.0, 97.0];
+/// Goal for the share of joints with friction under load or with memory although the truth has none, percent.
+const MAX_UNNEEDED_LAWS_PERCENT: f64 = 2.0;
 /// Goal for the share of distinguishable joints with a correct law, percent.
 const MIN_CORRECT_LAWS_PERCENT: f64 = 90.0;
 
 /// Columns of [`csv_line`], followed for each estimator by its error in percent and the runs in which it converged.
-const COLUMNS: &str = "robot,harmonics,length_s,rate_hz,friction,position_noise_rad,encoder_bits,torque_noise,torque_colour_s,outlier_share,lag_ms,runs,default_percent,default_free_percent,laws_stated_percent,best_percent,best_free_percent,best_cutoff_over_spectrum,default_cutoff_over_spectrum,default_over_best,plain_percent,plain_weighted_percent,error_over_bound,bodies_covered,bodies_intervals,friction_covered,friction_intervals,law_told,law_tellable,lag_found_ms,lag_held_runs,instruments_runs";
+const COLUMNS: &str = "robot,harmonics,length_s,rate_hz,friction,position_noise_rad,encoder_bits,torque_noise,torque_colour_s,outlier_share,lag_ms,runs,default_percent,default_free_percent,laws_stated_percent,best_percent,best_free_percent,best_cutoff_over_spectrum,default_cutoff_over_spectrum,default_over_best,plain_percent,plain_weighted_percent,error_over_bound,bodies_covered,bodies_intervals,friction_covered,friction_intervals,law_told,law_tellable,lag_found_ms,lag_held_runs,instruments_runs,laws_unneeded,joints_without_need";
 
 /// The first two lines of the table.
 pub const TABLE_HEADER: &str = "| robot | motion | friction | noise | lag, ms | default, % | laws stated, % | best, % | over best | plain, % | best by name, % | over bound | bodies cover, % | friction cover, % | law chosen | lag found, ms |
@@ -72,6 +74,8 @@ pub fn csv_line(case: &DefaultCase, figures: &CaseFigures) -> String {
         maybe(figures.lag_found_s.map(|lag_s| 1e3 * lag_s)),
         figures.lag_held.to_string(),
         figures.instruments.to_string(),
+        figures.unneeded.to_string(),
+        figures.without_need.to_string(),
     ];
     for figure in figure {
         line.push(',');
@@ -138,6 +142,8 @@ pub fn goals(done: &[CaseFigures]) -> Vec<String> {
     let friction: Covered = done.iter().map(|figures| figures.friction).sum();
     let (told, tellable) =
         done.iter().fold((0, 0), |(told, all), figures| (told + figures.told, all + figures.tellable));
+    let (unneeded, without_need) =
+        done.iter().fold((0, 0), |(some, all), figures| (some + figures.unneeded, all + figures.without_need));
     let wins = |figures: &&CaseFigures| {
         let plain = [figures.of_plain, figures.of_plain_weighted];
         plain.into_iter().flatten().all(|plain| figures.of_default < plain)
@@ -186,6 +192,12 @@ pub fn goals(done: &[CaseFigures]) -> Vec<String> {
             "law chosen where it can be told, at least {MIN_CORRECT_LAWS_PERCENT} %: {told} of {tellable}, {:.0} %, {}",
             share(told, tellable),
             verdict(share(told, tellable) >= MIN_CORRECT_LAWS_PERCENT)
+        ),
+        format!(
+            "law with memory or under load where the truth has none, at most {MAX_UNNEEDED_LAWS_PERCENT} %: {unneeded} of \
+             {without_need}, {:.1} %, {}",
+            share(unneeded, without_need),
+            verdict(share(unneeded, without_need) <= MAX_UNNEEDED_LAWS_PERCENT)
         ),
         format!(
             "better than plain least squares, ordinary and weighted: {} of {} cases, {}",

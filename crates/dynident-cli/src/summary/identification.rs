@@ -255,6 +255,11 @@ fn friction(r: &ResultFile) -> String {
         ]
     });
     let mut text = if chosen.is_empty() { String::new() } else { table(&header, 1..3, rows.collect()) };
+    for joint in &chosen {
+        if let Some(cost) = joint.restriction() {
+            text += &wrapped(&format!("friction of {}: {cost}", name(&joint.joint)), 2);
+        }
+    }
     // Combine joints with the same reason.
     for same in stated.chunk_by(|a, b| a.chosen == b.chosen) {
         let names: Vec<String> = same.iter().map(|joint| name(&joint.joint)).collect();

@@ -7,7 +7,7 @@ use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
 use crate::estimators::Estimator;
 use crate::friction::{
-    CandidateColumn, ConstantsError, FrictionSearch, JointFriction, JointScale, candidate_columns,
+    CandidateColumn, ConstantsError, FrictionSearch, JointFriction, JointScale, SearchLimits, candidate_columns,
     choose_friction as choose_terms, is_coulomb, smooth_width, step_columns,
 };
 use crate::payload::{Payload, free_gains};
@@ -68,7 +68,7 @@ pub(crate) fn stated_friction(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
 ) -> Result<ChosenFriction, IdentificationError> {
-    let (stated, before) = (RegressorModel::from(robot.clone()), &passes.settings.friction_before);
+    let (stated, before) = (RegressorModel::from(robot.clone()), passes.settings.friction.before());
     if before.is_empty() {
         return Ok(ChosenFriction::as_stated(stated));
     }
@@ -148,7 +148,7 @@ pub(crate) fn is_friction_open(settings: &IdentificationSettings, robot: &Parame
 
 fn searches_of<'a>(settings: &'a IdentificationSettings, robot: &ParametricModel) -> Vec<(usize, &'a FrictionSearch)> {
     let of = |search: &'a FrictionSearch| Some((robot.model().joint_index(&search.joint)?, search));
-    settings.friction.iter().filter_map(of).collect()
+    settings.friction.searches().iter().filter_map(of).collect()
 }
 
 #[derive(Clone)]
@@ -187,13 +187,16 @@ fn friction_of_grid(
     let gains = first.gains.as_ref().map_or_else(Vec::new, |(_, gains)| free_gains(gains));
 
     // All candidates are columns of one set of factors; each candidate model is a selection of them.
-    let most_inflation: Vec<f64> =
-        searches.iter().map(|(_, search)| search.most_inflation.unwrap_or(f64::INFINITY)).collect();
+    let limits_of = |(_, search): &(usize, &FrictionSearch)| SearchLimits {
+        max_inflation: search.most_inflation.unwrap_or(f64::INFINITY),
+        thresholds: &settings.thresholds.friction,
+    };
+    let limits: Vec<SearchLimits<'_>> = searches.iter().map(limits_of).collect();
     let chosen_among = |candidates: &[(usize, Vec<CandidateColumn>)]| -> Result<_, IdentificationError> {
         let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
         let wide = with_terms(&first.model, further).with_load_of_estimate(&first.model, &plain.values);
         let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, &first.model, &plain.values, &gains)?;
-        Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, &most_inflation, &plain, equal_weights)?)
+        Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, &limits, &plain, equal_weights)?)
     };
     // First the width of the step, then all terms. With payloads the load of the bare arm would be wrong.
     let scale = |joint: usize| JointScale::of(robot.model(), joint);

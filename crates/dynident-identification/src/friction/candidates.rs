@@ -2,7 +2,7 @@
 
 use dynident_model::Model;
 use dynident_model::terms::{
-    CandidateJoint, CandidateLaw, CandidateRole, Coulomb, CoulombShape, GridPoint, TorqueTerm,
+    CandidateJoint, CandidateLaw, CandidateRole, Coulomb, CoulombShape, GridPoint, TermClass, TorqueTerm,
 };
 
 pub(super) type FrictionKind = &'static CandidateLaw;
@@ -34,6 +34,8 @@ pub(crate) struct CandidateColumn {
     pub(crate) stated: Vec<TorqueTerm>,
     /// Step on the first axis of the grid, ascending; `None` for a single candidate.
     pub(crate) grid: Option<usize>,
+    /// Whether the search may select it; see [`FrictionSearch::laws`] and [`FrictionSearch::exportable`].
+    pub(crate) is_permitted: bool,
 }
 
 /// Search for a joint's friction from the training logs.
@@ -58,6 +60,11 @@ pub struct FrictionSearch {
     /// of the inflation. Unlimited by default. An iteration, which does not converge while a parameter is poorly
     /// determined, uses [`MOST_INFLATION`](Self::MOST_INFLATION).
     pub most_inflation: Option<f64>,
+    /// Names of the laws that may be selected ([`CandidateLaw::name`]). Viscous friction and the Coulomb step are always
+    /// permitted. All laws by default.
+    pub laws: Option<Vec<String>>,
+    /// Only laws that an exported file of this class holds without a loss. All laws by default.
+    pub exportable: Option<TermClass>,
 }
 
 impl FrictionSearch {
@@ -73,7 +80,15 @@ impl FrictionSearch {
             width: None,
             rows_near_rest: true,
             most_inflation: None,
+            laws: None,
+            exportable: None,
         }
+    }
+
+    fn permits(&self, kind: FrictionKind, term: &TorqueTerm) -> bool {
+        let is_start = kind.role == CandidateRole::Base || kind.is_common_step();
+        let is_named = self.laws.as_ref().is_none_or(|laws| laws.iter().any(|law| law == kind.name));
+        (is_start || is_named) && self.exportable.is_none_or(|class| class.holds_friction(term))
     }
 }
 
@@ -142,7 +157,13 @@ pub(crate) fn candidate_columns(
     }
     let own = CandidateJoint { joint, velocity, position, alone, widths, width: load_width };
     let columns_at = |kind: FrictionKind, GridPoint { terms: stated, step: grid }: GridPoint| {
-        let column = |term: &TorqueTerm| CandidateColumn { kind, term: term.clone(), stated: stated.clone(), grid };
+        let column = |term: &TorqueTerm| CandidateColumn {
+            kind,
+            term: term.clone(),
+            stated: stated.clone(),
+            grid,
+            is_permitted: search.permits(kind, term),
+        };
         stated.iter().map(column).collect::<Vec<_>>()
     };
     TorqueTerm::candidates()

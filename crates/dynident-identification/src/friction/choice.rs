@@ -6,7 +6,7 @@
 
 use super::candidates::{CandidateColumn, JointScale};
 use super::joint_friction::JointFriction;
-use super::search::search;
+use super::search::{SearchLimits, search};
 use dynident_dynamics::{Column, ParametricModel, ParametricModelError};
 use dynident_estimation::{CrossValidation, Estimate, EstimationError, LinearProblem};
 use dynident_model::terms::{TorqueTerm, sort_terms};
@@ -73,13 +73,13 @@ pub(super) fn further_columns(
 }
 
 /// Selects friction for joints whose `candidates` are columns of `wide_problem`. `plain` is the fit with the stated
-/// terms, in which joints have equal weights if `equal_weights`. `most_inflation` has one value per joint.
+/// terms, in which joints have equal weights if `equal_weights`. `limits` are those of each of `candidates`.
 pub(crate) fn choose_friction(
     model: &RegressorModel,
     wide: &RegressorModel,
     wide_problem: &LinearProblem,
     candidates: &[(usize, Vec<CandidateColumn>)],
-    most_inflation: &[f64],
+    limits: &[SearchLimits<'_>],
     plain: &Estimate,
     equal_weights: bool,
 ) -> Result<Vec<JointFriction>, EstimationError> {
@@ -96,42 +96,43 @@ pub(crate) fn choose_friction(
     let place = |term: &TorqueTerm| {
         wide.layout().columns().iter().position(|column| matches!(column, Column::Term(l) if l == term))
     };
-    let of_joint = |(joint, columns): (usize, &[CandidateColumn]), inflation: f64, before: &[Option<Vec<usize>>]| {
-        let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.term)).collect();
-        let speed = norms[variable[0]] / (rows[joint].max(1) as f64).sqrt();
-        let scale = JointScale::of(model.model(), joint);
-        if speed < MIN_SPEED * scale.velocity {
-            return Ok((refused(joint, "the joint does not move in the training logs"), Vec::new()));
-        }
-        // The stated model as far as it is excited, without this joint's friction, and with the selected friction of
-        // other joints.
-        let chosen_before = |other: usize| choose.iter().position(|&c| c == other).and_then(|c| before[c].as_ref());
-        let kept = |index: &usize| match &model.layout().columns()[*index] {
-            Column::Term(term) if term.is_joint_friction() => {
-                term.joints().iter().all(|&other| other != joint && chosen_before(other).is_none())
+    let of_joint =
+        |(joint, columns): (usize, &[CandidateColumn]), limits: &SearchLimits<'_>, before: &[Option<Vec<usize>>]| {
+            let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.term)).collect();
+            let speed = norms[variable[0]] / (rows[joint].max(1) as f64).sqrt();
+            let scale = JointScale::of(model.model(), joint);
+            if speed < MIN_SPEED * scale.velocity {
+                return Ok((refused(joint, "the joint does not move in the training logs"), Vec::new()));
             }
-            _ => true,
+            // The stated model as far as it is excited, without this joint's friction, and with the selected friction of
+            // other joints.
+            let chosen_before = |other: usize| choose.iter().position(|&c| c == other).and_then(|c| before[c].as_ref());
+            let kept = |index: &usize| match &model.layout().columns()[*index] {
+                Column::Term(term) if term.is_joint_friction() => {
+                    term.joints().iter().all(|&other| other != joint && chosen_before(other).is_none())
+                }
+                _ => true,
+            };
+            let fixed = |index: &usize| plain.rank.fixed.iter().any(|fixed| fixed.column == *index);
+            let stated = (0..model.layout().columns().len()).filter(|index| kept(index) && !fixed(index));
+            let others = choose.iter().filter(|&&other| other != joint).filter_map(|&other| chosen_before(other));
+            let further = further_columns(model, plain, wide, wide_problem);
+            let common: Vec<usize> = stated.chain(others.flatten().copied()).chain(further).collect();
+            match validation.joint(joint, &common, &variable, &weights) {
+                Ok(prepared) => Ok(search(name(joint), scale, folds, limits, &prepared, columns)),
+                Err(EstimationError::TooFewRows { .. }) => {
+                    Ok((refused(joint, "fewer rows than columns without one block"), Vec::new()))
+                }
+                Err(error) => Err(error),
+            }
         };
-        let fixed = |index: &usize| plain.rank.fixed.iter().any(|fixed| fixed.column == *index);
-        let stated = (0..model.layout().columns().len()).filter(|index| kept(index) && !fixed(index));
-        let others = choose.iter().filter(|&&other| other != joint).filter_map(|&other| chosen_before(other));
-        let further = further_columns(model, plain, wide, wide_problem);
-        let common: Vec<usize> = stated.chain(others.flatten().copied()).chain(further).collect();
-        match validation.joint(joint, &common, &variable, &weights) {
-            Ok(prepared) => Ok(search(name(joint), scale, folds, inflation, &prepared, columns)),
-            Err(EstimationError::TooFewRows { .. }) => {
-                Ok((refused(joint, "fewer rows than columns without one block"), Vec::new()))
-            }
-            Err(error) => Err(error),
-        }
-    };
     let mut chosen: Vec<JointFriction> = Vec::new();
     let mut before: Vec<Option<Vec<usize>>> = vec![None; choose.len()];
     for _ in 0..ROUNDS {
         let found: Vec<(JointFriction, Vec<usize>)> = candidates
             .par_iter()
-            .zip(most_inflation)
-            .map(|((joint, columns), inflation)| of_joint((*joint, columns), *inflation, &before))
+            .zip(limits)
+            .map(|((joint, columns), limits)| of_joint((*joint, columns), limits, &before))
             .collect::<Result<_, EstimationError>>()?;
         (chosen, before) = found
             .into_iter()

@@ -21,13 +21,36 @@ pub struct JointFriction {
     pub folds: usize,
     /// Compared candidates, each with its best constants.
     pub candidates: Vec<FrictionCandidate>,
+    /// The selection among all laws, if the study restricts them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unrestricted: Option<UnrestrictedFriction>,
+}
+
+/// What a restriction of the laws costs: the selection without it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct UnrestrictedFriction {
+    /// Friction that would be selected among all laws.
+    pub chosen: String,
+    /// Root mean square of the joint's residual on left-out blocks with it, Nm (N).
+    pub cv_error_nm: f64,
+    /// The same with the friction that was selected among the permitted laws, Nm (N).
+    pub restricted_cv_error_nm: f64,
 }
 
 impl JointFriction {
     /// Keeps the stated friction for this reason.
     pub fn as_stated(joint: impl Into<String>, reason: &str) -> Self {
         let chosen = format!("as the study states: {reason}");
-        Self { joint: joint.into(), chosen, terms: None, constants: Vec::new(), folds: 0, candidates: Vec::new() }
+        Self {
+            joint: joint.into(),
+            chosen,
+            terms: None,
+            constants: Vec::new(),
+            folds: 0,
+            candidates: Vec::new(),
+            unrestricted: None,
+        }
     }
 
     pub(crate) fn choose(&mut self, terms: &[TorqueTerm]) {

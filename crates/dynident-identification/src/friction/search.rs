@@ -9,12 +9,17 @@
 //! Statistical Learning*, 7.10). The standard error is that of the difference by block, because blocks differ far more
 //! than candidates.
 //!
+//! A law with memory or under load costs more than its parameters: not every controller and simulator can hold it. It is
+//! selected if its gain over the best selection without such laws is clear
+//! ([`FrictionThresholds`](crate::FrictionThresholds)).
+//!
 //! A constant of a term (a width, a velocity) may lie between two neighbours of its grid, whose columns together
 //! approximate the column between them. So a coarse grid does not cause additional terms.
 
 use super::candidates::{CandidateColumn, FrictionKind, JointScale, options, takes_one};
 use super::constants::{mean_term, with_one_step};
-use super::joint_friction::{FrictionCandidate, JointFriction};
+use super::joint_friction::{FrictionCandidate, JointFriction, UnrestrictedFriction};
+use crate::thresholds::FrictionThresholds;
 use dynident_estimation::{FoldErrors, JointFolds};
 use dynident_model::terms::{CandidateRole, TorqueTerm};
 
@@ -172,6 +177,7 @@ fn add_terms(
     columns: &[CandidateColumn],
     start: Vec<FrictionKind>,
     max_inflation: f64,
+    is_permitted: &dyn Fn(FrictionKind) -> bool,
     tried: &mut Vec<ScoredCandidate>,
 ) {
     let mut additions: Vec<FrictionKind> = columns
@@ -180,6 +186,7 @@ fn add_terms(
         .filter(|kind| matches!(kind.role, CandidateRole::InPlaceOf(_) | CandidateRole::Addition))
         .collect();
     additions.dedup();
+    additions.retain(|&kind| is_permitted(kind));
     let mut at = tried.len();
     tried.push(tuned(folds, columns, start, None));
     let is_distinct =
@@ -212,50 +219,121 @@ fn add_terms(
     }
 }
 
+/// Candidates that a search compared, and its selection among them.
+struct Selection {
+    tried: Vec<ScoredCandidate>,
+    chosen: usize,
+    least: usize,
+    excess: Vec<[f64; 2]>,
+}
+
+impl Selection {
+    /// Compares models of the permitted kinds.
+    fn new(
+        folds: &JointFolds,
+        columns: &[CandidateColumn],
+        max_inflation: f64,
+        is_permitted: &dyn Fn(FrictionKind) -> bool,
+    ) -> Self {
+        let mut tried = Vec::new();
+        let of_role = |role: CandidateRole| TorqueTerm::candidates().filter(move |kind| kind.role == role);
+        for start in of_role(CandidateRole::Start).filter(|&kind| is_permitted(kind)) {
+            let kinds = of_role(CandidateRole::Base).chain([start]).collect();
+            add_terms(folds, columns, kinds, max_inflation, is_permitted, &mut tried);
+        }
+        let by_error = |a: usize, b: usize| if tried[b].errors.rms() < tried[a].errors.rms() { b } else { a };
+        let least = (0..tried.len()).reduce(by_error).unwrap_or(0);
+        let excess: Vec<[f64; 2]> = tried.iter().map(|one| one.errors.excess_over(&tried[least].errors)).collect();
+        let within = |index: &usize| *index == least || excess[*index][0] <= excess[*index][1];
+        // Among equally simple candidates, prefer the smaller error.
+        let order = |a: &usize, b: &usize| {
+            let complexity = |index: usize| tried[index].complexity(columns);
+            complexity(*a).cmp(&complexity(*b)).then(tried[*a].errors.rms().total_cmp(&tried[*b].errors.rms()))
+        };
+        let chosen = (0..tried.len()).filter(within).min_by(order).unwrap_or(least);
+        Self { tried, chosen, least, excess }
+    }
+
+    /// The same with laws under load or with memory only if their gain is clear.
+    fn with_clear_gain(
+        folds: &JointFolds,
+        columns: &[CandidateColumn],
+        max_inflation: f64,
+        thresholds: &FrictionThresholds,
+        is_permitted: &dyn Fn(FrictionKind) -> bool,
+    ) -> Self {
+        let all = Self::new(folds, columns, max_inflation, is_permitted);
+        let is_simple =
+            |kind: FrictionKind| of_kind(columns, kind).all(|one| !one.term.has_memory() && !one.term.needs_load());
+        let best = all.best();
+        if best.kinds.iter().all(|&kind| is_simple(kind) || best.present(columns, kind).is_empty()) {
+            return all;
+        }
+        let simple = Self::new(folds, columns, max_inflation, &|kind| is_permitted(kind) && is_simple(kind));
+        let is_clear = best.errors.rms() < (1.0 - thresholds.min_gain_ratio) * simple.best().errors.rms();
+        if is_clear { all } else { simple }
+    }
+
+    fn best(&self) -> &ScoredCandidate {
+        &self.tried[self.chosen]
+    }
+
+    fn candidates(&self, columns: &[CandidateColumn]) -> Vec<FrictionCandidate> {
+        let candidate = |(index, one): (usize, &ScoredCandidate)| FrictionCandidate {
+            term: one.name(),
+            parameters: one.parameters(columns),
+            complexity: one.complexity(columns),
+            cv_error_nm: one.errors.rms(),
+            excess_standard_errors: if index == self.least || self.excess[index][1] <= 0.0 {
+                0.0
+            } else {
+                self.excess[index][0] / self.excess[index][1]
+            },
+            chosen: index == self.chosen,
+        };
+        self.tried.iter().enumerate().map(candidate).collect()
+    }
+}
+
+fn of_kind(columns: &[CandidateColumn], kind: FrictionKind) -> impl Iterator<Item = &CandidateColumn> {
+    columns.iter().filter(move |column| column.kind == kind)
+}
+
+/// Limits of one joint's search.
+pub(crate) struct SearchLimits<'a> {
+    /// Maximum variance inflation of separate Coulomb friction per direction.
+    pub(crate) max_inflation: f64,
+    pub(crate) thresholds: &'a FrictionThresholds,
+}
+
 pub(super) fn search(
     joint: String,
     scale: JointScale,
     count: usize,
-    max_inflation: f64,
+    limits: &SearchLimits<'_>,
     folds: &JointFolds,
     columns: &[CandidateColumn],
 ) -> (JointFriction, Vec<usize>) {
-    let mut tried = Vec::new();
-    let of_role = |role: CandidateRole| TorqueTerm::candidates().filter(move |kind| kind.role == role);
-    for start in of_role(CandidateRole::Start) {
-        let kinds = of_role(CandidateRole::Base).chain([start]).collect();
-        add_terms(folds, columns, kinds, max_inflation, &mut tried);
-    }
-    let least =
-        (0..tried.len()).reduce(|a, b| if tried[b].errors.rms() < tried[a].errors.rms() { b } else { a }).unwrap_or(0);
-    let excess: Vec<[f64; 2]> = tried.iter().map(|one| one.errors.excess_over(&tried[least].errors)).collect();
-    let within = |index: &usize| *index == least || excess[*index][0] <= excess[*index][1];
-    // Among equally simple candidates, prefer the smaller error.
-    let order = |a: &usize, b: &usize| {
-        let complexity = |index: usize| tried[index].complexity(columns);
-        complexity(*a).cmp(&complexity(*b)).then(tried[*a].errors.rms().total_cmp(&tried[*b].errors.rms()))
+    let among = |is_permitted: &dyn Fn(FrictionKind) -> bool| {
+        Selection::with_clear_gain(folds, columns, limits.max_inflation, limits.thresholds, is_permitted)
     };
-    let chosen = (0..tried.len()).filter(within).min_by(order).unwrap_or(least);
-    let candidate = |(index, one): (usize, &ScoredCandidate)| FrictionCandidate {
-        term: one.name(),
-        parameters: one.parameters(columns),
-        complexity: one.complexity(columns),
-        cv_error_nm: one.errors.rms(),
-        excess_standard_errors: if index == least || excess[index][1] <= 0.0 {
-            0.0
-        } else {
-            excess[index][0] / excess[index][1]
-        },
-        chosen: index == chosen,
-    };
-    let best = &tried[chosen];
+    let is_permitted = |kind: FrictionKind| of_kind(columns, kind).all(|one| one.is_permitted);
+    let selection = among(&is_permitted);
+    let best = selection.best();
+    let is_restricted = columns.iter().any(|one| !one.is_permitted);
+    let unrestricted = is_restricted.then(|| among(&|_| true)).map(|free| UnrestrictedFriction {
+        chosen: free.best().present_name(columns),
+        cv_error_nm: free.best().errors.rms(),
+        restricted_cv_error_nm: best.errors.rms(),
+    });
     let friction = JointFriction {
         joint,
         chosen: best.present_name(columns),
         terms: Some(with_one_step(best.terms(columns, scale))),
         constants: Vec::new(),
         folds: count,
-        candidates: tried.iter().enumerate().map(candidate).collect(),
+        candidates: selection.candidates(columns),
+        unrestricted,
     };
     let present = best.kinds.iter().flat_map(|&kind| best.present(columns, kind)).map(|(place, _)| place).collect();
     (friction, present)

@@ -135,12 +135,12 @@ fn fitted(
     identification.offsets = offsets;
     let fit = RunsFit { task, runs, settings, recordings: &recordings };
     let found = fit.rounds(&identification, LagRounds::of(identification.lags))?;
-    let is_free = settings.scheme == Scheme::AllJoints && !identification.friction.is_empty();
+    let is_free = settings.scheme == Scheme::AllJoints && identification.friction.is_selected();
     if !is_free || found.estimate.lag.kind == LagKind::Common {
         return Ok(found.estimate);
     }
     let mut stated = identification.clone();
-    stated.friction.clear();
+    stated.friction = stated.friction.without_selection();
     let of_stated = fit.rounds(&stated, LagRounds::of(identification.lags))?.estimate.lag;
     let common_s = if of_stated.kind == LagKind::Common { of_stated.lag_s.first().copied() } else { None };
     let Some(lag_s) = common_s.or_else(|| of_stated.common.map(|common| common.lag_s)) else {

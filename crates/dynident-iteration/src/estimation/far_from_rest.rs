@@ -88,18 +88,19 @@ impl OneRun<'_> {
     /// The estimate with these margins. Friction that needs rows near rest is not selected without them.
     fn identified(&self, rest_margins: &[StictionBand]) -> Result<RunEstimate, IterationError> {
         let mut settings = self.settings.clone();
-        for search in &mut settings.friction {
+        settings.friction = settings.friction.with_searches(|mut search| {
             let joint = self.task.robot.model().joint_index(&search.joint);
             let margin = joint.and_then(|joint| rest_margins.get(joint)).copied().unwrap_or_default();
             search.rows_near_rest &= margin == StictionBand::REST;
-        }
+            search
+        });
         identify_runs(self.task, &[self.log(rest_margins)], &settings)
     }
 
     /// The widest margin that leaves each joint enough samples (for a joint without dry friction: samples at rest
     /// only), and the share of the samples that it excludes.
     fn widest_margins(&self) -> Result<(Vec<StictionBand>, Vec<f64>), IterationError> {
-        let dry = has_dry_friction(&self.task.robot, &self.settings.friction);
+        let dry = has_dry_friction(&self.task.robot, self.settings.friction.searches());
         let count = |margin: StictionBand| -> Result<Vec<f64>, IterationError> {
             let margins = vec![margin; dry.len()];
             Ok(counted(&recordings(self.task, &[self.log(&margins)], self.settings)?, dry.len()))

@@ -56,7 +56,7 @@ pub(crate) fn other_length(
     let motions = recordings(task, runs, settings)?;
     // A fit that fails is skipped.
     let mut identification = identification_settings(task, settings, runs.len());
-    identification.friction.clear();
+    identification.friction = identification.friction.without_selection();
     identification.motion.torque_lag_s = known.lag.taken_off();
     let fitted = |joint: Option<usize>, change: f64| residuals_with(task, &motions, &identification, joint, change);
     let Some(described) = fitted(None, 0.0) else { return Ok(None) };

@@ -36,7 +36,7 @@ pub(crate) fn recordings(
     runs: &[RunLog<'_>],
     settings: &RunIdentificationSettings,
 ) -> Result<Vec<Recording>, IterationError> {
-    let dry = has_dry_friction(&task.robot, &settings.friction);
+    let dry = has_dry_friction(&task.robot, settings.friction.searches());
     let mut recordings = Vec::new();
     for log in runs {
         let legs = log.legs.len();
@@ -70,12 +70,10 @@ pub(crate) fn identification_settings(
     identification.estimation.held.clone_from(&task.known);
     identification.consistency.clone_from(&settings.consistency);
     // Poorly determined friction would prevent convergence.
-    let search = |own: &FrictionSearch| FrictionSearch {
+    identification.friction = settings.friction.clone().with_searches(|own| FrictionSearch {
         most_inflation: own.most_inflation.or(Some(FrictionSearch::MOST_INFLATION)),
-        ..own.clone()
-    };
-    identification.friction = settings.friction.iter().map(search).collect();
-    identification.friction_before.clone_from(&settings.friction_before);
+        ..own
+    });
     // With the same controller, friction causes another apparent lag at each joint and in each run.
     identification.lags = LagCandidates::Common;
     identification.log_noise = if runs > 1 { LogNoise::Own } else { LogNoise::Shared };

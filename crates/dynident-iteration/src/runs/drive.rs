@@ -207,7 +207,7 @@ impl Iteration {
         // The first good run is not checked against its tracking floor or for other lengths.
         let is_judged = known.is_some() && record.controller.model.is_some();
         if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
-            add_tracking_floors(evidence, &task, records, &self.settings, after, &in_force.friction_before, errors);
+            add_tracking_floors(evidence, &task, records, &self.settings, after, in_force.friction.before(), errors);
             let thresholds = &self.settings.settled.verdict.lengths;
             evidence.other_length = other_length(&task, &runs, &settings, after, thresholds)?;
         }

@@ -13,7 +13,7 @@ use crate::setup::parameter_shares::parameter_shares;
 use crate::setup::settings::{IterationSettings, RunIdentificationSettings};
 use crate::setup::status::IterationStatus;
 use dynident_dynamics::ParametricModel;
-use dynident_identification::friction::chosen_model;
+use dynident_identification::friction::{FrictionSource, chosen_model};
 use dynident_simulation::SimulationError;
 use dynident_simulation::controllers::ControllerModel;
 use std::borrow::Cow;
@@ -174,8 +174,7 @@ impl Iteration {
             Cow::Owned(robot) => (
                 Cow::Owned(IterationTask { robot, ..self.task.clone() }),
                 Cow::Owned(RunIdentificationSettings {
-                    friction: Vec::new(),
-                    friction_before: friction_chosen(before),
+                    friction: FrictionSource::SelectedBefore(friction_chosen(before)),
                     ..settings.clone()
                 }),
             ),

@@ -4,7 +4,7 @@ use crate::setup::verdict_settings::VerdictSettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;
-use dynident_identification::friction::{FrictionSearch, JointFriction};
+use dynident_identification::friction::FrictionSource;
 use dynident_identification::payload::Payload;
 use dynident_model::Model;
 use dynident_recording::{DecimationSettings, DifferentiatorSettings};
@@ -59,11 +59,9 @@ pub struct RunIdentificationSettings {
     /// Estimator, excitation thresholds and sources of error bars. Default weighted least squares. The joint-by-joint
     /// scheme supports ordinary and weighted least squares.
     pub estimation: EstimationSettings,
-    /// Joints whose friction is selected by the first run that allows it; later runs use the same terms. Default empty.
-    pub friction: Vec<FrictionSearch>,
-    /// Friction that an earlier run selected. The error bars include the uncertainty of its constants. Set by the
-    /// iteration.
-    pub friction_before: Vec<JointFriction>,
+    /// Source of the joints' friction; the terms of the robot by default. The first run that allows a selection makes
+    /// it, and later runs use the same terms.
+    pub friction: FrictionSource,
     /// Prior knowledge of the bodies for the physically consistent model of the controllers; `None` gives the
     /// controllers the unconstrained estimate.
     pub consistency: Option<ConsistencySettings>,
@@ -87,8 +85,7 @@ impl Default for RunIdentificationSettings {
             held_torque: true,
             set_aside_near_rest: true,
             estimation: EstimationSettings::default(),
-            friction: Vec::new(),
-            friction_before: Vec::new(),
+            friction: FrictionSource::default(),
             consistency: Some(ConsistencySettings::default()),
             payloads: Vec::new(),
             run_offsets: RunOffsets::default(),

@@ -73,7 +73,7 @@ pub(crate) fn row_scales(
     }
     let motions = recordings(task, runs, settings)?;
     let mut identification = identification_settings(task, settings, runs.len());
-    identification.friction.clear();
+    identification.friction = identification.friction.without_selection();
     identification.motion.torque_lag_s = known.lag.taken_off();
     let all: Vec<usize> = (0..motions.len()).collect();
     let found = || {

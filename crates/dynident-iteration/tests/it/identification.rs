@@ -133,7 +133,8 @@ fn friction_is_chosen_once_and_kept_by_the_runs_after() {
         .iter()
         .zip(task.robot.joint_names())
         .map(|(_, name)| FrictionSearch { coulomb: Some(stated), ..FrictionSearch::of(name) })
-        .collect();
+        .collect::<Vec<_>>()
+        .into();
     let settings = IterationSettings {
         identification,
         model_free: pd(),

@@ -89,7 +89,7 @@ fn settings() -> IterationSettings {
     .unwrap();
     settings.identification.parallel_filter =
         Some(DecimationSettings { factor: 12, cutoff_hz: Some(6.0), ..DecimationSettings::default() });
-    settings.identification.friction = ["j1", "j2", "j3", "j4"].map(FrictionSearch::of).to_vec();
+    settings.identification.friction = ["j1", "j2", "j3", "j4"].map(FrictionSearch::of).to_vec().into();
     settings.settled.tracking_tolerance = 1e-2;
     settings
 }

@@ -56,6 +56,17 @@ impl TermClass {
         }
     }
 
+    /// Whether a form of this class holds a friction term of one joint without a loss. A smooth step of any width is
+    /// treated as the step of URDF and MJCF.
+    pub fn holds_friction(self, term: &TorqueTerm) -> bool {
+        match self {
+            Self::DampingAndFriction | Self::DampingFrictionAndInertia => {
+                matches!(term, TorqueTerm::Viscous(_) | TorqueTerm::Coulomb(_))
+            }
+            Self::FunctionsOfMotion => Self::is_function_of_motion(&term),
+        }
+    }
+
     /// Whether a term depends only on the current motion: not on earlier motion, the load of the gear or a temperature.
     fn is_function_of_motion(term: &TorqueTerm) -> bool {
         !term.has_memory() && !term.needs_load() && !term.needs_temperature()

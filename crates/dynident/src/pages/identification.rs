@@ -354,7 +354,9 @@ fn friction(page: &mut Report, r: &ResultFile) {
     if !r.friction_choice.is_empty() {
         let row = |joint: &JointFrictionResult| {
             let constants: Vec<String> = joint.constants.iter().map(constant).collect();
-            vec![Cell::from(&joint.joint), Cell::from(&joint.chosen), Cell::from(constants.join(", "))]
+            let chosen =
+                joint.restriction().map_or_else(|| joint.chosen.clone(), |cost| format!("{} ({cost})", joint.chosen));
+            vec![Cell::from(&joint.joint), Cell::from(chosen), Cell::from(constants.join(", "))]
         };
         let header = ["joint", "friction", "constants with 95 % intervals (rad/s or m/s, and their powers)"];
         page.add(Table::new("Selected friction", header).rows(r.friction_choice.iter().map(row)));

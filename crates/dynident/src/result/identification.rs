@@ -15,7 +15,7 @@ use dynident_identification::estimators::{
 use dynident_identification::examination::{
     LagChoice, LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck,
 };
-use dynident_identification::friction::{FrictionCandidate, FrictionConstant};
+use dynident_identification::friction::{FrictionCandidate, FrictionConstant, UnrestrictedFriction};
 use dynident_identification::payload::{DriveGain, PayloadResult};
 use dynident_identification::rows::VelocityHistogram;
 use dynident_identification::{Condition, CutoffByError, DriveInertiaChoice, LogVariation, Role};
@@ -570,4 +570,18 @@ pub struct JointFrictionResult {
     pub folds: usize,
     /// The compared candidates, each with its best constants.
     pub candidates: Vec<FrictionCandidate>,
+    /// The selection among all laws, if `drive.candidates` or `drive.exportable` restricts them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unrestricted: Option<UnrestrictedFriction>,
+}
+
+impl JointFrictionResult {
+    /// What the restriction of the laws costs, as a phrase; `None` without a restriction or if it costs nothing.
+    pub fn restriction(&self) -> Option<String> {
+        let free = self.unrestricted.as_ref().filter(|free| free.chosen != self.chosen)?;
+        Some(format!(
+            "cross-validation error {:.3} instead of {:.3} with `{}`, which the study excludes",
+            free.restricted_cv_error_nm, free.cv_error_nm, free.chosen
+        ))
+    }
 }

@@ -1,10 +1,10 @@
 //! `[drive]` and `[[coupling]]`: friction, offsets and drive inertia.
 
 use super::arrays::two;
-use super::friction::{FrictionChoice, FrictionTerm};
+use super::friction::{ExportableForm, FrictionChoice, FrictionTerm};
 use crate::error::{Expected, StudyError};
 use dynident_identification::{GainChoice, OffsetChoice};
-use dynident_model::terms::Coupling;
+use dynident_model::terms::{Coupling, TorqueTerm};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -58,6 +58,12 @@ pub struct DriveSection {
     /// separate value per direction. By default 10 in `iterate`, so that every parameter is well determined, and no
     /// limit in the other commands.
     pub most_inflation: Option<f64>,
+    /// Laws that the selection may use in addition to viscous friction and the Coulomb step: `asymmetric viscous`,
+    /// `asymmetric coulomb`, `sigmoid`, `stribeck`, `cube-root`, `quadratic`, `load`, `maxwell-slip`. All by default.
+    pub candidates: Option<Vec<String>>,
+    /// Selects only friction that this exported form holds without a loss. No restriction by default: each exported form
+    /// is then fitted to what it can hold.
+    pub exportable: Option<ExportableForm>,
     /// Exceptions, by joint name.
     pub joints: BTreeMap<String, JointDrive>,
 }
@@ -77,6 +83,8 @@ impl Default for DriveSection {
             terms: Vec::new(),
             friction: None,
             most_inflation: None,
+            candidates: None,
+            exportable: None,
             joints: BTreeMap::new(),
         }
     }
@@ -163,6 +171,7 @@ impl DriveSection {
         if let Some(most) = self.most_inflation {
             Expected::Positive.check("drive.most_inflation", most)?;
         }
+        self.validate_candidates()?;
         if let Some(percent) = self.gain_std_percent {
             Expected::Range(0.0, 100.0).check("drive.gain_std_percent", percent)?;
         }
@@ -182,6 +191,28 @@ impl DriveSection {
             }
             if let Some(band) = drive.coulomb_dead_band {
                 Expected::NotNegative.check(format!("drive.joints.{joint}.coulomb_dead_band"), band)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_candidates(&self) -> Result<(), StudyError> {
+        let keys = [("drive.candidates", self.candidates.is_some()), ("drive.exportable", self.exportable.is_some())];
+        if let Some((key, _)) = keys.iter().find(|(_, is_stated)| *is_stated)
+            && self.friction == Some(FrictionChoice::Stated)
+        {
+            let fix = "it restricts the selection of friction; use friction = \"auto\" or remove one of both keys";
+            return Err(StudyError::conflict(*key, fix));
+        }
+        let known = || TorqueTerm::candidates().map(|law| law.name);
+        for name in self.candidates.iter().flatten() {
+            if !known().any(|law| law == name) {
+                return Err(StudyError::Unknown {
+                    key: "drive.candidates",
+                    what: "law",
+                    name: name.clone(),
+                    known: known().map(str::to_owned).collect(),
+                });
             }
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! Friction in the study file.
 
 use crate::error::{Expected, StudyError};
-use dynident_model::terms::StatedFault;
+use dynident_model::terms::{StatedFault, TermClass};
 use serde::{Deserialize, Serialize};
 
 pub use dynident_model::terms::FrictionTerm;
@@ -17,6 +17,29 @@ pub enum FrictionChoice {
     /// Cross-validation within the training logs. `offset` and `drive_inertia` stay in force; the stated friction is
     /// one of the candidates.
     Auto,
+}
+
+/// Exported form that must hold the selected friction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum ExportableForm {
+    /// URDF or SDF: viscous and Coulomb friction.
+    Urdf,
+    /// MJCF: the same friction.
+    Mjcf,
+    /// Generated functions of the current motion: all laws without memory.
+    Code,
+}
+
+impl From<ExportableForm> for TermClass {
+    fn from(form: ExportableForm) -> Self {
+        match form {
+            ExportableForm::Urdf => Self::DampingAndFriction,
+            ExportableForm::Mjcf => Self::DampingFrictionAndInertia,
+            ExportableForm::Code => Self::FunctionsOfMotion,
+        }
+    }
 }
 
 impl From<StatedFault> for StudyError {

@@ -117,7 +117,7 @@ impl Study {
         settings.estimation.estimator = self.estimator.estimator(|| self.simulated_loop(path, robot).map(Box::new))?;
         settings.consistency = self.estimator.physical.settings();
         settings.intervals = self.estimator.intervals;
-        settings.friction = self.friction_searches(robot);
+        settings.friction = self.friction_searches(robot).into();
         if self.why_drives_are_untested().is_none() {
             settings.drive_inertia = self.unstated_drives(robot);
         }
@@ -192,6 +192,8 @@ impl Study {
             dead_band: self.drive.coulomb_dead_band,
             width: self.drive.coulomb_width,
             most_inflation: self.drive.most_inflation,
+            laws: self.drive.candidates.clone(),
+            exportable: self.drive.exportable.map(Into::into),
             ..FrictionSearch::of(&description.name)
         };
         model.joints().iter().enumerate().filter(|(_, joint)| is_chosen(&joint.name)).map(search).collect()

@@ -2,7 +2,7 @@
 use crate::common::{Job, Random};
 use dynident::Folders;
 use dynident::dynamics::{Workspace, inverse_dynamics};
-use dynident::identification::friction::chosen_model;
+use dynident::identification::friction::{FrictionSource, chosen_model};
 use dynident::identification::{Execution, Identification, identify};
 use dynident::model::load_robot;
 use dynident::result::JointFrictionResult;
@@ -265,10 +265,10 @@ fn bars_with_constants_chosen_before(load: f64) {
     assert_eq!(chosen.training.model.needs_load(), load > 0.0, "{joints:?}");
 
     task.robot = chosen_model(&task.robot, joints).unwrap();
-    task.settings.friction.clear();
+    task.settings.friction = FrictionSource::Stated;
     task.settings.motion = chosen.motion.clone();
     let without = identify(&task, Execution::default()).unwrap();
-    task.settings.friction_before.clone_from(joints);
+    task.settings.friction = FrictionSource::SelectedBefore(joints.clone());
     let with = identify(&task, Execution::default()).unwrap();
     let bar = |found: &Identification, symbol: &str| {
         let column = found.training.problem.columns().iter().position(|own| own == symbol).unwrap();

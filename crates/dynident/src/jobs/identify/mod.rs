@@ -18,6 +18,7 @@ use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::diagnosis::Diagnosis;
 use dynident_identification::estimators::{Findings, InstrumentSource};
 use dynident_identification::examination::{LogTrace, friction_sign_findings, sign_findings};
+use dynident_identification::friction::FrictionSearch;
 use dynident_identification::{
     DiagnosisChoice, Identification, IdentificationError, IdentificationTask, conditionals, identify as identify_task,
     identify_payload, identify_with_instruments as identify_task_with_instruments,
@@ -125,7 +126,8 @@ fn identify_from_files(
     settings.diagnosis = DiagnosisChoice::Always;
     if source.is_some() {
         // Instruments need the terms that the study states.
-        settings.friction.retain(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
+        let is_auto = |search: &FrictionSearch| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto);
+        settings.friction = settings.friction.retaining(is_auto);
         settings.drive_inertia.clear();
     }
     settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;

@@ -346,6 +346,7 @@ pub(super) fn friction_results(choice: &[JointFriction]) -> Vec<JointFrictionRes
         constants: joint.constants.clone(),
         folds: joint.folds,
         candidates: joint.candidates.clone(),
+        unrestricted: joint.unrestricted.clone(),
     };
     choice.iter().map(of_joint).collect()
 }

@@ -228,20 +228,21 @@ impl IterationSection {
             DifferentiatorKey::Stated(stated) => (stated.clone(), false),
         };
         differentiator.validate().map_err(StudyError::at("iteration.differentiator"))?;
-        let IdentificationSettings { mut estimation, consistency, mut friction, offsets, .. } = identification;
+        let IdentificationSettings { mut estimation, consistency, friction, offsets, .. } = identification;
         let run_offsets = match offsets {
             OffsetChoice::Shared => RunOffsets::WhereSeen,
             OffsetChoice::PerLog => RunOffsets::PerRun,
         };
         // The controller uses the friction that the study states, unless `friction = "auto"` is set.
-        friction.retain(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
+        let friction =
+            friction.retaining(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
         if self.scheme == Scheme::StepByStep && !estimation.estimator.is_plain() {
             let key = format!("estimator.method = \"{}\"", estimation.estimator.name());
             return Err(StudyError::conflict(key, "scheme = \"step-by-step\" takes \"ordinary\" or \"weighted\""));
         }
         let in_turn =
             self.scheme == Scheme::StepByStep || self.order == LegOrder::OneAfterAnother && self.leg.len() > 1;
-        if in_turn && !friction.is_empty() {
+        if in_turn && friction.is_selected() {
             let fix = "the selection needs runs that excite all joints; state the friction, or remove scheme and order from [iteration]";
             return Err(StudyError::conflict("drive.friction = \"auto\"", fix));
         }
@@ -261,7 +262,6 @@ impl IterationSection {
                 set_aside_near_rest: !self.literal,
                 estimation,
                 friction,
-                friction_before: Vec::new(),
                 consistency: consistency.filter(|_| !self.literal),
                 payloads: study.payloads(),
                 run_offsets,

@@ -1,0 +1,68 @@
+//! Source of the joints' friction.
+
+use super::candidates::FrictionSearch;
+use super::joint_friction::JointFriction;
+
+/// Source of the joints' friction.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum FrictionSource {
+    /// The terms of the robot.
+    #[default]
+    Stated,
+    /// The terms of the robot, which other recordings selected. The error bars include the uncertainty of their
+    /// constants, as found by these recordings.
+    SelectedBefore(Vec<JointFriction>),
+    /// Selected from the training logs for these joints; other joints keep the terms of the robot.
+    Selected(Vec<FrictionSearch>),
+}
+
+impl FrictionSource {
+    /// The searches; empty without a selection.
+    pub fn searches(&self) -> &[FrictionSearch] {
+        if let Self::Selected(searches) = self { searches } else { &[] }
+    }
+
+    /// The friction that other recordings selected; empty without it.
+    pub fn before(&self) -> &[JointFriction] {
+        if let Self::SelectedBefore(before) = self { before } else { &[] }
+    }
+
+    /// Whether the friction of a joint is selected from the training logs.
+    pub fn is_selected(&self) -> bool {
+        matches!(self, Self::Selected(_))
+    }
+
+    /// The same source, except that the terms of the robot replace a selection.
+    #[must_use]
+    pub fn without_selection(self) -> Self {
+        if self.is_selected() { Self::Stated } else { self }
+    }
+
+    /// The same source with a change of every search.
+    #[must_use]
+    pub fn with_searches(self, change: impl FnMut(FrictionSearch) -> FrictionSearch) -> Self {
+        match self {
+            Self::Selected(searches) => Self::Selected(searches.into_iter().map(change).collect()),
+            other => other,
+        }
+    }
+
+    /// The same source with the searches that `keep` accepts.
+    #[must_use]
+    pub fn retaining(self, keep: impl FnMut(&FrictionSearch) -> bool) -> Self {
+        match self {
+            Self::Selected(mut searches) => {
+                searches.retain(keep);
+                searches.into()
+            }
+            other => other,
+        }
+    }
+}
+
+/// A selection for these joints; without joints the terms of the robot.
+impl From<Vec<FrictionSearch>> for FrictionSource {
+    fn from(searches: Vec<FrictionSearch>) -> Self {
+        if searches.is_empty() { Self::Stated } else { Self::Selected(searches) }
+    }
+}
