@@ -24,9 +24,9 @@ if command -v taskset > /dev/null; then pin="taskset -c ${CORE:-$(($(nproc) - 1)
 
 [ -n "$own_only" ] || sh "$here/build_rivals.sh" "$venv" "$out"
 cd "$here/.."
-own=${DYNIDENT_BENCHMARK:-cargo run --release -q -p dynident-benchmark --features counted --bin dynident-benchmark --}
+own=${DYNIDENT_BENCHMARK:-cargo run --release -q -p dynident-benchmark --bin dynident-benchmark --}
 [ -n "$rivals_only" ] || [ -n "${DYNIDENT_BENCHMARK:-}" ] ||
-  cargo build --release -q -p dynident-benchmark --features counted --bin dynident-benchmark
+  cargo build --release -q -p dynident-benchmark --bin dynident-benchmark
 [ -n "$rivals_only$own_only" ] || [ -n "${DYNIDENT:-}" ] || cargo build --release -q -p dynident-cli
 dynident=${DYNIDENT:-${CARGO_TARGET_DIR:-target}/release/dynident}
 log=$out/panda_arm7.csv
@@ -35,10 +35,8 @@ rm -f "$out"/*.jsonl
 
 # $own contains a program and its options.
 own() { [ -n "$rivals_only" ] || $pin $own "$@" >> "$out/dynident.jsonl"; }
-# Measure the limits of the machine in every round; the operation counts are the same in each round.
+# Measure the limits of the machine in every round.
 limits() { own --limits --csv "$log" ${CSV_ROWS:+--csv-rows "$CSV_ROWS"}; }
-# A program without the feature `counted` reports this, and the table then has no shares of operations.
-[ -n "$rivals_only" ] || $own --count > "$out/counted.jsonl" || rm "$out/counted.jsonl"
 round=1
 while [ "$round" -le "$rounds" ]; do
   echo "round $round of $rounds" >&2

@@ -119,15 +119,9 @@ def shares(folder, table, limit):
             continue
         least, column = min(own)
         head = [d["robot"], d["count_of"].replace("_", " "), column.removeprefix("Dynident ")]
-        if "flops" in d:
-            rate = d["flops"] / least
-            peak = limit.get(("peak_flops", column))
-            share = f"{100e9 * rate / peak[0]:.0f} % of the peak" if peak else ""
-            rows.append([*head, f"{d['flops']:.0f}", f"{rate:.2f} GFLOP/s", share])
-        else:
-            rate = d["bytes"] / least
-            parts = [f"{100e9 * rate / limit[key, ''][0]:.0f} % of {key}" for key in ("newlines", "floats") if (key, "") in limit]
-            rows.append([*head, f"{d['bytes']:.0f} bytes", f"{rate:.2f} GB/s", ", ".join(parts)])
+        rate = d["bytes"] / least
+        parts = [f"{100e9 * rate / limit[key, ''][0]:.0f} % of {key}" for key in ("newlines", "floats") if (key, "") in limit]
+        rows.append([*head, f"{d['bytes']:.0f} bytes", f"{rate:.2f} GB/s", ", ".join(parts)])
     return rows
 
 
@@ -162,8 +156,7 @@ def main():
             print(f"| {name.replace('_', ' ')} | {column.removeprefix('Dynident ')} | {rate / 1e9:.3g} {unit} | {what} |")
     rows = shares(sys.argv[1], table, limit)
     if rows:
-        print("\nShare of these limits: operations counted by the program with counting scalars (a multiply-add is two operations; plain arithmetic outside of the")
-        print("kernels is not counted), divided by the minimum time. The peak is the rate of multiply-adds in all lanes.\n")
+        print("\nShare of these limits: bytes divided by the minimum time.\n")
         print("| robot | quantity | | per call | reached | share |\n| --- | --- | --- | ---: | ---: | --- |")
         for row in rows:
             print("| " + " | ".join(row) + " |")

@@ -1,5 +1,5 @@
 //! Times dynamics, triangular factors from samples, a step of an excitation design, a step of the closed loop and
-//! reading text; measures machine limits; counts operations. Prints one JSON line per result, with the same lines,
+//! reading text; measures machine limits. Prints one JSON line per result, with the same lines,
 //! states and method as the programs in `benchmarks/`, which `benchmarks/compare.sh` compares.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing figures is what this program is for")]
@@ -26,9 +26,6 @@ struct Options {
     /// sets.
     #[arg(long, default_value_t = 72, value_parser = clap::value_parser!(u16).range(1..=512))]
     block: u16,
-    /// Count the operations of each quantity instead of timing it; needs the feature `counted`.
-    #[arg(long)]
-    count: bool,
     /// Also measure machine limits: processor peak, memory, text.
     #[arg(long)]
     limits: bool,
@@ -49,18 +46,6 @@ struct Options {
 /// The robot whose recording is read as text.
 const RECORDED: &str = "panda_arm7";
 
-/// Counting level, set as the default level too.
-#[cfg(feature = "counted")]
-fn counting() -> Option<Level> {
-    Level::count_everywhere().then(Level::counted)
-}
-
-#[cfg(not(feature = "counted"))]
-fn counting() -> Option<Level> {
-    eprintln!("--count: this program was built without the feature `counted`");
-    None
-}
-
 fn main() -> ExitCode {
     let options = Options::parse();
     // The clock measures this thread, so all work must be on it.
@@ -69,15 +54,8 @@ fn main() -> ExitCode {
         return ExitCode::FAILURE;
     }
     let available = Level::available();
-    let levels: Vec<Level> = if options.count {
-        match counting() {
-            Some(level) => vec![level],
-            None => return ExitCode::from(2),
-        }
-    } else {
-        let asked = |level: &Level| options.level.as_ref().is_none_or(|name| name.eq_ignore_ascii_case(level.name()));
-        available.iter().copied().filter(asked).collect()
-    };
+    let asked = |level: &Level| options.level.as_ref().is_none_or(|name| name.eq_ignore_ascii_case(level.name()));
+    let levels: Vec<Level> = available.iter().copied().filter(asked).collect();
     if levels.is_empty() {
         let names: Vec<&str> = available.iter().map(|level| level.name()).collect();
         eprintln!("unknown --level {}: use one of {}", options.level.unwrap_or_default(), names.join(", "));
@@ -85,7 +63,7 @@ fn main() -> ExitCode {
     }
     println!("{}", speed::environment(&available));
     let model = |name: &str| load_robot(options.robots.join(format!("{name}.urdf"))).map(|robot| robot.model);
-    if options.limits && !options.count {
+    if options.limits {
         let measured = model(RECORDED).map_err(|error| error.to_string()).and_then(|model| {
             let (csv, rows) = (options.csv.as_path(), options.csv_rows as usize);
             speed::time_machine(RECORDED, &model, &levels, csv, rows, &options.only)

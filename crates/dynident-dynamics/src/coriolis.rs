@@ -1,11 +1,11 @@
 //! The Coriolis matrix.
 
-use crate::joint_matrices::{JointMatrices, MatrixRows};
+use crate::joint_matrices::MatrixRows;
 use crate::sample_lanes::take_lanes;
-use crate::tree_scratch::{TreeBatch, TreeScratch, expanded, project_matrices};
+use crate::tree_scratch::TreeScratch;
 use crate::varied_body::VariedBody;
-use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace};
-use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
+use crate::workspace::{AnyScratch, CoreScratch, Workspace};
+use dynident_lanes::{Kernel, Lane, Scalar, dispatch_single};
 use dynident_model::Model;
 use dynident_model::terms::JointMotion;
 
@@ -66,34 +66,6 @@ pub fn coriolis_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64
         dispatch_single(*level, Fill { model, scratch, motion, out: MatrixRows { out: matrix, stride: 1 } });
     }
     matrix
-}
-
-/// [`coriolis_matrix`] of every sample of a motion; accelerations are not read.
-///
-/// Allocation-free once the array has grown to the number of samples, except for robots with coupled joints.
-///
-/// # Panics
-/// If an array of the motion does not have joints × samples values, or for a workspace or matrices of another tree.
-pub fn coriolis_matrices(
-    model: &Model,
-    workspace: &mut BatchWorkspace,
-    motion: &JointMotion<'_>,
-    out: &mut JointMatrices,
-) {
-    workspace.check(model, motion.samples, &[motion.q, motion.dq]);
-    let mut out = out.resize(model, motion.samples);
-    let BatchWorkspace { level, scratch, tree, .. } = workspace;
-    let Some(coupling) = model.coupling() else {
-        dispatch(*level, Fill { model, scratch, motion, out });
-        return;
-    };
-    let TreeBatch { motion: tree_motion, matrices: [of_tree, ..], .. } = tree;
-    let motion = &expanded(coupling, &JointMotion { ddq: motion.dq, ..*motion }, tree_motion);
-    of_tree.resize(coupling.joints() * motion.q.len(), 0.0);
-    let mut rows = MatrixRows { out: &mut *of_tree, stride: motion.samples };
-    rows.clear_across_branches(model);
-    dispatch(*level, Fill { model, scratch, motion, out: rows });
-    project_matrices(coupling, of_tree, motion.samples, &mut out);
 }
 
 struct Fill<'a> {

@@ -67,48 +67,8 @@ pub fn inverse_dynamics_derivatives<'w>(
 }
 
 /// Derivatives of several samples: entry `(i, k)` of sample `s` is at `[(i * dof + k) * samples + s]`.
-#[derive(Debug)]
-pub struct DerivativeArrays<'a> {
-    /// `∂τ/∂q`.
-    pub by_position: &'a mut [f64],
-    /// `∂τ/∂q̇`.
-    pub by_velocity: &'a mut [f64],
-    /// `∂τ/∂q̈`, the mass matrix.
-    pub by_acceleration: &'a mut [f64],
-}
-
-/// [`inverse_dynamics_derivatives`] of every sample of a motion.
-///
-/// Allocation-free, except for robots with coupled joints at the first block of a size.
-///
-/// # Panics
-/// If an array does not have joints × samples (derivatives: joints × joints × samples) values, or for a workspace of
-/// another size.
-#[doc(alias("rnea derivatives"))]
-pub fn inverse_dynamics_derivatives_batch(
-    model: &Model,
-    workspace: &mut BatchWorkspace,
-    motion: &JointMotion<'_>,
-    derivatives: DerivativeArrays<'_>,
-) {
-    workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq]);
-    let DerivativeArrays { by_position, by_velocity, by_acceleration } = derivatives;
-    let out = [by_position, by_velocity, by_acceleration];
-    for array in &out {
-        let entries = model.dof() * model.dof() * motion.samples;
-        assert_eq!(array.len(), entries, "a derivative has one entry for two joints and sample");
-    }
-    let mut out = out.map(|out| MatrixRows { out, stride: motion.samples });
-    if model.coupling().is_none() {
-        for rows in &mut out {
-            rows.clear_across_branches(model);
-        }
-    }
-    fill(model, workspace, motion, out);
-}
-
 /// [`inverse_dynamics_derivatives`] of every sample of a motion, by position, velocity and acceleration in this order,
-/// into arrays that keep the zeros of a tree. Fastest form.
+/// into arrays that keep the zeros of a tree.
 ///
 /// Allocation-free once the arrays have grown to the number of samples, except for robots with coupled joints.
 ///

@@ -8,11 +8,11 @@
 //! | --- | --- | --- |
 //! | joint torques of a motion | [`inverse_dynamics()`]; several samples: [`inverse_dynamics_batch`] | recursive Newton-Euler (RNEA) |
 //! | accelerations under torques | [`forward_dynamics()`] | articulated bodies (ABA) |
-//! | mass matrix | [`mass_matrix()`]; with bias torque: [`mass_matrix_and_bias`]; several samples: [`mass_matrix_batch`], [`mass_matrices`] | composite bodies (CRBA) |
-//! | Coriolis matrix, `Ṁ = C + Cᵀ` | [`coriolis_matrix`]; several samples: [`coriolis_matrices`] | analytic, in one frame |
+//! | mass matrix | [`mass_matrix()`]; with bias torque: [`mass_matrix_and_bias`]; several samples: [`mass_matrices`] | composite bodies (CRBA) |
+//! | Coriolis matrix, `Ṁ = C + Cᵀ` | [`coriolis_matrix`] | analytic, in one frame |
 //! | torque of gravity, its derivative, energies | [`gravity_torque`], [`gravity_torque_derivative`], [`kinetic_energy`], [`potential_energy`] | |
 //! | torques and mass matrix over a custom scalar | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
-//! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; several samples: [`inverse_dynamics_derivatives_batch`], [`inverse_dynamics_derivative_matrices`] | analytic, in one frame |
+//! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; several samples: [`inverse_dynamics_derivative_matrices`] | analytic, in one frame |
 //! | derivatives of the acceleration by q, q̇, τ | [`forward_dynamics_derivatives`] | from those of the torque, with `M = LᵀL` along the tree |
 //! | poses of the bodies | [`body_placements`] | forward kinematics |
 //! | torque regressor, all ten parameters of each body | [`torque_regressor`] | linear in the parameters |
@@ -82,11 +82,8 @@ mod workspace;
 pub use base_parameters::{
     BaseParameterSettings, BaseParameters, Determination, NumericalRank, numerical_rank, numerical_rank_by_body,
 };
-pub use coriolis::{coriolis_matrices, coriolis_matrix};
-pub use derivatives::{
-    DerivativeArrays, InverseDynamicsDerivatives, inverse_dynamics_derivative_matrices, inverse_dynamics_derivatives,
-    inverse_dynamics_derivatives_batch,
-};
+pub use coriolis::coriolis_matrix;
+pub use derivatives::{InverseDynamicsDerivatives, inverse_dynamics_derivative_matrices, inverse_dynamics_derivatives};
 pub use energy::{kinetic_energy, potential_energy};
 pub use forward_dynamics::forward_dynamics;
 pub use forward_dynamics_derivatives::{ForwardDynamicsDerivatives, forward_dynamics_derivatives};
@@ -95,7 +92,7 @@ pub use independent_columns::{IndependentColumns, independent_columns};
 pub use inverse_dynamics::{inverse_dynamics, inverse_dynamics_batch};
 pub use joint_matrices::JointMatrices;
 pub use kinematics::body_placements;
-pub use mass_matrix::{mass_matrices, mass_matrix, mass_matrix_batch};
+pub use mass_matrix::{mass_matrices, mass_matrix};
 pub use motion_equation::mass_matrix_and_bias;
 pub use over_scalar::{inverse_dynamics_over, mass_matrix_over};
 pub use parametric_model::{ParametricModel, ParametricModelError};

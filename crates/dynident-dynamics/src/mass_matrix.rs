@@ -34,27 +34,7 @@ pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -
     &matrices[0]
 }
 
-/// [`mass_matrix`] of every sample, from joint-major positions: entry `(i, k)` of sample `s` is at `out[(i * dof + k)
-/// * samples + s]`.
-///
-/// Allocation-free, except for robots with coupled joints at the first block of a size.
-///
-/// # Panics
-/// If `q` does not have joints × samples or `out` not joints × joints × samples values, or for a workspace of another
-/// tree.
-#[doc(alias("crba"))]
-pub fn mass_matrix_batch(model: &Model, workspace: &mut BatchWorkspace, q: &[f64], samples: usize, out: &mut [f64]) {
-    workspace.check(model, samples, &[q]);
-    workspace.check_tree(model);
-    assert_eq!(out.len(), model.dof() * model.dof() * samples, "one entry for two joints and sample");
-    let mut out = MatrixRows { out, stride: samples };
-    if model.coupling().is_none() {
-        out.clear_across_branches(model);
-    }
-    fill(model, workspace, q, samples, out);
-}
-
-/// [`mass_matrix`] of every sample, into an array that keeps the zeros of a tree. Fastest form.
+/// [`mass_matrix`] of every sample, into an array that keeps the zeros of a tree.
 ///
 /// Allocation-free once `out` has grown to the number of samples, except for robots with coupled joints.
 ///

@@ -77,7 +77,7 @@ pub(crate) fn expanded<'r>(
     JointMotion { samples, q, dq, ddq }
 }
 
-/// `Gᵀ A G` of the matrices of `samples` samples, by entry as in [`crate::mass_matrix_batch`].
+/// `Gᵀ A G` of the matrices of `samples` samples, entry `(i, k)` of sample `s` at `(i * dof + k) * samples + s`.
 pub(crate) fn project_matrices(coupling: &JointCoupling, tree: &[f64], samples: usize, to: &mut MatrixRows<'_>) {
     let (joints, dof) = (coupling.joints(), coupling.dof());
     let MatrixRows { out, stride } = to;

@@ -3,11 +3,10 @@
 #![allow(unsafe_code, reason = "a global allocator cannot be written without")]
 
 use dynident_dynamics::{
-    BatchWorkspace, DerivativeArrays, JointMatrices, PanelLayout, Panels, Workspace, all_columns, body_placements,
-    coriolis_matrices, coriolis_matrix, forward_dynamics, forward_dynamics_derivatives, gravity_torque,
-    gravity_torque_derivative, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivative_matrices,
-    inverse_dynamics_derivatives, inverse_dynamics_derivatives_batch, kinetic_energy, mass_matrices, mass_matrix,
-    mass_matrix_and_bias, mass_matrix_batch, potential_energy, regressor_panels, torque_regressor,
+    BatchWorkspace, JointMatrices, PanelLayout, Panels, Workspace, all_columns, body_placements, coriolis_matrix,
+    forward_dynamics, forward_dynamics_derivatives, gravity_torque, gravity_torque_derivative, inverse_dynamics,
+    inverse_dynamics_batch, inverse_dynamics_derivative_matrices, inverse_dynamics_derivatives, kinetic_energy,
+    mass_matrices, mass_matrix, mass_matrix_and_bias, potential_energy, regressor_panels, torque_regressor,
 };
 use dynident_lanes::Level;
 use dynident_model::sample::random_tree;
@@ -119,22 +118,11 @@ fn batches_allocate_nothing() {
     let fewer = JointMotion { samples: 20, q: &q[..dof * 20], dq: &dq[..dof * 20], ddq: &ddq[..dof * 20] };
     let mut tau = vec![0.0; dof * samples];
     let mut panels = Panels::default();
-    let mut matrices = [(); 3].map(|()| vec![0.0; dof * dof * samples]);
     for level in Level::available() {
         let mut workspace = BatchWorkspace::with_level(&model, level);
         let torques = requests_when_warm(|| inverse_dynamics_batch(&model, &mut workspace, &motion, &mut tau));
         assert_eq!(torques, 0, "inverse dynamics, {}", level.name());
-        let [by_position, by_velocity, by_acceleration] = &mut matrices;
-        let inertias = requests_when_warm(|| mass_matrix_batch(&model, &mut workspace, &q, samples, by_acceleration));
-        assert_eq!(inertias, 0, "mass matrices, {}", level.name());
-        let derivatives = requests_when_warm(|| {
-            let out = DerivativeArrays { by_position, by_velocity, by_acceleration };
-            inverse_dynamics_derivatives_batch(&model, &mut workspace, &motion, out);
-        });
-        assert_eq!(derivatives, 0, "derivatives, {}", level.name());
         let mut kept = [(); 3].map(|()| JointMatrices::new(&model));
-        let coriolis = requests_when_warm(|| coriolis_matrices(&model, &mut workspace, &motion, &mut kept[1]));
-        assert_eq!(coriolis, 0, "Coriolis matrices, {}", level.name());
         let inertias = requests_when_warm(|| mass_matrices(&model, &mut workspace, &q, samples, &mut kept[0]));
         assert_eq!(inertias, 0, "kept mass matrices, {}", level.name());
         let derivatives =

@@ -26,8 +26,7 @@
 //! | parameters, noise of every joint unknown | [`weighted_least_squares`] |
 //! | outlier-robust fit | [`robust_least_squares`] |
 //! | noise in position as well as in torque | [`instrumental_variables`], [`hausman_test`] |
-//! | joint estimate of motion and parameters | [`spline_motion_least_squares`], [`simultaneous_least_squares`],
-//! [`maximum_likelihood`] |
+//! | joint estimate of motion and parameters | [`spline_motion_least_squares`], [`simultaneous_least_squares`] |
 //! | fit of the simulated to the measured motion | [`simulated_least_squares`] |
 //! | errors correlated between joints | [`generalized_least_squares`] |
 //! | noise level that varies in time | [`noise_weighted_least_squares`] |
@@ -73,11 +72,10 @@ pub use linear::{
     weighted_least_squares, weighted_least_squares_with_known, weighted_values,
 };
 pub use nonlinear::{
-    ChannelNoise, ChannelRows, InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings,
-    SimulatedCriterion, SimulatedEstimate, SimulatedMotion, SimulatedProblem, SimulatedRows, SimulatedSettings,
-    SimultaneousEstimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings, SplineJointFit, SplineLogFit,
-    SplineMotionEstimate, SplineMotionProblem, SplineMotionSettings, SplineRecord, TorqueModel, TorqueSlopes,
-    maximum_likelihood, simulated_least_squares, simultaneous_bound, simultaneous_least_squares,
+    ChannelNoise, ChannelRows, SimulatedCriterion, SimulatedEstimate, SimulatedMotion, SimulatedProblem, SimulatedRows,
+    SimulatedSettings, SimultaneousEstimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings,
+    SplineJointFit, SplineLogFit, SplineMotionEstimate, SplineMotionProblem, SplineMotionSettings, SplineRecord,
+    TorqueModel, TorqueSlopes, simulated_least_squares, simultaneous_bound, simultaneous_least_squares,
     spline_motion_least_squares,
 };
 pub use uncertainty::{CovarianceMethod, Estimate, EstimateStatus, HALF_WIDTH_95, correlation, student_half_width};

@@ -151,7 +151,7 @@ impl<'a> Check<'a> {
     fn take_block(&mut self, times: &[f64]) {
         let Self { limits, model, probes, block, dynamics, kinematics, state, torque } = self;
         for (sample, &at_s) in times.iter().enumerate() {
-            for (state, from) in state.iter_mut().zip([&block.q, &block.dq, &block.ddq, &block.dddq]) {
+            for (state, from) in state.iter_mut().zip(block.arrays()) {
                 for (joint, to) in state.iter_mut().enumerate() {
                     *to = from[joint * times.len() + sample];
                 }

@@ -24,10 +24,20 @@ impl Motion {
     /// Resizes all arrays to `joints` × `samples` zeros, reusing the memory.
     pub fn reset(&mut self, joints: usize, samples: usize) {
         (self.joints, self.samples) = (joints, samples);
-        for values in [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.dddq] {
+        for values in self.arrays_mut() {
             values.clear();
             values.resize(joints * samples, 0.0);
         }
+    }
+
+    /// The four arrays: positions, velocities, accelerations, jerks.
+    pub fn arrays(&self) -> [&Vec<f64>; 4] {
+        [&self.q, &self.dq, &self.ddq, &self.dddq]
+    }
+
+    /// The four arrays for changes of their values, in the order of [`arrays`](Self::arrays).
+    pub fn arrays_mut(&mut self) -> [&mut Vec<f64>; 4] {
+        [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.dddq]
     }
 
     /// Index range of one joint in each of the four arrays.

@@ -167,7 +167,7 @@ pub struct EstimationThresholds {
     pub noise: NoiseThresholds,
     /// Variation between logs.
     pub log_variation: LogVariationThresholds,
-    /// Requirements on the motion of the simultaneous and maximum-likelihood methods.
+    /// Requirements on the motion of the simultaneous method.
     pub motion: MotionThresholds,
     /// Drive gains.
     pub gain: GainThresholds,
@@ -258,8 +258,6 @@ impl Default for LogVariationThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MotionThresholds {
-    /// Maximum difference of the periods relative to the size of the motion. 0.1 by default.
-    pub max_period_difference: f64,
     /// Maximum residual of the positions from the Fourier series relative to their size. 0.1 by default.
     pub max_series_residual: f64,
     /// Minimum size of a motion, rad (m). 1e-4 by default.
@@ -272,7 +270,7 @@ pub struct MotionThresholds {
 
 impl Default for MotionThresholds {
     fn default() -> Self {
-        Self { max_period_difference: 0.1, max_series_residual: 0.1, min_motion: 1e-4, max_spline_residual_ratio: 1.25 }
+        Self { max_series_residual: 0.1, min_motion: 1e-4, max_spline_residual_ratio: 1.25 }
     }
 }
 
@@ -311,7 +309,6 @@ impl EstimationThresholds {
             ("log_variation.min_pairs", log_variation.min_pairs as f64, 1.0),
             ("log_variation.min_degrees_of_freedom", log_variation.min_degrees_of_freedom, 2.0),
             ("log_variation.max_relative_square", log_variation.max_relative_square, 0.0),
-            ("motion.max_period_difference", motion.max_period_difference, 0.0),
             ("motion.max_series_residual", motion.max_series_residual, 0.0),
             ("motion.min_motion", motion.min_motion, 0.0),
             ("motion.max_spline_residual_ratio", motion.max_spline_residual_ratio, 0.0),

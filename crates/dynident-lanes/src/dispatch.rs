@@ -1,7 +1,5 @@
 //! The run-time choice of processor level.
 
-#[cfg(feature = "counted")]
-use crate::counted::Counted;
 use crate::kernel::Kernel;
 use crate::lanes::Wide;
 use crate::portable::Portable;
@@ -17,8 +15,6 @@ enum Instructions {
     Avx2(HasAvx2),
     #[cfg(target_arch = "x86_64")]
     Avx512(HasAvx512),
-    #[cfg(feature = "counted")]
-    Counted,
 }
 
 /// The level of [`Level::detect`].
@@ -45,21 +41,6 @@ impl Level {
     /// multiply-add.
     pub fn portable() -> Self {
         Self(Instructions::Portable)
-    }
-
-    /// Counts operations, with the numbers of [`portable`](Self::portable): see
-    /// [`counted_operations`](crate::counted_operations). Single samples use one value at a time, so that bundles are
-    /// never partly filled; batches use four.
-    #[cfg(feature = "counted")]
-    pub fn counted() -> Self {
-        Self(Instructions::Counted)
-    }
-
-    /// Makes [`detect`](Self::detect) return [`counted`](Self::counted) in this process; returns false if it has
-    /// already returned another level.
-    #[cfg(feature = "counted")]
-    pub fn count_everywhere() -> bool {
-        *CHOSEN.get_or_init(Self::counted) == Self::counted()
     }
 
     /// All levels of this processor, from portable to best.
@@ -91,8 +72,6 @@ impl Level {
             Instructions::Avx2(_) => "AVX2",
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx512(_) => "AVX-512",
-            #[cfg(feature = "counted")]
-            Instructions::Counted => "counted",
         }
     }
 }
@@ -109,8 +88,6 @@ pub fn dispatch<K: Kernel>(level: Level, kernel: K) -> K::Output {
         Instructions::Avx2(proof) => enter_avx2::<K, Wide<Avx2>>(proof, kernel),
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx512(proof) => enter_avx512::<K, Wide<Avx512>>(proof, kernel),
-        #[cfg(feature = "counted")]
-        Instructions::Counted => kernel.run::<Wide<Counted<4>>>(),
     }
 }
 
@@ -124,8 +101,6 @@ pub fn dispatch_single<K: Kernel>(level: Level, kernel: K) -> K::Output {
         #[cfg(target_arch = "x86_64")]
         // Measured: inside one sample four lanes are faster than eight (half-empty registers, slower shuffles).
         Instructions::Avx512(proof) => enter_avx512::<K, Wide<Portable<1, true>, Avx2>>(proof, kernel),
-        #[cfg(feature = "counted")]
-        Instructions::Counted => kernel.run::<Wide<Counted<1>>>(),
     }
 }
 

@@ -13,8 +13,6 @@
 #![deny(unsafe_code)]
 
 mod aligned;
-#[cfg(feature = "counted")]
-mod counted;
 mod dispatch;
 mod dual;
 mod exponential;
@@ -30,8 +28,6 @@ mod sin_cos;
 mod x86;
 
 pub use aligned::AlignedBuffer;
-#[cfg(feature = "counted")]
-pub use counted::{Operations, counted_operations};
 pub use dispatch::{Level, dispatch, dispatch_single};
 pub use dual::Dual;
 pub use kernel::Kernel;

@@ -14,7 +14,6 @@
 //! | gaps, dead channels, lags and other findings | [`MotionStream::report`], [`report`] |
 //! | a cut-off from the data | [`cutoff()`] |
 //! | regressor and torque filtered and decimated alike | [`Decimator`] |
-//! | the mean period of a periodic record and its noise | [`averaged_periods`] |
 //!
 //! Data flow: [`LogSource`] → [`LogReader`] (units, signs, gears, ranges, missing values) → [`RawBlock`]s → outliers
 //! and held samples marked ([`RejectedSamples`]) → pieces on a uniform clock ([`clock`]) → [`Differentiator`] →
@@ -80,7 +79,7 @@ pub mod report;
 pub use cleaning::{CleaningSettings, Reason, RejectedSamples};
 pub use derivative::{Derivatives, Differentiator, DifferentiatorSettings, Place, SampleRanges};
 pub use error::{FilterError, FormatError, RecordingError};
-pub use filter::{AveragedPeriods, DecimationSettings, Decimator, averaged_periods, cutoff, position_noise};
+pub use filter::{DecimationSettings, Decimator, cutoff, position_noise};
 pub use log::{FileLog, JointSamples, Log, LogFormat, LogReader, LogSource, LogTable, MemoryLog, RawBlock};
 pub use motion::{ImportLimits, MotionBlock, MotionSettings, MotionStream};
 pub use place::LogPlace;

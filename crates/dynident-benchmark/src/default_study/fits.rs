@@ -131,8 +131,6 @@ pub enum NamedEstimator {
     NoiseWeighted,
     /// Instruments from the logs' motion.
     Instrumental,
-    /// Maximum likelihood of a repeated motion.
-    MaximumLikelihood,
     /// Motion and parameters together, with a spline motion.
     Simultaneous,
     /// Motion and parameters together, with a Fourier series of known period.
@@ -141,7 +139,7 @@ pub enum NamedEstimator {
 
 impl NamedEstimator {
     /// All estimators, in the order of the table.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 9] = [
         Self::Ordinary,
         Self::Weighted,
         Self::Generalized,
@@ -149,7 +147,6 @@ impl NamedEstimator {
         Self::Tukey,
         Self::NoiseWeighted,
         Self::Instrumental,
-        Self::MaximumLikelihood,
         Self::Simultaneous,
         Self::SimultaneousSeries,
     ];
@@ -164,13 +161,12 @@ impl NamedEstimator {
             Self::Tukey => "tukey",
             Self::NoiseWeighted => "noise-weighted",
             Self::Instrumental => "instrumental",
-            Self::MaximumLikelihood => "maximum-likelihood",
             Self::Simultaneous => "simultaneous",
             Self::SimultaneousSeries => "simultaneous-series",
         }
     }
 
-    /// The estimator for a case; `None` if it is not applicable (less than two periods) or would take minutes.
+    /// The estimator for a case; `None` if it is would take minutes.
     pub(super) fn of(self, case: &DefaultCase, dof: usize) -> Option<Estimator> {
         let samples = case.motion.duration_s * case.motion.rate_hz * dof as f64;
         let periods = PeriodSettings { period_s: Some(PERIOD_S), ..PeriodSettings::default() };
@@ -182,8 +178,6 @@ impl NamedEstimator {
             Self::Tukey => Estimator::Tukey,
             Self::NoiseWeighted => Estimator::NoiseWeighted(NoiseLevels::default()),
             Self::Instrumental => Estimator::Instrumental(InstrumentSettings::default()),
-            Self::MaximumLikelihood if case.motion.duration_s < 2.0 * PERIOD_S => return None,
-            Self::MaximumLikelihood => Estimator::MaximumLikelihood(periods),
             Self::Simultaneous | Self::SimultaneousSeries if samples > MAX_SAMPLES_FOR_MOTION => return None,
             Self::Simultaneous => Estimator::SplineMotion(SplineMotionSettings::default()),
             Self::SimultaneousSeries => {

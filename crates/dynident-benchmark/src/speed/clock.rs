@@ -37,22 +37,6 @@ impl Report<'_> {
             return;
         }
         sweep();
-        #[cfg(feature = "counted")]
-        if self.level == Level::counted() {
-            dynident_lanes::counted_operations();
-            sweep();
-            let count = dynident_lanes::counted_operations();
-            let each = |operations: u64| operations as f64 / per as f64;
-            println!(
-                r#"{{"job":"operations","robot":"{}","nv":{},"count_of":"{quantity}","flops":{:.1},"fused":{:.1},"divisions":{:.1}}}"#,
-                self.robot,
-                self.dof,
-                each(count.flops()),
-                each(count.fused),
-                each(count.divisions),
-            );
-            return;
-        }
         let start = now_ns();
         sweep();
         let sweeps = (REPEAT_NS / (now_ns() - start).max(1.0)).max(1.0) as usize;

@@ -2,8 +2,8 @@
 
 use crate::invariants::cases;
 use dynident_dynamics::{
-    BatchWorkspace, DerivativeArrays, Workspace, inverse_dynamics_derivatives, inverse_dynamics_derivatives_batch,
-    mass_matrix, mass_matrix_batch,
+    BatchWorkspace, JointMatrices, Workspace, inverse_dynamics_derivative_matrices, inverse_dynamics_derivatives,
+    mass_matrices, mass_matrix,
 };
 use dynident_lanes::Level;
 use dynident_model::terms::JointMotion;
@@ -28,12 +28,11 @@ fn batched_matrices_equal_those_of_single_samples() {
             };
             let [q, dq, ddq] = [&case.q, &case.dq, &case.ddq].map(|vector| spread(vector));
             let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
-            // Initial content must be overwritten.
-            let [mut matrix, mut by_q, mut by_dq, mut by_ddq] = [(); 4].map(|()| vec![f64::NAN; dof * dof * samples]);
-            mass_matrix_batch(model, &mut batch, &q, samples, &mut matrix);
-            let derivatives =
-                DerivativeArrays { by_position: &mut by_q, by_velocity: &mut by_dq, by_acceleration: &mut by_ddq };
-            inverse_dynamics_derivatives_batch(model, &mut batch, &motion, derivatives);
+            let mut mass = JointMatrices::new(model);
+            let mut derivatives = [(); 3].map(|()| JointMatrices::new(model));
+            mass_matrices(model, &mut batch, &q, samples, &mut mass);
+            inverse_dynamics_derivative_matrices(model, &mut batch, &motion, &mut derivatives);
+            let [by_q, by_dq, by_ddq] = &derivatives;
             for sample in 0..samples {
                 let at = |array: &[f64]| (0..dof).map(|joint| array[joint * samples + sample]).collect::<Vec<f64>>();
                 let (q, dq, ddq) = (at(&q), at(&dq), at(&ddq));
@@ -41,11 +40,11 @@ fn batched_matrices_equal_those_of_single_samples() {
                 let varied = inverse_dynamics_derivatives(model, &mut workspace, &q, &dq, &ddq);
                 let expected = [&single[..], varied.by_position, varied.by_velocity, varied.by_acceleration];
                 for (name, (found, expected)) in
-                    ["M", "dq", "ddq", "dddq"].iter().zip([&matrix, &by_q, &by_dq, &by_ddq].into_iter().zip(expected))
+                    ["M", "dq", "ddq", "dddq"].iter().zip([&mass, by_q, by_dq, by_ddq].into_iter().zip(expected))
                 {
                     let scale = expected.iter().fold(1.0_f64, |most, x| most.max(x.abs()));
                     for (entry, expected) in expected.iter().enumerate() {
-                        let found = found[entry * samples + sample];
+                        let found = found.entry(entry / dof, entry % dof)[sample];
                         assert!(
                             (found - expected).abs() <= ROUNDING * scale,
                             "{name}, {}, sample {sample} of {samples}, entry {entry}: {found} against {expected}",

@@ -1,21 +1,16 @@
 //! **Nonlinear estimators**: the rows depend on the unknowns.
 //!
-//! [`maximum_likelihood`] includes errors of known covariance in every position of a periodic motion.
 //! [`simulated_least_squares`] fits the simulated to the measured motion (or torque). [`simultaneous_least_squares`]
 //! estimates motion and parameters together from encoder and torque channels with coloured noise;
 //! [`simultaneous_bound`] is its Cramér-Rao bound. [`spline_motion_least_squares`] does the same for any log, with a
 //! smoothing spline as motion.
 
 mod autoregression;
-mod maximum_likelihood;
 mod simulated;
 mod simultaneous;
 mod simultaneous_rows;
 mod spline_motion;
 
-pub use maximum_likelihood::{
-    InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings, maximum_likelihood,
-};
 pub use simulated::{
     SimulatedCriterion, SimulatedEstimate, SimulatedMotion, SimulatedProblem, SimulatedRows, SimulatedSettings,
     simulated_least_squares,

@@ -15,7 +15,6 @@ mod jackknife;
 mod joint_gains;
 mod known_columns;
 mod left_out_blocks;
-mod maximum_likelihood;
 mod noise_levels;
 mod physical_errors;
 mod physical_golden;

@@ -35,7 +35,7 @@ impl Metric {
         weights.reset(joints, times.len());
         for band in task.limits.bands().iter().filter(|band| band.order < 3) {
             let range = weights.of(band.joint);
-            order(&mut weights, band.order)[range].fill(1.0 / (band.half * band.half * times.len() as f64));
+            weights.arrays_mut()[band.order][range].fill(1.0 / (band.half * band.half * times.len() as f64));
         }
         let blocks = vec![DMatrix::zeros(each, each); joints];
         let size_weights = weights.clone();
@@ -90,7 +90,7 @@ impl Metric {
             let pushing = &pushing[band.row * samples..(band.row + 1) * samples];
             let range = self.weights.of(band.joint);
             let scale = 1.0 / (band.half * band.half);
-            for (to, from) in order(&mut self.weights, band.order)[range].iter_mut().zip(pushing) {
+            for (to, from) in self.weights.arrays_mut()[band.order][range].iter_mut().zip(pushing) {
                 *to += from * scale;
             }
         }
@@ -150,14 +150,5 @@ impl Metric {
                 own.dot(&(block * own))
             })
             .sum()
-    }
-}
-
-fn order(motion: &mut Motion, order: usize) -> &mut [f64] {
-    match order {
-        0 => &mut motion.q,
-        1 => &mut motion.dq,
-        2 => &mut motion.ddq,
-        _ => &mut motion.dddq,
     }
 }

@@ -56,7 +56,7 @@ pub(crate) fn derivatives(family: &dyn Family, seed: u64) {
     }
     let mut motion = Motion::default();
     family.motion(&parameters, &all, &mut motion);
-    let orders = [&motion.q, &motion.dq, &motion.ddq, &motion.dddq];
+    let orders = motion.arrays();
     for order in 0..3 {
         for joint in 0..family.joints() {
             let (low, high) = (&orders[order][motion.of(joint)], &orders[order + 1][motion.of(joint)]);
@@ -92,19 +92,14 @@ pub(crate) fn gradient_on(family: &dyn Family, parameters: &[f64], times: &[f64]
     let mut random = Random::new(seed ^ 0x77);
     let mut adjoint = Motion::default();
     adjoint.reset(family.joints(), times.len());
-    for values in [&mut adjoint.q, &mut adjoint.dq, &mut adjoint.ddq, &mut adjoint.dddq] {
-        for value in values.iter_mut() {
-            *value = random.normal();
-        }
+    for values in adjoint.arrays_mut() {
+        values.fill_with(|| random.normal());
     }
     let mut motion = Motion::default();
     let mut cost = |parameters: &[f64]| -> f64 {
         family.motion(parameters, times, &mut motion);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        dot(&motion.q, &adjoint.q)
-            + dot(&motion.dq, &adjoint.dq)
-            + dot(&motion.ddq, &adjoint.ddq)
-            + dot(&motion.dddq, &adjoint.dddq)
+        motion.arrays().into_iter().zip(adjoint.arrays()).map(|(motion, adjoint)| dot(motion, adjoint)).sum()
     };
     let mut gradient = vec![1.0; parameters.len()];
     family.apply_adjoint(parameters, times, &adjoint, &mut gradient);
@@ -136,10 +131,8 @@ pub(crate) fn curvature(family: &dyn Family, seed: u64) {
     let (joints, each) = (family.joints(), family.parameters() / family.joints());
     let mut weights = Motion::default();
     weights.reset(joints, times.len());
-    for values in [&mut weights.q, &mut weights.dq, &mut weights.ddq, &mut weights.dddq] {
-        for value in values.iter_mut() {
-            *value = random.uniform(0.0, 1.0);
-        }
+    for values in weights.arrays_mut() {
+        values.fill_with(|| random.uniform(0.0, 1.0));
     }
     for joint in 0..joints {
         let mut found = DMatrix::zeros(each, each);
@@ -149,17 +142,11 @@ pub(crate) fn curvature(family: &dyn Family, seed: u64) {
             for sample in weights.of(joint) {
                 let mut unit = Motion::default();
                 unit.reset(joints, times.len());
-                let (weights, one) = match order {
-                    0 => (&weights.q, &mut unit.q),
-                    1 => (&weights.dq, &mut unit.dq),
-                    2 => (&weights.ddq, &mut unit.ddq),
-                    _ => (&weights.dddq, &mut unit.dddq),
-                };
-                one[sample] = 1.0;
+                unit.arrays_mut()[order][sample] = 1.0;
                 let mut gradient = vec![0.0; parameters.len()];
                 family.apply_adjoint(&parameters, &times, &unit, &mut gradient);
                 let row = DVector::from_column_slice(&gradient[joint * each..(joint + 1) * each]);
-                expected.ger(weights[sample], &row, &row, 1.0);
+                expected.ger(weights.arrays()[order][sample], &row, &row, 1.0);
             }
         }
         let error = (&found - &expected).amax();

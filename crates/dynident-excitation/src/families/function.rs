@@ -87,7 +87,7 @@ impl FunctionFamily {
         let draws: Vec<f64> = (0..joints * parameters).map(|_| random.normal()).collect();
         let mut motion = Motion::default();
         family.motion(&draws, &times, &mut motion);
-        let values = |motion: &Motion| [&motion.q, &motion.dq, &motion.ddq, &motion.dddq].map(Clone::clone).concat();
+        let values = |motion: &Motion| motion.arrays().map(Clone::clone).concat();
         let tried = values(&motion);
         if tried.iter().any(|value| !value.is_finite()) {
             return Err(wrong("the motion is not finite for parameters of the standard normal distribution"));
@@ -156,7 +156,7 @@ impl FunctionFamily {
                 at.set(at.get() + 1);
                 for (to, motion) in out.iter_mut().zip(&columns) {
                     let place = joint * times.len() + sample;
-                    *to = [motion.q[place], motion.dq[place], motion.ddq[place], motion.dddq[place]];
+                    *to = motion.arrays().map(|values| values[place]);
                 }
             })
         };
@@ -229,15 +229,12 @@ impl Family for FunctionFamily {
             let [below, above] = &sides;
             for (joint, at) in own().enumerate() {
                 let span = adjoint.of(joint);
-                let parts = [
-                    (&adjoint.q, &below.q, &above.q),
-                    (&adjoint.dq, &below.dq, &above.dq),
-                    (&adjoint.ddq, &below.ddq, &above.ddq),
-                    (&adjoint.dddq, &below.dddq, &above.dddq),
-                ];
-                let pulled: f64 = parts
+                let sides = below.arrays().into_iter().zip(above.arrays());
+                let pulled: f64 = adjoint
+                    .arrays()
                     .into_iter()
-                    .map(|(pull, below, above)| -> f64 {
+                    .zip(sides)
+                    .map(|(pull, (below, above))| -> f64 {
                         let changes = below[span.clone()].iter().zip(&above[span.clone()]);
                         let pulls = pull[span.clone()].iter().zip(changes).filter(|(pull, _)| **pull != 0.0);
                         pulls.map(|(pull, (below, above))| pull * (above - below)).sum()
@@ -303,7 +300,7 @@ mod tests {
         let mut adjoint = Motion::default();
         adjoint.reset(3, 50);
         let mut random = Random::new(9);
-        for values in [&mut adjoint.q, &mut adjoint.dq, &mut adjoint.ddq, &mut adjoint.dddq] {
+        for values in adjoint.arrays_mut() {
             values.fill_with(|| random.normal());
         }
         let gradient = |family: &dyn Family| {

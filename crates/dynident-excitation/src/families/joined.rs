@@ -193,12 +193,10 @@ impl Family for FamilySequence {
                 Piece::Member(index) => {
                     self.members[index].motion(&parameters[own[index].clone()], &times, &mut part);
                     for joint in 0..self.joints {
-                        for (from, &sample) in part.of(joint).zip(&samples) {
-                            let to = joint * times_s.len() + sample;
-                            out.q[to] = part.q[from];
-                            out.dq[to] = part.dq[from];
-                            out.ddq[to] = part.ddq[from];
-                            out.dddq[to] = part.dddq[from];
+                        for (to, from) in out.arrays_mut().into_iter().zip(part.arrays()) {
+                            for (from, &sample) in from[part.of(joint)].iter().zip(&samples) {
+                                to[joint * times_s.len() + sample] = *from;
+                            }
                         }
                     }
                 }
@@ -208,10 +206,9 @@ impl Family for FamilySequence {
                         for (&time, &sample) in times.iter().zip(&samples) {
                             let to = joint * times_s.len() + sample;
                             let functions = quintic_hermite(time, self.settings.move_s);
-                            let value =
-                                |order: usize| functions.iter().zip(weights).map(|(f, weight)| f[order] * weight).sum();
-                            (out.q[to], out.dq[to]) = (value(0), value(1));
-                            (out.ddq[to], out.dddq[to]) = (value(2), value(3));
+                            for (order, out) in out.arrays_mut().into_iter().enumerate() {
+                                out[to] = functions.iter().zip(weights).map(|(f, weight)| f[order] * weight).sum();
+                            }
                         }
                     }
                 }
@@ -222,7 +219,7 @@ impl Family for FamilySequence {
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         check_shapes(self, parameters, times_s, adjoint, gradient);
         let own = self.ranges();
-        let arrays = [&adjoint.q, &adjoint.dq, &adjoint.ddq, &adjoint.dddq];
+        let arrays = adjoint.arrays();
         // Adjoint of both ends of each member through the moves.
         let mut ends = vec![Motion::default(); self.members.len()];
         for end in &mut ends {
@@ -234,12 +231,11 @@ impl Family for FamilySequence {
                 Piece::Member(index) => {
                     part.reset(self.joints, times.len());
                     for joint in 0..self.joints {
-                        for (to, &sample) in part.of(joint).zip(&samples) {
-                            let from = joint * times_s.len() + sample;
-                            part.q[to] = adjoint.q[from];
-                            part.dq[to] = adjoint.dq[from];
-                            part.ddq[to] = adjoint.ddq[from];
-                            part.dddq[to] = adjoint.dddq[from];
+                        let own = part.of(joint);
+                        for (to, from) in part.arrays_mut().into_iter().zip(arrays) {
+                            for (to, &sample) in to[own.clone()].iter_mut().zip(&samples) {
+                                *to = from[joint * times_s.len() + sample];
+                            }
                         }
                     }
                     let range = own[index].clone();

@@ -297,7 +297,7 @@ impl Family for LogisticStrokes {
         let own = &parameters[joint * parameters_per_joint..(joint + 1) * parameters_per_joint];
         let (_, strokes) = self.strokes(parameters, joint);
         let range = weights.of(joint);
-        let arrays = [&weights.q, &weights.dq, &weights.ddq, &weights.dddq].map(|array| &array[range.clone()]);
+        let arrays = weights.arrays().map(|array| &array[range.clone()]);
         let (mut raw, mut row) = (vec![[[0.0; 4]; 4]; strokes.len()], DVector::zeros(parameters_per_joint));
         for (sample, &time) in times_s.iter().enumerate() {
             if arrays.iter().all(|array| array[sample] == 0.0) {

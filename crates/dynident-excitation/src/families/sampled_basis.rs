@@ -85,7 +85,7 @@ impl SampledBasis {
     pub(crate) fn curvature(&self, from: usize, joint: usize, weights: &Motion, out: &mut DMatrix<f64>) {
         let columns = self.set(joint);
         let start = joint * weights.samples + from;
-        for (order, weights) in [&weights.q, &weights.dq, &weights.ddq, &weights.dddq].into_iter().enumerate() {
+        for (order, weights) in weights.arrays().into_iter().enumerate() {
             for (sample, weight) in weights[start..start + self.times_s.len()].iter().enumerate() {
                 if *weight == 0.0 {
                     continue;
@@ -337,7 +337,7 @@ mod tests {
             let (mut motion, mut adjoint) = (Motion::default(), Motion::default());
             motion.reset(joints, samples);
             adjoint.reset(joints, samples);
-            for values in [&mut adjoint.q, &mut adjoint.dq, &mut adjoint.ddq, &mut adjoint.dddq] {
+            for values in adjoint.arrays_mut() {
                 for value in values.iter_mut() {
                     *value = random.normal();
                 }
@@ -351,8 +351,8 @@ mod tests {
                     let mut functions = [[0.0; 4]; 4];
                     row(if sets == 1 { 0 } else { joint }, time, &mut functions);
                     let at = joint * samples + sample;
-                    let got = [motion.q[at], motion.dq[at], motion.ddq[at], motion.dddq[at]];
-                    let pull = [adjoint.q[at], adjoint.dq[at], adjoint.ddq[at], adjoint.dddq[at]];
+                    let got = motion.arrays().map(|values| values[at]);
+                    let pull = adjoint.arrays().map(|values| values[at]);
                     for order in 0..4 {
                         let sum: f64 = (0..4).map(|c| parameters[4 * joint + c] * functions[c][order]).sum();
                         assert!((sum - got[order]).abs() < 1e-13);

@@ -244,7 +244,7 @@ impl Family for SplicedLogistic {
             for (at, &time) in adjoint.of(joint).zip(times_s) {
                 let phase = self.phase(joint, omega, time);
                 let f = logistic(phase.argument);
-                let pulls = [adjoint.q[at], adjoint.dq[at], adjoint.ddq[at], adjoint.dddq[at]];
+                let pulls = adjoint.arrays().map(|values| values[at]);
                 let orders = if phase.frozen { 1 } else { 4 };
                 let mut power = 1.0;
                 for (order, pull) in pulls.into_iter().enumerate().take(orders) {

@@ -4,7 +4,6 @@ use super::description::JointLimit;
 use super::kind::{Constraint, LimitKind};
 use super::term::{Adjoint, Inputs, Term};
 use super::validate::middle_and_half;
-use crate::motion::Motion;
 use dynident_model::Model;
 
 /// `|x - middle| / half - 1` of one of the four arrays of a motion.
@@ -45,12 +44,13 @@ impl JointMotionLimits {
     }
 }
 
-fn array(motion: &Motion, kind: LimitKind) -> &[f64] {
+/// Order of the derivative that a limit concerns.
+fn order(kind: LimitKind) -> usize {
     match kind {
-        LimitKind::Position => &motion.q,
-        LimitKind::Speed => &motion.dq,
-        LimitKind::Acceleration => &motion.ddq,
-        _ => &motion.dddq,
+        LimitKind::Position => 0,
+        LimitKind::Speed => 1,
+        LimitKind::Acceleration => 2,
+        _ => 3,
     }
 }
 
@@ -70,12 +70,6 @@ pub(crate) struct JointBand {
 impl JointMotionLimits {
     /// The bands; this term must be the first of the set.
     pub(crate) fn bands(&self) -> Vec<JointBand> {
-        let order = |kind| match kind {
-            LimitKind::Position => 0,
-            LimitKind::Speed => 1,
-            LimitKind::Acceleration => 2,
-            _ => 3,
-        };
         let band = |(row, band): (usize, &Band)| JointBand {
             row,
             joint: band.joint,
@@ -95,7 +89,7 @@ impl Term for JointMotionLimits {
         let motion = inputs.motion;
         for (band, row) in self.0.iter().zip(out.chunks_exact_mut(motion.samples)) {
             let scale = 1.0 / band.half;
-            for (c, x) in row.iter_mut().zip(&array(motion, band.kind)[motion.of(band.joint)]) {
+            for (c, x) in row.iter_mut().zip(&motion.arrays()[order(band.kind)][motion.of(band.joint)]) {
                 *c = (x - band.middle).abs() * scale - 1.0;
             }
         }
@@ -105,13 +99,9 @@ impl Term for JointMotionLimits {
         let motion = inputs.motion;
         for (band, row) in self.0.iter().zip(weights.chunks_exact(motion.samples)) {
             let (scale, range) = (1.0 / band.half, motion.of(band.joint));
-            let to = match band.kind {
-                LimitKind::Position => &mut adjoint.motion.q,
-                LimitKind::Speed => &mut adjoint.motion.dq,
-                LimitKind::Acceleration => &mut adjoint.motion.ddq,
-                _ => &mut adjoint.motion.dddq,
-            };
-            for ((to, weight), x) in to[range.clone()].iter_mut().zip(row).zip(&array(motion, band.kind)[range]) {
+            let order = order(band.kind);
+            let to = &mut adjoint.motion.arrays_mut()[order][range.clone()];
+            for ((to, weight), x) in to.iter_mut().zip(row).zip(&motion.arrays()[order][range]) {
                 *to += weight * scale * (x - band.middle).signum();
             }
         }

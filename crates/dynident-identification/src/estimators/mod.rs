@@ -8,13 +8,11 @@ mod automatic;
 mod band_motion;
 mod error;
 mod exogeneity;
-mod filtered_period;
 mod function;
 mod generalized;
 mod instrument_rows;
 mod instrumental;
 mod instruments;
-mod maximum_likelihood;
 mod noise_in_regressor;
 mod noise_weighted;
 mod period_settings;
@@ -33,10 +31,9 @@ pub use error::EstimatorError;
 pub use function::{EstimatorFunction, EstimatorRule};
 pub use instrumental::InstrumentSettings;
 pub use instruments::{InstrumentSource, SmoothedMotion};
-pub use maximum_likelihood::PeriodicFit;
 pub use noise_in_regressor::{EstimateContrast, NoiseInRegressor, NoiseVerdict};
 pub use noise_weighted::NoiseLevels;
-pub use period_settings::{PeriodError, PeriodSettings};
+pub use period_settings::{PeriodError, PeriodSettings, PeriodicFit};
 pub use periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord};
 pub use robust::GrossErrors;
 pub use settings::EstimationSettings;
@@ -76,8 +73,8 @@ pub enum Estimator {
     Instrumental(InstrumentSettings),
     /// A caller's rule on the factors of the rows.
     Function(EstimatorFunction),
-    /// Maximum likelihood for a repeated motion: noise of motion and torque from the differences between periods.
-    MaximumLikelihood(PeriodSettings),
+    /// The same as [`SplineMotion`](Self::SplineMotion), under the name of an earlier method for repeated motions.
+    MaximumLikelihood(SplineMotionSettings),
     /// Motion and parameters together, for a motion that is a Fourier series, weighted by the noise of positions and
     /// torques.
     Simultaneous(PeriodSettings),
@@ -169,8 +166,6 @@ pub enum Findings {
     NoiseCorrelation(Vec<Vec<f64>>),
     /// Lowest and highest noise level of each joint's rows, Nm (N).
     NoiseLevels(Vec<[f64; 2]>),
-    /// Periods of a repeated motion.
-    Periodic(PeriodicFit),
     /// Motion and noise of every training log in the simultaneous fit.
     Series(Vec<SeriesFit>),
     /// Motion as a smoothing spline and noise of every training log.
@@ -288,12 +283,10 @@ fn without_instruments(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), 
         Estimator::Tukey => robust::robust(rows, RowWeight::tukey())?,
         Estimator::Generalized => generalized::generalized(rows)?,
         Estimator::NoiseWeighted(levels) => noise_weighted::noise_weighted(rows, levels)?,
-        Estimator::MaximumLikelihood(periods) => {
-            let (estimate, found) = maximum_likelihood::periodic(rows, periods)?;
-            (estimate, Findings::Periodic(found))
-        }
         Estimator::Simultaneous(periods) => simultaneous::simultaneous(rows, periods)?,
-        Estimator::SplineMotion(settings) => spline_motion::spline_motion(rows, settings)?,
+        Estimator::SplineMotion(settings) | Estimator::MaximumLikelihood(settings) => {
+            spline_motion::spline_motion(rows, settings)?
+        }
         Estimator::Didim(settings) => simulated(settings, ComparedSignal::TorqueRows)?,
         Estimator::Clie(settings) => simulated(settings, ComparedSignal::Torque)?,
         Estimator::Cloe(settings) => simulated(settings, ComparedSignal::Position)?,

@@ -19,6 +19,27 @@ pub struct PeriodSettings {
     pub harmonics: Option<usize>,
 }
 
+/// Periods of a repeated motion in results of earlier versions; kept so that these files can be read.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct PeriodicFit {
+    /// Period, s.
+    pub period_s: f64,
+    /// Number of averaged periods of each log.
+    pub periods: Vec<usize>,
+    /// Instants of all mean periods in the fit.
+    pub instants: usize,
+    /// Standard deviation of a single sample's smoothed position, velocity and acceleration of each joint, rad, rad/s,
+    /// rad/s² (m).
+    pub motion_std: Vec<[f64; 3]>,
+    /// Standard deviation of a single sample's filtered torque of each joint, Nm (N).
+    pub torque_std: Vec<f64>,
+    /// Cost of the likelihood.
+    pub cost: f64,
+    /// Expected cost for correct model and noise.
+    pub degrees_of_freedom: usize,
+}
+
 /// Invalid settings of a repeated motion.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]

@@ -36,11 +36,11 @@ pub(super) fn spline_motion(
     settings: &SplineMotionSettings,
 ) -> Result<(Estimate, Findings), EstimatorError> {
     let TrainingRows { logs, model, problem, .. } = *rows;
-    let wrong = |message: String| EstimatorError::Requirement { method: "simultaneous", message };
+    let wrong = |message: String| EstimatorError::Requirement { method: rows.settings.estimator.name(), message };
     let dof = model.dof();
     if problem.columns().len() != model.layout().columns().len() || problem.joints().len() != dof {
         return Err(wrong(
-            "payloads, parameters of single logs and joints without rows are not possible with the simultaneous method: use another method, or leave these logs out"
+            "payloads, parameters of single logs and joints without rows are not possible with this method: use another method, or leave these logs out"
                 .to_owned(),
         ));
     }

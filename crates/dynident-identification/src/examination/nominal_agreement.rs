@@ -26,13 +26,8 @@ pub struct PriorAgreement {
 }
 
 impl PriorAgreement {
-    /// Whether the torque of all joints, or of one joint, fits far better with the opposite sign, by the default
-    /// [`ExaminationSettings`].
-    pub fn is_reversed(&self) -> bool {
-        self.is_reversed_by(&ExaminationSettings::default())
-    }
-
-    /// The same by other settings; `reversed_joints` has the settings of the examination.
+    /// Whether the torque of all joints, or of one joint, fits far better with the opposite sign; `reversed_joints` has
+    /// the settings of the examination.
     pub fn is_reversed_by(&self, settings: &ExaminationSettings) -> bool {
         self.is_whole_reversed(settings) || !self.reversed_joints.is_empty()
     }
@@ -42,13 +37,7 @@ impl PriorAgreement {
         whole.is_some_and(|(given, other)| other < settings.max_reversed_ratio * given)
     }
 
-    /// Whether the residual is so large that the nominal bodies may belong to another robot, by the default
-    /// [`ExaminationSettings`].
-    pub fn is_poor(&self) -> bool {
-        self.is_poor_by(&ExaminationSettings::default())
-    }
-
-    /// The same by other settings.
+    /// Whether the residual is so large that the nominal bodies may belong to another robot.
     pub fn is_poor_by(&self, settings: &ExaminationSettings) -> bool {
         self.residual_percent.is_some_and(|left| left > settings.max_nominal_residual_percent)
     }

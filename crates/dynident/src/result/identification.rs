@@ -53,12 +53,14 @@ pub struct ResultFile {
     /// Smallest and largest noise level of each joint's rows, relative to its mean; null unless the estimator is
     /// `noise-weighted`.
     pub noise_levels: Option<Vec<[f64; 2]>>,
-    /// Periods and their noise; null unless the estimator is `maximum-likelihood`.
+    /// Periods and their noise, in results of earlier versions with the estimator `maximum-likelihood`; otherwise
+    /// null.
     pub periodic: Option<PeriodicFit>,
     /// Fourier motion and noise of every training log; only for the estimator `simultaneous` with a period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub series: Option<Vec<SeriesFit>>,
-    /// Spline motion and noise of every training log; only for the estimator `simultaneous` without a period.
+    /// Spline motion and noise of every training log; only for the estimators `simultaneous`
+    /// without a period and `maximum-likelihood`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spline_motion: Option<SplineFit>,
     /// The simulated loop; null unless the estimator is `didim`, `clie` or `cloe`.

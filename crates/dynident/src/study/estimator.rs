@@ -36,7 +36,7 @@ pub enum EstimatorMethod {
     Instrumental,
     /// The caller's function of the rows; a study file cannot contain its code.
     Function,
-    /// Maximum likelihood for periodic motion: the variation between periods gives the noise of motion and torque.
+    /// The same as `simultaneous` with a smoothing spline.
     MaximumLikelihood,
     /// Estimates motion and parameters together from noisy positions and torques. The motion is a smoothing spline, or
     /// a Fourier series if `periods` is given.
@@ -125,9 +125,9 @@ pub struct EstimatorSection {
     pub instruments: Option<InstrumentSettings>,
     /// Local noise estimate for `method = "noise-weighted"`.
     pub noise_levels: NoiseLevels,
-    /// Period of the motion for `method = "maximum-likelihood"`, and for `"simultaneous"` with a Fourier series.
+    /// Period of the motion for `method = "simultaneous"` with a Fourier series.
     pub periods: PeriodSettings,
-    /// Spline motion for `method = "simultaneous"` without `periods`.
+    /// Spline motion for `method = "simultaneous"` without `periods`, and for `"maximum-likelihood"`.
     pub spline: SplineMotionSettings,
     /// Simulation of the closed loop for `method = "didim"`, `"clie"` and `"cloe"`.
     pub simulated: SimulatedSection,
@@ -164,7 +164,7 @@ impl EstimatorSection {
                 rule: self.code.0.clone(),
             }),
             EstimatorMethod::Instrumental => Estimator::Instrumental(self.instruments.clone().unwrap_or_default()),
-            EstimatorMethod::MaximumLikelihood => Estimator::MaximumLikelihood(self.periods.clone()),
+            EstimatorMethod::MaximumLikelihood => Estimator::MaximumLikelihood(self.spline.clone()),
             EstimatorMethod::Simultaneous if self.has_series() => Estimator::Simultaneous(self.periods.clone()),
             EstimatorMethod::Simultaneous => Estimator::SplineMotion(self.spline.clone()),
             EstimatorMethod::Didim => Estimator::Didim(simulated()?),
@@ -181,7 +181,6 @@ impl EstimatorSection {
     /// Whether the method requires the commanded motion.
     pub(crate) fn needs_commanded_motion(&self) -> bool {
         match self.method {
-            EstimatorMethod::MaximumLikelihood => self.periods.period_s.is_none(),
             EstimatorMethod::Simultaneous => self.has_series() && self.periods.period_s.is_none(),
             EstimatorMethod::Didim | EstimatorMethod::Clie | EstimatorMethod::Cloe => true,
             EstimatorMethod::Auto
@@ -192,6 +191,7 @@ impl EstimatorSection {
             | EstimatorMethod::Tukey
             | EstimatorMethod::NoiseWeighted
             | EstimatorMethod::Function
+            | EstimatorMethod::MaximumLikelihood
             | EstimatorMethod::Instrumental => false,
         }
     }

@@ -1,11 +1,11 @@
-//! Estimators that read the logs again: local noise and periods; and their messages for unsuitable logs.
+//! Estimators that read the logs again, and their messages for unsuitable logs.
 use crate::common::{Job, Motion, Random, Truth, header, repository, write_log};
 use dynident::{Error, IdentificationOutcome, identify};
 use std::fmt::Write;
 use std::path::Path;
 
 const CLOCK: (f64, f64) = (250.0, 16.0);
-/// The lowest frequency is 0.13 Hz: 1923.08 samples, so that periods do not start on samples.
+/// The lowest frequency of the motion is 0.13 Hz.
 const PERIOD_S: f64 = 1.0 / 0.13;
 
 fn arm() -> std::path::PathBuf {
@@ -77,124 +77,6 @@ fn rows_count_by_the_noise_around_them() {
     assert!(score(&found, &values, &found.estimate.std) < 2.0);
 }
 
-/// Ten periods with position noise whose second derivative below 30 Hz is as large as that of the motion.
-fn write_periods(folder: &Path, truth: &Truth, periods: f64) {
-    let mut random = Random(8);
-    write_log(&folder.join("log.csv"), truth, &Motion::new(2, 3), (250.0, periods * PERIOD_S), &header(2), |q, tau| {
-        let q: Vec<f64> = q.iter().map(|q| q + 5e-4 * random.normal()).collect();
-        q.into_iter().chain(tau.iter().map(|t| t + 0.2 * random.normal())).collect()
-    });
-}
-
-const NOISY: &str = "motion = { trim_s = 0.3, differentiator = { method = \"butterworth\", cutoff_hz = 30.0 } }";
-
-#[test]
-fn periods_tell_the_noise_and_undo_its_bias() {
-    let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
-    write_periods(folder.path(), &truth, 10.2);
-    let plain = run(folder.path(), &study("weighted", NOISY)).unwrap();
-    let job =
-        Job::new(folder.path(), &(study("maximum-likelihood", NOISY) + &format!("periods.period_s = {PERIOD_S}")));
-    let found = job.identify();
-    let values = truth.base_values(&job.robot());
-    let fit = found.result.periodic.as_ref().unwrap();
-    assert_eq!(fit.periods, [10]);
-    // Position noise below 30 of 125 Hz: half of its standard deviation.
-    assert!(fit.motion_std.iter().all(|std| (2e-4..3.5e-4).contains(&std[0])), "{:?}", fit.motion_std);
-    // The cost is χ²: standard deviation √(2/n), below 5 % for 800 and more; four of these.
-    let degrees_of_freedom = fit.degrees_of_freedom as f64;
-    assert!(
-        (fit.cost / degrees_of_freedom - 1.0).abs() < 4.0 * (2.0 / degrees_of_freedom).sqrt() + 0.1,
-        "{} and {degrees_of_freedom}",
-        fit.cost
-    );
-    let bars = &found.estimate.std;
-    let (likely, weighted) = (score(&found, &values, bars), score(&plain, &values, bars));
-    // Nine squares with mean one: below 1.8 by four standard deviations.
-    assert!(likely < 1.8, "{likely}");
-    assert!(weighted > 3.0 * likely, "{weighted} and {likely}");
-}
-
-fn write_periods_with_friction(folder: &Path, seed: u64, (position, torque): (f64, f64)) -> Truth {
-    let truth = Truth::near(&arm(), 0.1, false);
-    let mut random = Random(seed);
-    write_log(&folder.join("log.csv"), &truth, &Motion::new(2, 3), (250.0, 10.2 * PERIOD_S), &header(2), |q, tau| {
-        let q: Vec<f64> = q.iter().map(|q| q + position * random.normal()).collect();
-        q.into_iter().chain(tau.iter().map(|t| t + torque * random.normal())).collect()
-    });
-    truth
-}
-
-fn study_with_friction(method: &str, cutoff_hz: f64) -> String {
-    let motion = format!("motion.differentiator = {{ method = \"butterworth\", cutoff_hz = {cutoff_hz:?} }}");
-    study(method, &motion).replace("drive.coulomb = \"none\"", "")
-}
-
-#[test]
-fn periods_of_an_arm_with_dry_friction_give_its_parameters() {
-    let folder = tempfile::tempdir().unwrap();
-    let truth = write_periods_with_friction(folder.path(), 8, (1e-7, 1e-3));
-    // The cut-off is nearly four times the highest frequency of the motion; friction reverses within samples, so torque
-    // and regressor must pass the same filter.
-    let text = study_with_friction("maximum-likelihood", 2.4) + &format!("periods.period_s = {PERIOD_S}");
-    let job = Job::new(folder.path(), &text);
-    let found = job.identify();
-    let values = truth.base_values(&job.robot());
-    // Sampling a friction step loses below 1 % of it, but some parameters are a tenth of the friction.
-    crate::common::assert_recovered(&found, &values, 0.05);
-}
-
-#[test]
-fn intervals_from_periods_hold_the_truth_with_dry_friction() {
-    let (mut inside, mut all) = (0, 0);
-    let runs = dynident_testing::count(8, 80);
-    for seed in 0..runs as u64 {
-        let folder = tempfile::tempdir().unwrap();
-        let truth = write_periods_with_friction(folder.path(), 100 + seed, (1e-5, 0.1));
-        let text = study_with_friction("maximum-likelihood", 6.0) + &format!("periods.period_s = {PERIOD_S}");
-        let job = Job::new(folder.path(), &text);
-        let found = job.identify();
-        let values = truth.base_values(&job.robot());
-        for (column, truth) in values.iter().enumerate() {
-            all += 1;
-            inside +=
-                usize::from((found.estimate.values[column] - truth).abs() <= found.estimate.half_width_95[column]);
-        }
-    }
-    // 95 % of a hundred: below 86 % by four standard deviations.
-    let share = inside as f64 / f64::from(all);
-    assert!(share >= 0.86, "{inside} of {all}");
-}
-
-#[test]
-fn the_period_may_come_from_the_commanded_motion() {
-    let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
-    write_periods(folder.path(), &truth, 3.2);
-    let motion = Motion::new(2, 3);
-    let mut table = "t_s,q1,q2,dq1,dq2,ddq1,ddq2".to_owned();
-    for k in 0..=200 {
-        let t = f64::from(k) / 200.0 * PERIOD_S;
-        write!(table, "\n{t}").unwrap();
-        motion.at(t).iter().flatten().for_each(|x| write!(table, ",{x}").unwrap());
-    }
-    std::fs::write(folder.path().join("period.csv"), table + "\n").unwrap();
-    let text = study("maximum-likelihood", NOISY);
-    let named = text.replace("file = \"log.csv\"", "file = \"log.csv\"\nreference = \"period.csv\"");
-    let found = run(folder.path(), &named).unwrap();
-    let fit = found.result.periodic.as_ref().unwrap();
-    assert!((fit.period_s - PERIOD_S).abs() < 1e-12 && fit.periods == [3], "{fit:?}");
-
-    let message = |text: &str| run(folder.path(), text).unwrap_err().to_string();
-    let unknown = message(&(text.clone() + "periods.harmonics = 5"));
-    assert!(unknown.contains("reference"), "{unknown}");
-    let too_few = message(&(text.clone() + "periods = { period_s = 7.69, skip_s = 12.0 }"));
-    assert!(too_few.contains("fewer than two periods"), "{too_few}");
-    let another = message(&(text.clone() + "periods.period_s = 5.0"));
-    assert!(another.contains("does not repeat every 5 s") && another.contains("joint1"), "{another}");
-    let backwards = Job::new_error(folder.path(), &(text + "periods.period_s = -1.0"));
-    assert!(backwards.contains("[estimator.periods]") && backwards.contains("-1"), "{backwards}");
-}
-
 /// Positions with noise of 2 mrad: 0.03 rad/s² at the highest frequency of the motion, 0.65 Hz, and much more behind a
 /// filter that passes the motion.
 fn write_noisy(folder: &Path, name: &str, truth: &Truth, seed: u64, seconds: f64) {
@@ -260,6 +142,19 @@ fn motion_and_parameters_of_any_log_find_the_truth() {
     let plain = Job::new(folder.path(), &study("weighted", "")).identify();
     let (together, alone) = (score(&found, &values, &plain.estimate.std), score(&plain, &values, &plain.estimate.std));
     assert!(together < 1.5 * alone, "{together} and {alone}");
+}
+
+/// `maximum-likelihood` is another name of the spline; a period in its study is not used.
+#[test]
+fn maximum_likelihood_is_the_spline() {
+    let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
+    write_noisy(folder.path(), "log.csv", &truth, 3, 16.0);
+    let spline = run(folder.path(), &study("simultaneous", "")).unwrap();
+    let text = study("maximum-likelihood", "") + &format!("periods.period_s = {PERIOD_S}");
+    let found = run(folder.path(), &text).unwrap();
+    assert_eq!(found.result.method.estimator, "maximum-likelihood");
+    assert!(found.result.periodic.is_none() && found.result.spline_motion.is_some());
+    assert_eq!((found.estimate.values, found.estimate.std), (spline.estimate.values, spline.estimate.std));
 }
 
 #[test]
@@ -351,7 +246,7 @@ fn fewer_samples_than_parameters_is_a_verdict() {
     write_motion(folder.path(), 5, &both);
     with_each_new_method(folder.path(), &both, |method, outcome| {
         let message = outcome.err().unwrap_or_else(|| panic!("{method} made a model of five samples")).to_string();
-        let said = message.contains("rows for") || message.contains("fewer than two periods");
+        let said = message.contains("rows for") || message.contains("no piece of 64 samples");
         assert!(said && (message.contains("joint") || message.contains("log")), "{method}: {message}");
     });
 }

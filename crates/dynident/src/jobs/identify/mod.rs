@@ -305,12 +305,11 @@ fn result_file(
     let parameters = &found.consistent.parameters;
     let covariance = estimate.covariance.view((0, 0), (base, base)).into_owned();
     let (mut gross_errors, mut noise_correlation, mut noise_levels) = (None, None, None);
-    let (mut periodic, mut series, mut spline_motion, mut simulated) = (None, None, None, None);
+    let (mut series, mut spline_motion, mut simulated) = (None, None, None);
     match found.estimation.findings.clone() {
         Findings::GrossErrors(found) => gross_errors = Some(found),
         Findings::NoiseCorrelation(found) => noise_correlation = Some(found),
         Findings::NoiseLevels(found) => noise_levels = Some(found),
-        Findings::Periodic(found) => periodic = Some(found),
         Findings::Series(found) => series = Some(found),
         Findings::Spline(found) => spline_motion = Some(found),
         Findings::Simulated(found) => simulated = Some(found),
@@ -331,7 +330,7 @@ fn result_file(
         gross_errors,
         noise_correlation,
         noise_levels,
-        periodic,
+        periodic: None,
         series,
         spline_motion,
         simulated,
