@@ -165,6 +165,7 @@ fn the_page_of_messages_is_that_of_the_sources() {
     assert!(codes.len() > 500, "{} codes", codes.len());
     let unique: BTreeSet<&String> = codes.iter().collect();
     assert_eq!(unique.len(), codes.len(), "two messages have the same code");
+    assert!(names().iter().all(|page| !unique.contains(page)), "a page has the name of a code");
 }
 
 /// The codes in the first column of the tables with three columns.

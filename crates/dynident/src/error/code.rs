@@ -111,7 +111,7 @@ fn of<E: StdError + 'static>(error: &(dyn StdError + 'static)) -> Option<String>
 
 /// Code of an error from the names of its type and variant: `StudyError::NotUtf8` has `study-not-utf8`.
 pub fn error_code(kind: &str, variant: Option<&str>) -> String {
-    let stem = ["Error", "Fault"].iter().find_map(|end| kind.strip_suffix(end)).filter(|stem| !stem.is_empty());
+    let stem = kind.strip_suffix("Error").filter(|stem| !stem.is_empty());
     let mut code = String::new();
     for letter in stem.unwrap_or(kind).chars().chain(variant.unwrap_or_default().chars()) {
         if letter.is_uppercase() && !code.is_empty() {
