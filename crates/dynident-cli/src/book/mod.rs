@@ -35,6 +35,13 @@ pub(crate) struct Entry<'a> {
     pub(crate) introduction: &'a str,
 }
 
+/// Addition to a sentence in a program without all pages.
+pub(crate) const SMALL_NOTE: &str = if cfg!(feature = "book") {
+    ""
+} else {
+    concat!("; this package contains only the pages about messages; all pages: ", env!("CARGO_PKG_REPOSITORY"))
+};
+
 /// All pages, in the order of the book.
 pub(crate) fn pages() -> Result<Vec<Page>, String> {
     let packed: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/book.deflate"));
@@ -111,7 +118,7 @@ pub(crate) fn page<'a>(pages: &'a [Page], wanted: &str) -> Result<&'a Page, Stri
     near.truncate(MAX_PROPOSED);
     let near = if near.is_empty() { String::new() } else { format!("; similar names: {}", list(&near)) };
     Err(format!(
-        "unknown page or code `{wanted}`{near}; `dynident docs` lists the pages, `dynident docs --search WORDS` searches them"
+        "unknown page or code `{wanted}`{near}; `dynident docs` lists the pages, `dynident docs --search WORDS` searches them{SMALL_NOTE}"
     ))
 }
 

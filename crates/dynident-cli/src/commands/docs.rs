@@ -95,10 +95,8 @@ fn list(pages: &[Page], context: &Context) -> Result<Verdict, String> {
         let line = format!("{:name_columns$}  {}: {}", page.name, page.title(), page.about());
         let _ = writeln!(text, "{}", cut(&line, terminal::width()));
     }
-    text += "\ndynident docs PAGE prints a page, dynident docs CODE explains a message, dynident docs --search WORDS searches\n";
-    if cfg!(not(feature = "book")) {
-        let _ = writeln!(text, "This package contains these pages only; all pages: {}", env!("CARGO_PKG_REPOSITORY"));
-    }
+    text += "\ndynident docs PAGE prints a page\ndynident docs CODE explains a message";
+    let _ = writeln!(text, "\ndynident docs --search WORDS lists the pages with these words{}", book::SMALL_NOTE);
     print(&text)
 }
 
