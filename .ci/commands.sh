@@ -22,6 +22,10 @@ run() {
 }
 
 # README and the first pages: the user's robot.
+run 0 "$dynident" docs
+run 0 "$dynident" docs troubleshooting
+run 0 "$dynident" docs --search lag
+run 0 "$dynident" docs study-toml
 run 0 "$dynident" completions bash
 run 0 "$dynident" man "$out/man"
 run 0 "$dynident" inspect robots/ur10.urdf

@@ -60,6 +60,7 @@ class Error(Exception):
     path: str | PathLike[str] | None
     line: int | None
     column: int | None
+    code: str | None
 
 class LogError(Error): ...
 class ResultError(Error): ...

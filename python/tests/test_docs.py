@@ -21,4 +21,4 @@ def test_examples_run(module: str, root, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_every_exception_says_where_if_anywhere() -> None:
     for kind in [dynident.Error, dynident.RobotError, dynident.StudyError, dynident.LogError, dynident.ResultError]:
         error = kind("nowhere in particular")
-        assert (error.path, error.line, error.column) == (None, None, None)
+        assert (error.path, error.line, error.column, error.code) == (None, None, None, None)

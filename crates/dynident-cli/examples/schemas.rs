@@ -13,6 +13,7 @@ use dynident::result::{
     VALIDATION_SCHEMA, ValidationFile,
 };
 use dynident_benchmark::accuracy::{BENCHMARK_SCHEMA, BenchmarkFile};
+use dynident_cli::{DOCS_SCHEMA, DocsFile};
 use dynident_paper::{PAPER_SCHEMA, PaperFile};
 use schemars::generate::SchemaSettings;
 use schemars::transform::RecursiveTransform;
@@ -30,6 +31,7 @@ pub(crate) fn write_all(folder: &Path) -> Result<(), Box<dyn Error>> {
     let files = [
         (BENCHMARK_SCHEMA, written::<BenchmarkFile>()),
         (CHECK_SCHEMA, written::<CheckFile>()),
+        (DOCS_SCHEMA, written::<DocsFile>()),
         (DESIGN_SCHEMA, written::<DesignFile>()),
         (EVALUATION_SCHEMA, written::<EvaluationFile>()),
         (EXPORT_SCHEMA, written::<ExportFile>()),

@@ -5,10 +5,13 @@
 //! assert_eq!(dynident_cli::run(["dynident", "--version"].map(Into::into)), 0);
 //! ```
 
+mod book;
 mod commands;
 mod progress;
 mod summary;
 mod terminal;
+
+pub use commands::docs::{DOCS_SCHEMA, DocsFile, DocsMessage, DocsPage};
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
@@ -29,7 +32,8 @@ use std::io::Write;
         5. dynident validate R/result.json --study other.toml\n  \
         6. load R/identified.urdf into your controller or simulator\n\n\
         dynident iterate runs a robot repeatedly, each time with a better model; simulate runs it once.\n\
-        dynident reproduce reproduces the paper behind this program; dynident benchmark compares estimators."
+        dynident reproduce reproduces the paper behind this program; dynident benchmark compares estimators.\n\
+        dynident docs prints the pages of the documentation and explains messages."
 )]
 struct Arguments {
     #[command(flatten)]
@@ -85,6 +89,8 @@ enum Command {
     /// Compare estimators on simulated recordings with known truth: error over the Cramér-Rao bound, coverage of error
     /// bars.
     Benchmark(commands::benchmark::Options),
+    /// Print a page of the documentation, or explain the code of a message.
+    Docs(commands::docs::Options),
     /// Print a shell script that completes commands, options and files.
     Completions(commands::completions::Options),
     /// Write the manual pages: `dynident.1`, and one for each command.
@@ -136,6 +142,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Iterate(options) => commands::iterate::run(&options, &context),
         Command::Reproduce(options) => commands::reproduce::run(&options, &context),
         Command::Benchmark(options) => commands::benchmark::run(&options, &context),
+        Command::Docs(options) => commands::docs::run(&options, &context),
         Command::Completions(options) => commands::completions::run(&options, Arguments::command(), &context),
         Command::Man(options) => commands::manual::run(&options, Arguments::command(), &context),
     });

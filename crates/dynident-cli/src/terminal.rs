@@ -4,6 +4,9 @@
 use dynident_text::{shortened_lines, visible};
 use std::io::{self, IsTerminal, Write as _};
 
+/// Columns of text in a pipe.
+const DEFAULT_WIDTH: usize = 80;
+
 /// Prints text for people to standard output, with long lines shortened. A closed pipe (`| head`) ends the printing,
 /// not the program.
 pub(crate) fn print(text: &str) -> Result<(), String> {
@@ -51,6 +54,24 @@ pub(crate) fn ask(question: &str) {
     let mut out = io::stderr().lock();
     let _ = write!(out, "{}", visible(question));
     let _ = out.flush();
+}
+
+/// Columns of text for people: those of the terminal, otherwise 80.
+#[cfg(unix)]
+pub(crate) fn width() -> usize {
+    let size = rustix::termios::tcgetwinsize(io::stdout());
+    size.ok().map(|size| usize::from(size.ws_col)).filter(|&columns| columns > 0).unwrap_or(DEFAULT_WIDTH)
+}
+
+/// Columns of text for people.
+#[cfg(not(unix))]
+pub(crate) fn width() -> usize {
+    DEFAULT_WIDTH
+}
+
+/// Whether standard output shows bold text.
+pub(crate) fn is_styled() -> bool {
+    io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
 pub(crate) fn watched() -> bool {

@@ -47,9 +47,9 @@ pub enum ExportError {
     #[error("the model cannot be written as JSON: {message}")]
     Json { message: String },
     /// Terms that do not belong to the model.
-    #[error(transparent)]
+    #[error("{0}")]
     Terms(#[from] ParametricModelError),
     /// Numbers that do not form a valid model.
-    #[error(transparent)]
+    #[error("{0}")]
     Model(#[from] ModelError),
 }

@@ -19,34 +19,34 @@ pub enum IdentificationError {
     #[error("no log has the role \"identify\": there is nothing to fit to")]
     NoTrainingLog,
     /// A recording gives no rows.
-    #[error(transparent)]
+    #[error("{0}")]
     Log(#[from] LogError),
     /// The estimation fails.
-    #[error(transparent)]
+    #[error("{0}")]
     Estimation(#[from] EstimationError),
     /// The estimator fails.
-    #[error(transparent)]
-    Estimator(EstimatorError),
+    #[error("{0}")]
+    Estimator(#[source] EstimatorError),
     /// Terms do not match the robot.
-    #[error(transparent)]
+    #[error("{0}")]
     Model(#[from] ParametricModelError),
     /// Payloads, offsets per log or gains contradict each other.
-    #[error(transparent)]
+    #[error("{0}")]
     Payload(#[from] PayloadError),
     /// Prior knowledge of unknown bodies.
     #[error("[estimator.physical]: {0}")]
-    Consistency(ConsistencyError),
+    Consistency(#[source] ConsistencyError),
     /// The logs cannot be reduced to factors.
-    #[error(transparent)]
+    #[error("{0}")]
     Reduce(#[from] ReduceError),
     /// A threshold is invalid.
-    #[error(transparent)]
+    #[error("{0}")]
     Threshold(#[from] ThresholdError),
     /// The intervals cannot be computed.
     #[error("estimator.intervals: {0}")]
-    Intervals(ConsistencyError),
+    Intervals(#[source] ConsistencyError),
     /// An invalid limit of diagnosis or examination.
-    #[error(transparent)]
+    #[error("{0}")]
     Limit(#[from] InvalidLimit),
 }
 

@@ -11,6 +11,7 @@ pub struct Located<F: Error> {
     /// Column, from 1, in characters.
     pub column: u32,
     /// The fault, with the fix.
+    #[source]
     pub fault: F,
 }
 

@@ -18,10 +18,10 @@ pub enum OnlineError {
     #[error("joint {joint}: its friction follows its temperature, which samples do not have: identify without it")]
     Temperature { joint: String },
     /// No consistent parameters were found.
-    #[error(transparent)]
+    #[error("{0}")]
     Consistency(#[from] ConsistencyError),
     /// Rows that the factor rejects.
-    #[error(transparent)]
+    #[error("{0}")]
     Rows(#[from] EstimationError),
 }
 

@@ -9,7 +9,7 @@ create_exception!(
     dynident,
     Error,
     PyException,
-    "An error, with the file, the place and the fix in its message.\n\n`path`, `line` and `column` are the place of the error, or None."
+    "An error, with the file, the place and the fix in its message.\n\n`path`, `line` and `column` are the place of the error, or None. `code` is the name under which `dynident docs` explains the message, or None."
 );
 create_exception!(dynident, RobotError, Error, "A robot description that cannot be read, or an unknown name in it.");
 create_exception!(dynident, StudyError, Error, "An invalid study.");
@@ -59,5 +59,6 @@ pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
     let _ = value.setattr("path", path);
     let _ = value.setattr("line", line);
     let _ = value.setattr("column", column);
+    let _ = value.setattr("code", error.code());
     exception
 }

@@ -47,7 +47,7 @@ mod _native {
     #[pymodule_init]
     fn with_version(module: &Bound<'_, PyModule>) -> PyResult<()> {
         // Default for exceptions without a place.
-        for place in ["path", "line", "column"] {
+        for place in ["path", "line", "column", "code"] {
             module.py().get_type::<crate::errors::Error>().setattr(place, module.py().None())?;
         }
         module.add("__version__", env!("CARGO_PKG_VERSION"))

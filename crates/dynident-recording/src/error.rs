@@ -26,7 +26,7 @@ impl FormatError {
 #[non_exhaustive]
 pub enum RecordingError {
     /// The log format is invalid.
-    #[error(transparent)]
+    #[error("{0}")]
     Format(#[from] FormatError),
     /// The operating system could not read the file.
     #[error("{}: cannot be read ({source}); check the path and its permissions", file.display())]
@@ -65,8 +65,8 @@ pub enum RecordingError {
         line: u64,
     },
     /// The file cannot be read in its format.
-    #[error(transparent)]
-    File(dynident_formats::FileError),
+    #[error("{0}")]
+    File(#[source] dynident_formats::FileError),
     /// A line is longer than the limit.
     #[error("{}:{line}: the line is longer than {limit} bytes; is this a CSV file with one sample per line?", file.display())]
     LineTooLong {
@@ -200,7 +200,7 @@ pub enum RecordingError {
         reason: String,
     },
     /// A filter setting is invalid.
-    #[error(transparent)]
+    #[error("{0}")]
     Filter(#[from] FilterError),
     /// A table of the commanded motion is invalid.
     #[error("{}: not a reference motion: {problem}; give a table as written by design: t_s, q1.., dq1.., ddq1..", file.display())]

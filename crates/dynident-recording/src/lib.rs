@@ -78,6 +78,7 @@ pub mod report;
 
 pub use cleaning::{CleaningSettings, Reason, RejectedSamples};
 pub use derivative::{Derivatives, Differentiator, DifferentiatorSettings, Place, SampleRanges};
+pub use dynident_formats::FileError;
 pub use error::{FilterError, FormatError, RecordingError};
 pub use filter::{DecimationSettings, Decimator, cutoff, position_noise};
 pub use log::{FileLog, JointSamples, Log, LogFormat, LogReader, LogSource, LogTable, MemoryLog, RawBlock};

@@ -59,10 +59,10 @@ pub enum SimulationError {
     )]
     MassMatrix,
     /// The parts of a model do not fit together.
-    #[error(transparent)]
+    #[error("{0}")]
     Model(#[from] ModelError),
     /// An invalid trajectory.
-    #[error(transparent)]
+    #[error("{0}")]
     Family(#[from] FamilyError),
 }
 

@@ -74,7 +74,7 @@ pub use dynident_text as text;
 pub use dynident_identification::{Progress, Role, Silent};
 pub use dynident_system::{ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
 pub use dynident_text::shortened_message;
-pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError, XacroError};
+pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError, XacroError, error_code};
 pub use factors::{FactorLog, Factors, seconds_of};
 pub use inputs::{MAX_RESULT_BYTES, read_result, refuse_overwriting, study_inputs};
 pub use jobs::check::{CheckSettings, check, check_with};

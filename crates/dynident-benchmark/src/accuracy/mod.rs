@@ -94,8 +94,8 @@ pub enum BenchmarkError {
         source: FilterError,
     },
     /// An error of the pipeline.
-    #[error(transparent)]
-    Pipeline(Box<IdentificationError>),
+    #[error("{0}")]
+    Pipeline(#[source] Box<IdentificationError>),
 }
 
 impl From<IdentificationError> for BenchmarkError {

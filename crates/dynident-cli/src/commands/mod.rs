@@ -5,6 +5,7 @@ pub(crate) mod benchmark;
 pub(crate) mod check;
 pub(crate) mod completions;
 pub(crate) mod design;
+pub(crate) mod docs;
 pub(crate) mod evaluate;
 pub(crate) mod export;
 mod factors;
@@ -65,7 +66,15 @@ pub(crate) fn pretty_json<T: Serialize>(value: &T) -> Result<Vec<u8>, String> {
 
 #[allow(clippy::needless_pass_by_value, reason = "required by map_err")]
 pub(crate) fn message_of(error: dynident::Error) -> String {
-    error.to_string()
+    explained(error.to_string(), &error)
+}
+
+/// The message of an error with the command that explains its code, on a separate line.
+fn explained(message: String, error: &dynident::Error) -> String {
+    match error.code() {
+        Some(code) => format!("{message}\nhelp: dynident docs {code}"),
+        None => message,
+    }
 }
 
 /// A limit for the relative error, in percent.
@@ -133,8 +142,9 @@ pub(crate) fn refuse_overwriting(
 /// name.
 pub(crate) fn known_in(study: &Path) -> impl Fn(dynident::Error) -> String {
     use dynident::Error::{Missing, Recording, Robot, Xacro};
-    move |error| match error {
-        Recording { .. } | Missing { .. } | Robot(_) | Xacro { .. } => format!("{}: {error}", study.display()),
-        _ => error.to_string(),
+    move |error| {
+        let is_elsewhere = matches!(error, Recording { .. } | Missing { .. } | Robot(_) | Xacro { .. });
+        let message = if is_elsewhere { format!("{}: {error}", study.display()) } else { error.to_string() };
+        explained(message, &error)
     }
 }

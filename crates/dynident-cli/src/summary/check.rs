@@ -1,4 +1,4 @@
-use super::text::{name, table, wrapped};
+use super::text::{explained, name, table, wrapped};
 use core::fmt::Write;
 use dynident::CheckFile;
 use dynident::recording::Level;
@@ -22,6 +22,7 @@ pub(crate) fn check(file: &CheckFile) -> String {
             text += &wrapped(&format!("  not distinguishable with these logs: {other}"), 4);
         }
     }
+    text += &explained(check.findings.iter().map(|finding| &finding.code[..]));
     if let Some(written) = &check.as_written {
         let best = check.best.as_ref();
         text.push_str("\nTorque not explained by any physically consistent model:\n");

@@ -1,6 +1,6 @@
 //! Findings of the importer; equal findings of several joints and logs are combined.
 
-use super::text::wrapped;
+use super::text::{explained, wrapped};
 use dynident::ResultFile;
 use dynident::recording::Level;
 use dynident::result::LogSummary;
@@ -39,15 +39,17 @@ pub(super) fn warnings(logs: &[LogSummary]) -> String {
 
 /// Findings of one level, with equal ones combined.
 fn of_level(logs: &[LogSummary], level: Level) -> String {
-    let mut groups: Vec<Group> = Vec::new();
+    let (mut groups, mut codes): (Vec<Group>, Vec<&str>) = (Vec::new(), Vec::new());
     for (log, summary) in logs.iter().enumerate() {
         for finding in summary.import.findings.iter().chain(&summary.model_findings) {
             if finding.level == level {
                 add(&mut groups, log, finding);
+                codes.push(&finding.code);
             }
         }
     }
-    groups.iter().map(|group| wrapped(&sentence(group, logs), 4)).collect()
+    let sentences: String = groups.iter().map(|group| wrapped(&sentence(group, logs), 4)).collect();
+    sentences + &explained(codes.into_iter())
 }
 
 fn add(groups: &mut Vec<Group>, log: usize, finding: &dynident::recording::Finding) {

@@ -1,6 +1,7 @@
 //! Formatting of words and numbers within a given width.
 
 use comfy_table::{CellAlignment, Table, presets};
+use std::collections::BTreeSet;
 
 pub(super) const WIDTH: usize = 80;
 
@@ -29,6 +30,16 @@ pub(super) fn wrapped(words: &str, indent: usize) -> String {
     }
     text.push('\n');
     text.replace('\u{a0}', " ")
+}
+
+/// The line that names the codes of findings; empty without codes.
+pub(super) fn explained<'a>(codes: impl Iterator<Item = &'a str>) -> String {
+    let codes: BTreeSet<&str> = codes.filter(|code| !code.is_empty()).collect();
+    let codes: Vec<&str> = codes.into_iter().collect();
+    if codes.is_empty() {
+        return String::new();
+    }
+    wrapped(&format!("  help: dynident docs CODE explains {}", codes.join(", ")), 4)
 }
 
 /// A table without lines: names left-aligned, numbers right-aligned, no trailing blanks.

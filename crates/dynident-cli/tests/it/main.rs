@@ -9,6 +9,7 @@ mod contract;
 mod design;
 mod design_check;
 mod design_paper;
+mod docs;
 mod edited_result;
 mod evaluation;
 mod export;

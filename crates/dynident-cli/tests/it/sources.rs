@@ -38,14 +38,14 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 /// The lines of a source without comments and without its tests, which are at its end.
-fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
+pub(crate) fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let is_test = |line: &&str| line.starts_with("#[cfg(test)]") || line.starts_with("#[cfg(all(test");
     let own = text.lines().take_while(move |line| !is_test(line)).enumerate();
     own.filter(|(_, line)| !line.trim_start().starts_with("//"))
 }
 
-#[test]
-fn programs_folders_and_clocks_are_used_in_one_place() {
+/// All sources of all crates except the tests' own, with their paths from the folder `crates`.
+pub(crate) fn all() -> Vec<(String, String)> {
     let crates = repository("crates");
     let mut files = Vec::new();
     for entry in std::fs::read_dir(&crates).unwrap() {
@@ -54,15 +54,20 @@ fn programs_folders_and_clocks_are_used_in_one_place() {
             sources(&folder.join("src"), &mut files);
         }
     }
+    let named = |path: &PathBuf| path.strip_prefix(&crates).unwrap().to_string_lossy().replace('\\', "/");
+    files.iter().map(|path| (named(path), std::fs::read_to_string(path).unwrap())).collect()
+}
+
+#[test]
+fn programs_folders_and_clocks_are_used_in_one_place() {
+    let files = all();
     assert!(files.len() > 300);
     for (calls, places, reason) in ONLY_IN {
         let mut seen = Vec::new();
-        for path in &files {
-            let name = path.strip_prefix(&crates).unwrap().to_string_lossy().replace('\\', "/");
-            let text = std::fs::read_to_string(path).unwrap();
-            for (number, line) in code(&text) {
+        for (name, text) in &files {
+            for (number, line) in code(text) {
                 if calls.iter().any(|call| line.contains(call)) {
-                    assert!(places.contains(&&*name), "{name}:{}: {line}\n{reason}", number + 1);
+                    assert!(places.contains(&&name[..]), "{name}:{}: {line}\n{reason}", number + 1);
                     seen.push(name.clone());
                 }
             }

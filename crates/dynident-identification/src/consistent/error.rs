@@ -33,9 +33,9 @@ pub enum ConsistencyError {
         known: Vec<String>,
     },
     /// Contradictory limits, an inconsistent prior body, values that are not finite.
-    #[error(transparent)]
+    #[error("{0}")]
     Physical(#[from] PhysicalError),
     /// Factors of another robot.
-    #[error(transparent)]
+    #[error("{0}")]
     Estimation(#[from] EstimationError),
 }

@@ -11,15 +11,15 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum DiagnosisError {
     /// An unreadable recording.
-    #[error(transparent)]
+    #[error("{0}")]
     Log(#[from] LogError),
     /// Too few rows.
-    #[error(transparent)]
+    #[error("{0}")]
     Estimation(#[from] EstimationError),
     /// Drive inertia that does not suit the robot.
-    #[error(transparent)]
+    #[error("{0}")]
     Model(#[from] ParametricModelError),
     /// An invalid limit.
-    #[error(transparent)]
+    #[error("{0}")]
     Limit(#[from] InvalidLimit),
 }

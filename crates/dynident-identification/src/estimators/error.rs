@@ -9,10 +9,10 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum EstimatorError {
     /// A recording gives no rows.
-    #[error(transparent)]
+    #[error("{0}")]
     Log(#[from] LogError),
     /// The rows do not determine an estimate.
-    #[error(transparent)]
+    #[error("{0}")]
     Estimation(#[from] EstimationError),
     /// A log or robot does not meet a requirement of the estimator.
     #[error("estimator.method = \"{method}\": {message}")]

@@ -8,7 +8,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub(super) enum NoStartError {
     #[error("no physically consistent set is available as start: {0}")]
-    Inconsistent(ConsistencyError),
+    Inconsistent(#[source] ConsistencyError),
     #[error("the robot description cannot be the start, because it has no inertial of {}", .0.join(", "))]
     Undescribed(Vec<String>),
     #[error("{0}; {1}")]

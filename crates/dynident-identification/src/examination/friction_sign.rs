@@ -70,6 +70,7 @@ pub fn friction_signs(model: &RegressorModel, problem: &LinearProblem, estimate:
 /// (`no_other_reading`): then an unmodelled effect is the likelier cause.
 pub fn friction_sign_findings(signs: &[FrictionSign], no_other_reading: bool) -> impl Iterator<Item = Finding> {
     signs.iter().filter(|sign| sign.is_reversed()).map(move |sign| Finding {
+        code: "fit-negative-friction".to_owned(),
         level: if no_other_reading { Level::Warning } else { Level::Problem },
         channel: format!("torque {}", sign.joint),
         message: format!(

@@ -191,22 +191,24 @@ impl PriorAgreement {
 /// The agreement as sentences.
 pub fn agreement_findings(agreement: &PriorAgreement) -> Vec<Finding> {
     let mut findings = Vec::new();
-    let mut add = |level, channel: String, message| findings.push(Finding { level, channel, message });
+    let mut add = |code: &str, level, channel: String, message| {
+        findings.push(Finding { code: code.to_owned(), level, channel, message });
+    };
     if let (Some(given), Some(other)) = (agreement.residual_percent, agreement.residual_percent_if_reversed) {
         if agreement.is_whole_reversed(&ExaminationSettings::default()) {
             let message = format!(
                 "the torque has the opposite sign of the model: with the robot description {given:.0} % of the torque are unexplained as given and \
                  {other:.0} % with the opposite sign; write `sign = -1` under torque"
             );
-            add(Level::Problem, "torque".to_owned(), message);
+            add("fit-torque-sign", Level::Problem, "torque".to_owned(), message);
         } else {
             let message = format!(
                 "with the robot description {given:.1} % of the torque are unexplained ({other:.0} % with the opposite sign)"
             );
-            add(Level::Info, "torque".to_owned(), message);
+            add("fit-description", Level::Info, "torque".to_owned(), message);
             for joint in &agreement.reversed_joints {
                 let message = "the opposite sign fits far better: check the sign of position and torque".to_owned();
-                add(Level::Problem, format!("torque {joint}"), message);
+                add("fit-joint-sign", Level::Problem, format!("torque {joint}"), message);
             }
         }
     }

@@ -66,6 +66,7 @@ pub fn sign_evidence(
 /// The finding of a reversed sign.
 pub fn sign_findings(evidence: &TorqueSignCheck) -> Option<Finding> {
     evidence.is_reversed().then(|| Finding {
+        code: "fit-torque-sign".to_owned(),
         level: Level::Problem,
         channel: "torque".to_owned(),
         message: format!(

@@ -61,7 +61,12 @@ pub fn delay_findings(lags: &[Option<TorqueLag>], joints: &[String]) -> Vec<Find
                 1e3 * lag.lag_s.abs(),
                 1e3 * lag.half_width_95_s
             );
-            Finding { level: Level::Info, channel: format!("torque {joint}"), message }
+            Finding {
+                code: "fit-torque-lag".to_owned(),
+                level: Level::Info,
+                channel: format!("torque {joint}"),
+                message,
+            }
         })
     };
     joints.iter().zip(lags).filter_map(of_joint).collect()

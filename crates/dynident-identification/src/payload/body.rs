@@ -54,9 +54,9 @@ const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 
 pub(crate) enum NoBodyError {
     #[error("its covariance is not positive definite")]
     Covariance,
-    #[error(transparent)]
+    #[error("{0}")]
     Estimation(#[from] EstimationError),
-    #[error(transparent)]
+    #[error("{0}")]
     Physical(#[from] PhysicalError),
 }
 

@@ -90,7 +90,7 @@ enum NotRedesigned {
     Interrupted,
     #[error("the best other motion reduces the error bars by only {percent:.0} %")]
     NoBetter { percent: f64 },
-    #[error(transparent)]
+    #[error("{0}")]
     Numbers(#[from] SimulationError),
 }
 

@@ -14,10 +14,10 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum IterationError {
     /// Invalid robot, controller or setting.
-    #[error(transparent)]
+    #[error("{0}")]
     Experiment(#[from] SimulationError),
     /// Parts of the robot that do not fit together.
-    #[error(transparent)]
+    #[error("{0}")]
     Model(#[from] ParametricModelError),
     /// Stored friction of an earlier run that does not fit this robot.
     #[error(
@@ -30,13 +30,13 @@ pub enum IterationError {
         source: ParametricModelError,
     },
     /// Rows that are not sufficient for a model.
-    #[error(transparent)]
+    #[error("{0}")]
     Identification(#[from] IdentificationError),
     /// Invalid differentiator or filter.
-    #[error(transparent)]
+    #[error("{0}")]
     Filter(#[from] FilterError),
     /// Rows that are not sufficient for an estimate.
-    #[error(transparent)]
+    #[error("{0}")]
     Estimation(#[from] EstimationError),
     /// An unusable record.
     #[error("record of joints {}: {problem}", joints.join(", "))]

@@ -103,10 +103,10 @@ pub enum HomeError {
     #[error("the search for the paths from and to home was interrupted")]
     Interrupted,
     /// Invalid limits.
-    #[error(transparent)]
+    #[error("{0}")]
     Limits(#[from] LimitError),
     /// Invalid numbers.
-    #[error(transparent)]
+    #[error("{0}")]
     Numbers(#[from] SimulationError),
 }
 

@@ -30,7 +30,11 @@ pub enum MeshError {
     #[error("{}: cannot be read: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
     #[error("{}: {fault}", path.display())]
-    Content { path: PathBuf, fault: MeshFault },
+    Content {
+        path: PathBuf,
+        #[source]
+        fault: MeshFault,
+    },
     #[error("{what}")]
     Unsupported {
         /// The element and what is wrong with it.

@@ -21,7 +21,7 @@ const SIGNATURE: &str = "# identified: ";
 #[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum DhWriteError {
     /// The original is not readable.
-    #[error(transparent)]
+    #[error("{0}")]
     Original(#[from] DhError),
     #[error("the D-H table has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },

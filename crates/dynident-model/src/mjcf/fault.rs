@@ -13,7 +13,13 @@ pub type MjcfError = Located<MjcfFault>;
 #[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum MjcfFault {
     #[error("in the included `{file}`, {line}:{column}: {fault}")]
-    Included { file: String, line: u32, column: u32, fault: Box<MjcfFault> },
+    Included {
+        file: String,
+        line: u32,
+        column: u32,
+        #[source]
+        fault: Box<MjcfFault>,
+    },
     #[error("the included `{file}` cannot be read: {reason}; give its path from the folder of the main file")]
     Include { file: String, reason: String },
     #[error("`{file}` is included a second time: delete one <include>, MuJoCo takes each file once")]

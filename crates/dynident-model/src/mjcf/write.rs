@@ -27,7 +27,7 @@ use thiserror::Error;
 #[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum MjcfWriteError {
     /// The original is not readable.
-    #[error(transparent)]
+    #[error("{0}")]
     Original(#[from] MjcfError),
     #[error("the MJCF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },

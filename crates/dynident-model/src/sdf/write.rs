@@ -26,7 +26,7 @@ use thiserror::Error;
 #[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum SdfWriteError {
     /// The original is not readable.
-    #[error(transparent)]
+    #[error("{0}")]
     Original(#[from] SdfError),
     #[error("the SDF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },

@@ -65,7 +65,7 @@ pub struct JointChange {
 #[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum UrdfWriteError {
     /// The original is not readable.
-    #[error(transparent)]
+    #[error("{0}")]
     Original(#[from] UrdfError),
     #[error("the URDF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },

@@ -27,6 +27,16 @@ impl Reason {
             Self::Spike => Quantity::Position,
         }
     }
+
+    /// Code of its finding.
+    pub(crate) fn code(self) -> &'static str {
+        match self {
+            Self::Outlier => "import-outliers",
+            Self::Held => "import-held-torque",
+            Self::Saturated => "import-saturated-torque",
+            Self::Spike => "import-spikes",
+        }
+    }
 }
 
 /// Rejected samples of one channel of one joint.

@@ -20,8 +20,8 @@ fn ordinal(number: u64) -> String {
 struct Findings(Vec<Finding>);
 
 impl Findings {
-    fn add(&mut self, level: Level, channel: &str, message: String) {
-        self.0.push(Finding { level, channel: channel.to_owned(), message });
+    fn add(&mut self, code: &str, level: Level, channel: &str, message: String) {
+        self.0.push(Finding { code: code.to_owned(), level, channel: channel.to_owned(), message });
     }
 }
 
@@ -52,7 +52,7 @@ impl ImportReport {
             self.check_jumps(channel, &mut findings);
         }
         if let Some((joints, message)) = self.position_jumps() {
-            findings.add(Level::Problem, &format!("position {joints}"), message);
+            findings.add("import-position-jumps", Level::Problem, &format!("position {joints}"), message);
         }
         for (quantity, comparisons) in [("velocity", &self.velocity), ("acceleration", &self.acceleration)] {
             for comparison in comparisons {
@@ -65,6 +65,7 @@ impl ImportReport {
 
     fn check_clock(&self, findings: &mut Findings) {
         findings.add(
+            "import-rows",
             Level::Info,
             "time",
             format!("{} rows at {:.4} Hz; {}", self.rows, self.rate_hz, self.clock.evidence),
@@ -74,30 +75,30 @@ impl ImportReport {
                 "{} steps longer than three median steps, the first of {:.4} s after row {} at {:.4} s",
                 self.gap_count, gap.length_s, gap.row, gap.time_s
             );
-            findings.add(Level::Warning, "time", message);
+            findings.add("import-gaps", Level::Warning, "time", message);
         }
     }
 
     fn check_pieces(&self, findings: &mut Findings) {
         if self.segments > 1 {
-            findings.add(Level::Info, "time", format!("split at gaps into {} pieces", self.segments));
+            findings.add("import-pieces", Level::Info, "time", format!("split at gaps into {} pieces", self.segments));
         }
         if self.bridged[0] > 0 {
             let [gaps, samples] = self.bridged;
             let message = format!("{gaps} short gaps were filled; the {samples} samples in them are not used as rows");
-            findings.add(Level::Info, "time", message);
+            findings.add("import-filled-gaps", Level::Info, "time", message);
         }
         if self.short_segments[0] > 0 {
             let [pieces, samples] = self.short_segments;
             let message = format!("{pieces} pieces too short for the filter were left out ({samples} samples)");
-            findings.add(Level::Warning, "time", message);
+            findings.add("import-short-pieces", Level::Warning, "time", message);
         }
         if self.unmapped_samples > 0 {
             let message = format!(
                 "{} samples were left out: off the stroke, or the commanded motion is not followed or not known there",
                 self.unmapped_samples
             );
-            findings.add(Level::Warning, "position", message);
+            findings.add("import-off-reference", Level::Warning, "position", message);
         }
     }
 
@@ -109,10 +110,16 @@ impl ImportReport {
                 "stamps equal the one before; rounded stamps are harmless, because the rate is the number of all rows \
                  over the time span"
             };
-            findings.add(Level::Warning, "time", format!("{} {what}", self.duplicate_stamps));
+            findings.add(
+                "import-duplicate-stamps",
+                Level::Warning,
+                "time",
+                format!("{} {what}", self.duplicate_stamps),
+            );
         }
         if self.backward_stamps > 0 {
             findings.add(
+                "import-backward-stamps",
                 Level::Problem,
                 "time",
                 format!("{} stamps are earlier than the one before", self.backward_stamps),
@@ -120,7 +127,7 @@ impl ImportReport {
         }
         if self.crowded_samples > 0 {
             let message = format!("{} samples are too close to the one before and were left out", self.crowded_samples);
-            findings.add(Level::Info, "time", message);
+            findings.add("import-crowded-samples", Level::Info, "time", message);
         }
     }
 
@@ -133,28 +140,39 @@ impl ImportReport {
                 ordinal(every),
                 self.rate_hz / every as f64
             );
-            findings.add(Level::Warning, quantity, message);
+            findings.add("import-repeated-values", Level::Warning, quantity, message);
         }
     }
 
     fn check_left_out(&self, findings: &mut Findings, limits: &ReportSettings) {
         if self.dropped.missing > 0 {
             findings.add(
+                "import-missing-values",
                 Level::Warning,
                 "rows",
                 format!("{} rows with missing values were left out", self.dropped.missing),
             );
         }
         if self.dropped.by_rule > 0 {
-            findings.add(Level::Info, "rows", format!("{} rows were left out by the rules", self.dropped.by_rule));
+            findings.add(
+                "import-rows-by-rule",
+                Level::Info,
+                "rows",
+                format!("{} rows were left out by the rules", self.dropped.by_rule),
+            );
         }
         if let Some(place) = &self.dropped.truncated {
-            findings.add(Level::Info, "rows", format!("the truncated last line was left out ({place})"));
+            findings.add(
+                "import-truncated-line",
+                Level::Info,
+                "rows",
+                format!("the truncated last line was left out ({place})"),
+            );
         }
         for found in &self.set_aside {
             let name = format!("{} {}", found.channel.key(), found.joint);
             let few = found.share < limits.max_info_share && matches!(found.reason, Reason::Outlier | Reason::Spike);
-            findings.add(if few { Level::Info } else { Level::Warning }, &name, found.sentence());
+            findings.add(found.reason.code(), if few { Level::Info } else { Level::Warning }, &name, found.sentence());
         }
     }
 
@@ -162,10 +180,10 @@ impl ImportReport {
         let Channel { name, measured } = Channel::of(channel);
         if channel.constant() {
             let level = if measured { Level::Problem } else { Level::Warning };
-            findings.add(level, &name, format!("dead: constantly {}", channel.min));
+            findings.add("import-dead", level, &name, format!("dead: constantly {}", channel.min));
         } else if channel.zero_share > 0.5 {
             let message = format!("mostly dead: {:.1} % of the samples are exactly zero", 100.0 * channel.zero_share);
-            findings.add(if measured { Level::Problem } else { Level::Warning }, &name, message);
+            findings.add("import-mostly-dead", if measured { Level::Problem } else { Level::Warning }, &name, message);
         }
         let of_channel = |found: &RejectedSamples, reason: Reason| {
             found.channel == channel.channel && found.joint == channel.joint && found.reason == reason
@@ -176,7 +194,7 @@ impl ImportReport {
                 "saturated? {} samples in a row at an extreme of [{}, {}]",
                 channel.longest_run_at_extreme, channel.min, channel.max
             );
-            findings.add(Level::Warning, &name, message);
+            findings.add("import-saturated", Level::Warning, &name, message);
         }
     }
 
@@ -188,7 +206,7 @@ impl ImportReport {
                  (numpy.unwrap) before reading",
                 channel.turns
             );
-            findings.add(Level::Problem, &name, message);
+            findings.add("import-whole-turns", Level::Problem, &name, message);
         }
         if let Some(worst) = &channel.worst_lone_sample
             && !self.sets_aside(channel)
@@ -198,12 +216,17 @@ impl ImportReport {
                  set `missing = \"drop\"`",
                 channel.lone_samples, worst.row, worst.value, worst.before
             );
-            findings.add(if measured { Level::Problem } else { Level::Warning }, &name, message);
+            findings.add(
+                "import-isolated-samples",
+                if measured { Level::Problem } else { Level::Warning },
+                &name,
+                message,
+            );
         }
         if let Some(step) = channel.quantisation_step
             && measured
         {
-            findings.add(Level::Info, &name, format!("quantised in steps of {step:.3e}"));
+            findings.add("import-quantised", Level::Info, &name, format!("quantised in steps of {step:.3e}"));
         }
     }
 
@@ -250,21 +273,26 @@ impl ImportReport {
         let difference = 100.0 * comparison.relative_rms_difference;
         if comparison.correlation < limits.opposite_correlation {
             let message = "the logged signal has the opposite sign of the position's derivative";
-            findings.add(Level::Problem, &name, message.to_owned());
+            findings.add("import-derivative-opposite", Level::Problem, &name, message.to_owned());
         } else if let Some(times) = comparison.times(limits).filter(|_| quantity == "velocity") {
             let message = DerivativeComparison::describe_velocity(times, self.rate_hz, limits);
-            findings.add(Level::Warning, &name, message);
+            findings.add("import-derivative-scale", Level::Warning, &name, message);
         } else if difference > limits.min_difference_percent && comparison.lag.is_some() {
             let message = format!(
                 "differs from the position's derivative by {difference:.1} % RMS (correlation {:.3})",
                 comparison.correlation
             );
-            findings.add(Level::Warning, &name, message);
+            findings.add("import-derivative-difference", Level::Warning, &name, message);
         } else if let Some(lag) = &comparison.lag
             && lag.matters()
             && lag.samples.abs() > 0.5
         {
-            findings.add(Level::Info, &name, format!("is {:.4} s behind the position's derivative", lag.seconds));
+            findings.add(
+                "import-derivative-lag",
+                Level::Info,
+                &name,
+                format!("is {:.4} s behind the position's derivative", lag.seconds),
+            );
         }
     }
 }

@@ -49,6 +49,9 @@ pub struct Finding {
     pub channel: String,
     /// Description in one sentence.
     pub message: String,
+    /// Code, which `dynident docs` explains; empty in results of older versions.
+    #[serde(default)]
+    pub code: String,
 }
 
 /// A step between successive samples that is longer than three median steps.

@@ -87,7 +87,7 @@ pub enum LogError {
         source: EstimationError,
     },
     /// The consumer rejects the rows.
-    #[error(transparent)]
+    #[error("{0}")]
     Refused(#[from] EstimationError),
 }
 

@@ -1,10 +1,12 @@
 //! Errors that end a job. Each message contains the file, the place and the fix.
 
+mod code;
 mod factors;
 mod new_study;
 mod study;
 mod xacro;
 
+pub use code::error_code;
 pub use factors::FactorsError;
 pub use new_study::NewStudyError;
 pub use study::{Expected, StudyError};
@@ -76,8 +78,8 @@ pub enum Error {
         source_of_data: Option<String>,
     },
     /// A robot description that cannot be read.
-    #[error(transparent)]
-    Robot(Box<ReadError>),
+    #[error("{0}")]
+    Robot(#[source] Box<ReadError>),
     /// A robot file whose macros cannot be expanded.
     #[error("{}: {source}", path.display())]
     Xacro {
@@ -125,8 +127,8 @@ pub enum Error {
         source: FactorsError,
     },
     /// Recordings from which a study cannot be written.
-    #[error(transparent)]
-    NewStudy(NewStudyError),
+    #[error("{0}")]
+    NewStudy(#[source] NewStudyError),
     /// A model that the export target cannot represent.
     #[error("{}: {source}", path.display())]
     Export {

@@ -10,7 +10,7 @@ const MAX_SHOWN: usize = 12;
 #[non_exhaustive]
 pub enum NewStudyError {
     /// No columns for a quantity, or not for the joints of the positions.
-    #[error("no columns of {quantity} recognised among {}; write the study by hand (docs/src/your-robot.md); `dynident log` shows the contents of a recording", shown(.columns))]
+    #[error("no columns of {quantity} recognised among {}; write the study by hand (page \"Your robot in 15 minutes\": `dynident docs your-robot`); `dynident log` shows the contents of a recording", shown(.columns))]
     NotRecognised {
         /// `positions`, or `torques or currents`.
         quantity: &'static str,

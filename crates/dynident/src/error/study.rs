@@ -32,7 +32,7 @@ pub enum StudyError {
         source: Box<StudyError>,
     },
     /// Invalid TOML, or an unknown key.
-    #[error("{problem}; docs/src/study.md lists every key")]
+    #[error("{problem}; page \"The study file\" lists every key: `dynident docs study`")]
     Toml {
         /// Message of the parser.
         problem: String,
@@ -176,7 +176,7 @@ pub enum StudyError {
     },
     /// An error of the program `xacro` or its settings.
     #[error("robot: {0}")]
-    Xacro(Box<XacroError>),
+    Xacro(#[source] Box<XacroError>),
     /// A joint without a limit on its speed.
     #[error(
         "joint `{joint}` has no limit of speed, acceleration, jerk, torque or power, so its motion could be infinitely fast; give one: joints = [{{ joint = \"{joint}\", acceleration = ... }}]"
@@ -207,7 +207,7 @@ pub enum StudyError {
         limits_rad: [f64; 2],
     },
     /// An invalid robot model.
-    #[error(transparent)]
+    #[error("{0}")]
     Model(#[from] ModelError),
     /// An inconsistent closed chain.
     #[error("[[robot.loop]]: {0}")]
@@ -219,44 +219,44 @@ pub enum StudyError {
     #[error("table: {0}")]
     Table(#[from] TorqueTableError),
     /// Bodies and torque terms that do not match.
-    #[error(transparent)]
+    #[error("{0}")]
     ParametricModel(#[from] ParametricModelError),
     /// A payload that does not belong to the robot.
-    #[error(transparent)]
+    #[error("{0}")]
     Payload(#[from] PayloadError),
     /// A filter, a differentiator or its reference.
-    #[error(transparent)]
+    #[error("{0}")]
     Filter(#[from] FilterError),
     /// The parallel filter.
-    #[error(transparent)]
+    #[error("{0}")]
     ParallelFilter(#[from] ParallelFilterError),
     /// The periodic motion of an estimator.
-    #[error(transparent)]
+    #[error("{0}")]
     Periods(#[from] PeriodError),
     /// A setting of an estimator.
-    #[error(transparent)]
+    #[error("{0}")]
     Estimation(#[from] EstimationError),
     /// A setting of the physically consistent fit.
-    #[error(transparent)]
+    #[error("{0}")]
     Physical(#[from] PhysicalError),
     /// A trajectory family.
-    #[error(transparent)]
+    #[error("{0}")]
     Family(#[from] FamilyError),
     /// Limits of a motion.
-    #[error(transparent)]
+    #[error("{0}")]
     Limits(#[from] LimitError),
     /// A search.
-    #[error(transparent)]
+    #[error("{0}")]
     Optimiser(#[from] OptimiserError),
     /// A windowed design.
-    #[error(transparent)]
+    #[error("{0}")]
     StepWise(#[from] StepWiseError),
     /// A simulated robot, a controller or a reference.
-    #[error(transparent)]
+    #[error("{0}")]
     Simulation(#[from] SimulationError),
     /// An iteration.
-    #[error(transparent)]
-    Iteration(Box<IterationError>),
+    #[error("{0}")]
+    Iteration(#[source] Box<IterationError>),
 }
 
 impl From<IterationError> for StudyError {

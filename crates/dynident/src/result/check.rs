@@ -52,6 +52,9 @@ pub struct CheckFinding {
     pub write: Vec<StudyChange>,
     /// Alternative explanations that these logs do not distinguish.
     pub or: Vec<String>,
+    /// Code, which `dynident docs` explains; empty in results of older versions.
+    #[serde(default)]
+    pub code: String,
 }
 
 /// A study key and its new value.

@@ -30,6 +30,7 @@ pub struct ExpressionError {
     /// Place, in characters from 1.
     pub character: usize,
     /// The error, with the fix.
+    #[source]
     pub problem: ExpressionProblem,
 }
 

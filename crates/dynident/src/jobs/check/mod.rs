@@ -90,6 +90,7 @@ fn too_few_rows(examined: &StudyExamination, thresholds: &CheckSettings) -> Opti
         ),
         write: Vec::new(),
         or: Vec::new(),
+        code: "check-rows".to_owned(),
     })
 }
 
@@ -120,6 +121,7 @@ fn impossible_bodies(robot: &StudyRobot) -> Option<CheckFinding> {
         ),
         write: Vec::new(),
         or: Vec::new(),
+        code: "check-description".to_owned(),
     })
 }
 
@@ -155,6 +157,7 @@ fn import_findings(log: &str, import: &ImportReport) -> Vec<CheckFinding> {
         evidence: finding.message.clone(),
         write: Vec::new(),
         or: Vec::new(),
+        code: finding.code.clone(),
     };
     matters.map(one).collect()
 }

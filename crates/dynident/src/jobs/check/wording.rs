@@ -18,7 +18,15 @@ pub(super) struct FindingContext<'a> {
 }
 
 pub(super) fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {
-    CheckFinding { level: Level::Problem, kind: kind.to_owned(), what, evidence, write: Vec::new(), or: Vec::new() }
+    CheckFinding {
+        level: Level::Problem,
+        kind: kind.to_owned(),
+        what,
+        evidence,
+        write: Vec::new(),
+        or: Vec::new(),
+        code: format!("check-{kind}"),
+    }
 }
 
 pub(super) fn alternative(mistake: &Mistake, joints: &[String], keys: Option<&StudyKeys>) -> String {

@@ -225,7 +225,7 @@ impl RecognisedColumns {
             self.logged.joints.iter().filter(|&&joint| limit(&joints[joint].limits).is_some()).count()
         };
         let note = format!(
-            "Dynident selects friction, cut-off, lag and estimator with the logs; docs/src/study.md lists the keys that state them. For a motor that drives two joints add [[coupling]]. Limits for `dynident design` in the robot description, of {} joints: {} positions, {} velocities, {} torques",
+            "Dynident selects friction, cut-off, lag and estimator with the logs; `dynident docs study` lists the keys that state them. For a motor that drives two joints add [[coupling]]. Limits for `dynident design` in the robot description, of {} joints: {} positions, {} velocities, {} torques",
             self.logged.joints.len(),
             known(|limits| limits.upper),
             known(|limits| limits.velocity),
