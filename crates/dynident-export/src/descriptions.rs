@@ -3,6 +3,7 @@
 use crate::drive_torque::drive_inertia;
 use crate::error::ExportError;
 use crate::exported::Exported;
+use crate::model_file::ModelTerm;
 use crate::nearest_friction::{ComparedOver, NearestFriction};
 use crate::robot_model::RobotModel;
 use crate::rotation::quaternion;
@@ -101,32 +102,33 @@ pub(crate) fn frictions(
     nearest
 }
 
-/// Notes on the terms of the identified robot that a form with the terms `kept` leaves out or replaces. Friction that
-/// other friction of the same joint replaces is noted if it depends on load or memory.
+/// Terms of the identified robot that are not among the terms `kept` of a form.
+pub fn terms_left_out(robot: &RobotModel, kept: &[TorqueTerm]) -> Vec<ModelTerm> {
+    ModelTerm::of(robot, |term| !kept.contains(term))
+}
+
+/// Notes on the terms of the identified robot that a form with the terms `kept` leaves out or replaces, with their
+/// values.
 pub fn notes_on_omitted(robot: &RobotModel, kept: &[TorqueTerm]) -> Vec<String> {
     let omitted = robot.terms().filter(|(term, _)| !kept.contains(term));
     omitted
-        .filter_map(|(term, value)| {
+        .map(|(term, value)| {
             let (symbol, unit, joint) = (term.symbol(), term.unit(), joint_name(robot, term));
             if term.own_joint().is_none() {
                 let effect = if term.is_friction() { "friction" } else { "inertia" };
-                Some(format!(
+                format!(
                     "{effect} of a drive that is coupled to two joints, {symbol} = {value:?} {unit}, is left out."
-                ))
+                )
             } else if let Some(law) = term.state_function() {
                 let law = law.description();
-                Some(format!("Torque {symbol} of joint {joint}, {value:?} {unit} times {law}, is left out: add it to the controller."))
-            } else if term.needs_load() || term.has_memory() {
-                Some(format!(
-                    "{symbol} = {value:?} {unit} ({}) of joint {joint} is replaced by the fitted friction.",
-                    term.kind_name()
-                ))
+                format!("Torque {symbol} of joint {joint}, {value:?} {unit} times {law}, is left out: add it to the controller.")
             } else if term.is_drive_inertia() {
-                Some(format!("Drive inertia {symbol} = {value:?} {unit} of joint {joint} is left out."))
+                format!("Drive inertia {symbol} = {value:?} {unit} of joint {joint} is left out.")
             } else if term.constant_torque(term.own_joint().unwrap_or(0)) != 0.0 {
-                Some(format!("Offset {symbol} = {value:?} {unit} of joint {joint} is left out."))
+                format!("Offset {symbol} = {value:?} {unit} of joint {joint} is left out.")
             } else {
-                None
+                let kind = term.kind_name();
+                format!("{symbol} = {value:?} {unit} ({kind}) of joint {joint} is replaced by the fitted friction.")
             }
         })
         .collect()

@@ -48,7 +48,7 @@ mod statements;
 mod symbol;
 mod target;
 
-pub use descriptions::notes_on_omitted;
+pub use descriptions::{notes_on_omitted, terms_left_out};
 pub use error::ExportError;
 pub use exported::Exported;
 pub use model_file::{

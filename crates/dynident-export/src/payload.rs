@@ -35,8 +35,8 @@ pub struct PayloadBody {
 /// Units and axes depend on the controller. UR and Franka use the inertia about the centre of mass in kg m² along the
 /// axes of the flange (UR in the order xx, yy, zz, xy, xz, yz; Franka all nine entries). KUKA and ABB use the centre of
 /// mass in mm, principal moments, and their axes as angles A, B, C in degrees about Z, Y', X'' (KUKA) or as a
-/// quaternion (ABB).
-pub fn payload_command(payload: &PayloadBody, reader: ControllerBrand) -> Option<String> {
+/// quaternion (ABB). `comment` has lines for a comment before it; JSON has no comments.
+pub fn payload_command(payload: &PayloadBody, reader: ControllerBrand, comment: &[String]) -> Option<String> {
     let (mass, com) = (payload.inertial.mass_kg(), payload.inertial.com_m()?.0);
     let i = payload.inertial.inertia_at_com()?.0;
     let ([x, y, z], mut name) = (com, identifier(&payload.name));
@@ -45,7 +45,15 @@ pub fn payload_command(payload: &PayloadBody, reader: ControllerBrand) -> Option
         return None;
     }
     let mm = com.map(|x| 1e3 * x);
-    Some(match reader {
+    let mark = match reader {
+        ControllerBrand::UniversalRobots => Some('#'),
+        ControllerBrand::Franka => None,
+        ControllerBrand::Kuka => Some(';'),
+        ControllerBrand::Abb => Some('!'),
+    };
+    let lines = comment.iter().map(|line| mark.map(|mark| format!("{mark} {}\n", one_line(line))).unwrap_or_default());
+    let head: String = lines.collect();
+    let command = match reader {
         ControllerBrand::UniversalRobots => format!(
             "set_target_payload({mass:?}, [{x:?}, {y:?}, {z:?}], [{:?}, {:?}, {:?}, {:?}, {:?}, {:?}])\n",
             i[0][0], i[1][1], i[2][2], i[0][1], i[0][2], i[1][2]
@@ -70,7 +78,16 @@ pub fn payload_command(payload: &PayloadBody, reader: ControllerBrand) -> Option
                 mm[0], mm[1], mm[2], moments[0], moments[1], moments[2]
             )
         }
-    })
+    };
+    Some(head + &command)
+}
+
+/// ASCII text for the comment of a controller's language, in one line.
+fn one_line(text: &str) -> String {
+    dynident_text::comment(&text.replace('±', "+-"))
+        .chars()
+        .map(|c| if c.is_ascii_graphic() || c == ' ' { c } else { '?' })
+        .collect()
 }
 
 /// Principal moments, and the rotation whose columns are their axes (right-handed).
@@ -108,12 +125,12 @@ mod tests {
             // Rounding error of the parallel-axis theorem in both directions.
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{text}");
         };
-        let ur = payload_command(&box_(), ControllerBrand::UniversalRobots).unwrap();
+        let ur = payload_command(&box_(), ControllerBrand::UniversalRobots, &[]).unwrap();
         close(
             ur.strip_prefix("set_target_payload").unwrap(),
             &[2.0, 0.01, -0.02, 0.08, 0.02, 0.03, 0.04, 0.001, -0.002, 0.003],
         );
-        let franka = payload_command(&box_(), ControllerBrand::Franka).unwrap();
+        let franka = payload_command(&box_(), ControllerBrand::Franka, &[]).unwrap();
         let matrix = [0.02, 0.001, -0.002, 0.001, 0.03, 0.003, -0.002, 0.003, 0.04];
         let values = [&[2.0, 0.01, -0.02, 0.08][..], &matrix].concat();
         close(&franka.replace(|c: char| c.is_alphabetic(), " "), &values);
@@ -127,10 +144,10 @@ mod tests {
             let com = body.com_m().unwrap();
             let payload = PayloadBody { name: "p".to_owned(), inertial: body };
             let inertia = body.inertia_at_com().unwrap();
-            let kuka = payload_command(&payload, ControllerBrand::Kuka).unwrap();
+            let kuka = payload_command(&payload, ControllerBrand::Kuka, &[]).unwrap();
             let n = numbers(kuka.strip_prefix("LOAD_DATA[1]").unwrap());
             let kuka_axes = Mat3::from_roll_pitch_yaw(n[6].to_radians(), n[5].to_radians(), n[4].to_radians());
-            let abb = payload_command(&payload, ControllerBrand::Abb).unwrap();
+            let abb = payload_command(&payload, ControllerBrand::Abb, &[]).unwrap();
             let m = numbers(&abb);
             let abb_axes = Mat3::from_quaternion([m[5], m[6], m[7], m[4]]);
             for (axes, moments, numbers) in [(kuka_axes, &n[7..10], &n), (abb_axes, &m[8..11], &m)] {
@@ -149,9 +166,9 @@ mod tests {
     #[test]
     fn nothing_is_no_payload() {
         let nothing = PayloadBody { name: String::new(), inertial: InertialParameters::ZERO };
-        assert_eq!(payload_command(&nothing, ControllerBrand::Abb), None);
+        assert_eq!(payload_command(&nothing, ControllerBrand::Abb, &[]), None);
         let mut huge = box_();
         huge.inertial.0[1] = 1e308;
-        assert_eq!(payload_command(&huge, ControllerBrand::Abb), None);
+        assert_eq!(payload_command(&huge, ControllerBrand::Abb, &[]), None);
     }
 }

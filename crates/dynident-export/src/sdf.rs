@@ -71,10 +71,11 @@ fn write_joint(
     let limits = &joint.limits;
     let stops = limits.lower.zip(limits.upper).filter(|(lower, upper)| lower < upper);
     let stops = stops.filter(|_| joint.kind != JointKind::Continuous);
-    let kind = match (joint.is_rotary(), stops) {
-        (true, Some(_)) => "revolute",
-        (true, None) => "continuous",
-        (false, _) => "prismatic",
+    let kind = match (joint.kind, stops) {
+        _ if !joint.is_rotary() => "prismatic",
+        (JointKind::Continuous, None) => "continuous",
+        // SDF treats missing limits as unlimited.
+        _ => "revolute",
     };
     let mut limit = String::new();
     let mut write_limit = |element: &str, value: f64| {

@@ -5,7 +5,7 @@ use crate::coupling::JointCoupling;
 use crate::dh_convention::DhConvention;
 use crate::error::ModelError;
 use crate::inertial::InertialParameters;
-use crate::joint::{Joint, JointMap, Mimic};
+use crate::joint::{Joint, JointKind, JointLimits, JointMap, Mimic};
 use crate::spatial::{Mat3, Transform, Vec3};
 use crate::steps::{JointStep, steps};
 
@@ -331,6 +331,23 @@ impl Model {
         model.inertials = inertials.to_vec();
         model.steps = steps(&model.tree, inertials);
         Ok(model)
+    }
+
+    /// The same robot with limits for joints whose limits are not known; `limits` gives them by the name of the joint.
+    /// Known limits are kept, and `continuous` joints get no position limits.
+    #[must_use]
+    pub fn with_missing_limits(mut self, limits: impl Fn(&str) -> JointLimits) -> Self {
+        for joint in self.tree.iter_mut().chain(&mut self.joints) {
+            let (known, more) = (joint.limits, limits(&joint.name));
+            let has_stops = joint.kind != JointKind::Continuous;
+            joint.limits = JointLimits {
+                lower: known.lower.or(more.lower.filter(|_| has_stops)),
+                upper: known.upper.or(more.upper.filter(|_| has_stops)),
+                velocity: known.velocity.or(more.velocity),
+                effort: known.effort.or(more.effort),
+            };
+        }
+        self
     }
 
     /// The same robot without some links. A fixed link is removed alone; a link that moves with a joint is removed

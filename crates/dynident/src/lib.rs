@@ -81,8 +81,8 @@ pub use jobs::check::{CheckSettings, check, check_with};
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::export::{
-    export_model, export_payload, export_payload_of, export_result, export_simulator, export_simulator_of,
-    export_stored,
+    EXPORT_VALIDATION_SUFFIX, export_model, export_payload, export_payload_of, export_result, export_simulator,
+    export_simulator_of, export_stored, export_validation, payload_validation, selected_payload, table_validation,
 };
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{
@@ -95,6 +95,7 @@ pub use jobs::options::RunOptions;
 pub use jobs::predict::{PredictedTorque, TorquePredictor};
 pub use jobs::reduce::{ReduceSettings, factors_errors, identify_factors, reduce};
 pub use jobs::simulate::{Simulation, simulate_study};
+pub use jobs::test_samples::test_samples;
 pub use jobs::validate::{validate, validate_result};
 pub use output::{check_writable, write_atomically};
 pub use output_set::OutputSet;

@@ -1,11 +1,14 @@
 use super::permission::ProgramOptions;
-use super::{Context, json, known_in, message_of};
+use super::{Context, json, known_in, message_of, pretty_json};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::export::{ControllerBrand, Exported, Target};
-use dynident::result::{EXPORT_SCHEMA, ExportFile};
-use dynident::{ResultFile, export_payload_of, export_result, export_simulator_of, export_stored, study_inputs};
-use std::path::PathBuf;
+use dynident::result::{EXPORT_SCHEMA, ExportFile, ExportValidationFile};
+use dynident::{
+    EXPORT_VALIDATION_SUFFIX, OutputSet, ResultFile, export_payload_of, export_result, export_simulator_of,
+    export_stored, export_validation, payload_validation, selected_payload, study_inputs,
+};
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
@@ -23,7 +26,7 @@ pub(crate) struct Options {
     /// Which payload, if the result has several.
     #[arg(long, value_name = "NAME")]
     payload: Option<String>,
-    /// Write to this file instead of standard output.
+    /// Write to this file instead of standard output, and its held-out error to FILE.validation.json next to it.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// An additional folder for the study's files.
@@ -77,6 +80,16 @@ enum Kind {
 }
 
 impl Form {
+    /// Name on the command line.
+    fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    /// Whether a file with the held-out error (for payloads, with the intervals) is written next to the file.
+    fn is_validated(self) -> bool {
+        !matches!(self.kind(), Kind::SimulatorJson | Kind::SimulatorTable)
+    }
+
     fn kind(self) -> Kind {
         match self {
             Self::C => Kind::Model(Target::C),
@@ -108,7 +121,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         let named = study.as_ref().map(|(study, path)| study_inputs(study, path, data, &["robot", "torque", "log"]));
         let mut inputs = named.unwrap_or_default();
         inputs.push(result.clone());
-        dynident::refuse_overwriting(core::slice::from_ref(out), &inputs).map_err(message_of)?;
+        let mut outputs = vec![out.clone()];
+        outputs.extend(options.to.is_validated().then(|| validation_path(out)));
+        dynident::refuse_overwriting(&outputs, &inputs).map_err(message_of)?;
     }
     let with_study = || {
         let study = study.as_ref().map(|(study, path)| (study, *path));
@@ -133,17 +148,51 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
             export_payload_of(&stored, &result, options.payload.as_deref(), reader).map_err(message_of)?
         }
     };
-    write(options, context, exported)
+    let name = options.out.as_ref().map_or_else(String::new, |out| file_name(out));
+    let validation = match options.to.kind() {
+        Kind::Model(target) => Some(export_validation(&stored, target, &name, &exported.text)),
+        Kind::SimulatorJson | Kind::SimulatorTable => None,
+        Kind::Payload(_) => {
+            let payload = selected_payload(&stored, &result, options.payload.as_deref()).map_err(message_of)?;
+            Some(payload_validation(&stored, payload.controller.as_ref(), &options.to.name(), &name, &exported.text))
+        }
+    };
+    write(options, context, exported, validation.as_ref())
 }
 
-/// Writes the text to its file or to standard output, and the notes to standard error.
-fn write(options: &Options, context: &Context, exported: Exported) -> Result<Verdict, String> {
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+/// The file with the held-out error of an exported file.
+fn validation_path(out: &Path) -> PathBuf {
+    let mut name = out.as_os_str().to_owned();
+    name.push(EXPORT_VALIDATION_SUFFIX);
+    name.into()
+}
+
+/// Writes the text to its file, with its held-out error next to it, or to standard output; and the notes to standard
+/// error.
+fn write(
+    options: &Options,
+    context: &Context,
+    exported: Exported,
+    validation: Option<&ExportValidationFile>,
+) -> Result<Verdict, String> {
     let Exported { text, notes } = exported;
-    if let Some(path) = &options.out {
-        dynident::write_atomically(path, text.as_bytes()).map_err(message_of)?;
+    match (&options.out, validation) {
+        (Some(path), Some(validation)) => {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let name = file_name(path);
+            let set = OutputSet::new(folder).file(&name, text.as_str());
+            let set = set.file(&format!("{name}{EXPORT_VALIDATION_SUFFIX}"), pretty_json(validation)?);
+            set.write().map_err(message_of)?;
+        }
+        (Some(path), None) => dynident::write_atomically(path, text.as_bytes()).map_err(message_of)?,
+        (None, _) => {}
     }
     if context.json {
-        let target = options.to.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned());
+        let target = options.to.name();
         let file = options.out.as_ref().map(|path| path.display().to_string());
         let text = options.out.is_none().then_some(text);
         let schema = EXPORT_SCHEMA.to_owned();

@@ -3,7 +3,11 @@
 use super::permission::ProgramOptions;
 use super::{Context, factors, json, judged, known_in, message_of, pretty_json, refuse_overwriting, show_problems};
 use crate::{Verdict, summary, terminal};
-use dynident::{Factors, IdentificationOutcome, OutputSet, RunOptions, check_writable, identify, identify_factors};
+use dynident::export::Target;
+use dynident::{
+    EXPORT_VALIDATION_SUFFIX, Factors, IdentificationOutcome, OutputSet, RunOptions, check_writable, export_validation,
+    identify, identify_factors, table_validation,
+};
 use std::path::{Path, PathBuf};
 
 /// The user's URDF with the new values.
@@ -27,7 +31,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "NAME", requires = "factors")]
     arm: Option<String>,
     /// Folder for result.json, report.html and identified.urdf (for a D-H table also identified.toml, for an MJCF
-    /// identified.xml, for an SDF identified.sdf).
+    /// identified.xml, for an SDF identified.sdf), each model with its held-out error in NAME.validation.json.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Folder of the recordings, if it differs from the study's.
@@ -41,7 +45,18 @@ pub(crate) struct Options {
 }
 
 /// All files that may be written.
-const FILES: [&str; 6] = [URDF, TABLE, MJCF, SDF, "report.html", "result.json"];
+const FILES: [&str; 10] = [
+    URDF,
+    TABLE,
+    MJCF,
+    SDF,
+    "report.html",
+    "result.json",
+    "identified.urdf.validation.json",
+    "identified.toml.validation.json",
+    "identified.xml.validation.json",
+    "identified.sdf.validation.json",
+];
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let progress = context.progress();
@@ -59,16 +74,23 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         .file("report.html", identification.report().map_err(message_of)?);
     let mut models = Vec::new();
     let texts = [
-        (URDF, &identification.urdf),
-        (TABLE, &identification.table),
-        (MJCF, &identification.mjcf),
-        (SDF, &identification.sdf),
+        (URDF, Some(Target::Urdf), &identification.urdf),
+        (TABLE, None, &identification.table),
+        (MJCF, Some(Target::Mjcf), &identification.mjcf),
+        (SDF, Some(Target::Sdf), &identification.sdf),
     ];
-    for (name, text) in texts {
+    for (name, target, text) in texts {
         models.extend(text.as_ref().map(|_| name));
+        let next_to_it = format!("{name}{EXPORT_VALIDATION_SUFFIX}");
         set = match text {
-            Some(text) => set.file(name, text.as_str()),
-            None => set.absent(name),
+            Some(text) => {
+                let validation = match target {
+                    Some(target) => export_validation(result, target, name, text),
+                    None => table_validation(result, name, text),
+                };
+                set.file(name, text.as_str()).file(&next_to_it, pretty_json(&validation)?)
+            }
+            None => set.absent(name).absent(&next_to_it),
         };
     }
     set.write().map_err(message_of)?;

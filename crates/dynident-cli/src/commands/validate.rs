@@ -1,8 +1,11 @@
 use super::permission::ProgramOptions;
-use super::{Context, json, judged, known_in, message_of, show_problems};
+use super::{Context, json, judged, known_in, message_of, pretty_json, show_problems};
 use crate::{Verdict, summary, terminal};
-use dynident::{ResultFile, RunOptions, validate_result};
-use std::path::PathBuf;
+use dynident::{OutputSet, ResultFile, RunOptions, Study, study_inputs, test_samples, validate_result};
+use std::path::{Path, PathBuf};
+
+/// The description of the tables of samples.
+const SAMPLES: &str = "samples.json";
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
@@ -20,6 +23,10 @@ pub(crate) struct Options {
     /// Exit with status 1 if the relative error on any log is larger.
     #[arg(long, value_name = "PERCENT", value_parser = super::percentage)]
     max_validation_error: Option<f64>,
+    /// Also write the samples of every log of the study as this test uses them, before the filter, and the filter
+    /// (samples.json).
+    #[arg(long, value_name = "DIR")]
+    samples: Option<PathBuf>,
     #[command(flatten)]
     programs: ProgramOptions,
 }
@@ -30,6 +37,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let read = if options.accept_edited { ResultFile::read_edited } else { ResultFile::read };
     let stored = read(&options.result).map_err(message_of)?;
+    if let Some(folder) = &options.samples {
+        write_samples(folder, options, (&study, &stored), &run)?;
+    }
     let file = validate_result(&stored, &options.result, &study, &options.study, &run);
     let file = file.map_err(known_in(&options.study))?;
     if context.json {
@@ -40,4 +50,22 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     show_problems(&file.problems, "");
     let within = judged(&file.validation, options.max_validation_error);
     Ok(if file.problems.is_empty() { within } else { Verdict::Negative })
+}
+
+fn write_samples(
+    folder: &Path,
+    options: &Options,
+    (study, stored): (&Study, &ResultFile),
+    run: &RunOptions<'_>,
+) -> Result<(), String> {
+    let (description, tables) =
+        test_samples(stored, &options.result, study, &options.study, run).map_err(known_in(&options.study))?;
+    let mut outputs = vec![folder.join(SAMPLES)];
+    outputs.extend(tables.iter().map(|(name, _)| folder.join(name)));
+    let mut inputs = study_inputs(study, &options.study, options.data.as_deref(), &["robot", "torque", "log"]);
+    inputs.push(options.result.clone());
+    dynident::refuse_overwriting(&outputs, &inputs).map_err(message_of)?;
+    let set = OutputSet::new(folder).file(SAMPLES, pretty_json(&description)?);
+    let set = tables.into_iter().fold(set, |set, (name, table)| set.file(&name, table));
+    set.write().map_err(message_of)
 }

@@ -29,6 +29,18 @@ fn identified() -> tempfile::TempDir {
     folder
 }
 
+/// The same with the last third of the log held out.
+fn identified_with_test() -> tempfile::TempDir {
+    let folder = identified();
+    let path = folder.path().join("good.toml");
+    let study = std::fs::read_to_string(&path).unwrap();
+    let log = "[[log]]\nfile = \"log.csv\"\n";
+    let parts = format!("{log}fraction = [0.0, 0.65]\n{log}fraction = [0.67, 1.0]\nrole = \"validate\"\n");
+    std::fs::write(&path, study.replace(log, &parts)).unwrap();
+    run_in(folder.path(), &["identify", "good.toml", "--out", "r"]);
+    folder
+}
+
 fn export(folder: &Path, more: &[&str]) -> CommandOutcome {
     run_in(folder, &[&["export", "r/result.json", "--study", "good.toml", "--to"], more].concat())
 }
@@ -121,4 +133,125 @@ fn a_payload_becomes_a_command() {
     assert!(several.status == 2 && several.stderr.contains("`box`, `ghost`"), "{}", several.stderr);
     let none = export(&["payload-abb", "--payload", "ghost"]);
     assert!(none.status == 2 && none.stderr.contains("no body that can be real: none fits"), "{}", none.stderr);
+}
+
+fn sha256(path: &Path) -> String {
+    use sha2::{Digest, Sha256};
+    Sha256::digest(std::fs::read(path).unwrap()).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Each model of `identify` and each exported file has its own held-out error next to it.
+#[test]
+fn the_error_of_a_file_is_next_to_it() {
+    let folder = identified_with_test();
+    let at = folder.path();
+    let read =
+        |name: &str| -> Value { serde_json::from_str(&std::fs::read_to_string(at.join(name)).unwrap()).unwrap() };
+    let result = read("r/result.json");
+    for (form, file) in [("urdf", "r/identified.urdf"), ("mjcf", "arm.xml"), ("c", "arm.h"), ("json", "arm.json")] {
+        if form != "urdf" {
+            assert_eq!(export(at, &[form, "--out", file]).status, 0);
+        }
+        let found = read(&format!("{file}.validation.json"));
+        assert_eq!((&found["schema"], &found["form"]), (&json!("dynident/export-validation/1"), &json!(form)));
+        assert_eq!(found["sha256"], sha256(&at.join(file)));
+        assert!(file.ends_with(found["file"].as_str().unwrap()));
+        assert_eq!(found["provenance"]["identity"], result["provenance"]["identity"]);
+        let class = result["forms"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|one| one["forms"].as_array().unwrap().contains(&json!(form)));
+        let logs = found["held_out"].as_array().unwrap();
+        match class {
+            Some(class) => {
+                assert_eq!((&found["held_out"], &found["refitted"]), (&class["held_out"], &class["refitted"]))
+            }
+            None => {
+                let of_model = &result["validation"][0]["physical"]["relative_error_percent"];
+                assert_eq!((&logs[0]["relative_error_percent"], &found["left_out"]), (of_model, &json!([])));
+            }
+        }
+        assert_eq!((logs.len(), logs[0]["joints"].as_array().unwrap().len()), (1, 2), "{found}");
+        // Terms of the model are in the file or listed.
+        let listed = found["left_out"].as_array().unwrap();
+        let kept = |symbol: &Value| {
+            class.is_none_or(|class| class["terms"].as_array().unwrap().iter().any(|term| term["symbol"] == *symbol))
+        };
+        for term in result["model"]["terms"].as_array().unwrap() {
+            let is_listed = listed.iter().any(|one| one["symbol"] == term["symbol"] && one["value"] == term["value"]);
+            assert!(is_listed || kept(&term["symbol"]), "{form}: {term}");
+        }
+        // The comment of each file lists them with their values.
+        let text = std::fs::read_to_string(at.join(file)).unwrap();
+        for term in listed {
+            assert!(text.contains(&format!("{} = ", term["symbol"].as_str().unwrap())), "{form}: {term}");
+        }
+        if class.is_some() {
+            assert!(text.contains("Held-out torque error of this file: "), "{form}: {text}");
+        }
+    }
+    // Files with error bars have none.
+    assert_eq!(export(at, &["simulator", "--out", "drives.json"]).status, 0);
+    assert!(!at.join("drives.json.validation.json").exists());
+}
+
+/// Another program can repeat the test: `--samples` writes the samples and the filter, and the error of the identified
+/// URDF computed from them is the printed one.
+#[test]
+fn samples_of_a_test_are_written() {
+    let folder = identified_with_test();
+    let at = folder.path();
+    let ran = run_in(at, &["validate", "r/result.json", "--study", "good.toml", "--samples", "samples", "--json"]);
+    assert!(ran.status < 2, "{}", ran.stderr);
+    let samples: Value =
+        serde_json::from_str(&std::fs::read_to_string(at.join("samples/samples.json")).unwrap()).unwrap();
+    assert_eq!(samples["schema"], "dynident/test-samples/1");
+    let result: Value = serde_json::from_str(&std::fs::read_to_string(at.join("r/result.json")).unwrap()).unwrap();
+    let logs = samples["logs"].as_array().unwrap();
+    let held_out = logs.iter().find(|log| log["role"] == "validate").unwrap();
+    let table = std::fs::read_to_string(at.join("samples").join(held_out["file"].as_str().unwrap())).unwrap();
+    let mut lines = table.lines();
+    assert_eq!(
+        lines.next(),
+        Some(
+            "segment,q_shoulder,q_elbow,dq_shoulder,dq_elbow,ddq_shoulder,ddq_elbow,tau_shoulder,tau_elbow,used_shoulder,used_elbow"
+        )
+    );
+    let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
+    let robot = dynident::load_robot(&at.join("r/identified.urdf"), &Default::default()).unwrap();
+    let model = &robot.model;
+    let taps: Vec<f64> = held_out["taps"].as_array().unwrap().iter().map(|tap| tap.as_f64().unwrap()).collect();
+    let taps = if taps.is_empty() { vec![1.0] } else { taps };
+    let factor = held_out["filter"]["factor"].as_u64().unwrap_or(1) as usize;
+    let mut workspace = dynident::dynamics::Workspace::new(model);
+    let (mut error, mut torque) = (0.0, 0.0);
+    for joint in 0..2 {
+        let (damping, friction) = (model.joints()[joint].damping.unwrap(), model.joints()[joint].friction.unwrap());
+        let columns: Vec<[f64; 3]> = rows
+            .iter()
+            .map(|row| {
+                let rigid =
+                    dynident::dynamics::inverse_dynamics(model, &mut workspace, &row[1..3], &row[3..5], &row[5..7]);
+                let dq = row[3 + joint];
+                let sign = if dq == 0.0 { 0.0 } else { dq.signum() };
+                let used = row[9 + joint];
+                [used * row[7 + joint], used * (rigid[joint] + damping * dq + friction * sign), used]
+            })
+            .collect();
+        for from in (0..columns.len().saturating_sub(taps.len() - 1)).step_by(factor) {
+            let sum = |k: usize| taps.iter().zip(&columns[from..]).map(|(tap, column)| tap * column[k]).sum::<f64>();
+            let [measured, predicted, coverage] = [sum(0), sum(1), sum(2)];
+            if coverage >= 0.5 {
+                error += ((measured - predicted) / coverage).powi(2);
+                torque += (measured / coverage).powi(2);
+            }
+        }
+    }
+    let form =
+        &result["forms"].as_array().unwrap().iter().find(|form| form["class"] == "damping-and-friction").unwrap();
+    let printed = form["held_out"][0]["relative_error_percent"].as_f64().unwrap();
+    let own = 100.0 * (error / torque).sqrt();
+    // Rounding of sums in another order.
+    assert!((own / printed - 1.0).abs() < 1e-9, "{own} % and {printed} % printed");
 }

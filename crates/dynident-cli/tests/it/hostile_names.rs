@@ -445,9 +445,14 @@ fn tables_and_json_hold_names_as_names() {
         for reader in
             [ControllerBrand::UniversalRobots, ControllerBrand::Franka, ControllerBrand::Kuka, ControllerBrand::Abb]
         {
-            let command = payload_command(&body, reader).unwrap();
+            let command = payload_command(&body, reader, &[]).unwrap();
             assert_visible("payload", &command);
             assert_eq!((command.lines().count(), command.matches([';', '"']).count() <= 7), (1, true), "{command}");
+            let commented = payload_command(&body, reader, core::slice::from_ref(name)).unwrap();
+            assert_visible("payload", &commented);
+            let (head, last) = commented.trim_end().rsplit_once('\n').unwrap_or(("", commented.trim_end()));
+            assert_eq!(last, command.trim_end());
+            assert!(head.lines().count() <= 1 && head.is_ascii(), "{commented}");
         }
 
         let table = format!(

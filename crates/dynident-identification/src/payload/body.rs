@@ -60,50 +60,86 @@ pub(crate) enum NoBodyError {
     Physical(#[from] PhysicalError),
 }
 
-/// The consistent body nearest to the estimate in the metric of its covariance.
-pub(crate) fn nearest_consistent_body(
-    name: &str,
-    columns: &PayloadColumns,
-    estimate: &Estimate,
-) -> Result<PhysicalFit, NoBodyError> {
-    let n = columns.kept.len();
-    let fixed = |place: &usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == columns.first + place);
-    let determined: Vec<usize> = (0..n).filter(|place| !fixed(place)).collect();
-    let value = |place: usize| estimate.values[columns.first + place];
-    let known_mass = columns.mass.as_ref().map(|(mass, _)| *mass);
-    let estimated = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(MIN_MASS_KG);
-    let mass = known_mass.unwrap_or(estimated);
-    let reference = rough_body(mass, GYRATION_RADIUS_M);
-    // Sum of both covariances, because one from few segments is singular.
-    let entry = |i: usize, j: usize| estimate.covariance[(i, j)] + estimate.covariance_white[(i, j)];
-    let mut covariance = DMatrix::from_fn(determined.len(), determined.len(), |i, j| {
-        entry(columns.first + determined[i], columns.first + determined[j])
-    });
-    for (i, &place) in determined.iter().enumerate() {
-        let length = match columns.kept[place] {
-            0 => 1.0,
-            1..=3 => GYRATION_RADIUS_M,
-            _ => GYRATION_RADIUS_M * GYRATION_RADIUS_M,
+/// The estimate of a payload as rows over its ten parameters, in units of their standard deviation.
+pub(crate) struct Determined {
+    /// Name of the payload.
+    pub(crate) name: String,
+    /// `L⁻¹ S B`: the determined parameters or sums `S B π` with covariance `L Lᵀ`, shape (determined, 10).
+    pub(crate) rows: DMatrix<f64>,
+    /// `L⁻¹ x̂`.
+    pub(crate) target: DVector<f64>,
+    /// Limits of the mass, if the study states it.
+    pub(crate) mass_kg: Option<[f64; 2]>,
+    mass: f64,
+}
+
+impl Determined {
+    pub(crate) fn of(name: &str, columns: &PayloadColumns, estimate: &Estimate) -> Result<Self, NoBodyError> {
+        let fixed = |place: &usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == columns.first + place);
+        let places: Vec<usize> = (0..columns.kept.len()).filter(|place| !fixed(place)).collect();
+        let value = |place: usize| estimate.values[columns.first + place];
+        let known_mass = columns.mass.as_ref().map(|(mass, _)| *mass);
+        let estimated = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(MIN_MASS_KG);
+        let mass = known_mass.unwrap_or(estimated);
+        // Sum of both covariances, because one from few segments is singular.
+        let entry = |i: usize, j: usize| estimate.covariance[(i, j)] + estimate.covariance_white[(i, j)];
+        let mut covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
+            entry(columns.first + places[i], columns.first + places[j])
+        });
+        for (i, &place) in places.iter().enumerate() {
+            let length = match columns.kept[place] {
+                0 => 1.0,
+                1..=3 => GYRATION_RADIUS_M,
+                _ => GYRATION_RADIUS_M * GYRATION_RADIUS_M,
+            };
+            covariance[(i, i)] += (MIN_RELATIVE_STD * mass * length).powi(2);
+        }
+        // V = L Lᵀ: rows L⁻¹ φ = L⁻¹ φ̂ have unit noise.
+        let lower = covariance.cholesky().ok_or(NoBodyError::Covariance)?.l();
+        let values = DVector::from_iterator(places.len(), places.iter().map(|&place| value(place)));
+        let (Some(white), Some(target)) = (lower.clone().try_inverse(), lower.solve_lower_triangular(&values)) else {
+            return Err(NoBodyError::Covariance);
         };
-        covariance[(i, i)] += (MIN_RELATIVE_STD * mass * length).powi(2);
+        let map = BaseMap::from_regrouping(&columns.kept, &columns.dropped, &columns.regrouping)?;
+        let rows = white * map.matrix().select_rows(&places);
+        let mass_kg = known_mass.map(|mass| [mass * (1.0 - MASS_TOLERANCE), mass * (1.0 + MASS_TOLERANCE)]);
+        Ok(Self { name: name.to_owned(), rows, target, mass_kg, mass })
     }
-    // V = L Lᵀ: rows L⁻¹ φ = L⁻¹ φ̂ have unit noise.
-    let lower = covariance.cholesky().ok_or(NoBodyError::Covariance)?.l();
-    let values = DVector::from_iterator(determined.len(), determined.iter().map(|&place| value(place)));
-    let (Some(rows), Some(target)) = (lower.clone().try_inverse(), lower.solve_lower_triangular(&values)) else {
-        return Err(NoBodyError::Covariance);
-    };
-    let mut panel = vec![0.0; (n + 1) * determined.len()];
-    for (i, &place) in determined.iter().enumerate() {
-        panel[place * determined.len()..(place + 1) * determined.len()].copy_from_slice(rows.column(i).as_slice());
+
+    /// Estimates of all ten parameters with this covariance.
+    #[cfg(test)]
+    pub(super) fn of_ten(values: &[f64; 10], covariance: DMatrix<f64>) -> Self {
+        let lower = covariance.cholesky().unwrap().l();
+        let target = lower.solve_lower_triangular(&DVector::from_column_slice(values)).unwrap();
+        Self { name: String::new(), rows: lower.try_inverse().unwrap(), target, mass_kg: None, mass: values[0] }
     }
-    panel[n * determined.len()..].copy_from_slice(target.as_slice());
-    let factor = TriangularFactor::from_rows(n, &panel, determined.len())?;
-    let map = BaseMap::from_regrouping(&columns.kept, &columns.dropped, &columns.regrouping)?;
-    let mass_kg = known_mass.map(|mass| [mass * (1.0 - MASS_TOLERANCE), mass * (1.0 + MASS_TOLERANCE)]);
-    let body = PhysicalBody { name: name.to_owned(), reference, known: None, mass_kg, com_box_m: None, inside: None };
-    let problem = PhysicalProblem::new(map, vec![body], Vec::new(), &factor)?;
-    Ok(physical_fit(&problem, &PhysicalSettings::default())?)
+
+    /// All ten parameters with their covariance, if the logs determine them.
+    pub(crate) fn all_ten(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        if self.rows.nrows() < 10 {
+            return None;
+        }
+        let inverse = self.rows.clone().try_inverse()?;
+        Some((&inverse * &self.target, &inverse * inverse.transpose()))
+    }
+
+    /// The consistent body nearest to the estimate in the metric of its covariance.
+    pub(crate) fn nearest_consistent_body(&self) -> Result<PhysicalFit, NoBodyError> {
+        let count = self.rows.nrows();
+        let panel: Vec<f64> = self.rows.as_slice().iter().chain(self.target.as_slice()).copied().collect();
+        let factor = TriangularFactor::from_rows(10, &panel, count)?;
+        let body = PhysicalBody {
+            name: self.name.clone(),
+            reference: rough_body(self.mass, GYRATION_RADIUS_M),
+            known: None,
+            mass_kg: self.mass_kg,
+            com_box_m: None,
+            inside: None,
+        };
+        let map = BaseMap::new(DMatrix::identity(10, 10))?;
+        let problem = PhysicalProblem::new(map, vec![body], Vec::new(), &factor)?;
+        Ok(physical_fit(&problem, &PhysicalSettings::default())?)
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ mod gains;
 mod known_arm;
 mod refit;
 mod result;
+mod round_body;
 
 pub use columns::{LoadColumns, Payload, known_payloads};
 pub use error::PayloadError;
@@ -17,6 +18,7 @@ pub use gains::DriveGain;
 pub use known_arm::KnownArm;
 pub use refit::Refit;
 pub use result::{ConsistentPayload, Measured, PayloadParameter, PayloadResult, payload_results};
+pub use round_body::{ControllerPayload, ControllerValue};
 
 pub(crate) use columns::SeenColumns;
 pub(crate) use free_gains::free_gains;

@@ -1,7 +1,8 @@
 //! Estimated payloads: values with error bars, and a consistent body.
 
-use super::body::{at_centre_of_mass, jacobian, nearest_consistent_body};
+use super::body::{Determined, NoBodyError, at_centre_of_mass, jacobian};
 use super::columns::{LoadColumns, Payload, PayloadColumns};
+use super::round_body::{ControllerPayload, controller_payload};
 use dynident_estimation::Estimate;
 use dynident_model::INERTIAL_NAMES;
 use dynident_rows::Recording;
@@ -78,6 +79,10 @@ pub struct PayloadResult {
     pub not_identified: Vec<String>,
     /// A consistent body.
     pub possible: Option<ConsistentPayload>,
+    /// The body that `export` writes for a controller: as `possible`, with the values of a round body of the payload's
+    /// size as far as the error bars allow.
+    #[serde(default)]
+    pub controller: Option<ControllerPayload>,
     /// Reason for a missing consistent body.
     pub failure: Option<String>,
     /// Effect on the base parameters, in their order; `validate` uses it for logs with this payload.
@@ -118,20 +123,9 @@ fn result(
         })
         .collect();
     let figures = figures(columns, estimate, &excited);
-    let (possible, failure) = match nearest_consistent_body(&section.name, columns, estimate) {
-        Ok(fit) => {
-            let p: [f64; 10] = core::array::from_fn(|k| fit.parameters[k]);
-            let [mass_kg, x, y, z, xx, xy, xz, yy, yz, zz] = at_centre_of_mass(&p);
-            let possible = ConsistentPayload {
-                mass_kg,
-                com_m: [x, y, z],
-                inertia_at_com_kgm2: [xx, xy, xz, yy, yz, zz],
-                moved_sigma: fit.moved_sigma,
-                on_the_boundary: fit.bodies.iter().any(|body| body.on_the_boundary),
-            };
-            (Some(possible), None)
-        }
-        Err(reason) => (None, Some(reason.to_string())),
+    let (possible, controller, failure) = match consistent_bodies(&section.name, columns, estimate, &figures) {
+        Ok((possible, controller)) => (Some(possible), Some(controller), None),
+        Err(reason) => (None, None, Some(reason.to_string())),
     };
     let added = (0..columns.change.nrows()).map(|row| {
         let of_mass = columns.mass.as_ref().map_or(0.0, |(_, added)| added[row]);
@@ -151,10 +145,32 @@ fn result(
         inertia_at_com_kgm2: core::array::from_fn(|k| figures[4 + k]),
         not_identified: not_identified(columns, &parameters),
         possible,
+        controller,
         failure,
         base_parameters_added: added.collect(),
         parameters,
     }
+}
+
+/// The consistent body nearest to the estimate, and the one for a controller.
+fn consistent_bodies(
+    name: &str,
+    columns: &PayloadColumns,
+    estimate: &Estimate,
+    figures: &[Option<Measured>; 10],
+) -> Result<(ConsistentPayload, ControllerPayload), NoBodyError> {
+    let data = Determined::of(name, columns, estimate)?;
+    let fit = data.nearest_consistent_body()?;
+    let nearest: [f64; 10] = core::array::from_fn(|k| fit.parameters[k]);
+    let [mass_kg, x, y, z, xx, xy, xz, yy, yz, zz] = at_centre_of_mass(&nearest);
+    let possible = ConsistentPayload {
+        mass_kg,
+        com_m: [x, y, z],
+        inertia_at_com_kgm2: [xx, xy, xz, yy, yz, zz],
+        moved_sigma: fit.moved_sigma,
+        on_the_boundary: fit.bodies.iter().any(|body| body.on_the_boundary),
+    };
+    Ok((possible, controller_payload(&data, &nearest, figures)?))
 }
 
 fn not_identified(columns: &PayloadColumns, parameters: &[PayloadParameter]) -> Vec<String> {

@@ -12,6 +12,9 @@ use crate::spatial::{Mat3, Transform, Vec3};
 use roxmltree::Node;
 use std::collections::HashMap;
 
+/// Position limit, rad or m, that means an unknown limit: no joint of a robot has such a range.
+pub(super) const UNKNOWN_POSITION: f64 = 1.0e3;
+
 pub(super) struct LinkElement<'a, 'input> {
     pub(super) node: Node<'a, 'input>,
     pub(super) name: &'a str,
@@ -141,6 +144,8 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
             JointLimits { velocity: number(limit, "velocity")?, effort: number(limit, "effort")?, ..element.limits };
         let (lower, upper) = (number(limit, "lower")?, number(limit, "upper")?);
         if kind != JointKind::Continuous {
+            let lower = lower.filter(|lower| *lower > -UNKNOWN_POSITION);
+            let upper = upper.filter(|upper| *upper < UNKNOWN_POSITION);
             element.limits = JointLimits { lower, upper, ..element.limits };
         }
     }

@@ -1,5 +1,6 @@
 //! Writes a model from another format, such as a D-H table, as URDF.
 
+use super::elements::UNKNOWN_POSITION;
 use super::write::inertial_lines;
 use crate::joint::{Joint, JointKind};
 use crate::spatial::{Mat3, Transform};
@@ -8,10 +9,13 @@ use core::fmt::Write;
 use dynident_text::xml::{comment, escaped};
 
 /// Writes the model as URDF: links, joints with placement, axis, limits and friction, and the known inertials. Reading
-/// the result gives the same model, except for these limitations of URDF: gravity is lost; a revolute joint without
-/// position limits becomes `continuous`, because URDF readers use zero for missing limits; an unknown velocity or
-/// effort limit is written as 0, with a comment, where the format requires one; a mimic joint with two sources is
-/// described in a comment.
+/// the result gives the same model, except for these limitations of URDF: gravity is lost; a mimic joint with two
+/// sources is described in a comment.
+///
+/// Unknown limits are written with a comment, because URDF readers use zero for missing limits: unknown positions of a
+/// revolute or prismatic joint as ±1000 rad or m, which the reader treats as unknown again, an unknown velocity or
+/// effort as 0 where the format requires one. A joint stays `revolute`, because readers such as Pinocchio describe the
+/// position of a `continuous` joint by two numbers.
 ///
 /// Angles are the fixed-axis roll, pitch and yaw of the placement, `R = Rz(yaw) Ry(pitch) Rx(roll)`, in rad.
 pub fn write_urdf(model: &Model) -> String {
@@ -58,11 +62,7 @@ fn write_links(text: &mut String, body: &Body, is_base: bool) {
 
 fn write_joint(text: &mut String, joint: &Joint, parent: &str, child: &str) {
     let limits = &joint.limits;
-    let stops = limits.lower.zip(limits.upper);
-    let kind = match (joint.kind, stops) {
-        (JointKind::Revolute | JointKind::Continuous, None) => JointKind::Continuous,
-        (kind, _) => kind,
-    };
+    let kind = joint.kind;
     let [x, y, z] = joint.axis.0;
     let _ = writeln!(
         text,
@@ -75,13 +75,22 @@ fn write_joint(text: &mut String, joint: &Joint, parent: &str, child: &str) {
     );
     let needs_limit = kind != JointKind::Continuous || limits.velocity.is_some() || limits.effort.is_some();
     if needs_limit {
+        let positions = [("lower", limits.lower), ("upper", limits.upper)];
+        let positions = positions.iter().filter(|(_, value)| value.is_none() && kind != JointKind::Continuous);
+        for (name, _) in positions {
+            let _ = writeln!(text, "    <!-- ±{UNKNOWN_POSITION:?}: {name} not known -->");
+        }
         let unknown = [("velocity", limits.velocity), ("effort", limits.effort)];
         let unknown: Vec<&str> = unknown.iter().filter(|(_, value)| value.is_none()).map(|(name, _)| *name).collect();
         if !unknown.is_empty() {
             let _ = writeln!(text, "    <!-- 0: {} not known -->", unknown.join(" and "));
         }
-        let stops = stops.filter(|_| kind != JointKind::Continuous);
-        let stops = stops.map_or(String::new(), |(lower, upper)| format!("lower=\"{lower:?}\" upper=\"{upper:?}\" "));
+        let stops = if kind == JointKind::Continuous {
+            String::new()
+        } else {
+            let [lower, upper] = [limits.lower.unwrap_or(-UNKNOWN_POSITION), limits.upper.unwrap_or(UNKNOWN_POSITION)];
+            format!("lower=\"{lower:?}\" upper=\"{upper:?}\" ")
+        };
         let _ = writeln!(
             text,
             "    <limit {stops}velocity=\"{:?}\" effort=\"{:?}\"/>",

@@ -3,8 +3,8 @@
 
 use core::fmt::Write;
 use dynident_model::{
-    InertialParameters, JointChange, JointKind, LinkChange, Mat3, Model, Vec3, link_changes, read_dh, read_urdf,
-    rewrite_dh, write_urdf,
+    InertialParameters, JointChange, JointKind, JointLimits, LinkChange, Mat3, Model, Vec3, link_changes, read_dh,
+    read_urdf, rewrite_dh, write_urdf,
 };
 use proptest::prelude::*;
 
@@ -109,6 +109,45 @@ fn unknown_parts_are_refused() {
     let link = LinkChange::Set { link: "a_link".to_owned(), inertial: nan, note: None };
     assert!(rewrite_dh(TABLE, &[link], &[]).unwrap_err().to_string().contains("finite"));
     assert!(rewrite_dh("name = ", &[], &[]).unwrap_err().to_string().contains("1:"));
+}
+
+/// A joint stays `revolute` in the URDF: readers such as Pinocchio describe a `continuous` joint by two numbers.
+#[test]
+fn unknown_limits_are_wide_and_stay_unknown() {
+    let table = "convention = \"modified\"\n[[joint]]\nname = \"a\"\n[[joint]]\nname = \"b\"\nlimits = { lower_rad = -2, upper_rad = 1 }\n\
+                 [[joint]]\nname = \"c\"\nkind = \"prismatic\"\nlimits = { lower_m = 0.1 }\n[[joint]]\nname = \"d\"\nkind = \"continuous\"\n";
+    let model = read_dh(table).unwrap();
+    let text = write_urdf(&model);
+    let kinds: Vec<&str> = text
+        .split(" type=\"")
+        .skip(1)
+        .map(|rest| rest.split('"').next().unwrap())
+        .filter(|kind| *kind != "fixed")
+        .collect();
+    assert_eq!(kinds, ["revolute", "revolute", "prismatic", "continuous"], "{text}");
+    let limits: Vec<&str> = text.lines().filter(|line| line.contains("<limit ")).map(str::trim).collect();
+    assert_eq!(
+        limits,
+        [
+            r#"<limit lower="-1000.0" upper="1000.0" velocity="0.0" effort="0.0"/>"#,
+            r#"<limit lower="-2.0" upper="1.0" velocity="0.0" effort="0.0"/>"#,
+            r#"<limit lower="0.1" upper="1000.0" velocity="0.0" effort="0.0"/>"#,
+        ]
+    );
+    assert_eq!(text.matches("lower not known").count() + text.matches("upper not known").count(), 3, "{text}");
+    let back = read_urdf(&text).unwrap().model;
+    for (joint, again) in model.joints().iter().zip(back.joints()) {
+        assert_eq!(
+            (joint.kind, joint.limits.lower, joint.limits.upper),
+            (again.kind, again.limits.lower, again.limits.upper)
+        );
+    }
+    // Limits from elsewhere replace only unknown ones.
+    let more = |_: &str| JointLimits { lower: Some(-3.0), upper: Some(3.0), velocity: Some(2.0), effort: None };
+    let limited = model.with_missing_limits(more);
+    let of: Vec<_> = limited.joints().iter().map(|joint| (joint.limits.lower, joint.limits.upper)).collect();
+    assert_eq!(of, [(Some(-3.0), Some(3.0)), (Some(-2.0), Some(1.0)), (Some(0.1), Some(3.0)), (None, None)]);
+    assert!(limited.joints().iter().all(|joint| joint.limits.velocity == Some(2.0)));
 }
 
 #[test]

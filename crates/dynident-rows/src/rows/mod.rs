@@ -62,6 +62,8 @@ pub struct RawSamples<'a> {
     pub rate_hz: f64,
     /// Regressor with the logged torque, smoothed if `smooth_torque` is set.
     pub panels: &'a Panels,
+    /// Positions, velocities and accelerations, joint after joint in the order of the model.
+    pub motion: &'a [Vec<f64>; 3],
     /// For each joint whether the torque of each sample is invalid (outlier, repeated value, bridged gap); empty if all
     /// are valid.
     pub set_aside: &'a [Vec<bool>],

@@ -43,6 +43,7 @@ pub(super) struct PanelMaker<'a> {
 #[derive(Debug, Default)]
 pub(super) struct SamplePanels {
     panels: Panels,
+    motion: [Vec<f64>; 3],
     segment: usize,
     rate_hz: f64,
     set_aside: Vec<Vec<bool>>,
@@ -55,6 +56,7 @@ impl SamplePanels {
             segment: self.segment,
             rate_hz: self.rate_hz,
             panels: &self.panels,
+            motion: &self.motion,
             set_aside: &self.set_aside,
             settled: self.settled.clone(),
         }
@@ -159,6 +161,7 @@ impl<'a> PanelMaker<'a> {
                 }
             }
         }
+        out.motion.clone_from(&self.motion);
         out.set_aside.clear();
         if !block.set_aside.is_empty() {
             let of_joints = self.places.iter().map(|&place| set_aside(block, place, from, samples).to_vec());

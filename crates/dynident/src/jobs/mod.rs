@@ -17,5 +17,6 @@ mod provenance;
 mod recorded_velocities;
 pub(crate) mod reduce;
 pub(crate) mod simulate;
+pub(crate) mod test_samples;
 pub(crate) mod validate;
 mod violations;

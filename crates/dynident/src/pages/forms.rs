@@ -11,12 +11,21 @@ pub(super) fn forms(page: &mut Report, r: &ResultFile) {
     }
     let percent = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2} %"));
     let rows = r.forms.iter().flat_map(|form| {
-        let held = match form.class {
-            TermClass::DampingAndFriction => "bodies, damping, Coulomb friction",
-            TermClass::DampingFrictionAndInertia => "bodies, damping, Coulomb friction, drive inertia, springs",
-            TermClass::FunctionsOfMotion => "everything except friction with memory, load or temperature",
+        // The columns of the table "What each form can hold" of the book (docs/src/export.md).
+        let (held, refitted) = match form.class {
+            TermClass::DampingAndFriction => {
+                ("bodies, damping, Coulomb friction", "damping and friction of each joint")
+            }
+            TermClass::DampingFrictionAndInertia => (
+                "bodies, damping, Coulomb friction, drive inertia, springs",
+                "damping, friction and drive inertia of each joint",
+            ),
+            TermClass::FunctionsOfMotion => (
+                "all terms that depend on the current motion",
+                "joints that have friction with memory, under load or with temperature",
+            ),
         };
-        let refitted = if form.refitted { "drives fitted again" } else { "nothing" };
+        let refitted = if form.refitted { refitted } else { "nothing: all terms are kept" };
         let row = move |log: &str, error: Option<f64>, model: Option<f64>| {
             let cells = [form.forms.join(", "), held.to_owned(), refitted.to_owned(), log.to_owned()];
             let errors = [percent(error), percent(model)];

@@ -1,5 +1,6 @@
 //! The model in each class of forms, with its own held-out error.
 
+use dynident_estimation::ValidationReport;
 use dynident_export::{ExportError, ModelFile, RobotModel};
 use dynident_model::terms::{TermClass, TorqueTerm};
 use serde::{Deserialize, Serialize};
@@ -62,6 +63,40 @@ pub struct FormError {
     pub relative_error_percent: Option<f64>,
     /// The same of the identified model: of the consistent set, if there is one.
     pub model_relative_error_percent: Option<f64>,
+    /// The errors of every joint; empty in results of older versions.
+    #[serde(default)]
+    pub joints: Vec<FormJointError>,
+}
+
+/// The error of a form at one joint, next to that of the identified model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct FormJointError {
+    /// The joint.
+    pub joint: String,
+    /// RMS error of the form's torque, Nm (N for a prismatic joint).
+    pub rmse_nm: f64,
+    /// RMS error, percent of the RMS of the measured torque; `None` if the torque is zero.
+    pub relative_error_percent: Option<f64>,
+    /// The same of the identified model.
+    pub model_relative_error_percent: Option<f64>,
+}
+
+impl FormJointError {
+    /// Every joint of the reports of a form and of the model.
+    pub(crate) fn of_joints(form: &ValidationReport, model: &ValidationReport) -> Vec<Self> {
+        let of_model = |name: &String| {
+            let joint = model.joints.iter().find(|joint| joint.name == *name)?;
+            joint.relative_error_percent
+        };
+        let joint = form.joints.iter().map(|joint| Self {
+            joint: joint.name.clone(),
+            rmse_nm: joint.rmse_nm,
+            relative_error_percent: joint.relative_error_percent,
+            model_relative_error_percent: of_model(&joint.name),
+        });
+        joint.collect()
+    }
 }
 
 impl FormResult {

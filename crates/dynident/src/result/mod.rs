@@ -6,6 +6,7 @@ mod design;
 mod error_terms;
 mod evaluation;
 mod export;
+mod export_validation;
 mod factors;
 mod forms;
 mod identification;
@@ -20,6 +21,7 @@ mod seal;
 mod simulation;
 mod sound;
 pub(crate) mod stored;
+mod test_samples;
 mod validation;
 
 pub use check::{CHECK_SCHEMA, CheckFile, CheckFinding, HypothesisResult, StudyChange, StudyCheck};
@@ -29,8 +31,9 @@ pub use design::{
 pub use error_terms::ErrorTermResult;
 pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
 pub use export::{EXPORT_SCHEMA, ExportFile};
+pub use export_validation::{EXPORT_VALIDATION_SCHEMA, ExportValidationFile};
 pub use factors::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
-pub use forms::{FormError, FormResult, FormTerm, StoredModel};
+pub use forms::{FormError, FormJointError, FormResult, FormTerm, StoredModel};
 pub use identification::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,
@@ -47,6 +50,7 @@ pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};
 pub use problems::ProblemSettings;
 pub use provenance::{InputFile, Provenance};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
+pub use test_samples::{TEST_SAMPLES_SCHEMA, TestSamplesFile, TestedLog};
 // Types of lower crates in these files.
 pub use dynident_excitation::check::LimitReport;
 pub use dynident_identification::ErrorSource;

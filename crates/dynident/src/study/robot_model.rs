@@ -8,7 +8,7 @@ use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
 use dynident_model::terms::{
     CoulombShape, Coupling, CouplingEffect, Declared, DriveChoice, StatedJoint, TorqueTerm, terms_per_joint,
 };
-use dynident_model::{LoopClosure, Model, ModelError, Robot, Vec3, has_xacro_macros, loops};
+use dynident_model::{JointLimits, LoopClosure, Model, ModelError, Robot, Vec3, has_xacro_macros, loops};
 use dynident_system::ProgramPermission;
 use std::path::Path;
 
@@ -24,6 +24,15 @@ pub struct StudyRobot {
 }
 
 impl Study {
+    /// The limits of a joint in `[design.limits]`, for a robot description without limits.
+    pub(crate) fn joint_limits(&self, joint: &str) -> JointLimits {
+        let Some(stated) = self.design.as_ref().and_then(|design| design.limits.of(joint)) else {
+            return JointLimits::default();
+        };
+        let [lower, upper] = stated.position.map_or([None, None], |ends| ends.map(Some));
+        JointLimits { lower, upper, velocity: stated.speed, effort: stated.torque }
+    }
+
     /// Expands a robot file with xacro macros by the program `xacro` and keeps the result in memory, because jobs do
     /// not start programs. Other robot files are left unread.
     ///

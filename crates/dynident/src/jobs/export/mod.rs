@@ -1,8 +1,10 @@
 //! `export`: an identified model for a controller or a simulator.
 
 mod simulator;
+mod validation;
 
 pub use simulator::{export_simulator, export_simulator_of};
+pub use validation::{EXPORT_VALIDATION_SUFFIX, export_validation, payload_validation, table_validation};
 
 use crate::error::Error;
 use crate::jobs::recorded_velocities::recorded_velocities;
@@ -13,6 +15,7 @@ use dynident_export::{
     ControllerBrand, ExportError, Exported, PayloadBody, RobotModel, Target, export, notes_on_omitted, payload_command,
 };
 use dynident_identification::Role;
+use dynident_identification::payload::{ControllerPayload, ControllerValue, PayloadResult};
 use dynident_model::terms::TorqueTerm;
 use dynident_model::{InertialParameters, Mat3, Vec3};
 use std::path::Path;
@@ -126,6 +129,7 @@ fn robot_model(
     };
     let inertials: Vec<_> = robot.model().bodies().iter().map(|body| of(body.name())).collect::<Result<_, _>>()?;
     let model = robot.model().with_inertials(&inertials).map_err(|error| wrong(error.to_string()))?;
+    let model = model.with_missing_limits(|joint| study.joint_limits(joint));
     let known = stored.joints.iter().flat_map(|joint| &joint.terms).chain(&stored.couplings);
     let value = |symbol: String| {
         let term = known.clone().find(|term| term.symbol == symbol);
@@ -172,28 +176,69 @@ pub fn export_payload_of(
     reader: ControllerBrand,
 ) -> Result<Exported, Error> {
     let wrong = |message: String| Error::Result { path: result_path.to_owned(), message };
-    let names = stored.payloads.iter().map(|payload| format!("`{}`", payload.name)).collect::<Vec<_>>().join(", ");
-    let found = match (name, &stored.payloads[..]) {
-        (_, []) => return Err(wrong("no payload was estimated: add [[payload]] to the study".to_owned())),
-        (None, [only]) => only,
-        (None, _) => return Err(wrong(format!("several payloads ({names}): select one (--payload)"))),
-        (Some(name), all) => (all.iter().find(|payload| payload.name == name))
-            .ok_or_else(|| wrong(format!("no payload `{name}`; it has {names}")))?,
-    };
+    let found = selected_payload(stored, result_path, name)?;
     let inconsistent = || {
         let why = found.failure.as_deref().unwrap_or("its mass is zero");
         wrong(format!("payload `{}` has no body that can be real: {why}", found.name))
     };
-    let body = found.possible.as_ref().ok_or_else(inconsistent)?;
-    let [xx, xy, xz, yy, yz, zz] = body.inertia_at_com_kgm2;
+    let (mass_kg, com_m, inertia) = match (&found.controller, &found.possible) {
+        (Some(body), _) => (body.mass_kg, body.com_m, body.inertia_at_com_kgm2),
+        // Results of older versions.
+        (None, Some(body)) => (body.mass_kg, body.com_m, body.inertia_at_com_kgm2),
+        (None, None) => return Err(inconsistent()),
+    };
+    let [xx, xy, xz, yy, yz, zz] = inertia;
     let inertia = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
-    let inertial = InertialParameters::from_centre_of_mass(body.mass_kg, Vec3(body.com_m), &inertia);
-    let text = payload_command(&PayloadBody { name: found.name.clone(), inertial }, reader).ok_or_else(inconsistent)?;
+    let inertial = InertialParameters::from_centre_of_mass(mass_kg, Vec3(com_m), &inertia);
     let mut notes = vec![format!("In the frame of the link {}; the controller must use the same frame.", found.link)];
-    if let Some(mass) = &found.mass_kg {
-        notes.push(format!("Mass {:.4} ± {:.4} kg (95 %).", mass.value, mass.half_width_95));
+    match &found.controller {
+        Some(body) => notes.extend(value_notes(body)),
+        None => notes
+            .extend(found.mass_kg.map(|mass| format!("Mass {:.4} ± {:.4} kg (95 %).", mass.value, mass.half_width_95))),
     }
     notes.extend(found.not_identified.iter().map(|what| format!("Not measured: {what}")));
     notes.extend(stored.problems.iter().map(|problem| format!("The result has a PROBLEM: {problem}")));
+    let payload = PayloadBody { name: found.name.clone(), inertial };
+    // Results of older versions have no intervals for the comment.
+    let comment = if found.controller.is_some() { &notes[..] } else { &[] };
+    let text = payload_command(&payload, reader, comment).ok_or_else(inconsistent)?;
     Ok(Exported { text, notes })
+}
+
+/// The payload of a result with this name, or its only one.
+///
+/// # Errors
+/// A result without payloads, without this one, or with several if `name` is `None`.
+pub fn selected_payload<'a>(
+    stored: &'a ResultFile,
+    result_path: &Path,
+    name: Option<&str>,
+) -> Result<&'a PayloadResult, Error> {
+    let wrong = |message: String| Error::Result { path: result_path.to_owned(), message };
+    let names = stored.payloads.iter().map(|payload| format!("`{}`", payload.name)).collect::<Vec<_>>().join(", ");
+    match (name, &stored.payloads[..]) {
+        (_, []) => Err(wrong("no payload was estimated: add [[payload]] to the study".to_owned())),
+        (None, [only]) => Ok(only),
+        (None, _) => Err(wrong(format!("several payloads ({names}): select one (--payload)"))),
+        (Some(name), all) => (all.iter().find(|payload| payload.name == name))
+            .ok_or_else(|| wrong(format!("no payload `{name}`; it has {names}"))),
+    }
+}
+
+/// The ten values of a payload with their intervals, one sentence each, and the rule for those of the round body.
+fn value_notes(body: &ControllerPayload) -> Vec<String> {
+    let value = |one: &ControllerValue| {
+        let start = format!("{} = {:.5e} {}", one.name, one.value, one.unit);
+        match (one.estimate, one.half_width_95, one.lower_95, one.upper_95) {
+            (Some(estimate), Some(half), Some(lower), Some(upper)) => format!(
+                "{start}; 95 % interval of the logs {lower:.3e} to {upper:.3e} (estimate {estimate:.3e} ± {half:.2e})."
+            ),
+            _ => format!("{start}; the logs do not determine it."),
+        }
+    };
+    let rule = format!(
+        "Inertia that the logs do not determine is that of a sphere of the payload's size: radius {:.3} m, moment {:.3e} kg m^2.",
+        body.round_radius_m, body.round_moment_kgm2
+    );
+    body.values.iter().map(value).chain([rule]).collect()
 }

@@ -1,6 +1,7 @@
 //! The model in each class of forms, for the result.
 
-use crate::result::{FormError, FormResult, FormTerm, StoredModel};
+use crate::result::{FormError, FormJointError, FormResult, FormTerm, StoredModel};
+use crate::study::Study;
 use dynident_estimation::ValidationReport;
 use dynident_export::{ModelFile, RobotModel, Target};
 use dynident_identification::Identification;
@@ -21,6 +22,7 @@ fn form_result(found: &Identification, form: &FormFit) -> FormResult {
             log: tested.validation.log.clone(),
             relative_error_percent: report.relative_error_percent,
             model_relative_error_percent: model.relative_error_percent,
+            joints: FormJointError::of_joints(report, model),
         })
     };
     let has_class = |target: &Target| target.class() == Some(form.class);
@@ -33,11 +35,15 @@ fn form_result(found: &Identification, form: &FormFit) -> FormResult {
     }
 }
 
-/// The identified robot; `None` if a body has no parameters.
-pub(super) fn stored_model(found: &Identification, inertials: &[InertialParameters]) -> Option<StoredModel> {
+/// The identified robot; `None` if a body has no parameters. Limits that the description lacks are those of the study.
+pub(super) fn stored_model(
+    study: &Study,
+    found: &Identification,
+    inertials: &[InertialParameters],
+) -> Option<StoredModel> {
     let model = &found.model().parametric;
     let values = &found.consistent.parameters[model.model().inertial_count()..];
-    let robot = model.model().with_inertials(inertials).ok()?;
+    let robot = model.model().with_inertials(inertials).ok()?.with_missing_limits(|joint| study.joint_limits(joint));
     let robot = RobotModel::new(robot, model.terms().to_vec(), values.to_vec()).ok()?;
     Some(StoredModel { robot: ModelFile::of(&robot, &[]), terms: form_terms(model.terms(), values) })
 }

@@ -187,8 +187,8 @@ pub(in crate::jobs) fn build_outcome(
     let in_study = Error::identification::<IdentificationError>(study_path);
     let inertials = found.inertials();
     let verdict = physical_verdict(study, &found, &inertials);
-    let (files, no_urdf) = match exported_model(robot, task, &found, &verdict, is_payload) {
-        Ok(files) => (Some(files.with_provenance(&provenance)), None),
+    let (files, no_urdf) = match exported_model((study, robot), task, &found, &verdict, is_payload) {
+        Ok(files) => (Some(files.with_provenance(&provenance, &form_results(&found))), None),
         Err(reason) => (None, Some(reason)),
     };
     let (mut urdf, mut table, mut mjcf, mut no_mjcf, mut sdf, mut no_sdf) = (None, None, None, None, None, None);
@@ -262,7 +262,7 @@ fn physical_verdict(study: &Study, found: &Identification, inertials: &[Inertial
 
 /// A result without URDF is still valid if a URDF cannot express its parameters.
 fn exported_model(
-    robot: &StudyRobot,
+    (study, robot): (&Study, &StudyRobot),
     task: &IdentificationTask,
     found: &Identification,
     verdict: &PhysicalVerdict,
@@ -278,7 +278,7 @@ fn exported_model(
         ));
     }
     let sources = sources(found.model(), found.estimate());
-    model_files(robot, found, &sources)
+    model_files(study, robot, found, &sources)
 }
 
 struct Parts<'a> {
@@ -346,7 +346,7 @@ fn result_file(
             .into_iter()
             .flat_map(friction_results)
             .collect(),
-        model: if parts.is_payload { None } else { stored_model(found, parts.inertials) },
+        model: if parts.is_payload { None } else { stored_model(study, found, parts.inertials) },
         forms: form_results(found),
         payloads: found.payloads.clone(),
         offsets: offset_results(found, &task.recordings),

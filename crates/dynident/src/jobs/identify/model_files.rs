@@ -1,14 +1,14 @@
 //! The user's robot description with the identified values; additionally a URDF for D-H tables, MJCF and SDF.
 
 use super::joint_values::JointValues;
-use crate::result::{InputFile, Provenance, ValueSource};
-use crate::study::StudyRobot;
+use crate::result::{FormResult, InputFile, Provenance, ValueSource};
+use crate::study::{Study, StudyRobot};
 use core::fmt::Write;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::HALF_WIDTH_95;
 use dynident_identification::Identification;
 use dynident_model::mjcf::{MjcfLoss, included_from};
-use dynident_model::terms::{JointProperty, TermClass};
+use dynident_model::terms::{JointProperty, TermClass, TorqueTerm};
 use dynident_model::{
     Body, DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, LinkChange, Model, Robot, link_changes,
     rewrite_dh, rewrite_mjcf, rewrite_sdf, rewrite_urdf, write_urdf,
@@ -26,9 +26,11 @@ pub(super) struct ModelFiles {
     pub(super) sdf: Option<Result<String, String>>,
 }
 
-/// Writes the new values into the user's robot description; locked joints keep their values. The error is the reason
+/// Writes the new values into the user's robot description; locked joints keep their values. A URDF converted from
+/// another format has the limits of `study` where the description lacks them. The error is the reason
 /// for a missing description.
 pub(super) fn model_files(
+    study: &Study,
     robot: &StudyRobot,
     found: &Identification,
     sources: &[[ValueSource; 10]],
@@ -42,6 +44,7 @@ pub(super) fn model_files(
     known.note(lost_in_urdf, &mut links);
     let Robot { model: whole, format, text, .. } = &robot.robot;
     let urdf = |text: &str| rewrite_urdf(text, &links, &joints).map_err(|error| error.to_string());
+    let converted = || write_urdf(&whole.clone().with_missing_limits(|joint| study.joint_limits(joint)));
     match format {
         DescriptionFormat::Urdf => Ok(ModelFiles { urdf: urdf(text)?, table: None, mjcf: None, sdf: None }),
         DescriptionFormat::Mjcf => {
@@ -52,18 +55,18 @@ pub(super) fn model_files(
                 let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
                 rewrite_mjcf(text, &mut included_from(folder), &links, &joints).map_err(|error| error.to_string())
             });
-            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: Some(mjcf), sdf: None })
+            Ok(ModelFiles { urdf: urdf(&converted())?, table: None, mjcf: Some(mjcf), sdf: None })
         }
         DescriptionFormat::Sdf => {
             let sdf = keeping(robot, model.model(), inertials).and_then(|mut links| {
                 known.note(lost_in_urdf, &mut links);
                 rewrite_sdf(text, &links, &with_springs(found, &joints)).map_err(|error| error.to_string())
             });
-            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: None, sdf: Some(sdf) })
+            Ok(ModelFiles { urdf: urdf(&converted())?, table: None, mjcf: None, sdf: Some(sdf) })
         }
         DescriptionFormat::Dh => {
             let table = rewrite_dh(text, &links, &joints).map_err(|error| error.to_string())?;
-            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: Some(table), mjcf: None, sdf: None })
+            Ok(ModelFiles { urdf: urdf(&converted())?, table: Some(table), mjcf: None, sdf: None })
         }
     }
 }
@@ -165,7 +168,9 @@ impl BodyNotes<'_> {
                 let _ = write!(text, "; mass {:.4} kg ± {:.2e} kg (95 %)", parameters[10 * index], HALF_WIDTH_95 * std);
             }
             let terms = model.terms().iter().zip(&parameters[model.model().inertial_count()..]);
-            let lost = terms.filter(|(term, _)| term.own_joint() == Some(index) && lost(term.property()));
+            // A coupling of two joints is listed at the first.
+            let is_here = |term: &TorqueTerm| term.joints().first() == Some(&index);
+            let lost = terms.filter(|(term, _)| is_here(term) && lost(term.property()));
             let lost: Vec<String> =
                 lost.map(|(term, value)| format!("{} = {value:.4} {}", term.symbol(), term.unit())).collect();
             if !lost.is_empty() {
@@ -190,17 +195,22 @@ const XML_COMMENT_START: &str = "<!-- dynident ";
 const TOML_COMMENT_START: &str = "# dynident ";
 
 impl ModelFiles {
-    /// Adds a comment about the origin of the values to each file; it replaces the comment of an earlier
-    /// identification.
-    pub(super) fn with_provenance(self, provenance: &Provenance) -> Self {
-        let line = provenance_line(provenance);
+    /// Adds a comment about the origin of the values and the held-out error of the file to each file; it replaces the
+    /// comment of an earlier identification.
+    pub(super) fn with_provenance(self, provenance: &Provenance, forms: &[FormResult]) -> Self {
+        let errors = |class: TermClass| -> String {
+            let form = forms.iter().find(|form| form.class == class);
+            form.map_or_else(String::new, |form| form.sentences().map(|sentence| format!(". {sentence}")).collect())
+        };
+        let line = provenance_line(provenance, &errors(TermClass::DampingAndFriction));
+        let line_of_mjcf = provenance_line(provenance, &errors(TermClass::DampingFrictionAndInertia));
         let table = |text: String| {
             let earlier = text.strip_prefix(TOML_COMMENT_START).and_then(|rest| rest.split_once('\n'));
             let rest = earlier.map_or(&*text, |(_, rest)| rest);
             format!("{TOML_COMMENT_START}{line}\n{}", rest.trim_start_matches('\u{feff}'))
         };
-        let commented = |text: Result<String, String>| text.map(|text| commented_xml(&text, &line));
-        let (mjcf, sdf) = (self.mjcf.map(commented), self.sdf.map(commented));
+        let mjcf = self.mjcf.map(|text| text.map(|text| commented_xml(&text, &line_of_mjcf)));
+        let sdf = self.sdf.map(|text| text.map(|text| commented_xml(&text, &line)));
         Self { urdf: commented_xml(&self.urdf, &line), table: self.table.map(table), mjcf, sdf }
     }
 }
@@ -222,11 +232,11 @@ fn commented_xml(urdf: &str, line: &str) -> String {
 }
 
 /// Origin of the values, in one line that cannot end a comment of XML or TOML.
-fn provenance_line(provenance: &Provenance) -> String {
+fn provenance_line(provenance: &Provenance, errors: &str) -> String {
     let robot = provenance.inputs.iter().find(|input| input.what == "robot");
     let named = |input: Option<&InputFile>| input.map_or_else(|| "in memory".to_owned(), |input| input.file.clone());
     let line = format!(
-        "{}, identity {}: identified from the study {} and the robot description {}; details in result.json",
+        "{}, identity {}: identified from the study {} and the robot description {}; details in result.json{errors}",
         provenance.version,
         provenance.identity,
         named(provenance.study.as_ref()),
@@ -270,11 +280,11 @@ mod tests {
             ("<?xml version=\"1.0\"?>\n<!-- mine -->\n<robot/>", "<?xml version=\"1.0\"?>\n"),
             ("\u{feff}<?xml version=\"1.0\"?><robot/>", "\u{feff}<?xml version=\"1.0\"?>\n"),
         ] {
-            let once = commented_xml(urdf, &provenance_line(&of("one")));
+            let once = commented_xml(urdf, &provenance_line(&of("one"), ""));
             assert!(once.starts_with(&format!("{head}<!-- dynident ")) && once.contains("identity one"), "{once}");
             let rest = |text: &str| text.split_once("-->").unwrap().1.trim_start().to_owned();
             assert!(urdf.ends_with(&rest(&once)), "{once}");
-            let twice = commented_xml(&once, &provenance_line(&of("two")));
+            let twice = commented_xml(&once, &provenance_line(&of("two"), ""));
             assert_eq!(twice, once.replace("identity one", "identity two"));
         }
     }
@@ -289,7 +299,7 @@ mod tests {
         };
         let provenance =
             Provenance { study: Some(file("study")), inputs: vec![file("robot")], ..Provenance::default() };
-        let urdf = commented_xml("<robot name=\"a\"/>", &provenance_line(&provenance));
+        let urdf = commented_xml("<robot name=\"a\"/>", &provenance_line(&provenance, ". On a-->.csv"));
         assert_eq!(roxmltree_names(&urdf), ["a"]);
     }
 

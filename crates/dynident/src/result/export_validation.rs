@@ -1,0 +1,39 @@
+//! The held-out error of an exported file, in a file next to it.
+
+use super::forms::FormError;
+use super::provenance::Provenance;
+use dynident_export::ModelTerm;
+use dynident_identification::payload::ControllerPayload;
+use serde::{Deserialize, Serialize};
+
+/// Name and version of the schema of [`ExportValidationFile`].
+pub const EXPORT_VALIDATION_SCHEMA: &str = "dynident/export-validation/1";
+
+/// What was validated of an exported file: `NAME.validation.json` next to the file NAME.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ExportValidationFile {
+    /// [`EXPORT_VALIDATION_SCHEMA`].
+    pub schema: String,
+    /// Provenance of the result.
+    pub provenance: Option<Provenance>,
+    /// Name of the study.
+    pub name: String,
+    /// The form by its name in `dynident export`; `dh` for a D-H table.
+    pub form: String,
+    /// Name of the exported file.
+    pub file: String,
+    /// SHA-256 of the exported file, as `sha256sum` prints it.
+    pub sha256: String,
+    /// Whether the form cannot contain all torque terms of the result, so that the others were fitted again.
+    pub refitted: bool,
+    /// Error of the predicted torque of the file and of the identified model, one entry for each held-out log. Empty
+    /// without held-out logs, for payloads and for results of older versions.
+    pub held_out: Vec<FormError>,
+    /// Torque terms of the identified model that the file does not contain, with their values in the model.
+    pub left_out: Vec<ModelTerm>,
+    /// The payload of the file with the interval of each value; null for models of the arm.
+    pub payload: Option<ControllerPayload>,
+    /// Problems of the result.
+    pub problems: Vec<String>,
+}
