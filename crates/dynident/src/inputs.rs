@@ -7,18 +7,8 @@ use dynident_model::collision::find_mesh;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Largest readable file of a result, a design, runs or factors, bytes.
-pub const MAX_RESULT_BYTES: u64 = 1 << 32;
 /// Largest robot description that is searched for meshes and included files, bytes.
 const MAX_ROBOT_BYTES: u64 = 64 << 20;
-
-/// Reads an output file of a command: a result, a design, runs, factors.
-///
-/// # Errors
-/// [`Error::File`] if the file cannot be read, is not a regular file, or is larger than [`MAX_RESULT_BYTES`].
-pub fn read_result(path: &Path) -> Result<Vec<u8>, Error> {
-    dynident_files::read(path, MAX_RESULT_BYTES).map_err(|source| Error::File { path: path.to_owned(), source })
-}
 
 /// State of a study's files at the start of a job.
 #[derive(Debug)]

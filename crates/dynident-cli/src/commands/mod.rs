@@ -64,8 +64,8 @@ pub(crate) fn pretty_json<T: Serialize>(value: &T) -> Result<Vec<u8>, String> {
 }
 
 #[allow(clippy::needless_pass_by_value, reason = "required by map_err")]
-pub(crate) fn message_of(error: dynident::Error) -> String {
-    error.to_string()
+pub(crate) fn message_of(error: impl Into<dynident::Error>) -> String {
+    error.into().to_string()
 }
 
 /// A limit for the relative error, in percent.
@@ -131,10 +131,12 @@ pub(crate) fn refuse_overwriting(
 
 /// Returns the message of an error in a study. If the error is in another file, the message also contains the study's
 /// name.
-pub(crate) fn known_in(study: &Path) -> impl Fn(dynident::Error) -> String {
-    use dynident::Error::{Missing, Recording, Robot, Xacro};
-    move |error| match error {
-        Recording { .. } | Missing { .. } | Robot(_) | Xacro { .. } => format!("{}: {error}", study.display()),
-        _ => error.to_string(),
+pub(crate) fn known_in<E: Into<dynident::Error>>(study: &Path) -> impl Fn(E) -> String {
+    use dynident::StudyFileError::{Missing, Recording, Robot, Xacro};
+    move |error| match error.into() {
+        error @ dynident::Error::Study(Recording { .. } | Missing { .. } | Robot(_) | Xacro { .. }) => {
+            format!("{}: {error}", study.display())
+        }
+        error => error.to_string(),
     }
 }

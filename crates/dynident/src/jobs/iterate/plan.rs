@@ -1,6 +1,6 @@
 //! Data that all stages of an iteration share: robot, legs, settings and report.
 
-use super::bound;
+use super::{bound, legs};
 use super::inputs::Inputs;
 use super::job::Job;
 use super::report::IterationReport;
@@ -31,7 +31,7 @@ impl<'a> Plan<'a> {
         let Job { study, study_path, options, .. } = *job;
         let in_section = |why: StudyError| job.section_error(why);
         let prior = prior(inputs).map_err(in_section)?;
-        let legs = section.legs(&trajectories.trajectories, robot).map_err(in_section)?;
+        let legs = legs::legs(section, &trajectories.trajectories, robot).map_err(in_section)?;
         let references: Vec<_> = legs.iter().map(Leg::reference).collect();
         let limits = match section.home {
             Some(_) => limits_of(study, study_path, &inputs.folders, robot)?,
@@ -54,7 +54,7 @@ impl<'a> Plan<'a> {
             lowered,
         };
         let planner = planner(job, inputs, &legs)?;
-        let held_out = trajectories.held_out.as_ref().map(|trajectory| section.held_out_motion(trajectory));
+        let held_out = trajectories.held_out.as_ref().map(|trajectory| legs::held_out_motion(section, trajectory));
         let held_out = held_out.transpose().map_err(in_section)?;
         let torque_limits = torque_limits(simulation, robot, truth.is_some());
         Ok(Self { prior, legs, settings, torque_limits, planner, held_out, report })

@@ -14,8 +14,8 @@ use crate::jobs::columns::{Family, Quantity, Source, best, column_list, families
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
 use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
-use crate::robot_file::{LoadSettings, XacroSettings, load_robot};
 use crate::study::Study;
+use crate::study::{LoadSettings, XacroSettings, load_robot};
 use channels::{LoggedJoints, in_order, logged_joints};
 use draft::{Draft, Table};
 use drives::{DriveInertiaFinding, drive_inertia};
