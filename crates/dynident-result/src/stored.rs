@@ -7,7 +7,7 @@ use crate::read::read_result;
 use dynident_dynamics::ParametricModel;
 use dynident_identification::RegressorModel;
 use dynident_identification::payload::{KnownArm, Refit, known_payloads};
-use dynident_study::{JointDrive, Study, StudyError, StudyFileError};
+use dynident_study::{JointDrive, Study, StudyError, StudyFile, StudyFileError};
 use nalgebra::DMatrix;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -239,12 +239,11 @@ impl ResultFile {
     pub fn payloads(
         &self,
         path: &Path,
-        study: &Study,
-        study_path: &Path,
+        study: StudyFile<'_>,
         model: &RegressorModel,
     ) -> Result<StoredPayloads, ResultFileError> {
         let known = known_payloads(&study.payloads(), model);
-        let mut added = known.map_err(StudyFileError::study(study_path))?;
+        let mut added = known.map_err(StudyFileError::study(study.path))?;
         let wrong = |message: String| ResultFileError::Content { path: path.to_owned(), message };
         for payload in &self.payloads {
             let values = &payload.base_parameters_added;

@@ -23,6 +23,7 @@ mod robot_file;
 mod robot_model;
 mod simulated;
 mod simulation;
+mod study_file;
 mod task;
 mod torque;
 
@@ -50,6 +51,7 @@ pub use robot_file::{LoadSettings, XacroSettings, load_robot};
 pub use robot_model::StudyRobot;
 pub use simulated::SimulatedSection;
 pub use simulation::{SimulatedTruth, SimulationSection};
+pub use study_file::{StudyFile, relative_path};
 pub use torque::TorqueSection;
 
 use dynident_identification::Role;

@@ -103,6 +103,6 @@ pub use result::{
     SimulationFile, ValidationFile, read_result,
 };
 pub use study::{
-    Expected, Folders, LoadSettings, Study, StudyError, StudyFileError, StudyRobot, XacroError, XacroSettings,
-    load_robot,
+    Expected, Folders, LoadSettings, Study, StudyError, StudyFile, StudyFileError, StudyRobot, XacroError,
+    XacroSettings, load_robot,
 };

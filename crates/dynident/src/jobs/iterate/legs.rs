@@ -4,7 +4,7 @@ use super::trajectory::Trajectory;
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
 use crate::study::{
-    CouplingSection, IterationSection, LegSection, RobotChoice, SimulationSection, Study, StudyRobot,
+    CouplingSection, IterationSection, LegSection, RobotChoice, SimulationSection, Study, StudyFile, StudyRobot,
 };
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
@@ -13,24 +13,22 @@ use dynident_iteration::robot::{FolderRobot, ProcessRobot};
 use dynident_iteration::{HeldOutMotion, Leg};
 use dynident_simulation::controllers::ControllerModel;
 use dynident_system::PermittedProgram;
-use std::path::Path;
 
 /// Decorrelates the noise of legs with separate iterations.
 const SEED_STEP_PER_LEG: u64 = 0xd1b5_4a32_d192_ed03;
 
 /// The trajectory of each leg; the study's trajectory is designed once, and again for each known payload.
 pub(super) fn trajectories(
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     robot: &StudyRobot,
     rate_hz: f64,
     options: &RunOptions<'_>,
     watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
 ) -> Result<Vec<Trajectory>, Error> {
-    let of = |study: &Study| Trajectory::of_study(study, study_path, robot, rate_hz, options, watch);
+    let of = |own: &Study| Trajectory::of_study(study.with_study(own), robot, rate_hz, options, watch);
     let section = study.iteration.clone().unwrap_or_default();
     if section.leg.is_empty() {
-        return Ok(vec![of(study)?]);
+        return Ok(vec![of(&study)?]);
     }
     let mut whole: Option<Trajectory> = None;
     let mut all = Vec::new();
@@ -39,7 +37,7 @@ pub(super) fn trajectories(
         let is_known = |name: &String| study.payload.iter().any(|one| one.name == *name && one.known().is_some());
         let load = leg.payload.as_ref().filter(|name| is_known(name));
         if leg.trajectory.is_some() || leg.design.is_some() || load.is_some() {
-            let mut own = study.clone();
+            let mut own = study.study.clone();
             if leg.trajectory.is_some() || leg.design.is_some() {
                 own.iteration.get_or_insert_default().trajectory.clone_from(&leg.trajectory);
             }
@@ -53,7 +51,7 @@ pub(super) fn trajectories(
             continue;
         }
         if whole.is_none() {
-            whole = Some(of(study)?);
+            whole = Some(of(&study)?);
         }
         all.extend(whole.clone());
     }
