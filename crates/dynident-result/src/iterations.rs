@@ -89,6 +89,14 @@ impl IterationsFile {
         Ok(file)
     }
 
+    /// The text of `iterations.json`.
+    ///
+    /// # Errors
+    /// As [`serde_json::to_string_pretty`].
+    pub fn to_json(&self) -> serde_json::Result<String> {
+        dynident_text::json::to_string_pretty(self)
+    }
+
     /// Message about loops that are slower than requested, with the keys that change this.
     pub fn lowered_bandwidths_sentence(&self) -> Option<String> {
         let in_words = |model: &str| match model {

@@ -1,4 +1,4 @@
-//! Hash that detects an edited or damaged result.
+//! Text of a result, and the hash that detects an edited or damaged one.
 
 use super::identification::ResultFile;
 use core::fmt::Write;
@@ -8,6 +8,14 @@ use sha2::{Digest, Sha256};
 pub(super) const HASH_KEY: &str = "provenance.content_sha256";
 
 impl ResultFile {
+    /// The text of `result.json`.
+    ///
+    /// # Errors
+    /// As [`serde_json::to_string_pretty`].
+    pub fn to_json(&self) -> serde_json::Result<String> {
+        Ok(dynident_text::json::to_string_pretty(self)? + "\n")
+    }
+
     /// Stores the hash of the content in `provenance`. Call it after the last change; `timings_s` and
     /// `provenance.command` may change later. Has no effect without provenance.
     pub fn seal(&mut self) {

@@ -240,6 +240,15 @@ impl Study {
         toml::to_string(self).map_err(|error| StudyError::Toml { problem: error.to_string() })
     }
 
+    /// The study as JSON, with the keys of the TOML.
+    ///
+    /// # Errors
+    /// As [`serde_json::to_value`].
+    pub fn to_json(&self) -> serde_json::Result<serde_json::Value> {
+        // Compiled once here: each generic call elsewhere would compile the writers of all sections again.
+        serde_json::to_value(self)
+    }
+
     /// Checks that there is a log; a study for `design` may have none.
     ///
     /// # Errors

@@ -68,8 +68,8 @@ pub struct LoadSettings<'a> {
 /// if `settings` permit that: xacro evaluates Python expressions of the file, so an untrusted file can run any command.
 ///
 /// # Errors
-/// [`StudyFileError::Robot`] if the file cannot be read; [`StudyFileError::Xacro`] if it cannot be expanded, and for xacro arguments for
-/// a file without macros.
+/// [`StudyFileError::Robot`] if the file cannot be read; [`StudyFileError::Xacro`] if it cannot be expanded, and for
+/// xacro arguments for a file without macros.
 pub fn load_robot(path: &Path, settings: &LoadSettings<'_>) -> Result<Robot, StudyFileError> {
     let wrong = |source: XacroError| StudyFileError::Xacro { path: path.to_owned(), source: Box::new(source) };
     settings.xacro.validate().map_err(wrong)?;

@@ -97,7 +97,7 @@ pub fn study_inputs(study: &Study, study_path: &Path, data: Option<&Path>, secti
 fn named_files(study: StudyFile<'_>, data: Option<&Path>, chosen: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let folders = study.folders(data);
     let mut texts = Vec::new();
-    if let Ok(Value::Object(all)) = serde_json::to_value(study.study) {
+    if let Ok(Value::Object(all)) = study.to_json() {
         all.iter().filter(|(section, _)| chosen(section)).for_each(|(_, value)| collect_texts(value, &mut texts));
     }
     let mut files: Vec<PathBuf> = texts.iter().filter_map(|text| folders.find(Path::new(text), None).ok()).collect();

@@ -113,7 +113,7 @@ pub(super) fn robot_found(
     }
     outcome.result.seal();
     let mut files = vec![
-        (RESULT, json(&outcome.result)?),
+        (RESULT, outcome.result.to_json().map_err(not_json)?.into_bytes()),
         (CONTROLLER, json(&controller(last, &parameters).map_err(failed)?)?),
         (PAGE, outcome.report()?.into_bytes()),
     ];
@@ -126,10 +126,13 @@ pub(super) fn robot_found(
     Ok(RobotFiles { files, base_parameters: result.base_parameters })
 }
 
-fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
-    let text = dynident_text::json::to_string_pretty(value)
-        .map_err(|error| Error::Result { path: PathBuf::from(RESULT), message: error.to_string() })?;
+fn json(value: &serde_json::Value) -> Result<Vec<u8>, Error> {
+    let text = dynident_text::json::to_string_pretty(value).map_err(not_json)?;
     Ok((text + "\n").into_bytes())
+}
+
+fn not_json(error: serde_json::Error) -> Error {
+    Error::Result { path: PathBuf::from(RESULT), message: error.to_string() }
 }
 
 fn controller(stage: &EndedStage<'_>, parameters: &[f64]) -> Result<serde_json::Value, IterationError> {
