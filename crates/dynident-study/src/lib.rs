@@ -191,7 +191,7 @@ impl Study {
             let good = error.utf8_error().valid_up_to();
             let before = String::from_utf8_lossy(&error.as_bytes()[..good]).into_owned();
             let (line, column) = line_and_column(&before, before.len());
-            StudyFileError::StudyAt { path: path.to_owned(), line, column, source: StudyError::NotUtf8 }
+            StudyFileError::StudyAt { path: path.to_owned(), line, column, source: Box::new(StudyError::NotUtf8) }
         })?;
         Self::parse(&text, path)
     }
@@ -210,7 +210,12 @@ impl Study {
         let study: Self = toml::from_str(text).map_err(|error| {
             let (line, column) = error.span().map_or((1, 1), |span| line_and_column(text, span.start));
             let problem = error.message().trim().replace('\n', " ");
-            StudyFileError::StudyAt { path: path.to_owned(), line, column, source: StudyError::Toml { problem } }
+            StudyFileError::StudyAt {
+                path: path.to_owned(),
+                line,
+                column,
+                source: Box::new(StudyError::Toml { problem }),
+            }
         })?;
         study.check().map_err(StudyFileError::study(path))?;
         Ok(study)

@@ -33,7 +33,7 @@ pub enum StudyFileError {
         /// Column, from 1.
         column: u32,
         /// The problem.
-        source: StudyError,
+        source: Box<StudyError>,
     },
     /// An error of the whole study, or a mismatch with its robot.
     #[error("{}: {source}", path.display())]
