@@ -6,7 +6,7 @@ use crate::base_parameters::{COLUMNS, theta};
 use crate::literal_map::LiteralMap;
 use crate::piece::{PaperCell, PaperFigure, PaperTable, rough};
 use crate::problem::table_3;
-use dynident::Error;
+use dynident::{Error, StudyFileError};
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
 use dynident_excitation::step_wise::Stroke;
@@ -93,7 +93,7 @@ pub(crate) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, 
 }
 
 pub(crate) fn failed(path: &Path, why: IterationError) -> Error {
-    Error::Study { path: path.to_owned(), source: Box::new(why.into()) }
+    StudyFileError::study(path)(why).into()
 }
 
 fn error(joint: usize, values: &[f64; 3]) -> f64 {

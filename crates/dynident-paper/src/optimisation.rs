@@ -5,7 +5,7 @@ use crate::piece::{PaperCell, PaperFigure, PaperTable, shown};
 use crate::problem;
 use core::ops::ControlFlow;
 use dynident::result::{StrokeFile, WindowedFile};
-use dynident::{Error, RunOptions, Study, StudyError, design_study};
+use dynident::{Error, RunOptions, Study, StudyError, StudyFileError, design_study};
 use dynident_excitation::optimisers::Generation;
 use dynident_excitation::step_wise::Stroke;
 use dynident_report::LinePlot;
@@ -31,8 +31,7 @@ pub(crate) fn optimised(arm: &Arm, seed: u64, options: &RunOptions<'_>) -> Resul
         outcome.file.windowed.as_ref().filter(|file| file.optimum_strokes.len() == 2 && file.strokes.len() == 2);
     let Some((file, optimum_fitness)) = windowed.and_then(|file| Some((file, file.optimum?))) else {
         let (key, fix) = ("design".to_owned(), "the search found no motion inside the limits (18)");
-        let source = Box::new(StudyError::Conflict { key, fix });
-        return Err(Error::Study { path: arm.design.clone(), source });
+        return Err(StudyFileError::study(&arm.design)(StudyError::Conflict { key, fix }).into());
     };
     let [optimum, genetic] =
         [&file.optimum_strokes, &file.strokes].map(|strokes| ["joint1", "joint2"].map(|joint| stroke(strokes, joint)));

@@ -19,7 +19,7 @@ pub(crate) fn assembled(
     samples: Vec<Option<MemoryLog>>,
     callables: &Callables,
 ) -> PyResult<Study> {
-    let mut study = Study::from_json(sections, path).map_err(|error| errors::job(py, &error))?;
+    let mut study = Study::from_json(sections, path).map_err(|error| errors::job(py, &error.into()))?;
     study.robot.description = robot.map(Box::new);
     for (log, samples) in study.log.iter_mut().zip(samples) {
         log.samples = samples;

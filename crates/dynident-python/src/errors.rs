@@ -32,26 +32,32 @@ pub(crate) fn factors(error: impl core::fmt::Display) -> PyErr {
 
 /// The exception of a job's error, with its place.
 pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
-    use dynident::Error as Job;
+    use dynident::{Error as Job, ResultFileError as OfResult, StudyFileError as OfStudy};
     let message = dynident::shortened_message(&error.to_string());
     let (exception, path, line, column): (PyErr, Option<&Path>, Option<u64>, Option<u32>) = match error {
-        Job::StudyAt { path, line, column, .. } => {
+        Job::Study(OfStudy::StudyAt { path, line, column, .. }) => {
             (StudyError::new_err(message), Some(path), Some(u64::from(*line)), Some(*column))
         }
-        Job::Study { path, .. } | Job::Identification { path, .. } | Job::NotPermitted { path, .. } => {
-            (StudyError::new_err(message), Some(path), None, None)
+        Job::Study(OfStudy::Study { path, .. })
+        | Job::ResultFile(OfResult::Study(OfStudy::Study { path, .. }))
+        | Job::Identification { path, .. }
+        | Job::NotPermitted { path, .. } => (StudyError::new_err(message), Some(path), None, None),
+        Job::Study(OfStudy::Robot(_)) => (RobotError::new_err(message), None, None, None),
+        Job::Study(OfStudy::Xacro { path, .. }) => (RobotError::new_err(message), Some(path), None, None),
+        Job::Study(OfStudy::Recording { .. }) | Job::NewStudy(_) => (LogError::new_err(message), None, None, None),
+        Job::States { path, line, .. } | Job::Study(OfStudy::Table { path, line, .. }) => {
+            (LogError::new_err(message), Some(path), Some(*line), None)
         }
-        Job::Robot(_) => (RobotError::new_err(message), None, None, None),
-        Job::Xacro { path, .. } => (RobotError::new_err(message), Some(path), None, None),
-        Job::Recording { .. } | Job::NewStudy(_) => (LogError::new_err(message), None, None, None),
-        Job::States { path, line, .. } => (LogError::new_err(message), Some(path), Some(*line), None),
-        Job::Missing { file, .. } => (StudyError::new_err(message), Some(file), None, None),
-        Job::Result { path, .. } | Job::Export { path, .. } | Job::Factors { path, .. } => {
-            (ResultError::new_err(message), Some(path), None, None)
-        }
-        Job::File { path, .. } | Job::Output { path, .. } | Job::Changed { path } => {
-            (Error::new_err(message), Some(path), None, None)
-        }
+        Job::Study(OfStudy::Missing { file, .. }) => (StudyError::new_err(message), Some(file), None, None),
+        Job::Result { path, .. }
+        | Job::ResultFile(OfResult::Content { path, .. })
+        | Job::Export { path, .. }
+        | Job::Factors { path, .. } => (ResultError::new_err(message), Some(path), None, None),
+        Job::File { path, .. }
+        | Job::Study(OfStudy::File { path, .. })
+        | Job::ResultFile(OfResult::File { path, .. })
+        | Job::Output { path, .. }
+        | Job::Changed { path } => (Error::new_err(message), Some(path), None, None),
         _ => (Error::new_err(message), None, None, None),
     };
     let value = exception.value(py);

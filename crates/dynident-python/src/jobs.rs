@@ -67,7 +67,10 @@ pub(crate) fn threads(asked: Option<usize>) -> usize {
 
 /// Calls `job` on this thread. After Ctrl-C the function that it receives returns true, and the interruption is raised
 /// afterwards.
-pub(crate) fn interruptible<T>(py: Python<'_>, job: impl FnOnce(&dyn Fn() -> bool) -> Result<T, Error>) -> PyResult<T> {
+pub(crate) fn interruptible<T, E: Into<Error>>(
+    py: Python<'_>,
+    job: impl FnOnce(&dyn Fn() -> bool) -> Result<T, E>,
+) -> PyResult<T> {
     let interrupted = RefCell::new(None);
     let outcome = job(&|| {
         if let Err(interruption) = py.check_signals() {
@@ -77,7 +80,7 @@ pub(crate) fn interruptible<T>(py: Python<'_>, job: impl FnOnce(&dyn Fn() -> boo
     });
     match interrupted.take() {
         Some(interruption) => Err(interruption),
-        None => outcome.map_err(|error| errors::job(py, &error)),
+        None => outcome.map_err(|error| errors::job(py, &error.into())),
     }
 }
 

@@ -92,7 +92,7 @@ impl FittedModel {
         let callables = study.get().callables.clone();
         let (study, path) = study.get().owned();
         let result = ResultFile::parse(json.as_bytes(), Path::new(RESULT));
-        let result = result.map_err(|error| errors::job(py, &error))?;
+        let result = result.map_err(|error| errors::job(py, &error.into()))?;
         let page = Page::Written(report);
         let made = Self { study, path, callables, result, descriptions, page, predictor: OnceLock::new() };
         // Checks that study and result belong together.

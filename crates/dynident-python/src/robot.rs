@@ -87,7 +87,7 @@ impl Robot {
             &Callables::default(),
         )?;
         let folders = Folders::new(&study, &path, None);
-        let made = StudyRobot::new(&study, &path, &folders).map_err(|error| errors::job(py, &error))?;
+        let made = StudyRobot::new(&study, &path, &folders).map_err(|error| errors::job(py, &error.into()))?;
         let model = made.model().clone();
         let (base, layouts) = (OnceLock::new(), Default::default());
         let (singles, batches, panels) = (Mutex::default(), Mutex::default(), Mutex::default());

@@ -55,7 +55,7 @@ impl Study {
     #[staticmethod]
     #[pyo3(signature = (path, *, allow_command=false))]
     fn load(py: Python<'_>, path: PathBuf, allow_command: bool) -> PyResult<Self> {
-        let study = dynident::Study::load(&path).map_err(|error| errors::job(py, &error))?;
+        let study = dynident::Study::load(&path).map_err(|error| errors::job(py, &error.into()))?;
         Self::read(py, study, path, allow_command)
     }
 
@@ -64,7 +64,7 @@ impl Study {
     #[staticmethod]
     #[pyo3(signature = (text, path=PathBuf::from("<study>"), *, allow_command=false))]
     fn parse(py: Python<'_>, text: &str, path: PathBuf, allow_command: bool) -> PyResult<Self> {
-        let study = dynident::Study::parse(text, &path).map_err(|error| errors::job(py, &error))?;
+        let study = dynident::Study::parse(text, &path).map_err(|error| errors::job(py, &error.into()))?;
         Self::read(py, study, path, allow_command)
     }
 

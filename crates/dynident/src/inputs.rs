@@ -1,24 +1,14 @@
 //! Input files of a job: they are not overwritten, and must not change during the job.
 
 use crate::error::Error;
-use crate::study::{Folders, Study};
+use crate::study::{Study, StudyFile};
 use dynident_files::SeenFiles;
 use dynident_model::collision::find_mesh;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Largest readable file of a result, a design, runs or factors, bytes.
-pub const MAX_RESULT_BYTES: u64 = 1 << 32;
 /// Largest robot description that is searched for meshes and included files, bytes.
 const MAX_ROBOT_BYTES: u64 = 64 << 20;
-
-/// Reads an output file of a command: a result, a design, runs, factors.
-///
-/// # Errors
-/// [`Error::File`] if the file cannot be read, is not a regular file, or is larger than [`MAX_RESULT_BYTES`].
-pub fn read_result(path: &Path) -> Result<Vec<u8>, Error> {
-    dynident_files::read(path, MAX_RESULT_BYTES).map_err(|source| Error::File { path: path.to_owned(), source })
-}
 
 /// State of a study's files at the start of a job.
 #[derive(Debug)]
@@ -27,9 +17,9 @@ pub(crate) struct InputFiles(SeenFiles);
 impl InputFiles {
     /// Records the study file, all existing files that the study refers to, and the meshes and included files of its
     /// robot.
-    pub(crate) fn of(study: &Study, study_path: &Path, data: Option<&Path>) -> Self {
-        let mut files = named_files(study, study_path, data, |_| true);
-        if let Ok(robot) = Folders::new(study, study_path, data).find(&study.robot.file, None) {
+    pub(crate) fn of(study: StudyFile<'_>, data: Option<&Path>) -> Self {
+        let mut files = named_files(study, data, |_| true);
+        if let Ok(robot) = study.folders(data).find(&study.robot.file, None) {
             files.extend(files_of_robot(&robot));
         }
         let seen = SeenFiles::default();
@@ -100,13 +90,14 @@ pub fn refuse_overwriting(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<(),
 /// these sections is tested: in the study's folders, and next to the files found there (as the `file` keys of a log's
 /// channels). So no key can be forgotten.
 pub fn study_inputs(study: &Study, study_path: &Path, data: Option<&Path>, sections: &[&str]) -> Vec<PathBuf> {
-    named_files(study, study_path, data, |section| sections.contains(&section))
+    let study = StudyFile::new(study, study_path);
+    named_files(study, data, |section| sections.contains(&section))
 }
 
-fn named_files(study: &Study, study_path: &Path, data: Option<&Path>, chosen: impl Fn(&str) -> bool) -> Vec<PathBuf> {
-    let folders = Folders::new(study, study_path, data);
+fn named_files(study: StudyFile<'_>, data: Option<&Path>, chosen: impl Fn(&str) -> bool) -> Vec<PathBuf> {
+    let folders = study.folders(data);
     let mut texts = Vec::new();
-    if let Ok(Value::Object(all)) = serde_json::to_value(study) {
+    if let Ok(Value::Object(all)) = study.to_json() {
         all.iter().filter(|(section, _)| chosen(section)).for_each(|(_, value)| collect_texts(value, &mut texts));
     }
     let mut files: Vec<PathBuf> = texts.iter().filter_map(|text| folders.find(Path::new(text), None).ok()).collect();
@@ -117,7 +108,7 @@ fn named_files(study: &Study, study_path: &Path, data: Option<&Path>, chosen: im
         .filter(|path| path.is_file())
         .collect();
     files.extend(siblings);
-    files.push(study_path.to_owned());
+    files.push(study.path.to_owned());
     files.sort();
     files.dedup();
     files

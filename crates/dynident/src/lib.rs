@@ -54,9 +54,6 @@ mod jobs;
 mod output;
 mod output_set;
 mod pages;
-pub mod result;
-mod robot_file;
-pub mod study;
 
 pub use dynident_dynamics as dynamics;
 pub use dynident_estimation as estimation;
@@ -67,16 +64,18 @@ pub use dynident_iteration as iteration;
 pub use dynident_model as model;
 pub use dynident_online as online;
 pub use dynident_recording as recording;
+pub use dynident_result as result;
 pub use dynident_simulation as simulation;
+pub use dynident_study as study;
 pub use dynident_system as system;
 pub use dynident_text as text;
 
 pub use dynident_identification::{Progress, Role, Silent};
 pub use dynident_system::{ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
 pub use dynident_text::shortened_message;
-pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError, XacroError, error_code};
+pub use error::{Error, FactorsError, NewStudyError, error_code};
 pub use factors::{FactorLog, Factors, seconds_of};
-pub use inputs::{MAX_RESULT_BYTES, read_result, refuse_overwriting, study_inputs};
+pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::{CheckSettings, check, check_with};
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
@@ -101,7 +100,10 @@ pub use output::{check_writable, write_atomically};
 pub use output_set::OutputSet;
 pub use pages::identification::identification_report;
 pub use result::{
-    CheckFile, DesignFile, Inspection, IterationsFile, LogContents, ResultFile, SimulationFile, ValidationFile,
+    CheckFile, DesignFile, Inspection, IterationsFile, LogContents, MAX_RESULT_BYTES, ResultFile, ResultFileError,
+    SimulationFile, ValidationFile, read_result,
 };
-pub use robot_file::{LoadSettings, XacroSettings, load_robot};
-pub use study::{Folders, Study, StudyRobot};
+pub use study::{
+    Expected, Folders, LoadSettings, Study, StudyError, StudyFile, StudyFileError, StudyRobot, XacroError,
+    XacroSettings, load_robot,
+};

@@ -68,8 +68,8 @@ fn commands(at: &dyn Fn(&str) -> std::path::PathBuf) -> bool {
                 assert!(finite, "a parameter is not finite");
             }));
         }
-        Err(error) => heard(Err(error)),
+        Err(error) => heard(Err(error.into())),
     }
-    heard(ResultFile::read(&at("result.json")).map(|_| ()));
+    heard(ResultFile::read(&at("result.json")).map(|_| ()).map_err(Into::into));
     accepted
 }

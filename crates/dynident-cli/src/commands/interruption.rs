@@ -1,7 +1,6 @@
 //! Ctrl-C, and other requests to end the program (SIGTERM, closing of the terminal).
 
 use crate::terminal;
-use dynident::Error;
 use dynident::iteration::StopSignal;
 use std::cell::Cell;
 use std::sync::{Mutex, Once, OnceLock, PoisonError};
@@ -50,7 +49,7 @@ fn on_ctrl_c() {
 }
 
 /// Calls `job`, which may run a program. Ctrl-C stops that program with all its processes, and then ends the command.
-pub(crate) fn while_program_runs<R>(job: impl FnOnce(&dyn Fn() -> bool) -> Result<R, Error>) -> Result<R, Error> {
+pub(crate) fn while_program_runs<R>(job: impl FnOnce(&dyn Fn() -> bool) -> R) -> R {
     let begun = Cell::new(false);
     let is_stopped = || {
         // Without a program Ctrl-C works as usual.

@@ -65,7 +65,8 @@ pub(crate) fn pretty_json<T: Serialize>(value: &T) -> Result<Vec<u8>, String> {
 }
 
 #[allow(clippy::needless_pass_by_value, reason = "required by map_err")]
-pub(crate) fn message_of(error: dynident::Error) -> String {
+pub(crate) fn message_of(error: impl Into<dynident::Error>) -> String {
+    let error = error.into();
     explained(error.to_string(), &error)
 }
 
@@ -140,10 +141,12 @@ pub(crate) fn refuse_overwriting(
 
 /// Returns the message of an error in a study. If the error is in another file, the message also contains the study's
 /// name.
-pub(crate) fn known_in(study: &Path) -> impl Fn(dynident::Error) -> String {
-    use dynident::Error::{Missing, Recording, Robot, Xacro};
+pub(crate) fn known_in<E: Into<dynident::Error>>(study: &Path) -> impl Fn(E) -> String {
+    use dynident::StudyFileError::{Missing, Recording, Robot, Xacro};
     move |error| {
-        let is_elsewhere = matches!(error, Recording { .. } | Missing { .. } | Robot(_) | Xacro { .. });
+        let error = error.into();
+        let is_elsewhere =
+            matches!(error, dynident::Error::Study(Recording { .. } | Missing { .. } | Robot(_) | Xacro { .. }));
         let message = if is_elsewhere { format!("{}: {error}", study.display()) } else { error.to_string() };
         explained(message, &error)
     }

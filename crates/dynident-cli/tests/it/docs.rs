@@ -187,8 +187,8 @@ fn every_finding_is_on_the_page() {
     let page = codes(&std::fs::read_to_string(example::page_path()).unwrap());
     let read = |path: &str| std::fs::read_to_string(repository(path)).unwrap();
     let audit = names_after(&read("crates/dynident-model/src/audit/mod.rs"), "Checks (`check` of the findings):");
-    let kinds = names_after(&read("crates/dynident/src/result/check.rs"), "Kind of mistake:");
-    let slips = read("crates/dynident/src/result/inspection.rs");
+    let kinds = names_after(&read("crates/dynident-result/src/check.rs"), "Kind of mistake:");
+    let slips = read("crates/dynident-result/src/inspection.rs");
     let slips = names_after(&slips, "An error in the inertials of a URDF.\n#[derive");
     let mut wanted: BTreeSet<String> = [("audit-", audit), ("check-", kinds), ("slip-", slips)]
         .into_iter()

@@ -1,6 +1,6 @@
 //! Codes of errors: the names under which the page "Messages" of the book lists them.
 
-use super::{Error, FactorsError, NewStudyError, StudyError, XacroError};
+use super::{Error, FactorsError, NewStudyError, ResultFileError, StudyError, StudyFileError};
 use core::error::Error as StdError;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
@@ -27,6 +27,7 @@ use dynident_online::OnlineError;
 use dynident_recording::{FileError, FilterError, FormatError, RecordingError};
 use dynident_report::ReportError;
 use dynident_simulation::{PlantFault, SimulationError};
+use dynident_study::XacroError;
 use dynident_system::{ProgramRefused, RunError};
 
 /// Returns the code of an error of this type, or of a box with one.
@@ -76,6 +77,7 @@ const CODES: &[CodeOf] = &[
     of::<ReduceError>,
     of::<RehearsalFailure>,
     of::<ReportError>,
+    of::<ResultFileError>,
     of::<RobotFault>,
     of::<RunError>,
     of::<SdfFault>,
@@ -83,6 +85,7 @@ const CODES: &[CodeOf] = &[
     of::<SimulationError>,
     of::<StepWiseError>,
     of::<StudyError>,
+    of::<StudyFileError>,
     of::<ThresholdError>,
     of::<TorqueTableError>,
     of::<UrdfFault>,
@@ -131,13 +134,14 @@ mod tests {
     fn the_code_is_that_of_the_innermost_cause() {
         let path = || PathBuf::from("study.toml");
         let at = |error: StudyError| StudyError::At { place: "[[log]]".to_owned(), source: Box::new(error) };
-        let code = |error: StudyError| Error::Study { path: path(), source: Box::new(error) }.code();
+        let code =
+            |error: StudyError| Error::from(StudyFileError::Study { path: path(), source: Box::new(error) }).code();
         assert_eq!(code(at(StudyError::NotUtf8)).as_deref(), Some("study-not-utf8"));
         // A forwarded error, and one that a box forwards.
         let cutoff = StudyError::Filter(FilterError::AboveNyquist { cutoff_hz: 50.0, rate_hz: 80.0 });
         assert_eq!(code(at(cutoff)).as_deref(), Some("filter-above-nyquist"));
         let io = std::io::Error::from(std::io::ErrorKind::NotFound);
-        let file = Error::Robot(Box::new(ReadError::File { path: path(), source: io }));
+        let file = Error::from(StudyFileError::Robot(Box::new(ReadError::File { path: path(), source: io })));
         assert_eq!(file.code().as_deref(), Some("read-file"));
         assert_eq!(Error::Changed { path: path() }.code().as_deref(), Some("error-changed"));
     }

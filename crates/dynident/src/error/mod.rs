@@ -3,19 +3,17 @@
 mod code;
 mod factors;
 mod new_study;
-mod study;
-mod xacro;
 
 pub use code::error_code;
 pub use factors::FactorsError;
 pub use new_study::NewStudyError;
-pub use study::{Expected, StudyError};
-pub use xacro::XacroError;
 
 use dynident_export::ExportError;
 use dynident_identification::IdentificationError;
 use dynident_model::ReadError;
 use dynident_recording::RecordingError;
+use dynident_result::ResultFileError;
+pub(crate) use dynident_study::{Expected, StudyError, StudyFileError};
 use dynident_system::ProgramRefused;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -38,26 +36,12 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
-    /// An error at a place in the text of a study.
-    #[error("{}:{line}:{column}: {source}", path.display())]
-    StudyAt {
-        /// The study file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: u32,
-        /// Column, from 1.
-        column: u32,
-        /// The problem.
-        source: StudyError,
-    },
-    /// An error of the whole study, or a mismatch with its robot.
-    #[error("{}: {source}", path.display())]
-    Study {
-        /// The study file.
-        path: PathBuf,
-        /// The problem.
-        source: Box<StudyError>,
-    },
+    /// A study, or a file that it names, that cannot be used.
+    #[error("{0}")]
+    Study(#[from] StudyFileError),
+    /// A result file that cannot be used.
+    #[error("{0}")]
+    ResultFile(#[from] ResultFileError),
     /// An identification that failed.
     #[error("{}: {source}", path.display())]
     Identification {
@@ -65,28 +49,6 @@ pub enum Error {
         path: PathBuf,
         /// The problem.
         source: Box<IdentificationError>,
-    },
-    /// A file that is in none of the study's folders.
-    #[error("{} is in none of the study's folders (tried {}); fix its path, or name its folder with --data{}",
-        file.display(), list(tried), source_of_data.as_ref().map_or(String::new(), |s| format!(". The recordings are public: {s}")))]
-    Missing {
-        /// The file.
-        file: PathBuf,
-        /// The paths tried.
-        tried: Vec<PathBuf>,
-        /// Source of the recordings.
-        source_of_data: Option<String>,
-    },
-    /// A robot description that cannot be read.
-    #[error("{0}")]
-    Robot(#[source] Box<ReadError>),
-    /// A robot file whose macros cannot be expanded.
-    #[error("{}: {source}", path.display())]
-    Xacro {
-        /// The robot file.
-        path: PathBuf,
-        /// The problem.
-        source: Box<XacroError>,
     },
     /// A program in the study that was not permitted.
     #[error(
@@ -98,14 +60,6 @@ pub enum Error {
         path: PathBuf,
         /// The program.
         source: ProgramRefused,
-    },
-    /// A log that cannot be read.
-    #[error("log `{log}`: {source}")]
-    Recording {
-        /// The log.
-        log: String,
-        /// The problem.
-        source: Box<RecordingError>,
     },
     /// A report that could not be built.
     #[error("report.html: {0}; this is a bug in Dynident: please report it")]
@@ -173,13 +127,13 @@ pub enum Error {
 
 impl From<ReadError> for Error {
     fn from(error: ReadError) -> Self {
-        Self::Robot(Box::new(error))
+        Self::Study(error.into())
     }
 }
 
 impl Error {
     pub(crate) fn recording(log: &str, source: RecordingError) -> Self {
-        Self::Recording { log: log.to_owned(), source: Box::new(source) }
+        Self::Study(StudyFileError::recording(log, source))
     }
 
     /// For `map_err`: wraps an identification error of the study at `path`.
@@ -189,15 +143,11 @@ impl Error {
 
     /// For `map_err`: wraps an error in the study at `path`.
     pub(crate) fn study<E: Into<StudyError>>(path: &Path) -> impl Fn(E) -> Self {
-        move |source| Self::Study { path: path.to_owned(), source: Box::new(source.into()) }
+        move |source| Self::Study(StudyFileError::study(path)(source))
     }
 
     /// For `map_err`: wraps an error in a section of the study at `path`.
     pub(crate) fn section<E: Into<StudyError>>(path: &Path, section: &str) -> impl Fn(E) -> Self {
         move |source| Self::study(path)(StudyError::at(format!("[{section}]"))(source))
     }
-}
-
-fn list(paths: &[PathBuf]) -> String {
-    paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
 }

@@ -67,7 +67,7 @@ impl Factors {
         let cannot = |error: serde_json::Error| FactorsError::Header { problem: error.to_string() };
         let robot = self.study.robot.description.as_ref();
         let head = Head {
-            study: serde_json::to_value(&self.study).map_err(cannot)?,
+            study: self.study.to_json().map_err(cannot)?,
             study_path: self.study_path.clone(),
             robot: robot.map(|robot| HeadRobot { path: robot.path.clone(), text: robot.text.clone() }),
             logs: self.logs().iter().map(head_of).collect(),

@@ -140,7 +140,7 @@ impl Factors {
     /// Settings that must be equal in merged factors.
     fn kind(&self) -> Result<serde_json::Value, FactorsError> {
         let cannot = |error: serde_json::Error| FactorsError::Header { problem: error.to_string() };
-        let mut kind = serde_json::to_value(&self.study).map_err(cannot)?;
+        let mut kind = self.study.to_json().map_err(cannot)?;
         let text = self.study.robot.description.as_ref().map(|robot| robot.text.clone());
         kind["robot"]["file"] = serde_json::Value::Null;
         kind["robot"]["description"] = text.map_or(serde_json::Value::Null, serde_json::Value::String);

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::result::{
     AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
 };
-use crate::robot_file::{LoadSettings, load_robot};
+use crate::study::{LoadSettings, load_robot};
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, numerical_rank_by_body};
 use dynident_model::{
     Body, DescriptionError, DescriptionFormat, InertialParameters, Joint, Model, ReadError, Robot, Slips,

@@ -1,8 +1,7 @@
 //! Execution options of a job.
 
-use crate::study::Study;
 use dynident_identification::{Execution, Progress};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Execution options of a job; they do not affect the result.
 pub struct RunOptions<'a> {
@@ -18,9 +17,4 @@ impl<'a> RunOptions<'a> {
     pub(crate) fn execution(&self) -> Execution<'a> {
         Execution { threads: self.threads, progress: self.progress }
     }
-}
-
-pub(crate) fn study_name(study: &Study, path: &Path) -> String {
-    let stem = || path.file_stem().map_or_else(|| "study".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    study.name.clone().unwrap_or_else(stem)
 }

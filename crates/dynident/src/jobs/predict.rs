@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::result::{LogSummary, ResultFile};
-use crate::study::{Folders, Study, StudyRobot};
+use crate::study::{Study, StudyFile};
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::student_half_width;
 use dynident_identification::RegressorModel;
@@ -53,9 +53,11 @@ impl TorquePredictor {
         study_path: &Path,
         data: Option<&Path>,
     ) -> Result<Self, Error> {
+        let study = StudyFile::new(study, study_path);
         let wrong = |message: &str| Error::Result { path: result_path.to_owned(), message: message.to_owned() };
-        let study = &stored.as_fitted(study);
-        let robot = StudyRobot::new(study, study_path, &Folders::new(study, study_path, data))?;
+        let fitted = stored.as_fitted(&study);
+        let study = study.with_study(&fitted);
+        let robot = study.robot_in(&study.folders(data))?;
         let free = stored.base_values(result_path, &robot.parametric)?;
         let model = stored.regressor_model(result_path, &robot.parametric)?;
         let theta = stored.consistent_values(result_path)?.unwrap_or(free);

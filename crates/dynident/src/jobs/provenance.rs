@@ -4,11 +4,11 @@ use crate::digest::hexadecimal;
 use crate::error::Error;
 use crate::factors::Factors;
 use crate::result::{InputFile, Provenance};
-use crate::study::{Folders, Study, StudyInput};
+use crate::study::{Study, StudyFile, StudyInput};
 use dynident_recording::LogSource;
 use sha2::{Digest, Sha256};
 use std::io::Read;
-use std::path::{Component, Path};
+use std::path::Path;
 
 const IDENTITY_DIGITS: usize = 12;
 const BLOCK_BYTES: usize = 1 << 16;
@@ -17,22 +17,17 @@ const BLOCK_BYTES: usize = 1 << 16;
 ///
 /// # Errors
 /// [`Error::File`] for a file that cannot be read again.
-pub(crate) fn provenance(
-    study: &Study,
-    study_path: &Path,
-    read: &[(&'static str, StudyInput)],
-) -> Result<Provenance, Error> {
-    let folder = study_path.parent().unwrap_or(Path::new(""));
+pub(crate) fn provenance(study: StudyFile<'_>, read: &[(&'static str, StudyInput)]) -> Result<Provenance, Error> {
     let mut inputs = Vec::new();
     for (index, (what, source)) in read.iter().enumerate() {
         if read[..index].iter().any(|(_, earlier)| is_same(earlier, source)) {
             continue;
         }
-        inputs.push(read_input(what, source, folder)?);
+        inputs.push(read_input(what, source, study)?);
     }
     // For a study built in memory the path is only a name.
-    let own = if study_path.is_file() { Some(input("study", study_path, folder)?) } else { None };
-    Ok(identified_by(study, own, inputs))
+    let own = if study.path.is_file() { Some(input("study", study.path, study)?) } else { None };
+    Ok(identified_by(&study, own, inputs))
 }
 
 /// Provenance of a result made long after study and robot were read: study and robot from `begun`, because the files
@@ -41,15 +36,13 @@ pub(crate) fn provenance(
 /// # Errors
 /// [`Error::File`] for a file that cannot be read again.
 pub(crate) fn later_provenance(
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     begun: &Provenance,
     read: &[(&'static str, StudyInput)],
 ) -> Result<Provenance, Error> {
-    let folder = study_path.parent().unwrap_or(Path::new(""));
     let robot = begun.inputs.iter().filter(|input| input.what == "robot").cloned().map(Ok);
-    let since = read.iter().map(|(what, source)| read_input(what, source, folder));
-    Ok(identified_by(study, begun.study.clone(), robot.chain(since).collect::<Result<_, _>>()?))
+    let since = read.iter().map(|(what, source)| read_input(what, source, study));
+    Ok(identified_by(&study, begun.study.clone(), robot.chain(since).collect::<Result<_, _>>()?))
 }
 
 pub(crate) fn factors_provenance(factors: &Factors) -> Provenance {
@@ -78,13 +71,13 @@ fn identified_by(study: &Study, own: Option<InputFile>, inputs: Vec<InputFile>) 
     Provenance { identity, version: version.to_owned(), command: None, content_sha256: None, study: own, inputs }
 }
 
-/// Describes `source` of the kind `what`, with a path relative to `folder`.
+/// Describes `source` of the kind `what`, with a path relative to the folder of `study`.
 ///
 /// # Errors
 /// [`Error::File`] for a file that cannot be read again.
-pub(crate) fn read_input(what: &str, source: &StudyInput, folder: &Path) -> Result<InputFile, Error> {
+pub(crate) fn read_input(what: &str, source: &StudyInput, study: StudyFile<'_>) -> Result<InputFile, Error> {
     Ok(match source {
-        StudyInput::File(path) => input(what, path, folder)?,
+        StudyInput::File(path) => input(what, path, study)?,
         StudyInput::Samples(samples) => {
             let numbers = samples.numbers().map(f64::to_le_bytes);
             input_in_memory(what, &samples.label(), numbers)
@@ -100,14 +93,13 @@ pub(crate) fn read_input(what: &str, source: &StudyInput, folder: &Path) -> Resu
 /// # Errors
 /// As [`provenance()`].
 pub(crate) fn motion_provenance(
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     data: Option<&Path>,
     further: &[(&'static str, StudyInput)],
 ) -> Result<Provenance, Error> {
-    let mut read = study.motion_inputs(&Folders::new(study, study_path, data));
+    let mut read = study.motion_inputs(&study.folders(data));
     read.extend_from_slice(further);
-    provenance(study, study_path, &read)
+    provenance(study, &read)
 }
 
 fn is_same(a: &StudyInput, b: &StudyInput) -> bool {
@@ -135,7 +127,7 @@ pub(crate) fn concurrently<R>(
     })
 }
 
-fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {
+fn input(what: &str, path: &Path, study: StudyFile<'_>) -> Result<InputFile, Error> {
     let cannot = |path: &Path, source| Error::File { path: path.to_owned(), source };
     let (mut hash, mut block, mut bytes) = (Sha256::new(), vec![0; BLOCK_BYTES], 0);
     // A recording in a folder is hashed part by part.
@@ -152,7 +144,7 @@ fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {
         }
     }
     let sha256 = hexadecimal(&hash.finalize());
-    Ok(InputFile { what: what.to_owned(), file: relative_path(folder, path), bytes, sha256 })
+    Ok(InputFile { what: what.to_owned(), file: study.relative(path), bytes, sha256 })
 }
 
 /// Describes data in memory: numbers as 8-byte IEEE 754, little-endian, row by row; texts as UTF-8.
@@ -171,27 +163,6 @@ fn input_in_memory<B: AsRef<[u8]>>(what: &str, label: &str, parts: impl Iterator
     InputFile { what: what.to_owned(), file: label.to_owned(), bytes, sha256: hexadecimal(&hash.finalize()) }
 }
 
-/// Relative path from a folder to a file, with `/`; only the file name if there is none (another drive).
-pub(crate) fn relative_path(folder: &Path, path: &Path) -> String {
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let name = || path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let (Ok(from), Ok(to)) = (folder.canonicalize(), path.canonicalize()) else { return name() };
-    let parts = |path: &Path| -> Vec<String> {
-        path.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect()
-    };
-    let drive = |path: &Path| match path.components().next() {
-        Some(Component::Prefix(prefix)) => Some(prefix.as_os_str().to_owned()),
-        _ => None,
-    };
-    if drive(&from) != drive(&to) {
-        return name();
-    }
-    let (from, to) = (parts(&from), parts(&to));
-    let common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
-    let up = std::iter::repeat_n("..".to_owned(), from.len() - common);
-    up.chain(to[common..].iter().cloned()).collect::<Vec<_>>().join("/")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -199,14 +170,16 @@ mod tests {
     #[test]
     fn hashes_are_those_of_the_standard_and_paths_are_relative_to_the_study() {
         let folder = tempfile::tempdir().unwrap();
-        let study = folder.path().join("studies");
-        std::fs::create_dir(&study).unwrap();
+        let studies = folder.path().join("studies");
+        std::fs::create_dir(&studies).unwrap();
+        let study = Study::parse("[robot]\nfile = \"arm.urdf\"\n", Path::new("study.toml")).unwrap();
+        let in_folder = |folder: &Path| folder.join("study.toml");
         let file = folder.path().join("abc.csv");
         std::fs::write(&file, "abc").unwrap();
         // FIPS 180-2, appendix B.1.
-        let found = input("log", &file, &study).unwrap();
+        let found = input("log", &file, StudyFile::new(&study, &in_folder(&studies))).unwrap();
         assert_eq!(found.sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
         assert_eq!((found.bytes, found.file.as_str()), (3, "../abc.csv"));
-        assert_eq!(relative_path(folder.path(), &file), "abc.csv");
+        assert_eq!(StudyFile::new(&study, &in_folder(folder.path())).relative(&file), "abc.csv");
     }
 }

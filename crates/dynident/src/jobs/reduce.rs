@@ -8,7 +8,7 @@ use crate::jobs::identify::{FitMetadata, IdentificationOutcome, build_outcome};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::factors_provenance;
 use crate::result::{ResultFile, Timings};
-use crate::study::{Folders, Study, StudyRobot};
+use crate::study::{Study, StudyFile, StudyRobot};
 use dynident_identification::{
     IdentificationError, IdentificationTask, Recording, ReducedLog, identify_reduced, reduce as reduce_task,
     reduced_errors,
@@ -46,30 +46,32 @@ pub fn reduce(
     settings: &ReduceSettings,
     options: &RunOptions<'_>,
 ) -> Result<Factors, Error> {
-    study.require_training_log(study_path)?;
-    let files = InputFiles::of(study, study_path, options.data.as_deref());
-    let folders = Folders::new(study, study_path, options.data.as_deref());
-    let factors = |source| Error::Factors { path: study_path.to_owned(), source };
+    let study = StudyFile::new(study, study_path);
+    study.require_training_log(study.path)?;
+    let files = InputFiles::of(study, options.data.as_deref());
+    let folders = study.folders(options.data.as_deref());
+    let factors = |source| Error::Factors { path: study.path.to_owned(), source };
     if let Some(file) = study.torque.iter().find_map(|torque| torque.table_file.as_ref()) {
         return Err(factors(FactorsError::Table { file: file.display().to_string() }));
     }
     // A design is not used here.
-    let undesigned = Study { design: None, ..study.clone() };
+    let undesigned = Study { design: None, ..study.study.clone() };
     if let Some(part) = undesigned.functions().into_iter().next() {
         return Err(factors(FactorsError::Function { part }));
     }
-    let mut study = like.map_or_else(|| study.clone(), |model| model.as_fitted(study));
+    let mut fitted = like.map_or_else(|| study.study.clone(), |model| model.as_fitted(&study));
     if let Some(cutoff_hz) = like.and_then(ResultFile::cutoff_hz) {
-        study.motion.differentiator = study.motion.differentiator.with_cutoff(cutoff_hz);
+        fitted.motion.differentiator = fitted.motion.differentiator.with_cutoff(cutoff_hz);
     }
-    let robot = StudyRobot::new(&study, study_path, &folders)?;
-    let in_study = Error::identification::<IdentificationError>(study_path);
-    let task = study.task_with(study.settings(study_path, &robot)?, &robot, &folders)?;
+    let study = study.with_study(&fitted);
+    let robot = study.robot_in(&folders)?;
+    let in_study = Error::identification::<IdentificationError>(study.path);
+    let task = study.task_with(study.settings(study.path, &robot)?, &robot, &folders)?;
     let reduced =
         files.while_unchanged(|| reduce_task(&task, settings.segments, options.execution()).map_err(&in_study))?;
     let log = |log| FactorLog::new(settings.arm.clone(), settings.recorded_at_s, log);
     let kind = without_logs(&study, &robot);
-    Ok(Factors::new(kind, name_alone(study_path), reduced.into_iter().map(log).collect()))
+    Ok(Factors::new(kind, name_alone(study.path), reduced.into_iter().map(log).collect()))
 }
 
 /// The parts of the study that a model from factors needs, without local paths.
@@ -93,14 +95,14 @@ fn without_logs(study: &Study, robot: &StudyRobot) -> Study {
 /// As [`identify()`](crate::identify()).
 pub fn identify_factors(factors: &Factors, options: &RunOptions<'_>) -> Result<IdentificationOutcome, Error> {
     let start = Instant::now();
-    let (study, path) = (&factors.study, &factors.study_path);
-    let robot = StudyRobot::new(study, path, &Folders::new(study, path, None))?;
-    let settings = study.settings(path, &robot)?;
+    let study = StudyFile::new(&factors.study, &factors.study_path);
+    let robot = study.robot_in(&study.folders(None))?;
+    let settings = study.settings(study.path, &robot)?;
     let logs = with_unique_names(factors);
     let named: Vec<&ReducedLog> = logs.iter().collect();
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
     let found = identify_reduced(&robot.parametric, &settings, &named, options.execution())
-        .map_err(Error::identification::<IdentificationError>(path))?;
+        .map_err(Error::identification::<IdentificationError>(study.path))?;
     timings.estimation = found.times.estimation_s;
     timings.total = start.elapsed().as_secs_f64();
     timings.made_at = now();
@@ -108,7 +110,7 @@ pub fn identify_factors(factors: &Factors, options: &RunOptions<'_>) -> Result<I
     let mut task = IdentificationTask::new(robot.parametric.clone(), recordings);
     task.settings = settings;
     let metadata = FitMetadata { timings, provenance: factors_provenance(factors), is_payload: false };
-    build_outcome(study, path, &robot, &task, found, metadata)
+    build_outcome(study, &robot, &task, found, metadata)
 }
 
 /// Residual of each log of `factors` with a model's base parameters, percent of the root mean square torque. `None` for
@@ -117,11 +119,11 @@ pub fn identify_factors(factors: &Factors, options: &RunOptions<'_>) -> Result<I
 /// # Errors
 /// [`Error::Result`] for a model of another robot.
 pub fn factors_errors(factors: &Factors, model: &ResultFile, path: &Path) -> Result<Vec<Option<f64>>, Error> {
-    let (study, own) = (&factors.study, &factors.study_path);
-    let robot = StudyRobot::new(study, own, &Folders::new(study, own, None))?;
+    let study = StudyFile::new(&factors.study, &factors.study_path);
+    let robot = study.robot_in(&study.folders(None))?;
     let theta = model.base_values(path, &robot.parametric)?;
     let logs: Vec<&ReducedLog> = factors.logs().iter().map(|log| &log.log).collect();
-    let in_study = Error::identification::<IdentificationError>(own);
+    let in_study = Error::identification::<IdentificationError>(study.path);
     reduced_errors(&robot.parametric, &theta, &logs).map_err(|error| in_study(error.into()))
 }
 

@@ -3,10 +3,10 @@
 use crate::error::Error;
 use crate::inputs::InputFiles;
 use crate::jobs::iterate::Trajectory;
-use crate::jobs::options::{RunOptions, study_name};
+use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::motion_provenance;
 use crate::result::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
-use crate::study::{Folders, Study, StudyRobot};
+use crate::study::{Study, StudyFile};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::{Robot, RunRequest};
@@ -34,23 +34,24 @@ pub fn simulate_study(
     options: &RunOptions<'_>,
     watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
 ) -> Result<Simulation, Error> {
+    let study = StudyFile::new(study, study_path);
     let simulation = study.simulation.clone().unwrap_or_default();
-    let files = InputFiles::of(study, study_path, options.data.as_deref());
-    let folders = Folders::new(study, study_path, options.data.as_deref());
-    let robot = StudyRobot::new(study, study_path, &folders)?;
-    let mut truth = simulation.truth(&study.coupling, &robot).map_err(Error::section(study_path, "simulation"))?;
+    let files = InputFiles::of(study, options.data.as_deref());
+    let folders = study.folders(options.data.as_deref());
+    let robot = study.robot_in(&folders)?;
+    let mut truth = simulation.truth(&study.coupling, &robot).map_err(Error::section(study.path, "simulation"))?;
     let controller = study
         .controller
         .clone()
         .unwrap_or_else(|| ControllerSettings::JointPd(JointPdSettings { kp: 100.0.into(), kd: 20.0.into() }));
-    controller.validate(robot.model().dof()).map_err(Error::section(study_path, "controller"))?;
-    let trajectory = Trajectory::of_study(study, study_path, &robot, simulation.rate_hz, options, watch)?;
-    let reference = trajectory.reference().map_err(Error::section(study_path, "iteration"))?;
+    controller.validate(robot.model().dof()).map_err(Error::section(study.path, "controller"))?;
+    let trajectory = Trajectory::of_study(study, &robot, simulation.rate_hz, options, watch)?;
+    let reference = trajectory.reference().map_err(Error::section(study.path, "iteration"))?;
     let prior = robot.nominal().to_vec();
     let model = ControllerModel::from_parameters(robot.model(), robot.terms(), &prior)
-        .map_err(Error::section(study_path, "controller"))?;
+        .map_err(Error::section(study.path, "controller"))?;
     let request = RunRequest { model: Some(&model), ..RunRequest::new(1, &reference, &controller) };
-    let run = truth.robot.run(&request).map_err(Error::section(study_path, "simulation"))?;
+    let run = truth.robot.run(&request).map_err(Error::section(study.path, "simulation"))?;
 
     let own = |values: &[f64], expressions: Vec<String>, units: Vec<String>| {
         let named = expressions.into_iter().zip(units).zip(values);
@@ -63,8 +64,8 @@ pub fn simulate_study(
         .map_or_else(|| (Vec::new(), Vec::new()), |truth| (truth.max_error.clone(), truth.saturated.clone()));
     let file = SimulationFile {
         schema: SIMULATION_SCHEMA.to_owned(),
-        name: study_name(study, study_path),
-        provenance: Some(motion_provenance(study, study_path, options.data.as_deref(), &[])?),
+        name: study.title(),
+        provenance: Some(motion_provenance(study, options.data.as_deref(), &[])?),
         controller: controller.name().to_owned(),
         done: run.status.is_done(),
         status: run.status,

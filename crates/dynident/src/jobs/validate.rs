@@ -3,10 +3,10 @@
 use crate::error::Error;
 use crate::inputs::InputFiles;
 use crate::jobs::log_summary::held_out_summary;
-use crate::jobs::options::{RunOptions, study_name};
-use crate::jobs::provenance::{read_input, relative_path};
+use crate::jobs::options::RunOptions;
+use crate::jobs::provenance::read_input;
 use crate::result::{InputFile, LogSummary, ResultFile, VALIDATION_SCHEMA, ValidationFile};
-use crate::study::{Folders, Study, StudyInput, StudyRobot};
+use crate::study::{Folders, Study, StudyFile, StudyInput};
 use dynident_identification::examination::{HeldOutExamination, ModelUnderTest, examine_held_out};
 use dynident_identification::{Logs, Role};
 use std::path::Path;
@@ -36,16 +36,18 @@ pub fn validate_result(
     study_path: &Path,
     options: &RunOptions<'_>,
 ) -> Result<ValidationFile, Error> {
-    study.require_log(study_path)?;
-    let files = InputFiles::of(study, study_path, options.data.as_deref());
-    let folders = Folders::new(study, study_path, options.data.as_deref());
-    let study = &stored.as_fitted(study);
-    let robot = StudyRobot::new(study, study_path, &folders)?;
+    let study = StudyFile::new(study, study_path);
+    study.require_log(study.path)?;
+    let files = InputFiles::of(study, options.data.as_deref());
+    let folders = study.folders(options.data.as_deref());
+    let fitted = stored.as_fitted(&study);
+    let study = study.with_study(&fitted);
+    let robot = study.robot_in(&folders)?;
     let theta = stored.base_values(result_path, &robot.parametric)?;
     let consistent = stored.consistent_values(result_path)?;
     let model = stored.regressor_model(result_path, &robot.parametric)?;
-    let payloads = stored.payloads(result_path, study, study_path, &model)?;
-    let task = study.task(study_path, &robot, &folders)?;
+    let payloads = stored.payloads(result_path, study, &model)?;
+    let task = study.task(study.path, &robot, &folders)?;
     let mut chosen = study.logs_of_role(Role::Validate);
     if chosen.is_empty() {
         chosen = (0..study.log.len()).collect();
@@ -66,21 +68,20 @@ pub fn validate_result(
         };
         chosen.iter().map(one).collect::<Result<Vec<_>, _>>()
     });
-    let tested = files.while_unchanged(|| tested.map_err(Error::identification(study_path)))?;
+    let tested = files.while_unchanged(|| tested.map_err(Error::identification(study.path)))?;
     let joints = model.joint_names();
-    let folder = study_path.parent().unwrap_or(Path::new(""));
     let summary = |log: &HeldOutExamination| {
         let mut summary = held_out_summary(&recordings[log.index], log, &joints);
-        summary.import.file = relative_path(folder, Path::new(&summary.import.file));
+        summary.import.file = study.relative(Path::new(&summary.import.file));
         summary
     };
     let logs: Vec<LogSummary> = tested.iter().map(summary).collect();
-    let mut problems = training_logs(stored, study, study_path, &folders, &chosen)?;
+    let mut problems = training_logs(stored, study, &folders, &chosen)?;
     problems.extend(logs.iter().flat_map(LogSummary::problems));
     files.unchanged()?;
     Ok(ValidationFile {
         schema: VALIDATION_SCHEMA.to_owned(),
-        name: study_name(study, study_path),
+        name: study.title(),
         logs,
         problems,
         validation: tested.into_iter().map(|log| log.validation).collect(),
@@ -89,15 +90,13 @@ pub fn validate_result(
 
 fn training_logs(
     stored: &ResultFile,
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     folders: &Folders,
     chosen: &[usize],
 ) -> Result<Vec<String>, Error> {
-    let folder = study_path.parent().unwrap_or(Path::new(""));
     let mut problems = Vec::new();
     for &index in chosen {
-        let input = read_input("log", &StudyInput::from(study.log_source(folders, index)?), folder)?;
+        let input = read_input("log", &StudyInput::from(study.log_source(folders, index)?), study)?;
         if let Some(fitted) = fitted_to(stored, &input) {
             problems.push(format!(
                 "log `{}` is the training log `{fitted}`, so this is no validation: use a log of another run",

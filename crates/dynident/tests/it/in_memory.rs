@@ -6,8 +6,8 @@ use dynident::model::terms::JointMotion;
 use dynident::model::{InertialParameters, load_robot};
 use dynident::recording::MemoryLog;
 use dynident::{
-    Error, Folders, ResultFile, RunOptions, Silent, Study, StudyError, StudyRobot, TorquePredictor, identify, validate,
-    validate_result,
+    Error, Folders, ResultFile, RunOptions, Silent, Study, StudyError, StudyFileError, StudyRobot, TorquePredictor,
+    identify, validate, validate_result,
 };
 use std::path::{Path, PathBuf};
 
@@ -91,7 +91,7 @@ fn samples_that_are_fitted_to_are_not_tested_on() {
     // Equal numbers in another table.
     carried.log[1].samples = Some(table(&repository("examples/ur10_simulated/train.csv")));
     let refused = identify(&carried, &path, &options()).unwrap_err();
-    let Error::Study { source, .. } = &refused else { panic!("{refused}") };
+    let Error::Study(StudyFileError::Study { source, .. }) = &refused else { panic!("{refused}") };
     assert!(matches!(**source, StudyError::Overlap { .. }), "{refused}");
 }
 

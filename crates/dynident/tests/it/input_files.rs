@@ -96,7 +96,7 @@ fn a_pipe_in_the_place_of_any_file_is_refused() {
         std::fs::remove_file(&path).unwrap();
         assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
         let error = match file {
-            "study.toml" => Study::load(&path).unwrap_err(),
+            "study.toml" => Study::load(&path).unwrap_err().into(),
             _ => identify(&job.study, &job.path, &Job::options(2)).unwrap_err(),
         };
         let message = error.to_string();

@@ -1,6 +1,6 @@
 //! A valid study with random byte changes: each is parsed or rejected with its place, without a panic.
 use crate::common::repository;
-use dynident::{Error, Expected, Folders, Study, StudyError, StudyRobot};
+use dynident::{Expected, Folders, Study, StudyError, StudyFileError, StudyRobot};
 use proptest::prelude::*;
 use std::path::Path;
 
@@ -123,7 +123,9 @@ proptest! {
 #[test]
 fn a_refused_number_is_there_as_data() {
     let text = "[robot]\nfile = \"arm.urdf\"\n[drive]\nlaws = [{ law = \"stribeck\", speed = -1.0, exponent = 2.0 }]\n";
-    let Error::Study { source, .. } = Study::parse(text, Path::new("study.toml")).unwrap_err() else { panic!() };
+    let StudyFileError::Study { source, .. } = Study::parse(text, Path::new("study.toml")).unwrap_err() else {
+        panic!()
+    };
     let StudyError::At { place, source } = *source else { panic!() };
     let StudyError::Number { key, value, expected: Expected::Range(least, greatest) } = *source else { panic!() };
     assert_eq!((&place[..], &key[..], value), ("drive.laws number 1", "speed", -1.0));

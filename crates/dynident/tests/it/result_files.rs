@@ -2,7 +2,7 @@
 
 use crate::common::{assert_reads_back, repository};
 use dynident::result::{LimitReport, RobotFault, RobotStatus};
-use dynident::{Error, ResultFile, RunOptions, Silent, Study, identify, inspect};
+use dynident::{ResultFile, ResultFileError, RunOptions, Silent, Study, identify, inspect};
 use serde_json::Value;
 use std::path::Path;
 use std::sync::LazyLock;
@@ -66,7 +66,7 @@ fn another_key_and_another_type_differ_from_the_schema() {
     assert_eq!(differences(&|value| value["timings_s"] = Value::Null).len(), 1);
 }
 
-fn read(value: &Value, folder: &Path) -> Result<ResultFile, Error> {
+fn read(value: &Value, folder: &Path) -> Result<ResultFile, ResultFileError> {
     let path = folder.join("result.json");
     std::fs::write(&path, value.to_string()).unwrap();
     ResultFile::read(&path)

@@ -3,7 +3,7 @@
 use crate::result::StudyChange;
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
-use dynident_identification::diagnosis::{KeyChange, Mistake, StudyKeys};
+use dynident_identification::diagnosis::{Mistake, StudyKeys};
 
 /// Keys for the first training log; `None` for a study without training logs.
 pub(super) fn keys_of_study(study: &Study, robot: &StudyRobot) -> Option<StudyKeys> {
@@ -33,11 +33,4 @@ pub(super) fn keys_of_log(study: &Study, robot: &StudyRobot, index: usize) -> St
 pub(super) fn changes(mistake: &Mistake, keys: Option<&StudyKeys>) -> Vec<StudyChange> {
     let changes = keys.map_or_else(Vec::new, |keys| mistake.changes(keys));
     changes.into_iter().map(StudyChange::from).collect()
-}
-
-impl From<KeyChange> for StudyChange {
-    fn from(change: KeyChange) -> Self {
-        let KeyChange { table, line } = change;
-        Self { table, line }
-    }
 }

@@ -10,9 +10,9 @@ pub use settings::CheckSettings;
 
 use crate::error::Error;
 use crate::inputs::InputFiles;
-use crate::jobs::options::{RunOptions, study_name};
+use crate::jobs::options::RunOptions;
 use crate::result::{CHECK_SCHEMA, CheckFile, CheckFinding, StudyCheck};
-use crate::study::{Folders, Study, StudyRobot};
+use crate::study::{Study, StudyFile, StudyRobot};
 use dynident_identification::diagnosis::Diagnosis;
 use dynident_identification::{IdentificationError, IdentificationSettings, StudyExamination, examine_study};
 use dynident_model::{AuditFinding, AuditLevel, InertialParameters, Mat3, audit};
@@ -45,21 +45,22 @@ pub fn check_with(
     options: &RunOptions<'_>,
     thresholds: &CheckSettings,
 ) -> Result<CheckFile, Error> {
-    thresholds.validate().map_err(Error::section(study_path, "check"))?;
-    study.require_training_log(study_path)?;
-    let files = InputFiles::of(study, study_path, options.data.as_deref());
-    let folders = Folders::new(study, study_path, options.data.as_deref());
-    let robot = StudyRobot::new(study, study_path, &folders)?;
-    let in_study = Error::identification::<IdentificationError>(study_path);
-    let settings = study.settings(study_path, &robot)?;
+    let study = StudyFile::new(study, study_path);
+    thresholds.validate().map_err(Error::section(study.path, "check"))?;
+    study.require_training_log(study.path)?;
+    let files = InputFiles::of(study, options.data.as_deref());
+    let folders = study.folders(options.data.as_deref());
+    let robot = study.robot_in(&folders)?;
+    let in_study = Error::identification::<IdentificationError>(study.path);
+    let settings = study.settings(study.path, &robot)?;
     let task = study.task_with(settings, &robot, &folders)?;
     let sources = study.log_sources(&folders)?;
-    study.check_overlap(&sources, &task.recordings).map_err(Error::study(study_path))?;
+    study.check_overlap(&sources, &task.recordings).map_err(Error::study(study.path))?;
     let examined = files.while_unchanged(|| examine_study(&task, options.execution()).map_err(in_study))?;
 
     let mut check = examined.diagnosis.as_ref().map_or_else(
         || StudyCheck { joints: robot.parametric.joint_names(), ..StudyCheck::default() },
-        |diagnosis| diagnosis_check(study, &robot, &task.settings, diagnosis, thresholds),
+        |diagnosis| diagnosis_check(&study, &robot, &task.settings, diagnosis, thresholds),
     );
     for (index, import) in &examined.imports {
         check.findings.extend(import.iter().flat_map(|import| import_findings(&study.log_name(*index), import)));
@@ -71,7 +72,7 @@ pub fn check_with(
     check.findings.extend(impossible_bodies(&robot));
     check.findings.extend(too_few_rows(&examined, thresholds));
     check.findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
-    Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study_name(study, study_path), check })
+    Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study.title(), check })
 }
 
 fn too_few_rows(examined: &StudyExamination, thresholds: &CheckSettings) -> Option<CheckFinding> {

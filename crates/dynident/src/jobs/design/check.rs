@@ -6,8 +6,8 @@ use super::setup::{DesignSetup, MotionInformation};
 use super::{DesignOutcome, table};
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::{motion_provenance, relative_path};
-use crate::study::{DesignSection, Folders, Study, StudyInput, StudyLogSource, StudyRobot};
+use crate::jobs::provenance::motion_provenance;
+use crate::study::{DesignSection, Folders, Study, StudyFile, StudyInput, StudyLogSource, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::SampledMotion;
 use dynident_excitation::{Family, Motion, grid};
@@ -39,13 +39,14 @@ pub fn check_trajectory(
     trajectory: &Path,
     options: &RunOptions<'_>,
 ) -> Result<DesignOutcome, Error> {
-    let folders = Folders::new(study, study_path, options.data.as_deref());
-    let joints = StudyRobot::new(study, study_path, &folders)?.parametric.joint_names();
+    let study = StudyFile::new(study, study_path);
+    let folders = study.folders(options.data.as_deref());
+    let joints = study.robot_in(&folders)?.parametric.joint_names();
     let table = table::trajectory(trajectory, &joints, &study.motion)?;
     let given = table.given;
     let samples = given.samples();
     let start: Vec<f64> = (0..joints.len()).map(|joint| samples.q[samples.of(joint).start]).collect();
-    let mut setup = DesignSetup::for_check(study, study_path, options, &start)?;
+    let mut setup = DesignSetup::for_check(study, options, &start)?;
     let duration_s = given.duration_s();
     let longest_s = DesignSection::longest_s(setup.robot.model());
     if duration_s > longest_s {
@@ -56,19 +57,16 @@ pub fn check_trajectory(
     setup.notes.extend(not_at_rest(&given, &joints));
     let motion_at = |times: &[f64], out: &mut Motion| given.motion(&[], times, out);
     let check_rate_hz = setup.robot.model().characteristic_scale().round_hertz(CHECK_RATE_HZ);
-    let check = LimitCheck::of(&setup, study_path, (duration_s, check_rate_hz), SPLINE, &motion_at, NO_SEARCH)?;
+    let check = LimitCheck::of(&setup, study.path, (duration_s, check_rate_hz), SPLINE, &motion_at, NO_SEARCH)?;
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
     let information = setup.information(&times, &motion_at);
     // An absolute path is stored relative to the study.
-    let name = match study_path.parent().filter(|_| trajectory.is_absolute()) {
-        Some(folder) => relative_path(folder, trajectory),
-        None => trajectory.display().to_string(),
-    };
+    let name = if trajectory.is_absolute() { study.relative(trajectory) } else { trajectory.display().to_string() };
     let origin = MotionOrigin::given(&setup, name, given, &information);
     let read = [("trajectory", StudyInput::File(trajectory.to_owned()))];
     let data = options.data.as_deref();
-    let provenance = setup.inputs.while_unchanged(|| motion_provenance(study, study_path, data, &read))?;
+    let provenance = setup.inputs.while_unchanged(|| motion_provenance(study, data, &read))?;
     let review = MotionReview { duration_s, rate_hz, information, check };
     Ok(DesignOutcome::new(setup, origin, review).with_provenance(provenance))
 }
@@ -85,12 +83,13 @@ pub fn check_log(
     name: &str,
     options: &RunOptions<'_>,
 ) -> Result<DesignOutcome, Error> {
-    study.require_log(study_path)?;
-    let index = log_called(study, name).map_err(Error::study(study_path))?;
-    let mut setup = DesignSetup::for_log(study, study_path, options)?;
-    let folders = Folders::new(study, study_path, options.data.as_deref());
+    let study = StudyFile::new(study, study_path);
+    study.require_log(study.path)?;
+    let index = log_called(&study, name).map_err(Error::study(study.path))?;
+    let mut setup = DesignSetup::for_log(study, options)?;
+    let folders = study.folders(options.data.as_deref());
     let source = study.log_source(&folders, index)?;
-    let (mut pieces, rate_hz) = pieces(study, study_path, &setup.robot, &folders, index, &source)?;
+    let (mut pieces, rate_hz) = pieces(study, &setup.robot, &folders, index, &source)?;
     let gaps = pieces.len().saturating_sub(1);
     if gaps > 0 {
         setup.notes.push(format!(
@@ -104,7 +103,7 @@ pub fn check_log(
     for piece in &pieces {
         let motion_at = |times: &[f64], out: &mut Motion| piece.motion(&[], times, out);
         check.append(
-            LimitCheck::of(&setup, study_path, (piece.duration_s(), rate_hz), SAMPLES, &motion_at, NO_SEARCH)?,
+            LimitCheck::of(&setup, study.path, (piece.duration_s(), rate_hz), SAMPLES, &motion_at, NO_SEARCH)?,
             duration_s,
         );
         let part = setup.information(piece.times_s(), &motion_at);
@@ -118,7 +117,7 @@ pub fn check_log(
     let origin = MotionOrigin::given(&setup, study.log_name(index), pieces.swap_remove(longest), &information);
     let read = [("log", source.into())];
     let data = options.data.as_deref();
-    let provenance = setup.inputs.while_unchanged(|| motion_provenance(study, study_path, data, &read))?;
+    let provenance = setup.inputs.while_unchanged(|| motion_provenance(study, data, &read))?;
     let review = MotionReview { duration_s, rate_hz, information, check };
     Ok(DesignOutcome::new(setup, origin, review).with_provenance(provenance))
 }
@@ -138,8 +137,7 @@ fn log_called(study: &Study, name: &str) -> Result<usize, StudyError> {
 
 /// Continuous pieces of a log as motions, joints in the order of the model, and the sample rate, Hz.
 fn pieces(
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     robot: &StudyRobot,
     folders: &Folders,
     index: usize,
@@ -153,11 +151,11 @@ fn pieces(
     let execution = Execution::default();
     let (model, alone) = (robot.model(), core::slice::from_ref(&recording));
     let motion = Logs::new(model, alone, settings.row_settings(), &[0], None, execution)
-        .map_err(Error::identification(study_path))?
+        .map_err(Error::identification(study.path))?
         .motion;
-    let places = recording.places(model).map_err(Error::identification(study_path))?;
-    let Some(mut stream) = recording.open(model, &motion).map_err(Error::identification(study_path))? else {
-        return Err(Error::study(study_path)(StudyError::missing(format!("log `{log}`"), "it has no samples")));
+    let places = recording.places(model).map_err(Error::identification(study.path))?;
+    let Some(mut stream) = recording.open(model, &motion).map_err(Error::identification(study.path))? else {
+        return Err(Error::study(study.path)(StudyError::missing(format!("log `{log}`"), "it has no samples")));
     };
     let rate_hz = stream.rate_hz();
     // Per piece: samples of q, dq, ddq for each joint of the model.

@@ -3,10 +3,9 @@
 use super::setup::DesignSetup;
 use crate::error::Error;
 use crate::jobs::options::RunOptions;
-use crate::study::Study;
+use crate::study::StudyFile;
 use dynident_excitation::limits::Limits;
 use dynident_excitation::{DesignSettings, Family};
-use std::path::Path;
 
 pub(in crate::jobs) struct MotionFamily {
     pub(in crate::jobs) family: Box<dyn Family>,
@@ -19,13 +18,9 @@ pub(in crate::jobs) struct MotionFamily {
 ///
 /// # Errors
 /// As [`design_study`](super::design_study).
-pub(in crate::jobs) fn motion_family(
-    study: &Study,
-    study_path: &Path,
-    options: &RunOptions<'_>,
-) -> Result<MotionFamily, Error> {
-    let setup = DesignSetup::for_search(study, study_path, options)?;
+pub(in crate::jobs) fn motion_family(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<MotionFamily, Error> {
+    let setup = DesignSetup::for_search(study, options)?;
     let family = setup.section.family.family(setup.robot.model().dof(), setup.section.duration_s);
-    let family = family.map_err(Error::section(study_path, "design.family"))?;
+    let family = family.map_err(Error::section(study.path, "design.family"))?;
     Ok(MotionFamily { family, limits: setup.limits, search: setup.section.search })
 }

@@ -3,7 +3,7 @@
 
 use super::prior;
 use crate::error::{Error, StudyError};
-use crate::study::{DesignSection, Folders, IterationSection, Study, StudyRobot};
+use crate::study::{DesignSection, Folders, IterationSection, StudyFile, StudyRobot};
 use dynident_excitation::check::LimitReport;
 use dynident_excitation::limits::{
     AssumedLimits, KnownTorque, LimitKind, Limits, LimitsInForce, ShapesOfLinks, StartPositions,
@@ -29,23 +29,22 @@ pub(super) enum LimitsFor<'a> {
 /// # Errors
 /// Limits, start posture, home or envelope that are invalid for the robot.
 pub(super) fn in_force(
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     folders: &Folders,
     robot: &StudyRobot,
     purpose: LimitsFor<'_>,
 ) -> Result<LimitsInForce, Error> {
     let section = study.design.clone().unwrap_or_default();
-    section.limits.validate(robot.model()).map_err(Error::section(study_path, "design.limits"))?;
+    section.limits.validate(robot.model()).map_err(Error::section(study.path, "design.limits"))?;
     let settings = if purpose == LimitsFor::Log { AssumedLimits::none() } else { section.defaults.clone() };
     let starts = starts(&section, study.iteration.as_ref(), robot.model(), purpose);
-    let starts = starts.map_err(Error::section(study_path, "design"))?;
+    let starts = starts.map_err(Error::section(study.path, "design"))?;
     let given = &section.limits;
     let with_shapes = settings.floor || (settings.self_collision && given.self_collision.is_none());
     let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
     let shapes = if with_shapes { ShapesOfLinks::of(robot.model(), folder) } else { ShapesOfLinks::default() };
     let mut in_force = LimitsInForce::new(robot.model(), &shapes, &settings, given, &starts)
-        .map_err(Error::section(study_path, "design.limits"))?;
+        .map_err(Error::section(study.path, "design.limits"))?;
     let iteration = study.iteration.as_ref();
     if let Some(envelope) =
         iteration.and_then(IterationSection::envelope_in_force).filter(|_| purpose != LimitsFor::Log)
@@ -53,7 +52,7 @@ pub(super) fn in_force(
         let margin = if purpose == LimitsFor::Search { envelope.search_margin() } else { 0.0 };
         in_force.limits = envelope
             .narrow(in_force.limits, robot.model(), margin)
-            .map_err(Error::section(study_path, "iteration.envelope"))?;
+            .map_err(Error::section(study.path, "iteration.envelope"))?;
         if margin > 0.0 {
             in_force.assumed.push(format!(
                 "the motion keeps a margin of {:.0} % of the allowed tracking error inside the iteration's envelope (iteration.envelope.search_margin_percent)",
@@ -83,10 +82,10 @@ pub(super) fn in_force(
 ///
 /// # Errors
 /// A payload that the study does not define, or whose mass or centre of mass is unknown.
-pub(super) fn loaded(study: &Study, study_path: &Path, robot: &StudyRobot) -> Result<Model, Error> {
+pub(super) fn loaded(study: StudyFile<'_>, robot: &StudyRobot) -> Result<Model, Error> {
     let model = robot.model();
     let Some(name) = study.design.as_ref().and_then(|design| design.payload.as_ref()) else { return Ok(model.clone()) };
-    let wrong = Error::section::<StudyError>(study_path, "design");
+    let wrong = Error::section::<StudyError>(study.path, "design");
     let Some(section) = study.payload.iter().find(|payload| payload.name == *name) else {
         let known = study.payload.iter().map(|payload| payload.name.clone()).collect();
         return Err(wrong(StudyError::Unknown { key: "payload", what: "payload", name: name.clone(), known }));
@@ -107,20 +106,15 @@ pub(super) fn loaded(study: &Study, study_path: &Path, robot: &StudyRobot) -> Re
     }
     let mut inertials = model.inertials().to_vec();
     inertials[body] = inertials[body].plus(&known.expressed_in(&link.placement));
-    model.with_inertials(&inertials).map_err(Error::study(study_path))
+    model.with_inertials(&inertials).map_err(Error::study(study.path))
 }
 
 /// Limits of a study's robot for approach and return paths.
 ///
 /// # Errors
 /// As [`in_force`].
-pub(in crate::jobs) fn limits_of(
-    study: &Study,
-    study_path: &Path,
-    folders: &Folders,
-    robot: &StudyRobot,
-) -> Result<Limits, Error> {
-    Ok(in_force(study, study_path, folders, robot, LimitsFor::Ways)?.limits)
+pub(in crate::jobs) fn limits_of(study: StudyFile<'_>, folders: &Folders, robot: &StudyRobot) -> Result<Limits, Error> {
+    Ok(in_force(study, folders, robot, LimitsFor::Ways)?.limits)
 }
 
 fn starts(

@@ -23,7 +23,7 @@ use crate::error::{Error, Expected};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::motion_provenance;
 use crate::result::WindowedFile;
-use crate::study::{CriterionChoice, DesignSection, Study};
+use crate::study::{CriterionChoice, DesignSection, Study, StudyFile};
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicBool, Ordering};
 use dynident_excitation::check::CHECK_RATE_HZ;
@@ -50,12 +50,12 @@ pub fn design_study(
     options: &RunOptions<'_>,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<DesignOutcome, Error> {
-    let mut setup = DesignSetup::for_search(study, study_path, options)?;
+    let study = StudyFile::new(study, study_path);
+    let mut setup = DesignSetup::for_search(study, options)?;
     let longest = Expected::Range(0.0, DesignSection::longest_s(setup.robot.model()));
-    longest.check("duration_s", setup.section.duration_s).map_err(Error::section(study_path, "design"))?;
+    longest.check("duration_s", setup.section.duration_s).map_err(Error::section(study.path, "design"))?;
     // The search takes long, so files may change after they have been read and hashed.
-    let provenance =
-        setup.inputs.while_unchanged(|| motion_provenance(study, study_path, options.data.as_deref(), &[]))?;
+    let provenance = setup.inputs.while_unchanged(|| motion_provenance(study, options.data.as_deref(), &[]))?;
     let is_stopped = AtomicBool::new(false);
     let watch = |progress: &DesignProgress| {
         let answer = watch(progress);
@@ -66,11 +66,11 @@ pub fn design_study(
     let found = match &setup.section.criterion {
         CriterionChoice::WindowedCondition(windowed) => {
             let found = step_wise(&setup.section, windowed, &setup.robot, &setup.limits, watch)
-                .map_err(Error::section(study_path, "design"))?;
+                .map_err(Error::section(study.path, "design"))?;
             setup.notes.push(WINDOWED_NOTE.to_owned());
             found
         }
-        _ => search(&setup, study_path, watch)?,
+        _ => search(&setup, study.path, watch)?,
     };
 
     // The limit check is independent of the search.
@@ -79,11 +79,11 @@ pub fn design_study(
     let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
     let single = || match found.windowed {
         Some(_) => Ok(Vec::new()),
-        None => changes(&setup, study_path, &found, watch),
+        None => changes(&setup, study.path, &found, watch),
     };
     let rates = (duration_s, check_rate_hz);
     let stop = || watch(&found.progress("check")).is_break();
-    let mut check = LimitCheck::of(&setup, study_path, rates, "the motion itself", &motion_at, (&single, &stop))?;
+    let mut check = LimitCheck::of(&setup, study.path, rates, "the motion itself", &motion_at, (&single, &stop))?;
     check.diagnosis.extend(found.windowed.iter().flat_map(WindowedFile::sentences));
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);

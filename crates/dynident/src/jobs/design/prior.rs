@@ -2,7 +2,7 @@
 
 use crate::error::{Error, StudyError};
 use crate::result::BaseParameterResult;
-use crate::result::stored::read_part;
+use crate::result::read_part;
 use crate::study::{Folders, PriorSection, StudyRobot};
 use dynident_dynamics::Column;
 use dynident_excitation::limits::KnownTorque;

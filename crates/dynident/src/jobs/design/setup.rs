@@ -5,14 +5,13 @@ use super::stopwatch::Stopwatch;
 use super::{prior, table};
 use crate::error::{Error, StudyError};
 use crate::inputs::InputFiles;
-use crate::jobs::options::{RunOptions, study_name};
-use crate::study::{CoulombChoice, CriterionChoice, DesignSection, Folders, Study, StudyRobot, TorqueNoise};
+use crate::jobs::options::RunOptions;
+use crate::study::{CoulombChoice, CriterionChoice, DesignSection, Study, StudyFile, StudyRobot, TorqueNoise};
 use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
 use dynident_excitation::limits::{LimitSet, Limits, LimitsInForce};
 use dynident_excitation::{Family, Information, Motion};
 use dynident_model::Model;
 use nalgebra::DMatrix;
-use std::path::Path;
 
 const BLOCK_SAMPLES: usize = 4096;
 
@@ -46,47 +45,42 @@ pub(super) struct DesignSetup {
 
 impl DesignSetup {
     /// For a search: smooth terms; the speed of every joint must be limited.
-    pub(super) fn for_search(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
+    pub(super) fn for_search(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<Self, Error> {
         let mut notes = Vec::new();
-        let setup = Self::new(&smooth(study, &mut notes), study_path, options, notes, LimitsFor::Search)?;
-        bounded(&setup.robot, &setup.limits).map_err(Error::section(study_path, "design.limits"))?;
+        let smooth = smooth(&study, &mut notes);
+        let setup = Self::new(study.with_study(&smooth), options, notes, LimitsFor::Search)?;
+        bounded(&setup.robot, &setup.limits).map_err(Error::section(study.path, "design.limits"))?;
         Ok(setup)
     }
 
     /// For an existing motion with these start positions: terms as in the study.
-    pub(super) fn for_check(
-        study: &Study,
-        study_path: &Path,
-        options: &RunOptions<'_>,
-        start: &[f64],
-    ) -> Result<Self, Error> {
-        Self::new(study, study_path, options, Vec::new(), LimitsFor::Motion(start))
+    pub(super) fn for_check(study: StudyFile<'_>, options: &RunOptions<'_>, start: &[f64]) -> Result<Self, Error> {
+        Self::new(study, options, Vec::new(), LimitsFor::Motion(start))
     }
 
     /// For a log: no assumed limits.
-    pub(super) fn for_log(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
-        Self::new(study, study_path, options, Vec::new(), LimitsFor::Log)
+    pub(super) fn for_log(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<Self, Error> {
+        Self::new(study, options, Vec::new(), LimitsFor::Log)
     }
 
     fn new(
-        study: &Study,
-        study_path: &Path,
+        study: StudyFile<'_>,
         options: &RunOptions<'_>,
         mut notes: Vec<String>,
         purpose: LimitsFor<'_>,
     ) -> Result<Self, Error> {
         let stopwatch = Stopwatch::start();
         let section = study.design.clone().unwrap_or_default();
-        section.validate().map_err(Error::section(study_path, "design"))?;
-        let inputs = InputFiles::of(study, study_path, options.data.as_deref());
-        let folders = Folders::new(study, study_path, options.data.as_deref());
-        let robot = StudyRobot::new(study, study_path, &folders)?;
-        let LimitsInForce { limits, assumed, not_checked } = in_force(study, study_path, &folders, &robot, purpose)?;
+        section.validate().map_err(Error::section(study.path, "design"))?;
+        let inputs = InputFiles::of(study, options.data.as_deref());
+        let folders = study.folders(options.data.as_deref());
+        let robot = study.robot_in(&folders)?;
+        let LimitsInForce { limits, assumed, not_checked } = in_force(study, &folders, &robot, purpose)?;
         notes.extend(included(&limits, robot.model()));
-        let loaded = loaded(study, study_path, &robot)?;
-        let set = LimitSet::new(&limits, &loaded).map_err(Error::section(study_path, "design.limits"))?;
-        let torque_std_nm = torque_std(&section, &robot, &mut notes).map_err(Error::section(study_path, "design"))?;
-        let prior = prior::information(&section.prior, &robot, study_path, &folders, &mut notes)?;
+        let loaded = loaded(study, &robot)?;
+        let set = LimitSet::new(&limits, &loaded).map_err(Error::section(study.path, "design.limits"))?;
+        let torque_std_nm = torque_std(&section, &robot, &mut notes).map_err(Error::section(study.path, "design"))?;
+        let prior = prior::information(&section.prior, &robot, study.path, &folders, &mut notes)?;
         let criteria = match &section.criterion {
             CriterionChoice::Prediction { trajectory } => {
                 let path = folders.find(trajectory, None)?;
@@ -102,7 +96,7 @@ impl DesignSetup {
             named => named.criteria().unwrap_or_default(),
         };
         Ok(Self {
-            name: study_name(study, study_path),
+            name: study.title(),
             ones: vec![1.0; robot.model().dof()],
             section,
             robot,

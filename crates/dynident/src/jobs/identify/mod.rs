@@ -10,10 +10,10 @@ use crate::error::Error;
 use crate::inputs::InputFiles;
 use crate::jobs::check::{CheckSettings, diagnosis_check};
 use crate::jobs::log_summary::{held_out_summary, training_summary};
-use crate::jobs::options::{RunOptions, study_name};
-use crate::jobs::provenance::{concurrently, provenance, relative_path};
+use crate::jobs::options::RunOptions;
+use crate::jobs::provenance::{concurrently, provenance};
 use crate::result::{LogSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
-use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyInput, StudyRobot};
+use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyFile, StudyInput, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::diagnosis::Diagnosis;
 use dynident_identification::estimators::{Findings, InstrumentSource};
@@ -75,7 +75,7 @@ impl IdentificationOutcome {
 /// # Errors
 /// Every variant of [`Error`] for files, study and logs. A poor fit is not an error.
 pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<IdentificationOutcome, Error> {
-    identify_unchanged(study, study_path, options, None)
+    identify_unchanged(StudyFile::new(study, study_path), options, None)
 }
 
 /// Like [`identify()`] with the method `"instrumental"`, regardless of the study, and instruments from `source`: a
@@ -92,37 +92,35 @@ pub fn identify_with_instruments(
 ) -> Result<IdentificationOutcome, Error> {
     let mut study = study.clone();
     study.estimator.method = EstimatorMethod::Instrumental;
-    identify_unchanged(&study, study_path, options, Some(source))
+    identify_unchanged(StudyFile::new(&study, study_path), options, Some(source))
 }
 
 fn identify_unchanged(
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     options: &RunOptions<'_>,
     source: Option<&mut dyn InstrumentSource>,
 ) -> Result<IdentificationOutcome, Error> {
-    let files = InputFiles::of(study, study_path, options.data.as_deref());
-    files.while_unchanged(|| identify_from_files(study, study_path, options, source))
+    let files = InputFiles::of(study, options.data.as_deref());
+    files.while_unchanged(|| identify_from_files(study, options, source))
 }
 
 fn identify_from_files(
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     options: &RunOptions<'_>,
     source: Option<&mut dyn InstrumentSource>,
 ) -> Result<IdentificationOutcome, Error> {
     let start = Instant::now();
-    study.require_training_log(study_path)?;
-    let folders = Folders::new(study, study_path, options.data.as_deref());
+    study.require_training_log(study.path)?;
+    let folders = study.folders(options.data.as_deref());
     let arm = study.arm.as_ref().map(|section| known_arm(section, &folders)).transpose()?;
     // Uses the friction that was selected when the arm was identified.
-    let with_arm = arm.as_ref().map(|(_, stored)| stored.as_fitted(study));
-    let study = with_arm.as_ref().unwrap_or(study);
-    let robot = StudyRobot::new(study, study_path, &folders)?;
-    let in_study = Error::identification::<IdentificationError>(study_path);
+    let with_arm = arm.as_ref().map(|(_, stored)| stored.as_fitted(&study));
+    let study = study.with_study(with_arm.as_ref().unwrap_or(study.study));
+    let robot = study.robot_in(&folders)?;
+    let in_study = Error::identification::<IdentificationError>(study.path);
     // Names are checked before any log is read.
     // The study is always examined, because any result may be used.
-    let mut settings = study.settings(study_path, &robot)?;
+    let mut settings = study.settings(study.path, &robot)?;
     settings.diagnosis = DiagnosisChoice::Always;
     if source.is_some() {
         // Instruments need the terms that the study states.
@@ -133,7 +131,7 @@ fn identify_from_files(
     settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;
     let task = study.task_with(settings, &robot, &folders)?;
     let sources = study.log_sources(&folders)?;
-    study.check_overlap(&sources, &task.recordings).map_err(Error::study(study_path))?;
+    study.check_overlap(&sources, &task.recordings).map_err(Error::study(study.path))?;
     let mut read = vec![("robot", study.robot_input(&robot))];
     read.extend(study.table_inputs(&folders));
     read.extend(sources.into_iter().map(|source| ("log", StudyInput::from(source))));
@@ -152,7 +150,7 @@ fn identify_from_files(
         };
         found.map_err(&in_study)
     };
-    let hashes = || provenance(study, study_path, &read);
+    let hashes = || provenance(study, &read);
     let (provenance, found) = concurrently(options.threads, hashes, identification);
     let (found, provenance) = (found?, provenance?);
     timings.logs = found.times.logs_s;
@@ -162,7 +160,7 @@ fn identify_from_files(
     timings.made_at = now();
 
     let metadata = FitMetadata { timings, provenance, is_payload: arm.is_some() };
-    build_outcome(study, study_path, &robot, &task, found, metadata)
+    build_outcome(study, &robot, &task, found, metadata)
 }
 
 pub(in crate::jobs) struct FitMetadata {
@@ -177,17 +175,16 @@ pub(in crate::jobs) struct FitMetadata {
 /// # Errors
 /// Rows that do not match the estimate.
 pub(in crate::jobs) fn build_outcome(
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     robot: &StudyRobot,
     task: &IdentificationTask,
     found: Identification,
     FitMetadata { timings, provenance, is_payload }: FitMetadata,
 ) -> Result<IdentificationOutcome, Error> {
-    let in_study = Error::identification::<IdentificationError>(study_path);
+    let in_study = Error::identification::<IdentificationError>(study.path);
     let inertials = found.inertials();
-    let verdict = physical_verdict(study, &found, &inertials);
-    let (files, no_urdf) = match exported_model((study, robot), task, &found, &verdict, is_payload) {
+    let verdict = physical_verdict(&study, &found, &inertials);
+    let (files, no_urdf) = match exported_model((&study, robot), task, &found, &verdict, is_payload) {
         Ok(files) => (Some(files.with_provenance(&provenance, &form_results(&found))), None),
         Err(reason) => (None, Some(reason)),
     };
@@ -207,7 +204,7 @@ pub(in crate::jobs) fn build_outcome(
     }
     let training = training_result(&found, &task.recordings).map_err(|error| in_study(error.into()))?;
     let parts = Parts {
-        name: study_name(study, study_path),
+        name: study.title(),
         timings,
         provenance,
         verdict,
@@ -218,12 +215,11 @@ pub(in crate::jobs) fn build_outcome(
         is_payload,
         training,
     };
-    let mut result = result_file(study, robot, task, &found, parts);
+    let mut result = result_file(&study, robot, task, &found, parts);
     result.problems = result.found_problems();
-    let folder = study_path.parent().unwrap_or(Path::new(""));
-    result.robot.file = relative_path(folder, &robot.robot.path);
+    result.robot.file = study.relative(&robot.robot.path);
     for log in &mut result.logs {
-        log.import.file = relative_path(folder, Path::new(&log.import.file));
+        log.import.file = study.relative(Path::new(&log.import.file));
     }
     result.seal();
     let mut traces = found.examination.traces;

@@ -35,7 +35,8 @@ impl<'a> ResultFiles<'a> {
     /// Writes the file, its page and the identified robot. Page and robot of an earlier call are removed until new ones
     /// exist.
     pub(super) fn write(&self, file: &IterationsFile, page: Option<String>, found: RobotFiles) -> Result<(), Error> {
-        let bytes = dynident_text::json::to_string_pretty(file)
+        let bytes = file
+            .to_json()
             .map_err(|error| Error::Result { path: self.out.join(ITERATIONS), message: error.to_string() })?;
         let set = found.added_to(OutputSet::new(self.out).file(ITERATIONS, bytes), self.robot_is_own);
         match page {

@@ -15,7 +15,7 @@ pub(super) fn fingerprint(study: &Study, robot: &StudyRobot, options: &RunOption
     let (model, version) = (format!("{:?}", robot.model()), env!("CARGO_PKG_VERSION"));
     let all = number(&format!("{study:?} {model} {:?} {version}", options.data));
     let mut parts = vec![format!("{all:016x}"), format!("description:{:08x}", number(&model) as u32)];
-    if let Ok(serde_json::Value::Object(tables)) = serde_json::to_value(&study) {
+    if let Ok(serde_json::Value::Object(tables)) = study.to_json() {
         let stated = tables.iter().filter(|(_, value)| !value.is_null());
         parts.extend(stated.map(|(name, value)| format!("{name}:{:08x}", number(&value.to_string()) as u32)));
     }

@@ -23,16 +23,16 @@ pub(super) struct Inputs {
 
 impl Inputs {
     pub(super) fn read(job: &Job<'_>, section: IterationSection) -> Result<Self, Error> {
-        let (study, study_path, data) = (job.study, job.study_path, job.options.data.as_deref());
+        let (study, data) = (job.study, job.options.data.as_deref());
         let simulation = study.simulation.clone().unwrap_or_default();
-        let files = InputFiles::of(study, study_path, data);
-        let folders = Folders::new(study, study_path, data);
-        let robot = StudyRobot::new(study, study_path, &folders)?;
-        let identification = study.settings(study_path, &robot)?;
-        let settings = section.settings(study, identification).map_err(Error::study(study_path))?;
+        let files = InputFiles::of(study, data);
+        let folders = study.folders(data);
+        let robot = study.robot_in(&folders)?;
+        let identification = study.settings(study.path, &robot)?;
+        let settings = section.settings(&study, identification).map_err(Error::study(study.path))?;
         let truth = match section.robot {
             RobotChoice::Simulation => {
-                Some(simulation.truth(&study.coupling, &robot).map_err(Error::section(study_path, "simulation"))?)
+                Some(simulation.truth(&study.coupling, &robot).map_err(Error::section(study.path, "simulation"))?)
             }
             _ => None,
         };

@@ -2,14 +2,13 @@
 
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
-use crate::study::Study;
+use crate::study::StudyFile;
 use dynident_iteration::IterationError;
 use std::path::Path;
 
 #[derive(Clone, Copy)]
 pub(super) struct Job<'a> {
-    pub(super) study: &'a Study,
-    pub(super) study_path: &'a Path,
+    pub(super) study: StudyFile<'a>,
     pub(super) out: &'a Path,
     /// Whether to keep the runs in the folder.
     pub(super) resume: bool,
@@ -18,7 +17,7 @@ pub(super) struct Job<'a> {
 
 impl Job<'_> {
     pub(super) fn section_error(&self, why: StudyError) -> Error {
-        Error::section(self.study_path, "iteration")(why)
+        Error::section(self.study.path, "iteration")(why)
     }
 
     /// Maps an error of the iteration to a file, the state in the folder, or the table `[iteration]`.

@@ -1,10 +1,10 @@
 //! The legs of an iteration: their trajectories, stages and robots.
 
 use super::trajectory::Trajectory;
-use crate::error::{Error, Expected, StudyError};
+use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
 use crate::study::{
-    CouplingSection, IterationSection, LegOrder, LegSection, RobotChoice, SimulationSection, Study, StudyRobot,
+    CouplingSection, IterationSection, LegSection, RobotChoice, SimulationSection, Study, StudyFile, StudyRobot,
 };
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
@@ -13,24 +13,22 @@ use dynident_iteration::robot::{FolderRobot, ProcessRobot};
 use dynident_iteration::{HeldOutMotion, Leg};
 use dynident_simulation::controllers::ControllerModel;
 use dynident_system::PermittedProgram;
-use std::path::Path;
 
 /// Decorrelates the noise of legs with separate iterations.
 const SEED_STEP_PER_LEG: u64 = 0xd1b5_4a32_d192_ed03;
 
 /// The trajectory of each leg; the study's trajectory is designed once, and again for each known payload.
 pub(super) fn trajectories(
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     robot: &StudyRobot,
     rate_hz: f64,
     options: &RunOptions<'_>,
     watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
 ) -> Result<Vec<Trajectory>, Error> {
-    let of = |study: &Study| Trajectory::of_study(study, study_path, robot, rate_hz, options, watch);
+    let of = |own: &Study| Trajectory::of_study(study.with_study(own), robot, rate_hz, options, watch);
     let section = study.iteration.clone().unwrap_or_default();
     if section.leg.is_empty() {
-        return Ok(vec![of(study)?]);
+        return Ok(vec![of(&study)?]);
     }
     let mut whole: Option<Trajectory> = None;
     let mut all = Vec::new();
@@ -39,7 +37,7 @@ pub(super) fn trajectories(
         let is_known = |name: &String| study.payload.iter().any(|one| one.name == *name && one.known().is_some());
         let load = leg.payload.as_ref().filter(|name| is_known(name));
         if leg.trajectory.is_some() || leg.design.is_some() || load.is_some() {
-            let mut own = study.clone();
+            let mut own = study.study.clone();
             if leg.trajectory.is_some() || leg.design.is_some() {
                 own.iteration.get_or_insert_default().trajectory.clone_from(&leg.trajectory);
             }
@@ -53,147 +51,111 @@ pub(super) fn trajectories(
             continue;
         }
         if whole.is_none() {
-            whole = Some(of(study)?);
+            whole = Some(of(&study)?);
         }
         all.extend(whole.clone());
     }
     Ok(all)
 }
 
-impl IterationSection {
-    pub(super) fn stages(&self) -> Vec<Vec<usize>> {
-        match self.order {
-            LegOrder::OneAfterAnother if self.leg.len() > 1 => (0..self.leg.len()).map(|leg| vec![leg]).collect(),
-            _ => vec![(0..self.leg.len().max(1)).collect()],
+/// The legs with their references and windows.
+pub(super) fn legs(
+    section: &IterationSection,
+    trajectories: &[Trajectory],
+    robot: &StudyRobot,
+) -> Result<Vec<Leg>, StudyError> {
+    let names = robot.parametric.joint_names();
+    let free = [LegSection::default()];
+    let sections = if section.leg.is_empty() { &free[..] } else { &section.leg[..] };
+    if sections.len() != trajectories.len() {
+        return Err(StudyError::conflict(
+            "trajectory.json",
+            "its legs differ from those of the study: remove the file",
+        ));
+    }
+    let mut legs = Vec::new();
+    for (leg, trajectory) in sections.iter().zip(trajectories) {
+        let held: Vec<Option<f64>> = names.iter().map(|name| leg.hold.get(name).copied()).collect();
+        let trajectory = trajectory.without(&held)?;
+        let mut reference = trajectory.reference()?;
+        for (joint, held) in held.iter().enumerate() {
+            if let Some(position) = held {
+                reference = reference.with_joint_held(joint, *position)?;
+            }
         }
-    }
-
-    pub(super) fn check_legs(&self, robot: &StudyRobot) -> Result<(), StudyError> {
-        let names = robot.parametric.joint_names();
-        for (number, leg) in (1..).zip(&self.leg) {
-            leg.check(&names).map_err(StudyError::at(format!("leg {number}")))?;
+        let everything = || vec![vec![[-1.0, reference.duration_s() + 1.0]]; names.len()];
+        let mut windows = match &trajectory.windows {
+            _ if !leg.windows.is_empty() => {
+                Some(names.iter().map(|name| leg.windows.get(name).cloned().unwrap_or_default()).collect())
+            }
+            Some(windows) if !section.every_sample => Some(windows.clone()),
+            _ => (!leg.hold.is_empty()).then(everything),
+        };
+        if let Some(windows) = &mut windows {
+            windows.iter_mut().zip(&held).filter(|(_, held)| held.is_some()).for_each(|(own, _)| own.clear());
         }
-        Ok(())
+        let placed = match windows {
+            None => Leg::whole(reference),
+            Some(windows) => Leg::windowed(reference, windows),
+        };
+        legs.push(placed?.with_payload(leg.payload.clone()));
     }
-
-    pub(super) fn legs(&self, trajectories: &[Trajectory], robot: &StudyRobot) -> Result<Vec<Leg>, StudyError> {
-        let names = robot.parametric.joint_names();
-        let free = [LegSection::default()];
-        let sections = if self.leg.is_empty() { &free[..] } else { &self.leg[..] };
-        if sections.len() != trajectories.len() {
-            return Err(StudyError::conflict(
-                "trajectory.json",
-                "its legs differ from those of the study: remove the file",
-            ));
-        }
-        let mut legs = Vec::new();
-        for (section, trajectory) in sections.iter().zip(trajectories) {
-            let held: Vec<Option<f64>> = names.iter().map(|name| section.hold.get(name).copied()).collect();
-            let trajectory = trajectory.without(&held)?;
-            let mut reference = trajectory.reference()?;
-            for (joint, held) in held.iter().enumerate() {
-                if let Some(position) = held {
-                    reference = reference.with_joint_held(joint, *position)?;
-                }
-            }
-            let everything = || vec![vec![[-1.0, reference.duration_s() + 1.0]]; names.len()];
-            let mut windows = match &trajectory.windows {
-                _ if !section.windows.is_empty() => {
-                    Some(names.iter().map(|name| section.windows.get(name).cloned().unwrap_or_default()).collect())
-                }
-                Some(windows) if !self.every_sample => Some(windows.clone()),
-                _ => (!section.hold.is_empty()).then(everything),
-            };
-            if let Some(windows) = &mut windows {
-                windows.iter_mut().zip(&held).filter(|(_, held)| held.is_some()).for_each(|(own, _)| own.clear());
-            }
-            let leg = match windows {
-                None => Leg::whole(reference),
-                Some(windows) => Leg::windowed(reference, windows),
-            };
-            legs.push(leg?.with_payload(section.payload.clone()));
-        }
-        Ok(legs)
-    }
-
-    pub(super) fn held_out_motion(&self, trajectory: &Trajectory) -> Result<HeldOutMotion, StudyError> {
-        let every = self.held_out.as_ref().and_then(|own| own.every);
-        Ok(HeldOutMotion { leg: Leg::whole(trajectory.reference()?)?, every })
-    }
-
-    /// Robots of one iteration: one simulator per leg, or the external robot (`program` is the permitted program of the
-    /// study); empty for a robot of the caller.
-    pub(super) fn robots(
-        &self,
-        simulation: &SimulationSection,
-        coupling: &[CouplingSection],
-        robot: &StudyRobot,
-        stage: usize,
-        members: &[usize],
-        program: Option<&PermittedProgram>,
-    ) -> Result<Vec<Box<dyn Robot>>, StudyError> {
-        let joints = robot.parametric.joint_names();
-        Ok(match &self.robot {
-            RobotChoice::Process(settings) => {
-                let robot = |program: &PermittedProgram| ProcessRobot::new(settings.clone(), joints, program.clone());
-                program.map(robot).transpose()?.into_iter().map(|robot| Box::new(robot) as Box<dyn Robot>).collect()
-            }
-            RobotChoice::Folder(settings) => {
-                let mut settings = settings.clone();
-                if stage > 0 {
-                    settings.folder = settings.folder.join(format!("leg_{}", stage + 1));
-                }
-                // Used to detect a wrong torque unit; without a model the torques are not compared.
-                let prior = ControllerModel::from_parameters(robot.model(), robot.terms(), robot.nominal()).ok();
-                vec![Box::new(FolderRobot::new(settings, joints)?.with_prior(prior))]
-            }
-            RobotChoice::Function => Vec::new(),
-            RobotChoice::Simulation => {
-                let mut simulation = simulation.clone();
-                // The runs of every leg start at 1, but their noise must differ.
-                simulation.sensors.seed ^= (stage as u64).wrapping_mul(SEED_STEP_PER_LEG);
-                let mut robots: Vec<Box<dyn Robot>> = Vec::new();
-                for &member in members {
-                    let robot = simulation.truth(coupling, robot)?.robot;
-                    let section = self.leg.get(member).filter(|leg| leg.locked && !leg.hold.is_empty());
-                    robots.push(Box::new(match section {
-                        Some(leg) => {
-                            let held: Vec<String> = leg.hold.keys().cloned().collect();
-                            robot.with_locked(&held)?
-                        }
-                        None => robot,
-                    }));
-                }
-                robots
-            }
-        })
-    }
+    Ok(legs)
 }
 
-impl LegSection {
-    fn check(&self, names: &[String]) -> Result<(), StudyError> {
-        if self.trajectory.is_some() && self.design.is_some() {
-            return Err(StudyError::Exclusive { keys: vec!["trajectory", "design"] });
+/// The held-out motion along a trajectory.
+pub(super) fn held_out_motion(
+    section: &IterationSection,
+    trajectory: &Trajectory,
+) -> Result<HeldOutMotion, StudyError> {
+    let every = section.held_out.as_ref().and_then(|own| own.every);
+    Ok(HeldOutMotion { leg: Leg::whole(trajectory.reference()?)?, every })
+}
+
+/// Robots of one iteration: one simulator per leg, or the external robot (`program` is the permitted program of the
+/// study); empty for a robot of the caller.
+pub(super) fn robots(
+    section: &IterationSection,
+    simulation: &SimulationSection,
+    coupling: &[CouplingSection],
+    robot: &StudyRobot,
+    stage: usize,
+    members: &[usize],
+    program: Option<&PermittedProgram>,
+) -> Result<Vec<Box<dyn Robot>>, StudyError> {
+    let joints = robot.parametric.joint_names();
+    Ok(match &section.robot {
+        RobotChoice::Process(settings) => {
+            let robot = |program: &PermittedProgram| ProcessRobot::new(settings.clone(), joints, program.clone());
+            program.map(robot).transpose()?.into_iter().map(|robot| Box::new(robot) as Box<dyn Robot>).collect()
         }
-        for (key, mut joints) in
-            [("hold", self.hold.keys().collect::<Vec<_>>()), ("windows", self.windows.keys().collect())]
-        {
-            joints.retain(|name| !names.contains(name));
-            if let Some(&name) = joints.first() {
-                let known = names.to_vec();
-                return Err(StudyError::Unknown { key, what: "joint", name: name.clone(), known });
+        RobotChoice::Folder(settings) => {
+            let mut settings = settings.clone();
+            if stage > 0 {
+                settings.folder = settings.folder.join(format!("leg_{}", stage + 1));
             }
+            // Used to detect a wrong torque unit; without a model the torques are not compared.
+            let prior = ControllerModel::from_parameters(robot.model(), robot.terms(), robot.nominal()).ok();
+            vec![Box::new(FolderRobot::new(settings, joints)?.with_prior(prior))]
         }
-        if let Some(both) = self.hold.keys().find(|name| self.windows.contains_key(*name)) {
-            let (joint, key, other) = (both.clone(), "windows", "hold");
-            return Err(StudyError::JointInBoth { joint, key, other, state: "held" });
+        RobotChoice::Function => Vec::new(),
+        RobotChoice::Simulation => {
+            let mut simulation = simulation.clone();
+            // The runs of every leg start at 1, but their noise must differ.
+            simulation.sensors.seed ^= (stage as u64).wrapping_mul(SEED_STEP_PER_LEG);
+            let mut robots: Vec<Box<dyn Robot>> = Vec::new();
+            for &member in members {
+                let robot = simulation.truth(coupling, robot)?.robot;
+                let leg = section.leg.get(member).filter(|leg| leg.locked && !leg.hold.is_empty());
+                robots.push(Box::new(match leg {
+                    Some(leg) => {
+                        let held: Vec<String> = leg.hold.keys().cloned().collect();
+                        robot.with_locked(&held)?
+                    }
+                    None => robot,
+                }));
+            }
+            robots
         }
-        for (name, position) in &self.hold {
-            Expected::Finite.check(format!("hold.{name}"), *position)?;
-        }
-        if self.hold.len() == names.len() {
-            return Err(StudyError::conflict("hold", "all joints are held: at least one must move"));
-        }
-        Ok(())
-    }
+    })
 }

@@ -22,7 +22,7 @@ use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
 use crate::pages::iteration::{TimeSpent, iteration_report};
 use crate::result::IterationsFile;
-use crate::study::{RobotChoice, Study};
+use crate::study::{RobotChoice, Study, StudyFile};
 use dynident_iteration::{IterationError, IterationStore};
 use files::ResultFiles;
 use fingerprint::fingerprint;
@@ -52,7 +52,7 @@ pub fn iterate_study(
     options: &RunOptions<'_>,
     watch: &mut IterationWatch<'_>,
 ) -> Result<IterationsFile, Error> {
-    iterated(Job { study, study_path, out, resume, options }, watch, None)
+    iterated(Job { study: StudyFile::new(study, study_path), out, resume, options }, watch, None)
 }
 
 /// Like [`iterate_study`] with the caller's robot: `robot` receives the joint names and returns the robot.
@@ -70,7 +70,7 @@ pub fn iterate_with_robot(
 ) -> Result<IterationsFile, Error> {
     let mut study = study.clone();
     study.iteration.get_or_insert_default().robot = RobotChoice::Function;
-    iterated(Job { study: &study, study_path, out, resume, options }, watch, Some(robot))
+    iterated(Job { study: StudyFile::new(&study, study_path), out, resume, options }, watch, Some(robot))
 }
 
 fn iterated(
@@ -78,19 +78,19 @@ fn iterated(
     watch: &mut IterationWatch<'_>,
     own_robot: Option<RobotMaker<'_>>,
 ) -> Result<IterationsFile, Error> {
-    let Job { study, study_path, out, resume, options } = job;
+    let Job { study, out, resume, options } = job;
     // Permission is checked before any file is read or search starts.
     let section = study.iteration.clone().unwrap_or_default();
-    let program = permitted_program(&section, study_path, watch.programs)?;
+    let program = permitted_program(&section, study.path, watch.programs)?;
     let begin = Instant::now();
     let inputs = Inputs::read(&job, section)?;
     if inputs.section.robot == RobotChoice::Function && own_robot.is_none() {
         let fix = "robot = \"function\" needs code of the caller: call iterate_with_robot";
         return Err(job.section_error(StudyError::missing("robot", fix)));
     }
-    inputs.check_section(study).map_err(|why| job.section_error(why))?;
+    inputs.check_section(&study).map_err(|why| job.section_error(why))?;
 
-    let fingerprint = fingerprint(study, &inputs.robot, options);
+    let fingerprint = fingerprint(&study, &inputs.robot, options);
     let members = inputs.section.stages();
     let files = ResultFiles::of(out);
     let stores = opened_stores(&job, &files, members.len(), &fingerprint)?;
@@ -109,11 +109,10 @@ fn iterated(
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: results.runs_made };
     // The runs remain valid if the robot files cannot be written.
     let (provenance, failed) = (&plan.report.provenance, |error| job.iteration_error(error));
-    let found = robot_found(study, study_path, &inputs.robot, provenance, &results.ended, options, failed)
-        .unwrap_or_else(|why| {
-            file.no_result = Some(why.to_string());
-            RobotFiles::none()
-        });
+    let found = robot_found(study, &inputs.robot, provenance, &results.ended, options, failed).unwrap_or_else(|why| {
+        file.no_result = Some(why.to_string());
+        RobotFiles::none()
+    });
     file.base_parameters.clone_from(&found.base_parameters);
     files.write(&file, Some(iteration_report(&file, &results.traces, &time)?), found)?;
     Ok(file)

@@ -4,15 +4,15 @@ use crate::clock::now;
 use crate::error::Error;
 use crate::jobs::identify::{FitMetadata, IdentificationOutcome, build_outcome};
 use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::{later_provenance, relative_path};
+use crate::jobs::provenance::later_provenance;
 use crate::output_set::OutputSet;
 use crate::result::{BaseParameterResult, Provenance, Timings};
-use crate::study::{Study, StudyInput, StudyRobot};
+use crate::study::{StudyFile, StudyInput, StudyRobot};
 use dynident_identification::{IdentificationError, IdentificationTask, Role, identify};
 use dynident_iteration::robot::{RunRequest, controller_json};
 use dynident_iteration::{Iteration, IterationError, IterationStore, ModelParameters, RunRecord, friction_chosen};
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 const RESULT: &str = "result.json";
@@ -63,8 +63,7 @@ impl RobotFiles {
 /// # Errors
 /// Missing logs, or rows without an estimate.
 pub(super) fn robot_found(
-    study: &Study,
-    study_path: &Path,
+    study: StudyFile<'_>,
     robot: &StudyRobot,
     begun: &Provenance,
     stages: &[EndedStage<'_>],
@@ -94,7 +93,7 @@ pub(super) fn robot_found(
         }
     }
     let (Some(task), Some(last)) = (whole, stages.last()) else { return Ok(RobotFiles::none()) };
-    let in_study = Error::identification::<IdentificationError>(study_path);
+    let in_study = Error::identification::<IdentificationError>(study.path);
     let mut found = identify(&task, options.execution()).map_err(&in_study)?;
     found.training.friction_choice = friction_chosen(&last.records);
     let read: Vec<_> = logs.iter().map(|log| ("log", StudyInput::File(log.clone()))).collect();
@@ -107,16 +106,14 @@ pub(super) fn robot_found(
         ..Timings::default()
     };
     let parameters = found.consistent.parameters.clone();
-    let metadata =
-        FitMetadata { timings, provenance: later_provenance(study, study_path, begun, &read)?, is_payload: false };
-    let mut outcome = build_outcome(study, study_path, robot, &task, found, metadata)?;
-    let folder = study_path.parent().unwrap_or(Path::new(""));
+    let metadata = FitMetadata { timings, provenance: later_provenance(study, begun, &read)?, is_payload: false };
+    let mut outcome = build_outcome(study, robot, &task, found, metadata)?;
     for (summary, path) in outcome.result.logs.iter_mut().zip(&logs) {
-        summary.import.file = relative_path(folder, path);
+        summary.import.file = study.relative(path);
     }
     outcome.result.seal();
     let mut files = vec![
-        (RESULT, json(&outcome.result)?),
+        (RESULT, outcome.result.to_json().map_err(not_json)?.into_bytes()),
         (CONTROLLER, json(&controller(last, &parameters).map_err(failed)?)?),
         (PAGE, outcome.report()?.into_bytes()),
     ];
@@ -129,10 +126,13 @@ pub(super) fn robot_found(
     Ok(RobotFiles { files, base_parameters: result.base_parameters })
 }
 
-fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
-    let text = dynident_text::json::to_string_pretty(value)
-        .map_err(|error| Error::Result { path: PathBuf::from(RESULT), message: error.to_string() })?;
+fn json(value: &serde_json::Value) -> Result<Vec<u8>, Error> {
+    let text = dynident_text::json::to_string_pretty(value).map_err(not_json)?;
     Ok((text + "\n").into_bytes())
+}
+
+fn not_json(error: serde_json::Error) -> Error {
+    Error::Result { path: PathBuf::from(RESULT), message: error.to_string() }
 }
 
 fn controller(stage: &EndedStage<'_>, parameters: &[f64]) -> Result<serde_json::Value, IterationError> {

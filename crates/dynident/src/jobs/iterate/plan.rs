@@ -1,10 +1,10 @@
 //! Data that all stages of an iteration share: robot, legs, settings and report.
 
-use super::bound;
 use super::inputs::Inputs;
 use super::job::Job;
 use super::report::IterationReport;
 use super::trajectories::Trajectories;
+use super::{bound, legs};
 use crate::error::{Error, StudyError};
 use crate::jobs::design::{MotionFamily, limits_of, motion_family};
 use crate::jobs::provenance::motion_provenance;
@@ -28,24 +28,23 @@ pub(super) struct Plan<'a> {
 impl<'a> Plan<'a> {
     pub(super) fn of(job: &Job<'a>, inputs: &'a Inputs, trajectories: &Trajectories) -> Result<Self, Error> {
         let Inputs { section, simulation, robot, truth, .. } = inputs;
-        let Job { study, study_path, options, .. } = *job;
+        let Job { study, options, .. } = *job;
         let in_section = |why: StudyError| job.section_error(why);
         let prior = prior(inputs).map_err(in_section)?;
-        let legs = section.legs(&trajectories.trajectories, robot).map_err(in_section)?;
+        let legs = legs::legs(section, &trajectories.trajectories, robot).map_err(in_section)?;
         let references: Vec<_> = legs.iter().map(Leg::reference).collect();
         let limits = match section.home {
-            Some(_) => limits_of(study, study_path, &inputs.folders, robot)?,
+            Some(_) => limits_of(study, &inputs.folders, robot)?,
             None => Limits::default(),
         };
         let (settings, lowered) =
-            section.guarded(inputs.settings.clone(), study, limits, robot, &references).map_err(in_section)?;
+            section.guarded(inputs.settings.clone(), &study, limits, robot, &references).map_err(in_section)?;
         let has_bound = section.stages().len() == 1 && truth.is_some();
         let data = options.data.as_deref();
         let report = IterationReport {
             study,
-            study_path,
             // Runs take hours, so files may change after they have been read and hashed.
-            provenance: inputs.files.while_unchanged(|| motion_provenance(study, study_path, data, &[]))?,
+            provenance: inputs.files.while_unchanged(|| motion_provenance(study, data, &[]))?,
             robot,
             duration_s: legs.iter().map(|leg| leg.reference().duration_s()).sum(),
             truth: truth.as_ref().map(|truth| truth.base_values.clone()),
@@ -54,7 +53,7 @@ impl<'a> Plan<'a> {
             lowered,
         };
         let planner = planner(job, inputs, &legs)?;
-        let held_out = trajectories.held_out.as_ref().map(|trajectory| section.held_out_motion(trajectory));
+        let held_out = trajectories.held_out.as_ref().map(|trajectory| legs::held_out_motion(section, trajectory));
         let held_out = held_out.transpose().map_err(in_section)?;
         let torque_limits = torque_limits(simulation, robot, truth.is_some());
         Ok(Self { prior, legs, settings, torque_limits, planner, held_out, report })
@@ -89,9 +88,9 @@ fn prior(inputs: &Inputs) -> Result<ParametricModel, StudyError> {
 
 /// Planner of the next motion; `None` unless `[iteration]` requests a redesign.
 fn planner(job: &Job<'_>, inputs: &Inputs, legs: &[Leg]) -> Result<Option<Arc<dyn MotionPlanner>>, Error> {
-    let settings = inputs.section.redesign(job.study).map_err(|why| job.section_error(why))?;
+    let settings = inputs.section.redesign(&job.study).map_err(|why| job.section_error(why))?;
     let Some(settings) = settings else { return Ok(None) };
-    let MotionFamily { family, limits, search } = motion_family(job.study, job.study_path, job.options)?;
+    let MotionFamily { family, limits, search } = motion_family(job.study, job.options)?;
     let planner = Redesign::new(family, limits, search, settings.clone(), &legs[0]);
     Ok(Some(Arc::new(planner.map_err(|why| job.section_error(why.into()))?)))
 }

@@ -1,18 +1,16 @@
 //! Content of `iterations.json`.
 
 use super::bound::cramer_rao;
-use crate::jobs::options::study_name;
 use crate::result::{
     INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance, RunForecast,
     UnmetConditionEntry,
 };
-use crate::study::{Study, StudyRobot};
+use crate::study::{StudyFile, StudyRobot};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::{
     IterationStatus, Leg, LoweredBandwidth, MotionForecast, RunEstimate, RunRecord, UnmetCondition,
 };
 use dynident_simulation::SensorSettings;
-use std::path::Path;
 
 /// The newest earlier run whose estimate is the controller's model.
 fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
@@ -24,8 +22,7 @@ fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
 }
 
 pub(super) struct IterationReport<'a> {
-    pub(super) study: &'a Study,
-    pub(super) study_path: &'a Path,
+    pub(super) study: StudyFile<'a>,
     pub(super) provenance: Provenance,
     pub(super) robot: &'a StudyRobot,
     /// Length of a run with all its legs, s.
@@ -63,7 +60,7 @@ impl IterationReport<'_> {
         let last = good.last().and_then(|record| record.knowledge());
         IterationsFile {
             schema: ITERATIONS_SCHEMA.to_owned(),
-            name: study_name(self.study, self.study_path),
+            name: self.study.title(),
             provenance: Some(self.provenance.clone()),
             converged: status.is_converged(),
             status: status_key(status).to_owned(),

@@ -3,6 +3,7 @@
 use super::files::ResultFiles;
 use super::inputs::Inputs;
 use super::job::Job;
+use super::legs;
 use super::model::{EndedStage, RobotFiles};
 use super::plan::Plan;
 use super::report::{Stage, merged};
@@ -88,7 +89,7 @@ impl<'a> Stages<'a> {
     ) -> Result<Vec<Box<dyn Robot>>, StudyError> {
         let Inputs { section, simulation, robot, .. } = self.inputs;
         let coupling = &self.job.study.coupling;
-        let mut robots = section.robots(simulation, coupling, robot, stage, members, self.program)?;
+        let mut robots = legs::robots(section, simulation, coupling, robot, stage, members, self.program)?;
         robots.extend(own_robot.iter_mut().map(|make| make(&robot.parametric.joint_names())));
         Ok(robots)
     }

@@ -6,8 +6,8 @@ use super::legs;
 use super::trajectory::Trajectory;
 use super::watch::IterationWatch;
 use crate::error::Error;
-use crate::inputs::read_result;
 use crate::output::write_atomically;
+use crate::result::read_result;
 use dynident_iteration::other_settings;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -22,15 +22,18 @@ pub(super) struct Trajectories {
 impl Trajectories {
     pub(super) fn of_study(job: &Job<'_>, inputs: &Inputs, watch: &IterationWatch<'_>) -> Result<Self, Error> {
         let Inputs { section, simulation, robot, .. } = inputs;
-        let Job { study, study_path, options, .. } = *job;
+        let Job { study, options, .. } = *job;
         let rate_hz = section.rate_hz.unwrap_or(simulation.rate_hz);
-        let trajectories = legs::trajectories(study, study_path, robot, rate_hz, options, watch.design)?;
+        let trajectories = legs::trajectories(study, robot, rate_hz, options, watch.design)?;
         // An interrupted search must not be stored, because later calls would use its trajectory.
         if watch.stop.is_requested() {
             return Err(Error::Interrupted { what: "the search for the trajectory" });
         }
-        let held_out = match section.held_out_study(study) {
-            Some(other) => Some(Trajectory::of_study(&other, study_path, robot, rate_hz, options, watch.design)?),
+        let held_out = match section.held_out_study(&study) {
+            Some(other) => {
+                let other = study.with_study(&other);
+                Some(Trajectory::of_study(other, robot, rate_hz, options, watch.design)?)
+            }
             None => None,
         };
         if watch.stop.is_requested() {

@@ -3,12 +3,11 @@
 use crate::error::{Error, StudyError};
 use crate::jobs::design::{design_study, trajectory_table};
 use crate::jobs::options::RunOptions;
-use crate::study::{Folders, Study, StudyRobot};
+use crate::study::{StudyFile, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::{DesignProgress, Motion};
 use dynident_simulation::{Reference, SimulationError};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// A trajectory at the controller's rate, with time windows per joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,17 +39,16 @@ pub(crate) struct StrokeSpan {
 
 impl Trajectory {
     pub(crate) fn of_study(
-        study: &Study,
-        study_path: &Path,
+        study: StudyFile<'_>,
         robot: &StudyRobot,
         rate_hz: f64,
         options: &RunOptions<'_>,
         watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
     ) -> Result<Self, Error> {
-        let in_reference = Error::section::<SimulationError>(study_path, "iteration");
+        let in_reference = Error::section::<SimulationError>(study.path, "iteration");
         let file = study.iteration.as_ref().and_then(|section| section.trajectory.as_ref());
         if let Some(file) = file {
-            let folders = Folders::new(study, study_path, options.data.as_deref());
+            let folders = study.folders(options.data.as_deref());
             let path = folders.find(file, None)?;
             let table = trajectory_table(&path, &robot.parametric.joint_names(), &study.motion)?;
             let reference = Reference::of_family(&table.given, &[], rate_hz, None).map_err(in_reference)?;
@@ -59,9 +57,9 @@ impl Trajectory {
         if study.design.is_none() {
             let missing =
                 StudyError::missing("no trajectory", "name a file with trajectory = \"...\", or give a [design]");
-            return Err(Error::section(study_path, "iteration")(missing));
+            return Err(Error::section(study.path, "iteration")(missing));
         }
-        let outcome = design_study(study, study_path, options, watch)?;
+        let outcome = design_study(&study, study.path, options, watch)?;
         let mut strokes = Vec::new();
         let windows = outcome.file.windowed.as_ref().map(|windowed| {
             let mut windows = vec![Vec::new(); robot.model().dof()];

@@ -18,10 +18,8 @@ use std::path::Path;
 /// # Errors
 /// If it cannot be read.
 pub fn log_contents(path: &Path) -> Result<LogContents, Error> {
-    contents(path).map_err(|source| Error::Recording {
-        log: path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
-        source: Box::new(source),
-    })
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    contents(path).map_err(|source| Error::recording(&name, source))
 }
 
 fn contents(path: &Path) -> Result<LogContents, RecordingError> {

@@ -3,7 +3,6 @@
 mod channels;
 mod draft;
 mod drives;
-mod paths;
 mod settings;
 
 pub use settings::NewStudySettings;
@@ -14,15 +13,13 @@ use crate::jobs::columns::{Family, Quantity, Source, best, column_list, families
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
 use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
-use crate::robot_file::{LoadSettings, XacroSettings, load_robot};
-use crate::study::Study;
+use crate::study::{LoadSettings, Study, XacroSettings, load_robot, relative_path};
 use channels::{LoggedJoints, in_order, logged_joints};
 use draft::{Draft, Table};
 use drives::{DriveInertiaFinding, drive_inertia};
 use dynident_model::{JointKind, Model, Robot};
 use dynident_recording::Level;
 use dynident_text::quoted;
-use paths::path_in_study;
 use std::path::{Path, PathBuf};
 
 const MAX_ROUNDS: usize = 3;
@@ -381,4 +378,10 @@ fn basis(family: &Family, what: &str) -> String {
     };
     let unit = family.unit.map_or_else(String::new, |unit| format!(", in {unit}"));
     format!("{source}{what} {by}{unit}")
+}
+
+/// `path` relative to `folder`, with `/`; unchanged if there is no relative path.
+fn path_in_study(path: &Path, folder: &Path) -> String {
+    let unchanged = || path.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
+    relative_path(folder, path).unwrap_or_else(unchanged)
 }

@@ -3,7 +3,7 @@
 use super::{Row, read};
 use crate::common::repository;
 use dynident::result::ResultFile;
-use dynident::{Error, RunOptions, Silent, Study, StudyError, check, identify, validate};
+use dynident::{Error, RunOptions, Silent, Study, StudyError, StudyFileError, check, identify, validate};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -49,7 +49,9 @@ fn training_rows_saved_again_are_no_test() {
         let path = study_with(folder.path(), &held_out, digits);
         let study = Study::load(&path).unwrap();
         for refused in [check(&study, &path, &options()).map(|_| ()), identify(&study, &path, &options()).map(|_| ())] {
-            let Err(Error::Study { source, .. }) = refused else { panic!("{name}: {refused:?}") };
+            let Err(Error::Study(StudyFileError::Study { source, .. })) = refused else {
+                panic!("{name}: {refused:?}")
+            };
             assert!(matches!(*source, StudyError::SameSamples { .. }), "{name}: {source}");
         }
     }

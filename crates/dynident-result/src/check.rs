@@ -1,0 +1,121 @@
+//! Result of `check`, also part of the result of `identify`: consistency of study, robot and logs.
+
+use core::fmt::Write;
+use dynident_identification::diagnosis::KeyChange;
+use dynident_recording::Level;
+use serde::{Deserialize, Serialize};
+
+/// Name and version of the schema of `check --json`.
+pub const CHECK_SCHEMA: &str = "dynident/check/1";
+
+/// Result of `check`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct CheckFile {
+    /// [`CHECK_SCHEMA`].
+    pub schema: String,
+    /// Name of the study.
+    pub name: String,
+    /// Findings about the logs and from the comparison of hypotheses.
+    pub check: StudyCheck,
+}
+
+/// Consistency of study, robot and logs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct StudyCheck {
+    /// Findings, the most serious first.
+    pub findings: Vec<CheckFinding>,
+    /// Names of the joints, in the order of the hypothesis results.
+    pub joints: Vec<String>,
+    /// The study as written; null if the hypotheses could not be compared.
+    pub as_written: Option<HypothesisResult>,
+    /// The hypothesis that explains the logs clearly better, if there is one.
+    pub best: Option<HypothesisResult>,
+    /// Number of tested hypotheses.
+    pub tried: usize,
+}
+
+/// One thing that was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct CheckFinding {
+    /// Severity.
+    pub level: Level,
+    /// Kind of mistake: `sign`, `order`, `offset`, `unit`, `coupling`, `lag`, `mounting`, `payload`, `description`,
+    /// `torque`, `limits`, `samples`, `rows` or `log`.
+    pub kind: String,
+    /// Description, with the names of joints.
+    pub what: String,
+    /// Evidence, with numbers.
+    pub evidence: String,
+    /// Corrections of the study; empty if no key corrects the mistake.
+    pub write: Vec<StudyChange>,
+    /// Alternative explanations that these logs do not distinguish.
+    pub or: Vec<String>,
+    /// Code, which `dynident docs` explains; empty in results of older versions.
+    #[serde(default)]
+    pub code: String,
+}
+
+/// A study key and its new value.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct StudyChange {
+    /// Table of the key: `format.torque`, `robot`, `[[log]] 2`.
+    pub table: String,
+    /// The new line, as TOML.
+    pub line: String,
+}
+
+/// Score of one hypothesis: the best physically consistent fit to the logs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct HypothesisResult {
+    /// Torque of each joint without explanation by a physically consistent robot, percent (root mean squares).
+    pub left_percent: Vec<f64>,
+    /// Joints that exceed their limits.
+    pub beyond_limits: Vec<String>,
+    /// Score from all evidence, lower is better; a difference of 0.6 is clear.
+    pub score: f64,
+}
+
+impl StudyCheck {
+    /// Findings that make an identification unreliable.
+    pub fn problems(&self) -> impl Iterator<Item = String> + '_ {
+        self.findings.iter().filter(|finding| finding.level == Level::Problem).map(CheckFinding::sentence)
+    }
+}
+
+impl From<KeyChange> for StudyChange {
+    fn from(change: KeyChange) -> Self {
+        let KeyChange { table, line } = change;
+        Self { table, line }
+    }
+}
+
+impl StudyChange {
+    /// The table in brackets.
+    pub fn place(&self) -> String {
+        if self.table.starts_with('[') { self.table.clone() } else { format!("[{}]", self.table) }
+    }
+
+    /// Whether the line is one key with a value of TOML.
+    pub fn is_well_formed(&self) -> bool {
+        self.line.parse::<toml::Table>().is_ok_and(|table| table.len() == 1)
+    }
+}
+
+impl CheckFinding {
+    /// Finding, evidence and corrections in one text.
+    pub fn sentence(&self) -> String {
+        let mut text = format!("{}: {}", self.what, self.evidence);
+        for change in &self.write {
+            let _ = write!(text, "; in {} write `{}`", change.place(), change.line);
+        }
+        if !self.or.is_empty() {
+            let _ = write!(text, "; these logs do not distinguish it from: {}", self.or.join("; or "));
+        }
+        text
+    }
+}

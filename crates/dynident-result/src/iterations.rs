@@ -1,0 +1,325 @@
+//! Content of `iterations.json`.
+
+use super::identification::BaseParameterResult;
+use super::provenance::Provenance;
+use crate::error::ResultFileError;
+use crate::read::read_result;
+use dynident_identification::examination::TorqueLag;
+use dynident_iteration::{
+    CommandSource, DifferentiatorChoice, HeldOutRun, LoweredBandwidth, Oscillation, RunEvidence, RunOffset,
+    TorqueCheck, UnmetCondition, WarmUp,
+};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Schema of `iterations.json`.
+pub const ITERATIONS_SCHEMA: &str = "dynident/iterations/1";
+
+/// Status of an iteration that was stopped.
+pub const INTERRUPTED: &str = "interrupted";
+
+/// `iterations.json`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct IterationsFile {
+    /// [`ITERATIONS_SCHEMA`].
+    pub schema: String,
+    /// Name of the study.
+    pub name: String,
+    /// Provenance; null in files of earlier versions.
+    #[serde(default)]
+    pub provenance: Option<Provenance>,
+    /// Whether all conditions of convergence are met: see `unmet`.
+    pub converged: bool,
+    /// `converged`, `settled` (no further change, but unmet conditions), `runs-used-up`, `refused`, `waiting` or
+    /// `interrupted`.
+    pub status: String,
+    /// Explanation of the status.
+    pub reason: String,
+    /// Unmet conditions after the last run; empty if the iteration has converged, and in files of earlier versions.
+    #[serde(default)]
+    pub unmet: Vec<UnmetConditionEntry>,
+    /// Forecast of a further run that was not worthwhile, if motions are redesigned and all conditions are met.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub declined: Option<RunForecast>,
+    /// Names of the joints.
+    pub joints: Vec<String>,
+    /// Joints whose loops are slower than `bandwidth_hz` for stability with delay; empty if the gains are stated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lowered_bandwidths: Vec<LoweredBandwidth>,
+    /// Duration of each run, s; for sequential legs, the sum over all legs.
+    pub duration_s: f64,
+    /// The runs.
+    pub runs: Vec<IterationRun>,
+    /// Largest tracking error (mean over the joints) of the first accepted run divided by that of the last; null for
+    /// fewer than two runs.
+    pub tracking_improvement: Option<f64>,
+    /// Root mean square parameter error of the last accepted run alone, relative to the Cramér-Rao bound; for simulated
+    /// robots with torque noise.
+    pub error_over_bound: Option<f64>,
+    /// Cramér-Rao bound of every parameter for one run of the first motion: white torque noise of the simulated sensors
+    /// at every recorded sample, exact positions.
+    pub bound: Option<Vec<f64>>,
+    /// The base parameters from all accepted runs, as in `result.json`; empty until the last run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub base_parameters: Vec<BaseParameterResult>,
+    /// Reason for a missing `result.json` after an accepted run; null if it exists.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_result: Option<String>,
+    /// All parameters of the last accepted physically consistent set: ten per body, one per term.
+    pub possible_parameters: Option<Vec<f64>>,
+}
+
+impl IterationsFile {
+    /// Reads the file of an iteration.
+    ///
+    /// # Errors
+    /// A file that cannot be read or has another version.
+    pub fn read(path: &Path) -> Result<Self, ResultFileError> {
+        let bytes = read_result(path)?;
+        let wrong = |message: String| ResultFileError::Content { path: path.to_owned(), message };
+        let file: Self = serde_json::from_slice(&bytes)
+            .map_err(|error| wrong(format!("not a file written by `iterate`: {error}")))?;
+        if file.schema != ITERATIONS_SCHEMA {
+            return Err(wrong(format!(
+                "schema `{}`, not `{ITERATIONS_SCHEMA}`: iterate again with this version",
+                file.schema
+            )));
+        }
+        Ok(file)
+    }
+
+    /// The text of `iterations.json`.
+    ///
+    /// # Errors
+    /// As [`serde_json::to_string_pretty`].
+    pub fn to_json(&self) -> serde_json::Result<String> {
+        dynident_text::json::to_string_pretty(self)
+    }
+
+    /// Message about loops that are slower than requested, with the keys that change this.
+    pub fn lowered_bandwidths_sentence(&self) -> Option<String> {
+        let in_words = |model: &str| match model {
+            "none" => "without a model",
+            "nominal" => "with the nominal model",
+            _ => "with the newest model",
+        };
+        let mut each: Vec<String> = Vec::new();
+        for of_model in self.lowered_bandwidths.chunk_by(|one, next| one.model == next.model) {
+            let joints: Vec<String> =
+                of_model.iter().map(|one| format!("{} {:.2} Hz of {}", one.joint, one.hz, one.asked_hz)).collect();
+            each.push(format!("{}: {}", in_words(&of_model[0].model), joints.join(", ")));
+        }
+        (!each.is_empty()).then(|| {
+            format!(
+                "Gains are lower than bandwidth_hz requests, so that the robot is stable with the assumed delay in \
+                 all postures of the motion and joints with light drives do not oscillate ({}); if sensors and drives \
+                 are faster, state rehearsal.delay_s; if drives are heavier, state rehearsal.lightest_drive",
+                each.join("; ")
+            )
+        })
+    }
+
+    /// Limitations of the torque check of the last accepted run; empty if it checked everything.
+    pub fn unchecked_torque(&self) -> Vec<String> {
+        let Some(last) = self.runs.iter().rfind(|run| run.accepted) else { return Vec::new() };
+        let Some(check) = &last.torque_check else {
+            return vec!["the logged torque compared with the commanded torque".to_owned()];
+        };
+        let alone = self.joints.iter().zip(&check.joints).filter(|(_, joint)| joint.row_scale.is_none());
+        let alone: Vec<&str> = alone.map(|(name, _)| &**name).collect();
+        let common = "a common torque scale of all joints, because the drives have their own loop";
+        let gains = format!(
+            "whether the drives of {} deliver the logged torque: their masses and inertias do not affect other joints' \
+             torques enough",
+            alone.join(", ")
+        );
+        let is_path_only = check.source == CommandSource::PathOnly;
+        is_path_only.then(|| common.to_owned()).into_iter().chain((!alone.is_empty()).then_some(gains)).collect()
+    }
+
+    /// Messages about joints whose torque oscillates in the log of a run.
+    pub fn oscillation_sentences(&self) -> Vec<String> {
+        let of_run = |run: &IterationRun| -> Vec<String> {
+            let joints = run.evidence.iter().flat_map(|evidence| self.joints.iter().zip(&evidence.joints));
+            let oscillating = joints.filter_map(|(name, shown)| Some((name, shown.oscillation?)));
+            let sentence = |(name, own): (&String, Oscillation)| {
+                format!(
+                    "Torque of joint {name} oscillates at {:.0} Hz with an amplitude of {:.3} Nm (N) in {:.0} % of the \
+                     samples of run {}: the loop is too fast for its inertia and delay, or the drive \
+                     switches; give this joint a lower bandwidth_hz or lower gains, and check its torque",
+                    own.frequency_hz,
+                    own.amplitude,
+                    100.0 * own.share,
+                    run.run
+                )
+            };
+            oscillating.map(sentence).collect()
+        };
+        self.runs.iter().flat_map(of_run).collect()
+    }
+
+    /// Summary in one line: status, runs, tracking, unmet conditions.
+    pub fn status_line(&self) -> String {
+        let good = self.runs.iter().filter(|run| run.accepted).count();
+        let last = self.runs.iter().rfind(|run| run.accepted);
+        let tracking = last.map_or_else(String::new, |last| {
+            let worst = last.max_tracking_error_rad.iter().fold(0.0_f64, |most, error| most.max(*error));
+            format!("; tracking {worst:.2e} rad (m)")
+        });
+        let unmet = if self.converged { String::new() } else { format!("; {} unmet", self.unmet.len()) };
+        format!("{}: {}; {good} of {} runs accepted{tracking}{unmet}", self.name, self.reason, self.runs.len())
+    }
+}
+
+/// Predicted and actual improvement by the motion of a run. Error bars are those of the (at most) ten least known
+/// directions, in terms of the torque uncertainty over the workspace: their root mean square.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct RunForecast {
+    /// Whether the motion differs from that of the accepted run before.
+    pub redesigned: bool,
+    /// Reason for repeating the motion although a new one was designed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// Predicted reduction of the error bars, percent.
+    pub gain_percent: f64,
+    /// The same for a repetition of the previous motion.
+    pub repeat_gain_percent: f64,
+    /// Actual reduction; null for a run that was not made or was rejected.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reached_gain_percent: Option<f64>,
+    /// Predicted standard deviation of every base parameter after the run; null for an undetermined one.
+    pub std: Vec<Option<f64>>,
+    /// Largest torque of each joint along the motion within the model uncertainty (95 %), Nm (N).
+    pub largest_torque: Vec<f64>,
+}
+
+impl RunForecast {
+    /// Motion, prediction and outcome as text.
+    pub fn sentence(&self) -> String {
+        let motion = match (&self.reason, self.redesigned) {
+            (_, true) => "new motion".to_owned(),
+            (Some(reason), false) => format!("repeated motion ({reason})"),
+            (None, false) => "repeated motion".to_owned(),
+        };
+        let reached = self.reached_gain_percent.map_or_else(String::new, |reached| match reached {
+            narrower if narrower >= 0.0 => format!(", actual reduction {narrower:.0} %"),
+            wider => format!(", actual increase {:.0} %", -wider),
+        });
+        let again =
+            if self.redesigned { format!(" (a repetition: {:.0} %)", self.repeat_gain_percent) } else { String::new() };
+        format!("{motion}, predicted reduction of the largest error bars by {:.0} %{again}{reached}", self.gain_percent)
+    }
+}
+
+/// An unmet condition of convergence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct UnmetConditionEntry {
+    /// The condition with its numbers.
+    #[serde(flatten)]
+    pub shortfall: UnmetCondition,
+    /// Message.
+    pub message: String,
+    /// Remedy.
+    pub remedy: String,
+}
+
+/// One run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct IterationRun {
+    /// Run number, from 1.
+    pub run: usize,
+    /// Leg number, from 1, if each leg has a separate iteration; null otherwise.
+    pub leg: Option<usize>,
+    /// The controller.
+    pub controller: String,
+    /// Whether the controller had a model.
+    pub model_based: bool,
+    /// Run whose physically consistent set (or estimate) was the controller's model; null for the robot description, an
+    /// intermediate step, or no model.
+    pub model_of_run: Option<usize>,
+    /// Fraction of the step from the last accepted parameters.
+    pub damping: f64,
+    /// Factor on the gains of the controller without a model.
+    pub stiffness: f64,
+    /// Whether the run was accepted.
+    pub accepted: bool,
+    /// Outcome of the robot's run.
+    pub outcome: String,
+    /// Reason for the rejection.
+    pub reason: Option<String>,
+    /// Largest tracking error of each joint, rad (m).
+    pub max_tracking_error_rad: Vec<f64>,
+    /// Result of the warm-up before the run; null without a warm-up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub warm_up: Option<WarmUp>,
+    /// Held-out run after this run with the accuracy of the model's prediction; null without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOutRun>,
+    /// Parameters from this run alone.
+    pub parameters: Vec<IterationParameter>,
+    /// Parameters from all accepted runs so far; empty for the first run, for rejected runs, and without pooling.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pooled: Vec<IterationParameter>,
+    /// Deviation of the constant torques of each accepted run from their mean; empty if the runs share them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub run_offsets: Vec<RunOffset>,
+    /// Evidence from the log in addition to parameters, per joint; null for an incomplete run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<RunEvidence>,
+    /// Comparison of logged and commanded torque; null if too little was recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque_check: Option<TorqueCheck>,
+    /// Predicted and actual improvement by the motion; null without redesign or without earlier knowledge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub forecast: Option<RunForecast>,
+    /// Cramér-Rao bound of a run with this motion if it differs from the first; for simulated robots with torque noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bound: Option<Vec<f64>>,
+    /// Lag of each joint's torque behind the motion from this run alone; null if it is not identifiable or windows
+    /// exclude rows, empty for the step-by-step scheme.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub torque_lags: Vec<Option<TorqueLag>>,
+    /// The selected method for velocities and accelerations, with the alternatives; null if it was stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub differentiator: Option<DifferentiatorChoice>,
+}
+
+impl IterationRun {
+    /// Message about the largest deviation of a run's constant torque; `None` if the runs share their offsets.
+    pub fn run_offsets_sentence(&self, joints: &[String]) -> Option<String> {
+        let largest = self.run_offsets.iter().max_by(|a, b| a.deviation.abs().total_cmp(&b.deviation.abs()))?;
+        let RunOffset { run, joint, deviation, std } = largest;
+        let name = joints.get(*joint).map_or("a joint", String::as_str);
+        Some(format!(
+            "constant torques differ between runs, most in run {run} at {name}: {deviation:+.3} +- {:.3} Nm (95 %) from the mean: check for drift of the torque sensors' zero, or a cable that pulls",
+            1.96 * std
+        ))
+    }
+
+    /// Parameters known after this run: from all accepted runs, or from this run without pooling.
+    pub fn known(&self) -> &[IterationParameter] {
+        if self.pooled.is_empty() { &self.parameters } else { &self.pooled }
+    }
+}
+
+/// One base parameter of one run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct IterationParameter {
+    /// Symbol of its column.
+    pub symbol: String,
+    /// Expression.
+    pub expression: String,
+    /// Unit.
+    pub unit: String,
+    /// Value.
+    pub value: f64,
+    /// Standard deviation; null if the run does not determine it.
+    pub std: Option<f64>,
+    /// Value minus true value of the simulated robot; null for a real one.
+    pub error: Option<f64>,
+}

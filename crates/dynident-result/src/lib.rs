@@ -1,0 +1,65 @@
+//! **Output files of jobs**: one type per file, for writing and reading. Within a version of a schema keys are added,
+//! never renamed.
+
+#![forbid(unsafe_code)]
+
+mod check;
+mod design;
+mod error;
+mod error_terms;
+mod evaluation;
+mod export;
+mod export_validation;
+mod factors;
+mod forms;
+mod identification;
+mod inspection;
+mod iterations;
+mod log;
+mod new_study;
+mod numbers;
+mod problems;
+mod provenance;
+mod read;
+mod seal;
+mod simulation;
+mod sound;
+mod stored;
+mod test_samples;
+mod validation;
+
+pub use check::{CHECK_SCHEMA, CheckFile, CheckFinding, HypothesisResult, StudyChange, StudyCheck};
+pub use design::{
+    DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast, StrokeFile, StrokeLimitFile, WindowedFile,
+};
+pub use error::ResultFileError;
+pub use error_terms::ErrorTermResult;
+pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
+pub use export::{EXPORT_SCHEMA, ExportFile};
+pub use export_validation::{EXPORT_VALIDATION_SCHEMA, ExportValidationFile};
+pub use factors::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
+pub use forms::{FormError, FormJointError, FormResult, FormTerm, StoredModel};
+pub use identification::{
+    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
+    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,
+    Timings, TrainingErrors, TrainingJoint, TrainingResult, ValueSource,
+};
+pub use inspection::{
+    AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
+};
+pub use iterations::{
+    INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, RunForecast, UnmetConditionEntry,
+};
+pub use log::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
+pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};
+pub use problems::ProblemSettings;
+pub use provenance::{InputFile, Provenance};
+pub use read::{MAX_RESULT_BYTES, read_result};
+pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
+pub use test_samples::{TEST_SAMPLES_SCHEMA, TestSamplesFile, TestedLog};
+// Types of lower crates in these files.
+pub use dynident_excitation::check::LimitReport;
+pub use dynident_identification::ErrorSource;
+pub use dynident_iteration::{RobotFault, RobotStatus};
+pub use stored::{StoredPayloads, read_part};
+pub use validation::{VALIDATION_SCHEMA, ValidationFile};

@@ -1,0 +1,264 @@
+//! Reasons against loading a result's model into a robot.
+
+use super::{CheckFinding, LogSummary, ResultFile, StudyCheck};
+use dynident_identification::estimators::{NoiseInRegressor, NoiseVerdict};
+use dynident_identification::examination::LogValidation;
+use dynident_recording::Level;
+use dynident_study::{Expected, StudyError};
+
+/// Thresholds of [`ResultFile::problems_of_the_model_with`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProblemSettings {
+    /// Largest ratio of the torque errors of the consistent set and the estimate on the same rows, all joints. Default
+    /// 1.5: real test logs have 0.8 to 1.14, dead torque channels 1.6.
+    pub max_error_ratio: f64,
+    /// The same for a single joint. Default 2.5: real test logs have 0.6 to 1.7, dead torque channels 5.2.
+    pub max_joint_error_ratio: f64,
+    /// Largest unexplained torque of training or held-out logs, percent. Default 60.
+    pub max_unexplained_percent: f64,
+    /// Largest ratio of held-out and training residuals (root mean square over the joints). Default 4: ten real data
+    /// sets have 0.9 to 2.4, a fit of 58 parameters to 3 s has 6.
+    pub max_held_out_ratio: f64,
+    /// The same if `check` found an inconsistent joint torque. Default 2.
+    pub max_held_out_ratio_if_inconsistent: f64,
+    /// Unexplained torque of a held-out log below which its residual ratio is ignored, percent. Default 1.
+    pub min_held_out_percent: f64,
+    /// Smallest torque of a joint for the comparison of errors, relative to the largest joint torque. Default 1e-3:
+    /// smaller torques are friction only.
+    pub min_torque_share: f64,
+}
+
+impl Default for ProblemSettings {
+    fn default() -> Self {
+        Self {
+            max_error_ratio: 1.5,
+            max_joint_error_ratio: 2.5,
+            max_unexplained_percent: 60.0,
+            max_held_out_ratio: 4.0,
+            max_held_out_ratio_if_inconsistent: 2.0,
+            min_held_out_percent: 1.0,
+            min_torque_share: 1.0e-3,
+        }
+    }
+}
+
+impl ProblemSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// The first setting that is not a positive number, with its value.
+    pub fn validate(&self) -> Result<(), StudyError> {
+        for (key, value) in [
+            ("max_error_ratio", self.max_error_ratio),
+            ("max_joint_error_ratio", self.max_joint_error_ratio),
+            ("max_unexplained_percent", self.max_unexplained_percent),
+            ("max_held_out_ratio", self.max_held_out_ratio),
+            ("max_held_out_ratio_if_inconsistent", self.max_held_out_ratio_if_inconsistent),
+            ("min_held_out_percent", self.min_held_out_percent),
+            ("min_torque_share", self.min_torque_share),
+        ] {
+            Expected::Positive.check(key, value)?;
+        }
+        Ok(())
+    }
+}
+
+impl LogSummary {
+    /// Problems found in the log.
+    pub fn problems(&self) -> Vec<String> {
+        let findings = self.import.findings.iter().chain(&self.model_findings);
+        let problems = findings.filter(|finding| finding.level == Level::Problem);
+        problems.map(|finding| format!("log `{}`, {}: {}", self.log, finding.channel, finding.message)).collect()
+    }
+}
+
+impl ResultFile {
+    /// All problems: [`problems_of_the_model`](Self::problems_of_the_model), then the problems of the logs.
+    pub fn found_problems(&self) -> Vec<String> {
+        let mut problems = self.problems_of_the_model();
+        problems.extend(self.logs.iter().flat_map(LogSummary::problems));
+        problems
+    }
+
+    /// Those of [`problems`](Self::problems) that are not findings of a single log, with default thresholds.
+    pub fn problems_of_the_model(&self) -> Vec<String> {
+        self.problems_of_the_model_with(&ProblemSettings::default())
+    }
+
+    /// Problems that are not findings of a single log: those of the study examination, an estimator that did not
+    /// converge, and a consistent set (which is exported) with clearly larger errors than the estimate. The errors are
+    /// those on held-out logs; without held-out logs those on the training rows, if the difference is significant.
+    pub fn problems_of_the_model_with(&self, settings: &ProblemSettings) -> Vec<String> {
+        let mut problems: Vec<String> = self.check.iter().flat_map(StudyCheck::problems).collect();
+        if !self.method.is_settled() {
+            problems.push(format!(
+                "the estimator {} did not converge: the values are those of its last iteration",
+                self.method.estimator
+            ));
+        }
+        problems.extend(self.noise_in_regressor.as_ref().and_then(|noise| self.noise_problem(noise)));
+        problems.extend(self.unexplained(settings));
+        let tested = self.validation.iter().filter_map(|log| {
+            let [free, written] = [&log.model, log.physical.as_ref()?].map(|report| Errors {
+                relative_percent: report.relative_error_percent,
+                joints: report.joints.iter().map(|j| (&j.name[..], j.rmse_nm, j.relative_error_percent)).collect(),
+            });
+            worse_when_consistent(&format!("log `{}`", log.log), &free, &written, settings)
+        });
+        problems.extend(tested);
+        problems.extend(self.inconsistent_torques(settings));
+        problems.extend(self.validation.iter().filter_map(|log| self.overfit(log, settings)));
+        // On training rows the estimate always has the smaller error, so only a significant difference is a problem.
+        let difference = self.physical.fit.as_ref().and_then(|fit| fit.difference);
+        let is_tested = self.validation.is_empty() && difference.is_none_or(|test| test.is_significant);
+        if let (true, Some(physical)) = (is_tested, &self.training.physical) {
+            let pairs = [
+                (self.training.relative_error_percent, &self.training.joints),
+                (physical.relative_error_percent, &physical.joints),
+            ];
+            let [free, written] = pairs.map(|(relative_percent, joints)| Errors {
+                relative_percent,
+                joints: joints.iter().map(|j| (&j.name[..], j.rmse_nm, j.relative_error_percent)).collect(),
+            });
+            problems.extend(worse_when_consistent("logs that were fitted to", &free, &written, settings));
+        }
+        problems
+    }
+
+    /// Bias by noise in the regressor beyond the error bars, for any estimator.
+    fn noise_problem(&self, noise: &NoiseInRegressor) -> Option<String> {
+        let by_instruments = self.method.estimator == "instrumental";
+        if by_instruments && noise.instruments.weak {
+            let column = noise.instruments.weakest_column.as_deref().unwrap_or("some parameter");
+            let f = noise.instruments.weakest_f.unwrap_or_default();
+            return Some(format!(
+                "weak instruments: they hardly determine {column} (first-stage F {f:.1}), so the estimate is biased like least squares; \
+                 raise or remove cutoff_hz of estimator.instruments, or move the robot faster"
+            ));
+        }
+        let is_plain = ["weighted", "ordinary", "generalized"].contains(&&self.method.estimator[..]);
+        if !is_plain || noise.verdict != NoiseVerdict::BiasesLeastSquares {
+            return None;
+        }
+        let followed = noise.fast_motion.map_or(0.0, |fast| 100.0 * fast.followed.clamp(0.0, 1.0));
+        let apart = noise.least_squares.as_ref().map_or(String::new(), |contrast| {
+            format!(", and with instruments {} differs by {:.0} error bars", contrast.column, contrast.largest)
+        });
+        let fix = if noise.instruments.weak {
+            "instruments from the logs' motion are too weak to correct this: lower cutoff_hz of motion.differentiator, or record with less position noise or a faster motion"
+        } else {
+            "use estimator.method = \"auto\", or lower cutoff_hz of motion.differentiator"
+        };
+        Some(format!(
+            "noise in the regressor biases least squares beyond its error bars: torque follows {followed:.0} % of the fast motion{apart}; {fix}"
+        ))
+    }
+
+    /// A model that leaves most of the training or held-out torque unexplained.
+    fn unexplained(&self, settings: &ProblemSettings) -> Option<String> {
+        let physical = self.training.physical.as_ref().map(|physical| physical.relative_error_percent);
+        let percent = physical.unwrap_or(self.training.relative_error_percent)?;
+        let most = settings.max_unexplained_percent;
+        let tested = |log: &LogValidation| {
+            let percent = log.physical.as_ref().unwrap_or(&log.model).relative_error_percent?;
+            (percent > most).then(|| {
+                format!(
+                    "{percent:.0} % of the torque of log `{}` is unexplained: the model does not fit this robot, or the log is of another robot \
+                     or motion; run `dynident check`",
+                    log.log
+                )
+            })
+        };
+        let of_training = (percent > most).then(|| {
+            format!(
+                "{percent:.0} % of the training torque is unexplained: the study does not describe this robot or these logs, or position \
+                 noise exceeds the motion; run `dynident check`, and see `position_noise` of the logs"
+            )
+        });
+        of_training.or_else(|| self.validation.iter().find_map(tested))
+    }
+
+    /// A held-out log with a much larger error than the training logs.
+    fn overfit(&self, log: &LogValidation, settings: &ProblemSettings) -> Option<String> {
+        let times = self.held_out_ratio(log, settings)?;
+        if times <= settings.max_held_out_ratio {
+            return None;
+        }
+        Some(format!(
+            "log `{}`: its residual is {times:.1} times that of the training logs: the fit follows \
+             their noise, or the logs differ (payload, temperature, motion); record longer training logs, with a motion from `design`",
+            log.log
+        ))
+    }
+
+    /// Inconsistent joint torques, if a held-out log also has a large error: each alone may have other reasons.
+    fn inconsistent_torques<'a>(&'a self, settings: &'a ProblemSettings) -> impl Iterator<Item = String> + 'a {
+        let worst = self.validation.iter().filter_map(|log| self.held_out_ratio(log, settings)).fold(0.0, f64::max);
+        let findings = self.check.iter().flat_map(|check| &check.findings);
+        let is_doubted = |finding: &&CheckFinding| finding.kind == "torque" && finding.level == Level::Warning;
+        findings
+            .filter(move |finding| worst > settings.max_held_out_ratio_if_inconsistent && is_doubted(finding))
+            .map(CheckFinding::sentence)
+    }
+
+    /// Residual of a held-out log relative to the training logs; `None` if the held-out error is small.
+    fn held_out_ratio(&self, log: &LogValidation, settings: &ProblemSettings) -> Option<f64> {
+        // Both must use the same band: in the band of the fit, only the unconstrained estimate has figures.
+        let written = || self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
+        let (fitted, held_out) = match &log.in_fit_band {
+            Some(report) => (&self.training.joints, report),
+            None => (written(), log.physical.as_ref().unwrap_or(&log.model)),
+        };
+        let pairs = fitted.iter().zip(&held_out.joints).filter(|(fitted, _)| fitted.rmse_nm > 0.0);
+        let squares: Vec<f64> = pairs.map(|(fitted, held)| (held.rmse_nm / fitted.rmse_nm).powi(2)).collect();
+        let times = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+        let is_good = held_out.relative_error_percent.is_none_or(|percent| percent < settings.min_held_out_percent);
+        (!is_good).then_some(times)
+    }
+}
+
+struct Errors<'a> {
+    relative_percent: Option<f64>,
+    /// Joint, root mean square error (Nm or N), relative error in percent.
+    joints: Vec<(&'a str, f64, Option<f64>)>,
+}
+
+/// Message if the consistent set is clearly worse than the estimate on the same rows.
+fn worse_when_consistent(
+    place: &str,
+    free: &Errors<'_>,
+    written: &Errors<'_>,
+    settings: &ProblemSettings,
+) -> Option<String> {
+    let largest = free.joints.iter().map(torque_norm).fold(0.0, f64::max);
+    let times = |before: f64, after: f64| if before > 0.0 { after / before } else { 1.0 };
+    let joints = free.joints.iter().zip(&written.joints);
+    let worst = joints
+        .filter(|(free, _)| torque_norm(free) > settings.min_torque_share * largest)
+        .map(|(free, held)| (times(free.1, held.1), free, held))
+        .filter(|(ratio, ..)| *ratio > settings.max_joint_error_ratio)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    let percent = |value: Option<f64>| value.map_or_else(|| "?".to_owned(), |value| format!("{value:.2}"));
+    let sentence = |place: String, before: Option<f64>, after: Option<f64>| {
+        format!(
+            "{place}: {} % of the torque is unexplained by the consistent set (exported), {} % by the unconstrained estimate; no \
+             physically consistent robot explains this log: check for a reversed or exchanged channel, a wrong unit, or a \
+             wrong robot description",
+            percent(after),
+            percent(before)
+        )
+    };
+    if let Some((_, free, held)) = worst {
+        return Some(sentence(format!("{place}, joint `{}`", free.0), free.2, held.2));
+    }
+    // All joints: on the same rows, the ratio of relative errors equals that of the root mean squares.
+    let ratio = free.relative_percent.zip(written.relative_percent).map(|(before, after)| times(before, after));
+    (ratio? > settings.max_error_ratio)
+        .then(|| sentence(place.to_owned(), free.relative_percent, written.relative_percent))
+}
+
+/// Root mean square of a joint's measured torque, Nm (N).
+fn torque_norm(joint: &(&str, f64, Option<f64>)) -> f64 {
+    let (_, rmse_nm, relative) = joint;
+    relative.map_or(0.0, |percent| if percent > 0.0 { 100.0 * rmse_nm / percent } else { 0.0 })
+}

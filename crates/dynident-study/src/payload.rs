@@ -1,0 +1,92 @@
+//! `[[payload]]` and `[arm]`: payloads of the logs, and an arm identified earlier.
+
+use super::arrays::exactly;
+use crate::error::StudyError;
+use dynident_identification::payload::Refit;
+use dynident_model::{InertialParameters, Mat3, Vec3};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// `[[payload]]`: a load at a link of the robot during some recordings. A `[[log]]` refers to it by name. Without
+/// `mass_kg` all its parameters are estimated; with `mass_kg` and `com_m` it is known; with `mass_kg` alone (weighed on
+/// a scale) the rest is estimated.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct PayloadSection {
+    /// Name that logs refer to.
+    pub name: String,
+    /// The link that it is fixed to; the payload's parameters are in the frame of this link.
+    pub link: String,
+    /// Mass, if known.
+    #[serde(default)]
+    pub mass_kg: Option<f64>,
+    /// Centre of mass in the link's frame, if known.
+    #[serde(default, deserialize_with = "exactly")]
+    pub com_m: Option<[f64; 3]>,
+    /// Inertia about its centre of mass, in the axes of the link's frame: xx, xy, xz, yy, yz, zz. Zero (a point mass)
+    /// by default.
+    #[serde(default, deserialize_with = "exactly")]
+    pub inertia_at_com_kgm2: Option<[f64; 6]>,
+}
+
+/// `[arm]`: the arm from an earlier identification. Only payloads are estimated then; their error bars include those of
+/// the arm.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct ArmSection {
+    /// The earlier `result.json`, of the same robot with the same drives.
+    pub result: PathBuf,
+    /// Parameters of the arm that are estimated again; none by default.
+    #[serde(default)]
+    pub refit: Refit,
+}
+
+/// Smallest eigenvalue of a pseudo-inertia, relative to its largest entry: rounding in published values of thin bodies.
+const MAX_RELATIVE_ROUNDING: f64 = 1.0e-6;
+
+impl PayloadSection {
+    /// Mass of a payload of which only the mass is known.
+    pub(crate) fn known_mass_kg(&self) -> Option<f64> {
+        self.mass_kg.filter(|_| self.com_m.is_none())
+    }
+
+    /// The ten parameters of a known payload in the link's frame.
+    pub fn known(&self) -> Option<InertialParameters> {
+        let [xx, xy, xz, yy, yz, zz] = self.inertia_at_com_kgm2.unwrap_or_default();
+        let inertia = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
+        let com = Vec3(self.com_m?);
+        self.mass_kg.map(|mass| InertialParameters::from_centre_of_mass(mass, com, &inertia))
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), StudyError> {
+        let numbers = self.com_m.iter().flatten().chain(self.inertia_at_com_kgm2.iter().flatten());
+        if let Some(value) = numbers.chain(&self.mass_kg).find(|value| !value.is_finite() || value.abs() > 1.0e6) {
+            let (key, expected) = ("a number".to_owned(), "finite numbers in kg, m and kg m^2");
+            return Err(StudyError::Numbers { key, values: vec![*value], expected });
+        }
+        match (self.mass_kg, self.com_m, self.inertia_at_com_kgm2) {
+            (None, None, None) => return Ok(()),
+            (Some(mass), None, None) if mass > 0.0 => return Ok(()),
+            (Some(_), Some(_), _) => {}
+            _ => {
+                return Err(StudyError::conflict(
+                    "incomplete payload",
+                    "give mass_kg and com_m for a known payload (and inertia_at_com_kgm2 unless it is a point mass); give none of them, or only a positive mass_kg, to estimate it",
+                ));
+            }
+        }
+        let Some(known) = self.known() else { return Ok(()) };
+        let pseudo_inertia = known.pseudo_inertia();
+        if known.mass_kg() <= 0.0
+            || pseudo_inertia.symmetric_eigenvalues().min() < -MAX_RELATIVE_ROUNDING * pseudo_inertia.amax()
+        {
+            return Err(StudyError::conflict(
+                "mass and inertia are not physically consistent",
+                "the mass must be positive and no moment about the centre of mass larger than the sum of the other two",
+            ));
+        }
+        Ok(())
+    }
+}
