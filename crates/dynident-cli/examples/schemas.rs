@@ -7,9 +7,10 @@
 use dynident::export::{MODEL_SCHEMA, ModelFile, SIMULATOR_SCHEMA, SimulatorFile};
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
-    CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EXPORT_SCHEMA, EvaluationFile, ExportFile,
-    FACTORS_SCHEMA, FactorsFile, INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA,
-    LogContents, NEW_STUDY_SCHEMA, NewStudyFile, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA, SimulationFile,
+    CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EXPORT_SCHEMA, EXPORT_VALIDATION_SCHEMA,
+    EvaluationFile, ExportFile, ExportValidationFile, FACTORS_SCHEMA, FactorsFile, INSPECTION_SCHEMA,
+    ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA, LogContents, NEW_STUDY_SCHEMA, NewStudyFile,
+    RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA, SimulationFile, TEST_SAMPLES_SCHEMA, TestSamplesFile,
     VALIDATION_SCHEMA, ValidationFile,
 };
 use dynident_benchmark::accuracy::{BENCHMARK_SCHEMA, BenchmarkFile};
@@ -35,6 +36,7 @@ pub(crate) fn write_all(folder: &Path) -> Result<(), Box<dyn Error>> {
         (DESIGN_SCHEMA, written::<DesignFile>()),
         (EVALUATION_SCHEMA, written::<EvaluationFile>()),
         (EXPORT_SCHEMA, written::<ExportFile>()),
+        (EXPORT_VALIDATION_SCHEMA, written::<ExportValidationFile>()),
         (FACTORS_SCHEMA, written::<FactorsFile>()),
         (INSPECTION_SCHEMA, written::<Inspection>()),
         (ITERATIONS_SCHEMA, written::<IterationsFile>()),
@@ -46,6 +48,7 @@ pub(crate) fn write_all(folder: &Path) -> Result<(), Box<dyn Error>> {
         (RESULT_SCHEMA, written::<ResultFile>()),
         (RUN_SCHEMA, written::<RunFile>()),
         (SIMULATION_SCHEMA, written::<SimulationFile>()),
+        (TEST_SAMPLES_SCHEMA, written::<TestSamplesFile>()),
         (VALIDATION_SCHEMA, written::<ValidationFile>()),
     ];
     for (name, mut schema) in files {
