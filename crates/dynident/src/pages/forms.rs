@@ -10,15 +10,20 @@ pub(super) fn forms(page: &mut Report, r: &ResultFile) {
         return;
     }
     let percent = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2} %"));
-    let rows = r.forms.iter().flat_map(|form| {
+    // Without friction with memory, code with state is that without.
+    let shown = r.forms.iter().filter(|form| form.class != TermClass::WithState || form.has_memory());
+    let rows = shown.flat_map(|form| {
         let held = match form.class {
             TermClass::DampingAndFriction => "bodies, damping, Coulomb friction",
             TermClass::DampingFrictionAndInertia => "bodies, damping, Coulomb friction, drive inertia, springs",
-            TermClass::FunctionsOfMotion => "everything except friction with memory, load or temperature",
+            TermClass::FunctionsOfMotion => "everything except friction with memory or temperature",
+            TermClass::WithState => "everything except friction with temperature",
         };
         let refitted = if form.refitted { "drives fitted again" } else { "nothing" };
         let row = move |log: &str, error: Option<f64>, model: Option<f64>| {
-            let cells = [form.forms.join(", "), held.to_owned(), refitted.to_owned(), log.to_owned()];
+            let names = form.forms.join(", ");
+            let names = if form.class == TermClass::WithState { format!("function step of {names}") } else { names };
+            let cells = [names, held.to_owned(), refitted.to_owned(), log.to_owned()];
             let errors = [percent(error), percent(model)];
             cells.into_iter().chain(errors).map(Into::into).collect::<Vec<_>>()
         };
