@@ -43,8 +43,13 @@ impl Drives {
         with_state: bool,
     ) -> Result<Self, ExportError> {
         let zeros = || vec![Symbol::ZERO; dof];
-        let mut drives =
-            Self { inertia: inertia(dof, terms.clone()), friction: zeros(), declared: None, load_shares: None, memory: None };
+        let mut drives = Self {
+            inertia: inertia(dof, terms.clone()),
+            friction: zeros(),
+            declared: None,
+            load_shares: None,
+            memory: None,
+        };
         for (term, value) in terms {
             let scaled = |unit: Symbol| Symbol::splat(value) * unit;
             match term {

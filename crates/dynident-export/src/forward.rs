@@ -61,7 +61,8 @@ fn under_load(load: &Model, inputs: &Inputs, factor: &Factor, shares: &[Symbol],
     let loads: Vec<Symbol> = joints.iter().map(|&joint| bias[joint] + row(joint, &a)).collect();
     let compliance: Vec<Vec<Symbol>> =
         joints.iter().map(|&joint| responses.iter().map(|response| row(joint, response)).collect()).collect();
-    let mut friction: Vec<Symbol> = joints.iter().zip(&loads).map(|(&joint, load)| shares[joint] * load.abs()).collect();
+    let mut friction: Vec<Symbol> =
+        joints.iter().zip(&loads).map(|(&joint, load)| shares[joint] * load.abs()).collect();
     for _ in 0..LOAD_PASSES {
         for (place, &joint) in joints.iter().enumerate() {
             let taken = compliance[place].iter().zip(&friction);
@@ -76,8 +77,8 @@ fn under_load(load: &Model, inputs: &Inputs, factor: &Factor, shares: &[Symbol],
     found
 }
 
-/// `M = Lᵀ D L`, from the tip to the base, so that the zeros between independent branches are kept (Featherstone, *Rigid
-/// Body Dynamics Algorithms* (2008), section 6.5).
+/// `M = Lᵀ D L`, from the tip to the base, so that the zeros between independent branches are kept (Featherstone,
+/// *Rigid Body Dynamics Algorithms* (2008), section 6.5).
 struct Factor {
     m: Vec<Symbol>,
     inverses: Vec<Symbol>,

@@ -25,8 +25,8 @@
 //!
 //! Functions: `inverse_dynamics`, `gravity`, `coriolis`, `friction` (with constant offsets), `mass_matrix` (with the
 //! inertia of drives) and `forward_dynamics`, so that `inverse_dynamics = mass_matrix · ddq + coriolis + gravity +
-//! friction`. Load-dependent friction is a further function `load_friction`; friction with memory is in a function `step`
-//! with state ([`RobotModel::with_state_terms`]).
+//! friction`. Load-dependent friction is a further function `load_friction`; friction with memory is in a function
+//! `step` with state ([`RobotModel::with_state_terms`]).
 
 #![forbid(unsafe_code)]
 

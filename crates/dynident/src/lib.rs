@@ -81,8 +81,8 @@ pub use jobs::check::{CheckSettings, check, check_with};
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::export::{
-    ExportSettings, export_model, export_payload, export_payload_of, export_result, export_simulator, export_simulator_of,
-    export_stored,
+    ExportSettings, export_model, export_payload, export_payload_of, export_result, export_simulator,
+    export_simulator_of, export_stored,
 };
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{

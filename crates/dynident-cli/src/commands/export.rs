@@ -140,8 +140,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         let (study, path) = with_study()?;
         export_simulator_of(&stored, &result, study, path, data).map_err(known_in(path))
     };
-    let code =
-        CodeOptions { float32: options.float32, regressor: options.regressor, step_width: options.step_width };
+    let code = CodeOptions { float32: options.float32, regressor: options.regressor, step_width: options.step_width };
     if !matches!(options.to.kind(), Kind::Model(_)) && code != CodeOptions::default() {
         return Err("--float32, --regressor and --step-width are options of code: omit them".to_owned());
     }

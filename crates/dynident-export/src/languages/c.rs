@@ -77,7 +77,8 @@ pub(crate) fn c_header(source: &Source<'_>) -> String {
     );
     if source.equations.graph.has(|node| matches!(node, Node::Step(..))) {
         let zero = syntax.number(0.0);
-        let (size, sign) = (syntax.called("fabs", "x"), syntax.called("copysign", &format!("{}, x", syntax.number(1.0))));
+        let (size, sign) =
+            (syntax.called("fabs", "x"), syntax.called("copysign", &format!("{}, x", syntax.number(1.0))));
         let _ = write!(
             text,
             "\n/* Sign of x, zero while |x| is at most band. */\nstatic inline {real} {name}_sign({real} x, {real} band) {{\n    \

@@ -96,15 +96,10 @@ fn together(values: &[String], given: &str) -> String {
 pub(super) fn write_function(text: &mut String, source: &Source<'_>, function: &Equation, syntax: &ArraySyntax) {
     let (dof, library) = (source.dof(), syntax.library);
     let statements = source.statements(function, syntax);
-    let _ = write!(
-        text,
-        "\n\ndef {}({}):\n    \"\"\"{}\"\"\"\n",
-        function.name,
-        function.arguments(),
-        function.about
-    );
+    let _ = write!(text, "\n\ndef {}({}):\n    \"\"\"{}\"\"\"\n", function.name, function.arguments(), function.about);
     if function.inputs.is_empty() {
-        let _ = write!(text, "    return {library}.array([\n        {},\n    ])\n", statements.outputs.join(",\n        "));
+        let _ =
+            write!(text, "    return {library}.array([\n        {},\n    ])\n", statements.outputs.join(",\n        "));
         return;
     }
     text.push_str(&given(function));

@@ -73,7 +73,8 @@ pub(crate) fn rust_module(source: &Source<'_>) -> String {
     let real = if source.float32 { "f32" } else { "f64" };
     let syntax = RustSyntax { float32: source.float32 };
     let needed = needed_functions(graph);
-    let typed = |arguments: &[&str]| arguments.iter().map(|name| format!("{name}: {real}")).collect::<Vec<_>>().join(", ");
+    let typed =
+        |arguments: &[&str]| arguments.iter().map(|name| format!("{name}: {real}")).collect::<Vec<_>>().join(", ");
     let mut text = source.comment("//");
     let _ = write!(
         text,

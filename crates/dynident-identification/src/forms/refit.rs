@@ -94,9 +94,8 @@ impl<'a> WideModel<'a> {
         let robot = &identified.parametric;
         let mut terms: Vec<TorqueTerm> = robot.terms().to_vec();
         for class in TermClass::ALL {
-            let of_joints = (0..robot.dof()).flat_map(|joint| {
-                class.terms_of_joint(robot.model(), robot.terms(), joint).into_iter().flatten()
-            });
+            let of_joints = (0..robot.dof())
+                .flat_map(|joint| class.terms_of_joint(robot.model(), robot.terms(), joint).into_iter().flatten());
             let shared = robot.terms().iter().filter(|term| term.own_joint().is_none());
             for term in of_joints.chain(shared.map(|term| class.in_form(robot.model(), term))) {
                 if !terms.contains(&term) {

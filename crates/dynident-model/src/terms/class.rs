@@ -47,9 +47,8 @@ impl TermClass {
                 vec![simple().into_iter().chain(own().find(|term| *term == drive)).collect()]
             }
             Self::FunctionsOfMotion | Self::WithState => {
-                let is_held = |term: &TorqueTerm| {
-                    !term.needs_temperature() && (self == Self::WithState || !term.has_memory())
-                };
+                let is_held =
+                    |term: &TorqueTerm| !term.needs_temperature() && (self == Self::WithState || !term.has_memory());
                 let kept: Vec<TorqueTerm> = own().filter(is_held).map(|term| self.in_form(model, &term)).collect();
                 let is_step = |term: &TorqueTerm| term.step().is_some() && !term.needs_load() || term.has_memory();
                 let has_step = kept.iter().any(|term| term.is_joint_friction() && is_step(term));
