@@ -49,7 +49,7 @@ run 0 "$dynident" reduce examples/ur10_simulated.toml --like "$out/result/result
 run 0 "$dynident" reduce examples/ur10_simulated.toml --like "$out/result/result.json" --log test --arm left --recorded-at 2026-01-05 --out "$out/test.factors"
 run 0 "$dynident" merge "$out/test.factors" "$out/train.factors" --out "$out/both.factors"
 run 0 "$dynident" identify --factors "$out/both.factors" --out "$out/of_factors"
-for form in c cpp rust python matlab mjcf urdf sdf ros2-yaml json simulator simulator-table; do
+for form in c cpp rust python matlab casadi jax pinocchio mjcf urdf sdf ros2-yaml json simulator simulator-table; do
     run 0 "$dynident" export "$out/result/result.json" --study examples/ur10_simulated.toml --to "$form" --out "$out/exported.$form"
 done
 run 0 "$venv/bin/python" .ci/export.py "$dynident" "$out/result/result.json" examples/ur10_simulated.toml "$out/export" "$examples/description"

@@ -177,8 +177,9 @@ class Model:
         return Robot.from_urdf(self.to_urdf())
 
     def export(self, form: str) -> str:
-        """Exports the model as ``c``, ``cpp``, ``rust``, ``python``, ``matlab``, ``mjcf``, ``urdf``, ``sdf``,
-        ``ros2-yaml`` or ``json``. A comment lists the parts that the format cannot represent.
+        """Exports the model as ``c``, ``cpp``, ``rust``, ``python``, ``matlab``, ``casadi``, ``jax``, ``pinocchio``,
+        ``mjcf``, ``urdf``, ``sdf``, ``ros2-yaml`` or ``json``. A comment lists the parts that the format cannot
+        represent.
         """
         return self._native.export(form)[0]
 

@@ -2,39 +2,25 @@
 
 use crate::error::ExportError;
 use crate::graph::{Function, Function2};
-use crate::robot_model::RobotModel;
 use crate::symbol::Symbol;
 use dynident_lanes::{Real, Scalar};
 use dynident_model::terms::{
-    DeclaredLaw, Expression, ExpressionFunction, ExpressionFunction2, ExpressionNode, TorqueTable, TorqueTerm,
+    Declared, DeclaredLaw, Expression, ExpressionFunction, ExpressionFunction2, ExpressionNode, TorqueTable,
 };
 
-/// Declared torque of every joint; `None` if there is none.
+/// Torque of a declared term per unit of its value.
 ///
 /// # Errors
 /// [`ExportError::Term`] for the caller's code.
-pub(crate) fn declared_torque(
-    robot: &RobotModel,
-    q: &[Symbol],
-    dq: &[Symbol],
-) -> Result<Option<Vec<Symbol>>, ExportError> {
-    let mut torque = vec![Symbol::ZERO; robot.model().dof()];
-    let mut is_declared = false;
-    for (term, value) in robot.terms() {
-        let symbol = term.symbol();
-        let TorqueTerm::Declared(term) = term else { continue };
-        is_declared = true;
-        let unit = match &term.law {
-            DeclaredLaw::Expression(expression) => of_expression(expression, q, dq),
-            DeclaredLaw::Table(table) => of_table(table, q[term.joint]),
-            DeclaredLaw::Function(_) => {
-                let needs = "the code of a function in the calling program";
-                return Err(ExportError::Term { symbol, kind: "declared", needs });
-            }
-        };
-        torque[term.joint] += Symbol::splat(value) * unit;
+pub(crate) fn declared_unit(term: &Declared, q: &[Symbol], dq: &[Symbol]) -> Result<Symbol, ExportError> {
+    match &term.law {
+        DeclaredLaw::Expression(expression) => Ok(of_expression(expression, q, dq)),
+        DeclaredLaw::Table(table) => Ok(of_table(table, q[term.joint])),
+        DeclaredLaw::Function(_) => {
+            let needs = "the code of a function in the calling program";
+            Err(ExportError::Term { symbol: term.name.clone(), kind: "declared", needs })
+        }
     }
-    Ok(is_declared.then_some(torque))
 }
 
 fn of_expression(expression: &Expression, q: &[Symbol], dq: &[Symbol]) -> Symbol {

@@ -102,15 +102,15 @@ pub(crate) fn frictions(
     nearest
 }
 
-/// Terms of the identified robot that are not among the terms `kept` of a form.
+/// Terms of the identified robot that are not among the terms `kept` of a form. A term with another step is kept.
 pub fn terms_left_out(robot: &RobotModel, kept: &[TorqueTerm]) -> Vec<ModelTerm> {
-    ModelTerm::of(robot, |term| !kept.contains(term))
+    ModelTerm::of(robot, |term| kept.iter().all(|one| one.symbol() != term.symbol()))
 }
 
 /// Notes on the terms of the identified robot that a form with the terms `kept` leaves out or replaces, with their
-/// values.
+/// values. A term with another step is kept.
 pub fn notes_on_omitted(robot: &RobotModel, kept: &[TorqueTerm]) -> Vec<String> {
-    let omitted = robot.terms().filter(|(term, _)| !kept.contains(term));
+    let omitted = robot.terms().filter(|(term, _)| kept.iter().all(|one| one.symbol() != term.symbol()));
     omitted
         .map(|(term, value)| {
             let (symbol, unit, joint) = (term.symbol(), term.unit(), joint_name(robot, term));

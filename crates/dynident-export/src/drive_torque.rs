@@ -1,34 +1,144 @@
 //! Torque terms as symbols: friction, offsets and drive inertia.
 
+use crate::declared_torque::declared_unit;
 use crate::error::ExportError;
+use crate::graph::{Function2, Input};
 use crate::robot_model::RobotModel;
 use crate::symbol::Symbol;
-use dynident_lanes::Scalar;
-use dynident_model::terms::{JointMotion, TermConstant, TorqueTerm};
+use dynident_lanes::{Real, Scalar};
+use dynident_model::terms::{Coulomb, JointMotion, TermConstant, TorqueTerm};
 
-/// Friction and offset torque of every joint at the velocities `dq`. Temperature-dependent terms are at their
-/// reference temperature.
+/// Motion of all joints, and the load of load-dependent friction.
+#[derive(Clone, Copy)]
+pub(crate) struct SymbolMotion<'a> {
+    pub(crate) q: &'a [Symbol],
+    pub(crate) dq: &'a [Symbol],
+    pub(crate) ddq: &'a [Symbol],
+    /// Torque on the gear of each joint; empty without load-dependent friction.
+    pub(crate) load: &'a [Symbol],
+}
+
+/// Torque terms by their role in the equation of motion.
+pub(crate) struct Drives {
+    /// Constant contribution to the mass matrix, row-major.
+    pub(crate) inertia: Vec<f64>,
+    /// Friction and offset of every joint as a function of the velocities. Temperature-dependent terms are at their
+    /// reference temperature.
+    pub(crate) friction: Vec<Symbol>,
+    /// Declared torque; `None` without a declared term.
+    pub(crate) declared: Option<Vec<Symbol>>,
+    /// Load-dependent friction of every joint per magnitude of its load; `None` without such friction.
+    pub(crate) load_shares: Option<Vec<Symbol>>,
+    /// Friction with memory, and the deflection of each element after the step.
+    pub(crate) memory: Option<(Vec<Symbol>, Vec<Symbol>)>,
+}
+
+impl Drives {
+    /// # Errors
+    /// A term that is not a function of the motion; a term with memory unless `with_state`.
+    pub(crate) fn of<'a>(
+        dof: usize,
+        terms: impl Iterator<Item = (&'a TorqueTerm, f64)> + Clone,
+        (q, dq): (&[Symbol], &[Symbol]),
+        with_state: bool,
+    ) -> Result<Self, ExportError> {
+        let zeros = || vec![Symbol::ZERO; dof];
+        let mut drives = Self {
+            inertia: inertia(dof, terms.clone()),
+            friction: zeros(),
+            declared: None,
+            load_shares: None,
+            memory: None,
+        };
+        for (term, value) in terms {
+            let scaled = |unit: Symbol| Symbol::splat(value) * unit;
+            match term {
+                TorqueTerm::Declared(declared) => {
+                    let torque = drives.declared.get_or_insert_with(zeros);
+                    torque[declared.joint] += scaled(declared_unit(declared, q, dq)?);
+                }
+                TorqueTerm::MaxwellSlip(slip) if with_state => {
+                    let (torque, deflections) = drives.memory.get_or_insert_with(|| (zeros(), Vec::new()));
+                    let deflection = deflection(deflections.len(), slip.joint, slip.yield_displacement, q);
+                    torque[slip.joint] += scaled(deflection * Symbol::splat(1.0 / slip.yield_displacement));
+                    deflections.push(deflection);
+                }
+                _ => {
+                    for row in term.joints() {
+                        let torque = if term.needs_load() {
+                            drives.load_shares.get_or_insert_with(zeros)
+                        } else {
+                            &mut drives.friction
+                        };
+                        torque[row] += scaled(velocity_unit(term, row, dq)?);
+                    }
+                }
+            }
+        }
+        Ok(drives)
+    }
+
+    /// Torque of everything but drive inertia; with an empty `load`, also without load-dependent friction.
+    pub(crate) fn torque(&self, load: &[Symbol]) -> Vec<Symbol> {
+        let mut torque = self.friction.clone();
+        let of_load = self.load_friction(load).filter(|_| !load.is_empty());
+        let further = [self.declared.clone(), of_load, self.memory.as_ref().map(|both| both.0.clone())];
+        for further in further.into_iter().flatten() {
+            torque.iter_mut().zip(further).for_each(|(torque, further)| *torque += further);
+        }
+        torque
+    }
+
+    /// Load-dependent friction.
+    pub(crate) fn load_friction(&self, load: &[Symbol]) -> Option<Vec<Symbol>> {
+        let shares = self.load_shares.as_ref()?;
+        Some(shares.iter().zip(load).map(|(&share, load)| share * load.abs()).collect())
+    }
+}
+
+/// `z ← clamp(z + q − last, −Δ, Δ)`, in the order of operations of the model.
+fn deflection(element: usize, joint: usize, yield_displacement: f64, q: &[Symbol]) -> Symbol {
+    let [z, last] = [(Input::Deflection, element), (Input::LastPosition, joint)].map(|(of, at)| Symbol::input(of, at));
+    let limit = Symbol::splat(yield_displacement);
+    (z + q[joint] - last).call2(Function2::Max, -limit).call2(Function2::Min, limit)
+}
+
+/// Torque of joint `row` per unit of a term without memory.
 ///
 /// # Errors
-/// A term that needs more than the velocity.
-pub(crate) fn friction(robot: &RobotModel, dq: &[Symbol]) -> Result<Vec<Symbol>, ExportError> {
-    let mut torque = vec![Symbol::ZERO; robot.model().dof()];
-    for (term, value) in robot.terms() {
-        for row in term.joints() {
-            let unit = term.torque(row, dq);
-            let unit =
-                unit.map_err(|needs| ExportError::Term { symbol: term.symbol(), kind: term.kind_name(), needs })?;
-            torque[row] += Symbol::splat(value) * unit;
-        }
+/// A term that is not a function of the motion.
+pub(crate) fn unit_torque(term: &TorqueTerm, row: usize, motion: SymbolMotion<'_>) -> Result<Symbol, ExportError> {
+    if let TorqueTerm::Declared(declared) = term {
+        return declared_unit(declared, motion.q, motion.dq);
     }
-    Ok(torque)
+    let mut unit = velocity_unit(term, row, motion.dq)?;
+    if term.needs_load() {
+        unit = unit * motion.load[row].abs();
+    }
+    for (column, &acceleration) in motion.ddq.iter().enumerate() {
+        unit += Symbol::splat(term.mass_matrix_entry(row, column)) * acceleration;
+    }
+    Ok(unit)
+}
+
+/// Dependence of a term on the velocity; for load-dependent friction its step.
+fn velocity_unit(term: &TorqueTerm, row: usize, dq: &[Symbol]) -> Result<Symbol, ExportError> {
+    let step = term.step().filter(|_| term.needs_load());
+    let unit = match step {
+        Some(shape) => TorqueTerm::Coulomb(Coulomb { joint: row, shape }).torque(row, dq),
+        None => term.torque(row, dq),
+    };
+    unit.map_err(|needs| ExportError::Term { symbol: term.symbol(), kind: term.kind_name(), needs })
 }
 
 /// Constant contribution of the drives to the mass matrix, row-major.
 pub(crate) fn drive_inertia(robot: &RobotModel) -> Vec<f64> {
-    let dof = robot.model().dof();
+    inertia(robot.model().dof(), robot.terms())
+}
+
+fn inertia<'a>(dof: usize, terms: impl Iterator<Item = (&'a TorqueTerm, f64)>) -> Vec<f64> {
     let mut matrix = vec![0.0; dof * dof];
-    for (term, value) in robot.terms() {
+    for (term, value) in terms {
         for row in term.joints() {
             for column in term.joints() {
                 matrix[row * dof + column] += value * term.mass_matrix_entry(row, column);

@@ -1,24 +1,26 @@
 //! The functions of all languages as graphs: runs the recursive Newton-Euler and composite-rigid-body algorithms over
 //! symbols.
 
-use crate::declared_torque::declared_torque;
-use crate::drive_torque::{drive_inertia, friction};
+use crate::drive_torque::{Drives, SymbolMotion};
 use crate::error::ExportError;
+use crate::forward::{forward, mass_matrix};
 use crate::graph::{Graph, Input};
+use crate::regressor::Regressor;
 use crate::robot_model::RobotModel;
 use crate::symbol::{Symbol, record};
-use dynident_dynamics::{inverse_dynamics_over, mass_matrix_over};
+use dynident_dynamics::inverse_dynamics_over;
 use dynident_lanes::Scalar;
 use dynident_model::{Model, Vec3};
 
-/// One function: inputs are joint vectors, the output is a joint vector or a row-major square matrix.
+/// One function: inputs are joint vectors, the output is a vector or a row-major matrix.
 #[derive(Debug)]
 pub(crate) struct Equation {
     pub(crate) name: &'static str,
     pub(crate) about: &'static str,
     pub(crate) inputs: &'static [Input],
     pub(crate) output: &'static str,
-    pub(crate) is_matrix: bool,
+    /// Number of columns of a matrix; `None` for a vector.
+    pub(crate) columns: Option<usize>,
     pub(crate) values: Vec<Symbol>,
 }
 
@@ -28,34 +30,60 @@ impl Equation {
     }
 }
 
+/// The function with state: torque of a motion, and the deflections of the elements with memory after it.
+#[derive(Debug)]
+pub(crate) struct StepEquation {
+    /// Inputs are the motion; positions and deflections before it are further inputs of the values. The torque is
+    /// followed by the deflections.
+    pub(crate) equation: Equation,
+    /// Number of elements with memory.
+    pub(crate) elements: usize,
+}
+
 #[derive(Debug)]
 pub(crate) struct Equations {
     pub(crate) dof: usize,
     pub(crate) graph: Graph,
     pub(crate) functions: Vec<Equation>,
+    pub(crate) step: Option<StepEquation>,
+    /// Names of the regressor's columns; empty without a regressor.
+    pub(crate) parameters: Vec<String>,
 }
 
 impl Equations {
+    /// The functions, with the regressor on request; numbers are at most `most`.
+    ///
     /// # Errors
     /// A torque term that is not a function of the motion, a joint without inertia, or an overflow.
-    pub(crate) fn of(robot: &RobotModel) -> Result<Self, ExportError> {
+    pub(crate) fn of(robot: &RobotModel, with_regressor: bool, most: f64) -> Result<Self, ExportError> {
         let reduced = robot.reduced()?;
         let weightless = reduced.clone().with_gravity(Vec3::ZERO)?;
-        let (graph, values) = record(|| Values::of(robot, &reduced, &weightless));
-        let functions = values?.functions();
-        match graph.not_finite() {
+        let load = robot.load_model()?;
+        let (graph, made) = record(|| -> Result<_, ExportError> {
+            let inputs = Inputs::new(robot.model().dof());
+            let load = load.as_ref();
+            let values = Values::of(robot, &reduced, &weightless, load, &inputs)?;
+            let step = step(robot, &reduced, load, &inputs)?;
+            let of_load = inputs.load(load);
+            let regressor = with_regressor.then(|| Regressor::of(robot, inputs.motion(&of_load)));
+            Ok((values.functions(), step, regressor.transpose()?))
+        });
+        let (mut functions, step, regressor) = made?;
+        let parameters = regressor.as_ref().map_or_else(Vec::new, |regressor| regressor.names.clone());
+        functions.extend(regressor.into_iter().flat_map(Regressor::functions));
+        match graph.too_large(most) {
             Some(value) => Err(ExportError::Overflow { value }),
-            None => Ok(Self { dof: robot.model().dof(), graph, functions }),
+            None => Ok(Self { dof: robot.model().dof(), graph, functions, step, parameters }),
         }
     }
 }
 
-struct Inputs {
-    q: Vec<Symbol>,
-    dq: Vec<Symbol>,
-    ddq: Vec<Symbol>,
-    tau: Vec<Symbol>,
-    rest: Vec<Symbol>,
+pub(crate) struct Inputs {
+    pub(crate) q: Vec<Symbol>,
+    pub(crate) dq: Vec<Symbol>,
+    pub(crate) ddq: Vec<Symbol>,
+    pub(crate) tau: Vec<Symbol>,
+    pub(crate) rest: Vec<Symbol>,
 }
 
 impl Inputs {
@@ -63,6 +91,15 @@ impl Inputs {
         let [q, dq, ddq, tau] = [Input::Position, Input::Velocity, Input::Acceleration, Input::Torque]
             .map(|input| Symbol::inputs(input, dof));
         Self { q, dq, ddq, tau, rest: vec![Symbol::ZERO; dof] }
+    }
+
+    /// Torque of the load bodies, empty without them.
+    fn load(&self, load: Option<&Model>) -> Vec<Symbol> {
+        load.map_or_else(Vec::new, |load| inverse_dynamics_over(load, &self.q, &self.dq, &self.ddq))
+    }
+
+    fn motion<'a>(&'a self, load: &'a [Symbol]) -> SymbolMotion<'a> {
+        SymbolMotion { q: &self.q, dq: &self.dq, ddq: &self.ddq, load }
     }
 }
 
@@ -74,42 +111,44 @@ struct Values {
     mass_matrix: Vec<Symbol>,
     forward: Vec<Symbol>,
     declared: Option<Vec<Symbol>>,
+    load_friction: Option<Vec<Symbol>>,
 }
 
 impl Values {
-    /// Runs the algorithms; `weightless` is the reduced robot without gravity.
-    fn of(robot: &RobotModel, reduced: &Model, weightless: &Model) -> Result<Self, ExportError> {
-        let inputs = Inputs::new(robot.model().dof());
-        let Inputs { q, dq, rest, .. } = &inputs;
-        let rotors = drive_inertia(robot);
-        let friction = friction(robot, dq)?;
-        let declared = declared_torque(robot, q, dq)?;
-        // Torques other than those of rigid bodies and drive inertia.
-        let other: Vec<Symbol> = match &declared {
-            Some(declared) => friction.iter().zip(declared).map(|(&friction, &declared)| friction + declared).collect(),
-            None => friction.clone(),
-        };
-        let mass_matrix = mass_matrix(reduced, q, &rotors);
-        let inverse = inverse(reduced, &inputs, &rotors, &other);
-        let forward = forward(reduced, &inputs, &mass_matrix, &other)?;
+    /// Runs the algorithms; `weightless` is the reduced robot without gravity, `load` has the load bodies.
+    fn of(
+        robot: &RobotModel,
+        reduced: &Model,
+        weightless: &Model,
+        load: Option<&Model>,
+        inputs: &Inputs,
+    ) -> Result<Self, ExportError> {
+        let Inputs { q, dq, rest, .. } = inputs;
+        let drives = Drives::of(robot.model().dof(), robot.terms(), (q, dq), false)?;
+        let of_load = inputs.load(load);
+        let mass_matrix = mass_matrix(reduced, q, &drives.inertia);
+        let inverse = inverse(reduced, inputs, &drives, &of_load);
+        let forward = forward(reduced, load, inputs, &mass_matrix, &drives)?;
         Ok(Self {
             inverse,
             gravity: inverse_dynamics_over(reduced, q, rest, rest),
             coriolis: inverse_dynamics_over(weightless, q, dq, rest),
-            friction,
+            load_friction: drives.load_friction(&of_load),
+            friction: drives.friction,
             mass_matrix,
             forward,
-            declared,
+            declared: drives.declared,
         })
     }
 
     fn functions(self) -> Vec<Equation> {
+        let dof = self.friction.len();
         let function = |name, about, inputs, output, values: Vec<Symbol>| Equation {
             name,
             about,
             inputs,
             output,
-            is_matrix: name == "mass_matrix",
+            columns: (name == "mass_matrix").then_some(dof),
             values,
         };
         let mut functions = vec![
@@ -159,81 +198,53 @@ impl Values {
                 declared,
             )
         }));
+        functions.extend(self.load_friction.map(|friction| {
+            function(
+                "load_friction",
+                "Friction that depends on the torque on the gear; included in inverse_dynamics and forward_dynamics, not in friction.",
+                &[Input::Position, Input::Velocity, Input::Acceleration],
+                "tau",
+                friction,
+            )
+        }));
         functions
     }
 }
 
-fn mass_matrix(reduced: &Model, q: &[Symbol], rotors: &[f64]) -> Vec<Symbol> {
-    let mut mass_matrix = mass_matrix_over(reduced, q);
-    for (entry, &rotor) in mass_matrix.iter_mut().zip(rotors) {
-        *entry += Symbol::splat(rotor);
-    }
-    mass_matrix
+/// The function with state; `None` without a term with memory.
+fn step(
+    robot: &RobotModel,
+    reduced: &Model,
+    load: Option<&Model>,
+    inputs: &Inputs,
+) -> Result<Option<StepEquation>, ExportError> {
+    let terms = robot.state_terms().iter().map(|(term, value)| (term, *value));
+    let drives = Drives::of(robot.model().dof(), terms, (&inputs.q, &inputs.dq), true)?;
+    let mut values = inverse(reduced, inputs, &drives, &inputs.load(load));
+    Ok(drives.memory.map(|(_, deflections)| {
+        let elements = deflections.len();
+        values.extend(deflections);
+        let equation = Equation {
+            name: "step",
+            about: "Torque of a motion with the friction that has a memory; call it once for each sample, in their order.",
+            inputs: &[Input::Position, Input::Velocity, Input::Acceleration],
+            output: "tau",
+            columns: None,
+            values,
+        };
+        StepEquation { equation, elements }
+    }))
 }
 
-fn inverse(reduced: &Model, inputs: &Inputs, rotors: &[f64], other: &[Symbol]) -> Vec<Symbol> {
+fn inverse(reduced: &Model, inputs: &Inputs, drives: &Drives, load: &[Symbol]) -> Vec<Symbol> {
     let Inputs { q, dq, ddq, .. } = inputs;
     let mut inverse = inverse_dynamics_over(reduced, q, dq, ddq);
+    let other = drives.torque(load);
     for (row, torque) in inverse.iter_mut().enumerate() {
         for (column, &acceleration) in ddq.iter().enumerate() {
-            *torque += Symbol::splat(rotors[row * ddq.len() + column]) * acceleration;
+            *torque += Symbol::splat(drives.inertia[row * ddq.len() + column]) * acceleration;
         }
         *torque += other[row];
     }
     inverse
-}
-
-fn forward(
-    reduced: &Model,
-    inputs: &Inputs,
-    mass_matrix: &[Symbol],
-    other: &[Symbol],
-) -> Result<Vec<Symbol>, ExportError> {
-    let Inputs { q, dq, tau, rest, .. } = inputs;
-    let bias = inverse_dynamics_over(reduced, q, dq, rest);
-    let left = (0..tau.len()).map(|joint| tau[joint] - (bias[joint] + other[joint])).collect();
-    solved(mass_matrix.to_vec(), left)
-        .map_err(|joint| ExportError::NoInertia { joint: reduced.joints()[joint].name.clone() })
-}
-
-/// `M⁻¹ b` by `M = Lᵀ D L`, from the tip to the base, so that the zeros between independent branches are kept
-/// (Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 6.5). Fails with the index of a joint whose pivot is
-/// constant and not positive.
-fn solved(mut m: Vec<Symbol>, mut b: Vec<Symbol>) -> Result<Vec<Symbol>, usize> {
-    let dof = b.len();
-    let mut inverses = vec![Symbol::ZERO; dof];
-    for k in (0..dof).rev() {
-        let pivot = m[k * dof + k];
-        if pivot.number().is_some_and(|pivot| pivot <= 0.0) {
-            return Err(k);
-        }
-        inverses[k] = pivot.recip();
-        for i in 0..k {
-            let factor = m[k * dof + i] * inverses[k];
-            if factor.is_zero() {
-                continue;
-            }
-            for j in 0..=i {
-                let taken = factor * m[k * dof + j];
-                m[i * dof + j] -= taken;
-            }
-        }
-        for i in 0..k {
-            m[k * dof + i] = m[k * dof + i] * inverses[k];
-        }
-    }
-    for k in (0..dof).rev() {
-        for i in 0..k {
-            let taken = m[k * dof + i] * b[k];
-            b[i] -= taken;
-        }
-    }
-    for k in 0..dof {
-        b[k] = b[k] * inverses[k];
-        for i in 0..k {
-            let taken = m[k * dof + i] * b[i];
-            b[k] -= taken;
-        }
-    }
-    Ok(b)
 }

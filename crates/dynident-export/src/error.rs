@@ -32,6 +32,10 @@ pub enum ExportError {
     Velocity { joint: String, velocity: f64, samples: f64 },
     #[error("the bodies {} have no inertial: their dynamics are unknown", bodies.join(", "))]
     Unknown { bodies: Vec<String> },
+    #[error("the step width {width} is not a positive finite number: state a velocity in rad/s (m/s)")]
+    StepWidth { width: f64 },
+    #[error("the form {target} has no option {option}: omit the option, or use one of {}", targets.join(", "))]
+    Option { option: &'static str, target: &'static str, targets: Vec<&'static str> },
     #[error(
         "{symbol} ({kind}) cannot be written as a function of q, dq and ddq: it needs {needs}; identify with another friction law ([drive] of the study) to export"
     )]

@@ -15,6 +15,10 @@ pub(crate) enum Input {
     Velocity,
     Acceleration,
     Torque,
+    /// Position at the previous call of the function with state.
+    LastPosition,
+    /// Deflection of an element with memory; the index is that of the element.
+    Deflection,
 }
 
 impl Input {
@@ -25,6 +29,8 @@ impl Input {
             Self::Velocity => "dq",
             Self::Acceleration => "ddq",
             Self::Torque => "tau",
+            Self::LastPosition => "last",
+            Self::Deflection => "z",
         }
     }
 }
@@ -140,9 +146,10 @@ impl Graph {
         place
     }
 
-    pub(crate) fn not_finite(&self) -> Option<f64> {
+    /// A constant that is not finite, or is larger than `most`.
+    pub(crate) fn too_large(&self, most: f64) -> Option<f64> {
         self.nodes.iter().find_map(|node| match node {
-            Node::Constant(bits) => Some(f64::from_bits(*bits)).filter(|value| !value.is_finite()),
+            Node::Constant(bits) => Some(f64::from_bits(*bits)).filter(|value| value.is_nan() || value.abs() > most),
             _ => None,
         })
     }

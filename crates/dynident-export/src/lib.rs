@@ -12,6 +12,9 @@
 //! | [`Target::Rust`] | one module, no `std`, no dependency |
 //! | [`Target::Python`] | one module over NumPy, many states at once |
 //! | [`Target::Matlab`] | one function file for MATLAB and Octave |
+//! | [`Target::Casadi`] | one Python module with a `casadi.Function` for each function |
+//! | [`Target::Jax`] | one Python module of pure functions over JAX |
+//! | [`Target::Pinocchio`] | one Python module that builds a model of Pinocchio, with a torque function |
 //! | [`Target::Mjcf`], [`Target::Urdf`], [`Target::Sdf`] | descriptions for simulators, with the nearest friction that they support |
 //! | [`Target::Ros2Yaml`] | parameters of a ROS 2 node |
 //! | [`Target::Json`] | all numbers, as a [`ModelFile`] |
@@ -22,7 +25,8 @@
 //!
 //! Functions: `inverse_dynamics`, `gravity`, `coriolis`, `friction` (with constant offsets), `mass_matrix` (with the
 //! inertia of drives) and `forward_dynamics`, so that `inverse_dynamics = mass_matrix · ddq + coriolis + gravity +
-//! friction`.
+//! friction`. Load-dependent friction is a further function `load_friction`; friction with memory is in a function
+//! `step` with state ([`RobotModel::with_state_terms`]).
 
 #![forbid(unsafe_code)]
 
@@ -32,6 +36,7 @@ mod drive_torque;
 mod equations;
 mod error;
 mod exported;
+mod forward;
 mod from_file;
 mod graph;
 mod languages;
@@ -39,6 +44,7 @@ mod model_file;
 mod nearest_friction;
 mod payload;
 mod recorded_velocity;
+mod regressor;
 mod robot_model;
 mod ros2_parameters;
 mod rotation;
@@ -59,7 +65,7 @@ pub use payload::{ControllerBrand, PayloadBody, payload_command};
 pub use recorded_velocity::RecordedVelocity;
 pub use robot_model::RobotModel;
 pub use simulator::{DriveKnowledge, FrictionError, SIMULATOR_SCHEMA, SimulatorFile, SimulatorJoint, SimulatorValue};
-pub use target::{Target, export};
+pub use target::{CodeOptions, Target, export, export_with};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

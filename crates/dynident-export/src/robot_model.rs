@@ -3,7 +3,7 @@
 use crate::error::ExportError;
 use crate::recorded_velocity::RecordedVelocity;
 use dynident_dynamics::{Column, ParametricModel};
-use dynident_model::terms::TorqueTerm;
+use dynident_model::terms::{CoulombShape, TermClass, TorqueTerm};
 use dynident_model::urdf::MAX_MAGNITUDE;
 use dynident_model::{InertialParameters, Joint, Mat3, Model, Transform, Vec3};
 
@@ -18,6 +18,8 @@ pub struct RobotModel {
     terms: Vec<TorqueTerm>,
     values: Vec<f64>,
     velocities: Vec<Vec<RecordedVelocity>>,
+    load: Option<Vec<InertialParameters>>,
+    state_terms: Vec<(TorqueTerm, f64)>,
 }
 
 impl RobotModel {
@@ -28,12 +30,7 @@ impl RobotModel {
     /// A body without or with too large inertial parameters, values that are not finite or do not match the terms, or a
     /// term of an unknown joint.
     pub fn new(model: Model, terms: Vec<TorqueTerm>, values: Vec<f64>) -> Result<Self, ExportError> {
-        if values.len() != terms.len() {
-            return Err(ExportError::Values { expected: terms.len(), found: values.len() });
-        }
-        if let Some((term, &value)) = terms.iter().zip(&values).find(|(_, value)| !value.is_finite()) {
-            return Err(ExportError::NotFinite { symbol: term.symbol(), value });
-        }
+        check_terms(&terms, &values)?;
         let bodies: Vec<String> = model.bodies_without_prior().into_iter().map(str::to_owned).collect();
         if !bodies.is_empty() {
             return Err(ExportError::Unknown { bodies });
@@ -43,7 +40,78 @@ impl RobotModel {
         }
         // Validates the terms.
         let checked = ParametricModel::new(model, terms)?;
-        Ok(Self { model: checked.model().clone(), terms: checked.terms().to_vec(), values, velocities: Vec::new() })
+        let (model, terms) = (checked.model().clone(), checked.terms().to_vec());
+        Ok(Self { model, terms, values, velocities: Vec::new(), load: None, state_terms: Vec::new() })
+    }
+
+    /// Replaces the torque terms, one value each; the load is kept.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_terms(&self, terms: Vec<TorqueTerm>, values: Vec<f64>) -> Result<Self, ExportError> {
+        Ok(Self { load: self.load.clone(), ..Self::new(self.model.clone(), terms, values)? })
+    }
+
+    /// Sets the inertial parameters whose rigid-body torque is the load of load-dependent friction, one set for each
+    /// body. They need not be physically consistent. Without this call the bodies of the model are used.
+    ///
+    /// # Errors
+    /// A different number of bodies, or numbers that are not finite.
+    pub fn with_load(self, bodies: Vec<InertialParameters>) -> Result<Self, ExportError> {
+        let _ = self.model.with_inertials(&bodies)?;
+        Ok(Self { load: Some(bodies), ..self })
+    }
+
+    /// Adds the torque terms of the function with state: all terms, also those with memory. Without this call, or if no
+    /// term has a memory, code has no function with state.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_state_terms(self, terms: Vec<TorqueTerm>, values: Vec<f64>) -> Result<Self, ExportError> {
+        check_terms(&terms, &values)?;
+        let checked = ParametricModel::new(self.model.clone(), terms)?;
+        let state_terms = checked.terms().iter().cloned().zip(values).collect();
+        Ok(Self { state_terms, ..self })
+    }
+
+    /// Sets the width of all signs and of all smooth steps up to the usual width of code
+    /// ([`TermClass::CODE_STEP_WIDTH`]) to `width`, rad/s (m/s). Wider steps get at least this width. Values of the
+    /// terms are kept.
+    ///
+    /// # Errors
+    /// A width that is not a positive finite number.
+    pub fn with_step_width(&self, width: f64) -> Result<Self, ExportError> {
+        if !(width.is_finite() && width > 0.0) {
+            return Err(ExportError::StepWidth { width });
+        }
+        let usual = |term: &TorqueTerm| {
+            let least = TermClass::FunctionsOfMotion.in_form(&self.model, term).step_width().unwrap_or(0.0);
+            let is_narrow = term.step_width().is_some_and(|own| own <= least);
+            term.clone().with_step(|step| match step {
+                CoulombShape::Smooth { width: own } if !is_narrow => CoulombShape::Smooth { width: own.max(width) },
+                CoulombShape::Smooth { .. } | CoulombShape::Sign { .. } => CoulombShape::Smooth { width },
+            })
+        };
+        let terms = self.terms.iter().map(usual).collect();
+        let state_terms = self.state_terms.iter().map(|(term, value)| (usual(term), *value)).collect();
+        Ok(Self { terms, state_terms, ..self.clone() })
+    }
+
+    /// Torque terms of the function with state; empty if no term has a memory.
+    pub(crate) fn state_terms(&self) -> &[(TorqueTerm, f64)] {
+        if self.state_terms.iter().any(|(term, _)| term.has_memory()) { &self.state_terms } else { &[] }
+    }
+
+    /// The robot whose rigid-body torque is the load of load-dependent friction; `None` if no friction depends on it.
+    pub(crate) fn load_model(&self) -> Result<Option<Model>, ExportError> {
+        let mut terms = self.terms.iter().chain(self.state_terms.iter().map(|(term, _)| term));
+        if !terms.any(TorqueTerm::needs_load) {
+            return Ok(None);
+        }
+        match &self.load {
+            Some(bodies) => Ok(Some(with_exact_right_angles(&self.model)?.with_inertials(bodies)?)),
+            None => self.reduced().map(Some),
+        }
     }
 
     /// Adds the recorded velocities of each joint (empty if unknown), over which the friction of simulators is fitted.
@@ -75,7 +143,7 @@ impl RobotModel {
     }
 
     /// Torque terms with their values.
-    pub fn terms(&self) -> impl Iterator<Item = (&TorqueTerm, f64)> {
+    pub fn terms(&self) -> impl Iterator<Item = (&TorqueTerm, f64)> + Clone {
         self.terms.iter().zip(self.values.iter().copied())
     }
 
@@ -104,6 +172,16 @@ impl RobotModel {
     }
 }
 
+fn check_terms(terms: &[TorqueTerm], values: &[f64]) -> Result<(), ExportError> {
+    if values.len() != terms.len() {
+        return Err(ExportError::Values { expected: terms.len(), found: values.len() });
+    }
+    match terms.iter().zip(values).find(|(_, value)| !value.is_finite()) {
+        Some((term, &value)) => Err(ExportError::NotFinite { symbol: term.symbol(), value }),
+        None => Ok(()),
+    }
+}
+
 /// Checks that a body's parameters and the derived numbers in robot descriptions are within the magnitude limit.
 fn check_numbers(body: &str, inertial: &InertialParameters) -> Result<(), ExportError> {
     let com = inertial.com_m().map_or([0.0; 3], |com| com.0);
@@ -121,7 +199,7 @@ fn check_numbers(body: &str, inertial: &InertialParameters) -> Result<(), Export
     Ok(())
 }
 
-fn with_exact_right_angles(model: &Model) -> Result<Model, ExportError> {
+pub(crate) fn with_exact_right_angles(model: &Model) -> Result<Model, ExportError> {
     let sweep = |x: f64| if (x - x.round()).abs() < RIGHT_ANGLE_TOLERANCE && x.abs() < 1.5 { x.round() } else { x };
     let joint = |joint: &Joint| Joint {
         placement: Transform {

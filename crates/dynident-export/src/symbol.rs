@@ -29,8 +29,12 @@ impl Symbol {
         self.0
     }
 
+    pub(crate) fn input(input: Input, place: usize) -> Self {
+        in_graph(|graph| graph.input(input, place))
+    }
+
     pub(crate) fn inputs(input: Input, dof: usize) -> Vec<Self> {
-        (0..dof).map(|joint| in_graph(|graph| graph.input(input, joint))).collect()
+        (0..dof).map(|joint| Self::input(input, joint)).collect()
     }
 
     pub(crate) fn is_zero(self) -> bool {

@@ -5,7 +5,10 @@ use crate::drive_torque::reference_temperatures;
 use crate::equations::Equations;
 use crate::error::ExportError;
 use crate::exported::Exported;
-use crate::languages::{Source, c_header, cpp_header, matlab_function, python_module, rust_module};
+use crate::languages::{
+    Source, c_header, casadi_module, cpp_header, jax_module, matlab_function, pinocchio_module, python_module,
+    rust_module,
+};
 use crate::model_file::model_json;
 use crate::robot_model::RobotModel;
 use crate::ros2_parameters::ros2_parameters;
@@ -26,6 +29,12 @@ pub enum Target {
     Python,
     /// One function file for MATLAB and Octave.
     Matlab,
+    /// One Python module with a `casadi.Function` for each function.
+    Casadi,
+    /// One Python module of pure functions over JAX.
+    Jax,
+    /// One Python module that builds a model of Pinocchio, with a torque function.
+    Pinocchio,
     /// MuJoCo's MJCF.
     Mjcf,
     /// URDF.
@@ -40,12 +49,15 @@ pub enum Target {
 
 impl Target {
     /// All formats.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 13] = [
         Self::C,
         Self::Cpp,
         Self::Rust,
         Self::Python,
         Self::Matlab,
+        Self::Casadi,
+        Self::Jax,
+        Self::Pinocchio,
         Self::Mjcf,
         Self::Urdf,
         Self::Sdf,
@@ -56,11 +68,38 @@ impl Target {
     /// The class of torque terms that the form can hold; `None` if it can list all terms.
     pub fn class(self) -> Option<TermClass> {
         match self {
-            Self::C | Self::Cpp | Self::Rust | Self::Python | Self::Matlab => Some(TermClass::FunctionsOfMotion),
+            Self::C
+            | Self::Cpp
+            | Self::Rust
+            | Self::Python
+            | Self::Matlab
+            | Self::Casadi
+            | Self::Jax
+            | Self::Pinocchio => Some(TermClass::FunctionsOfMotion),
             Self::Mjcf => Some(TermClass::DampingFrictionAndInertia),
             Self::Urdf | Self::Sdf => Some(TermClass::DampingAndFriction),
             Self::Ros2Yaml | Self::Json => None,
         }
+    }
+
+    /// Whether the form is a program.
+    pub fn is_code(self) -> bool {
+        self.class() == Some(TermClass::FunctionsOfMotion)
+    }
+
+    /// Whether the code has a function with state for friction with memory.
+    pub fn has_state(self) -> bool {
+        self.is_code() && self != Self::Pinocchio
+    }
+
+    /// Whether the code can contain the regressor.
+    fn has_regressor(self) -> bool {
+        self.has_state()
+    }
+
+    /// Whether the code can have numbers of 32 bits.
+    fn has_float32(self) -> bool {
+        matches!(self, Self::C | Self::Cpp | Self::Rust)
     }
 
     /// Name on the command line.
@@ -71,6 +110,9 @@ impl Target {
             Self::Rust => "rust",
             Self::Python => "python",
             Self::Matlab => "matlab",
+            Self::Casadi => "casadi",
+            Self::Jax => "jax",
+            Self::Pinocchio => "pinocchio",
             Self::Mjcf => "mjcf",
             Self::Urdf => "urdf",
             Self::Sdf => "sdf",
@@ -80,13 +122,52 @@ impl Target {
     }
 }
 
+/// Options of code.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CodeOptions {
+    /// Numbers of 32 bits (C, C++ and Rust).
+    pub float32: bool,
+    /// Adds the regressor of the base parameters and their values: `inverse_dynamics = W(q, dq, ddq) parameters`.
+    pub regressor: bool,
+    /// Width of the steps near zero velocity, rad/s (m/s): see [`RobotModel::with_step_width`]. `None` keeps them.
+    pub step_width: Option<f64>,
+}
+
+impl CodeOptions {
+    fn check(self, target: Target) -> Result<(), ExportError> {
+        let is_wrong = |option, wanted: bool, has: fn(Target) -> bool| {
+            let targets = || Target::ALL.into_iter().filter(|&target| has(target)).map(Target::name).collect();
+            let error = || ExportError::Option { option, target: target.name(), targets: targets() };
+            if wanted && !has(target) { Err(error()) } else { Ok(()) }
+        };
+        is_wrong("float32", self.float32, Target::has_float32)?;
+        is_wrong("regressor", self.regressor, Target::has_regressor)?;
+        is_wrong("step-width", self.step_width.is_some(), Target::is_code)
+    }
+}
+
 /// Writes the robot in the format `target`; `further` are additional notes of the caller, such as the origin of the
 /// model.
 ///
 /// # Errors
-/// A torque term that is not a function of `q`, `dq` and `ddq` (load, Maxwell slip); a joint without inertia; or an
-/// overflow.
+/// A torque term with memory in code (see [`RobotModel::with_state_terms`]); a joint without inertia; or an overflow.
 pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<Exported, ExportError> {
+    export_with(robot, target, CodeOptions::default(), further)
+}
+
+/// As [`export`] with options of code.
+///
+/// # Errors
+/// As [`export`], or an option that the format does not have.
+pub fn export_with(
+    robot: &RobotModel,
+    target: Target,
+    options: CodeOptions,
+    further: &[String],
+) -> Result<Exported, ExportError> {
+    options.check(target)?;
+    let with_steps = options.step_width.map(|width| robot.with_step_width(width)).transpose()?;
+    let robot = with_steps.as_ref().unwrap_or(robot);
     let temperatures = reference_temperatures(robot);
     let at_reference = temperatures
         .iter()
@@ -95,8 +176,9 @@ pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<
     // Additional safety: shows invisible characters that a format did not escape.
     let finished = |exported: Exported| Exported { text: visible(&exported.text).into_owned(), ..exported };
     let code = |write: fn(&Source<'_>) -> String, notes: Vec<String>| {
-        let equations = Equations::of(robot)?;
-        let text = write(&Source { robot, equations: &equations, notes: &notes });
+        let most = if options.float32 { f64::from(f32::MAX) } else { f64::MAX };
+        let equations = Equations::of(robot, options.regressor, most)?;
+        let text = write(&Source { robot, equations: &equations, notes: &notes, float32: options.float32 });
         Ok(Exported { text, notes })
     };
     let exported = match target {
@@ -105,6 +187,9 @@ pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<
         Target::Rust => code(rust_module, notes),
         Target::Python => code(python_module, notes),
         Target::Matlab => code(matlab_function, notes),
+        Target::Casadi => code(casadi_module, notes),
+        Target::Jax => code(jax_module, notes),
+        Target::Pinocchio => code(pinocchio_module, notes),
         Target::Mjcf => mjcf(robot, notes),
         Target::Urdf => urdf(robot, notes),
         Target::Sdf => sdf(robot, notes),

@@ -188,7 +188,7 @@ fn identified(
         form_fits(
             &logs,
             settings,
-            &training.model.parametric,
+            &training.model,
             &examined.consistent.parameters,
             &chosen,
             &resting_joints(&training),

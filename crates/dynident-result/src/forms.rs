@@ -2,6 +2,7 @@
 
 use dynident_estimation::ValidationReport;
 use dynident_export::{ExportError, ModelFile, RobotModel};
+use dynident_model::InertialParameters;
 use dynident_model::terms::{TermClass, TorqueTerm};
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +30,10 @@ pub struct StoredModel {
     pub robot: ModelFile,
     /// All torque terms with their values.
     pub terms: Vec<FormTerm>,
+    /// With load-dependent friction: the ten inertial parameters of each body whose torque is the load (see
+    /// `method.load_parameters`). They are base parameters, not those of physically consistent bodies.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load_bodies: Option<Vec<[f64; 10]>>,
 }
 
 impl StoredModel {
@@ -38,7 +43,11 @@ impl StoredModel {
     /// A model that cannot be read, or terms that do not match it.
     pub fn robot(&self) -> Result<RobotModel, ExportError> {
         let terms = self.terms.iter().map(|one| one.term.clone()).collect();
-        self.robot.robot(terms, self.terms.iter().map(|one| one.value).collect())
+        let robot = self.robot.robot(terms, self.terms.iter().map(|one| one.value).collect())?;
+        match &self.load_bodies {
+            Some(bodies) => robot.with_load(bodies.iter().copied().map(InertialParameters).collect()),
+            None => Ok(robot),
+        }
     }
 }
 
@@ -103,12 +112,17 @@ impl FormJointError {
 }
 
 impl FormResult {
-    /// The errors of the form in sentences, one for each held-out log.
-    pub fn sentences(&self) -> impl Iterator<Item = String> {
+    /// Whether a term has a memory: for the class with state, whether it differs from code without state.
+    pub fn has_memory(&self) -> bool {
+        self.terms.iter().any(|one| one.term.has_memory())
+    }
+
+    /// The errors of the form in sentences, one for each held-out log; `what` is the name of the form.
+    pub fn sentences(&self, what: &str) -> impl Iterator<Item = String> {
         let percent = |value: Option<f64>| value.map_or_else(|| "unknown".to_owned(), |value| format!("{value:.2} %"));
         self.held_out.iter().map(move |error| {
             format!(
-                "Held-out torque error of this file: {} on {}; of the identified model: {}.",
+                "Held-out torque error of {what}: {} on {}; of the identified model: {}.",
                 percent(error.relative_error_percent),
                 error.log,
                 percent(error.model_relative_error_percent)

@@ -1,8 +1,8 @@
 //! A parametric model with the data that its regressor needs in addition to the motion.
 
 use dynident_dynamics::{BaseParameters, Column, PanelLayout, ParametricModel};
-use dynident_model::Model;
 use dynident_model::terms::TorqueTerm;
+use dynident_model::{InertialParameters, Model};
 
 /// Regrouping factors below this value are rounding errors.
 const MIN_REGROUPING_FACTOR: f64 = 1e-9;
@@ -113,6 +113,19 @@ impl RegressorModel {
             self.load_parameters = Some(self.layout().columns().iter().map(value).collect());
         }
         self
+    }
+
+    /// Inertial parameters whose rigid-body torque is the load of load-dependent friction: the load parameters at the
+    /// places of their columns. They are not those of physically consistent bodies. `None` without load parameters.
+    pub fn load_bodies(&self) -> Option<Vec<InertialParameters>> {
+        let parameters = self.load_parameters.as_ref()?;
+        let mut bodies = vec![InertialParameters::ZERO; self.model().body_count()];
+        for (column, &value) in self.layout().columns().iter().zip(parameters) {
+            if let Column::Body { body, parameter } = *column {
+                bodies[body].0[parameter] = value;
+            }
+        }
+        Some(bodies)
     }
 
     /// Whether some friction depends on the joint load.

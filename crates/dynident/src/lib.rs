@@ -8,7 +8,7 @@
 //! | logs to factors, and factors to one model | [`reduce()`], [`Factors`], [`identify_factors()`], [`factors_errors()`] |
 //! | predict torque along a motion, with its error band | [`TorquePredictor`] |
 //! | inspect a robot description | [`inspect()`]; correct it: [`mended()`] |
-//! | export a model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters, JSON; drives for a simulator; a payload for a controller | [`export_model()`], [`export_simulator()`], [`export_payload()`] |
+//! | export a model as C, C++, Rust, Python, MATLAB, CasADi, JAX, Pinocchio, MJCF, URDF, SDF, ROS 2 parameters, JSON; drives for a simulator; a payload for a controller | [`export_model()`], [`export_simulator()`], [`export_payload()`] |
 //! | dynamics for a table of states | [`evaluate()`] |
 //! | design a motion | [`design_study()`]; check an existing one: [`check_trajectory()`], [`check_log()`] |
 //! | contents of a recording | [`log_contents()`] |
@@ -80,8 +80,9 @@ pub use jobs::check::{CheckSettings, check, check_with};
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::export::{
-    EXPORT_VALIDATION_SUFFIX, export_model, export_payload, export_payload_of, export_result, export_simulator,
-    export_simulator_of, export_stored, export_validation, payload_validation, selected_payload, table_validation,
+    EXPORT_VALIDATION_SUFFIX, ExportSettings, export_model, export_payload, export_payload_of, export_result,
+    export_simulator, export_simulator_of, export_stored, export_validation, payload_validation, selected_payload,
+    table_validation,
 };
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{

@@ -2,11 +2,11 @@ use super::permission::ProgramOptions;
 use super::{Context, json, known_in, message_of, pretty_json};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
-use dynident::export::{ControllerBrand, Exported, Target};
+use dynident::export::{CodeOptions, ControllerBrand, Exported, Target};
 use dynident::result::{EXPORT_SCHEMA, ExportFile, ExportValidationFile};
 use dynident::{
-    EXPORT_VALIDATION_SUFFIX, OutputSet, ResultFile, export_payload_of, export_result, export_simulator_of,
-    export_stored, export_validation, payload_validation, selected_payload, study_inputs,
+    EXPORT_VALIDATION_SUFFIX, ExportSettings, OutputSet, ResultFile, export_payload_of, export_result,
+    export_simulator_of, export_stored, export_validation, payload_validation, selected_payload, study_inputs,
 };
 use std::path::{Path, PathBuf};
 
@@ -23,6 +23,15 @@ pub(crate) struct Options {
     /// The format.
     #[arg(long, value_enum, value_name = "FORM")]
     to: Form,
+    /// Code with numbers of 32 bits: c, cpp, rust.
+    #[arg(long)]
+    float32: bool,
+    /// Code with the regressor of the base parameters and their values.
+    #[arg(long)]
+    regressor: bool,
+    /// Width of the steps of friction near zero velocity in code, rad/s (m/s). Default: 0.002 rad/s of a typical arm.
+    #[arg(long, value_name = "WIDTH")]
+    step_width: Option<f64>,
     /// Which payload, if the result has several.
     #[arg(long, value_name = "NAME")]
     payload: Option<String>,
@@ -48,6 +57,12 @@ enum Form {
     Python,
     /// MATLAB and Octave, one function file.
     Matlab,
+    /// Python with CasADi, one module of casadi.Function.
+    Casadi,
+    /// Python with JAX, one module of pure functions.
+    Jax,
+    /// Python that builds a Pinocchio model, with a torque function.
+    Pinocchio,
     /// MuJoCo's MJCF.
     Mjcf,
     /// URDF.
@@ -97,6 +112,9 @@ impl Form {
             Self::Rust => Kind::Model(Target::Rust),
             Self::Python => Kind::Model(Target::Python),
             Self::Matlab => Kind::Model(Target::Matlab),
+            Self::Casadi => Kind::Model(Target::Casadi),
+            Self::Jax => Kind::Model(Target::Jax),
+            Self::Pinocchio => Kind::Model(Target::Pinocchio),
             Self::Mjcf => Kind::Model(Target::Mjcf),
             Self::Urdf => Kind::Model(Target::Urdf),
             Self::Sdf => Kind::Model(Target::Sdf),
@@ -135,13 +153,20 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         let (study, path) = with_study()?;
         export_simulator_of(&stored, &result, study, path, data).map_err(known_in(path))
     };
+    let code = CodeOptions { float32: options.float32, regressor: options.regressor, step_width: options.step_width };
+    if !matches!(options.to.kind(), Kind::Model(_)) && code != CodeOptions::default() {
+        return Err("--float32, --regressor and --step-width are options of code: omit them".to_owned());
+    }
     let exported = match options.to.kind() {
-        Kind::Model(target) => match &study {
-            Some((study, path)) => {
-                export_result(&stored, &result, study, path, data, target).map_err(known_in(path))?
+        Kind::Model(target) => {
+            let form = ExportSettings { target, code };
+            match &study {
+                Some((study, path)) => {
+                    export_result(&stored, &result, study, path, data, form).map_err(known_in(path))?
+                }
+                None => export_stored(&stored, &result, form).map_err(message_of)?,
             }
-            None => export_stored(&stored, &result, target).map_err(message_of)?,
-        },
+        }
         Kind::SimulatorJson => drives()?.json().map_err(|error| error.to_string())?,
         Kind::SimulatorTable => drives()?.table(),
         Kind::Payload(reader) => {

@@ -4,12 +4,15 @@ use super::common::{CommandOutcome, broken, run_in};
 use serde_json::{Value, json};
 use std::path::Path;
 
-const FORMS: [(&str, &str); 12] = [
+const FORMS: [(&str, &str); 15] = [
     ("c", "arm_inverse_dynamics(const double q[2]"),
     ("cpp", "inline Vector inverse_dynamics(const Vector& q"),
     ("rust", "pub fn inverse_dynamics<M: Math>(q: &[f64; 2]"),
     ("python", "def inverse_dynamics(q, dq, ddq):"),
     ("matlab", "case 'inverse_dynamics'"),
+    ("casadi", "return ca.Function(\"inverse_dynamics\", [q, dq, ddq]"),
+    ("jax", "import jax.numpy as jnp"),
+    ("pinocchio", "tree = pin.rnea(MODEL, DATA"),
     ("mjcf", "<mujoco model=\"arm\">"),
     ("urdf", "<robot name=\"arm\">"),
     ("sdf", "<model name=\"arm\">"),
@@ -63,6 +66,29 @@ fn every_form_is_written() {
             assert!(printed.stderr.contains(note.as_str().unwrap()), "{form}: {note}");
         }
     }
+}
+
+#[test]
+fn options_of_code() {
+    let folder = identified();
+    let at = folder.path();
+    let text = |more: &[&str]| {
+        let printed = export(at, more);
+        assert_eq!(printed.status, 0, "{}", printed.stderr);
+        printed.stdout
+    };
+    assert!(text(&["c", "--float32"]).contains("const float q[2]"));
+    let with_regressor = text(&["rust", "--regressor"]);
+    assert!(with_regressor.contains("pub fn regressor<M: Math>") && with_regressor.contains("parameter 0: "));
+    assert!(text(&["python", "--step-width", "0.5"]).contains("have a width of at least 0.5 rad/s"));
+    let refused = |more: &[&str], says: &str| {
+        let outcome = export(at, more);
+        assert_eq!(outcome.status, 2, "{}", outcome.stderr);
+        assert!(outcome.stderr.contains(says), "{}", outcome.stderr);
+    };
+    refused(&["urdf", "--float32"], "the form urdf has no option float32");
+    refused(&["c", "--step-width", "0"], "not a positive finite number");
+    refused(&["simulator", "--regressor"], "options of code");
 }
 
 #[test]

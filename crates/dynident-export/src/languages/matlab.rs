@@ -2,6 +2,7 @@
 //! one function.
 
 use super::Source;
+use crate::equations::StepEquation;
 use crate::graph::{Function, Function2, Input, Node};
 use crate::statements::Syntax;
 use core::fmt::Write;
@@ -31,7 +32,7 @@ impl Syntax for MatlabSyntax {
     }
 
     fn step(&self, of: &str, dead_band: f64) -> String {
-        format!("step_({of}, {dead_band:?})")
+        format!("sign_({of}, {dead_band:?})")
     }
 }
 
@@ -40,7 +41,9 @@ impl Syntax for MatlabSyntax {
 pub(crate) fn matlab_function(source: &Source<'_>) -> String {
     let (name, dof) = (format!("{}_dynamics", source.robot.identifier()), source.dof());
     let functions = &source.equations.functions;
-    let mut text = format!("function out = {name}(quantity, varargin)\n{}\n", source.comment("%"));
+    let step = source.equations.step.as_ref();
+    let outputs = if step.is_some() { "[out, state]" } else { "out" };
+    let mut text = format!("function {outputs} = {name}(quantity, varargin)\n{}\n", source.comment("%"));
     let _ = writeln!(text, "% Keep it as {name}.m. Joint vectors are columns or rows; columns come back.");
     for function in functions {
         let _ = writeln!(
@@ -52,6 +55,15 @@ pub(crate) fn matlab_function(source: &Source<'_>) -> String {
             function.about
         );
     }
+    if let Some(step) = step {
+        let _ = writeln!(
+            text,
+            "%   state = {name}('reset')  Starts a motion: elements with memory are undeflected at its first position.\n\
+             %   [tau, state] = {name}('step', state, {})  {}",
+            step.equation.arguments(),
+            step.equation.about
+        );
+    }
     text.push_str("  switch quantity\n");
     for function in functions {
         let arguments: Vec<String> =
@@ -59,13 +71,21 @@ pub(crate) fn matlab_function(source: &Source<'_>) -> String {
         let _ =
             write!(text, "    case '{}'\n      out = {}_({});\n", function.name, function.name, arguments.join(", "));
     }
+    if let Some(step) = step {
+        let _ = write!(
+            text,
+            "    case 'reset'\n      out = struct('last', [], 'z', zeros({}, 1));\n    case 'step'\n      \
+             [out, state] = step_(varargin{{1}}, joints_(varargin{{2}}), joints_(varargin{{3}}), joints_(varargin{{4}}));\n",
+            step.elements
+        );
+    }
     let _ = write!(
         text,
         "    otherwise\n      error('{name}: no quantity %s', quantity);\n  end\nend\n\n\
          function v = joints_(v)\n  if numel(v) ~= {dof}\n    error('{name}: a joint vector has {dof} entries, not %d', numel(v));\n  end\nend\n"
     );
     if source.equations.graph.has(|node| matches!(node, Node::Step(..))) {
-        text.push_str("\nfunction s = step_(x, band)\n  s = sign(x) * (abs(x) > band);\nend\n");
+        text.push_str("\nfunction s = sign_(x, band)\n  s = sign(x) * (abs(x) > band);\nend\n");
     }
     for function in functions {
         let statements = source.statements(function, &MatlabSyntax);
@@ -77,10 +97,36 @@ pub(crate) fn matlab_function(source: &Source<'_>) -> String {
         for (place, expression) in statements.outputs.iter().enumerate() {
             let _ = writeln!(text, "  out({}) = {expression};", place + 1);
         }
-        if function.is_matrix {
-            let _ = writeln!(text, "  out = reshape(out, {dof}, {dof}).';");
+        if let Some(columns) = function.columns {
+            let _ = writeln!(text, "  out = reshape(out, {columns}, {dof}).';");
         }
         text.push_str("end\n");
     }
+    if let Some(step) = step {
+        write_step(&mut text, source, step);
+    }
     text
+}
+
+fn write_step(text: &mut String, source: &Source<'_>, step: &StepEquation) {
+    let (dof, function) = (source.dof(), &step.equation);
+    let statements = source.statements(function, &MatlabSyntax);
+    let _ = write!(
+        text,
+        "\nfunction [out, state] = step_(state, {})\n  if isempty(state.last)\n    state.last = q;\n  end\n  \
+         last = state.last;\n  z = state.z;\n",
+        function.arguments()
+    );
+    for (variable, expression) in &statements.lines {
+        let _ = writeln!(text, "  {variable} = {expression};");
+    }
+    let _ = writeln!(text, "  out = zeros({dof}, 1);");
+    let (tau, deflections) = statements.outputs.split_at(dof);
+    for (place, expression) in tau.iter().enumerate() {
+        let _ = writeln!(text, "  out({}) = {expression};", place + 1);
+    }
+    for (place, expression) in deflections.iter().enumerate() {
+        let _ = writeln!(text, "  state.z({}) = {expression};", place + 1);
+    }
+    text.push_str("  state.last = q;\nend\n");
 }

@@ -1,14 +1,20 @@
 //! One file per language: syntax of expressions and surrounding code.
 
 mod c;
+mod casadi;
 mod cpp;
+mod jax;
 mod matlab;
+mod pinocchio;
 mod python;
 mod rust;
 
 pub(crate) use c::c_header;
+pub(crate) use casadi::casadi_module;
 pub(crate) use cpp::cpp_header;
+pub(crate) use jax::jax_module;
 pub(crate) use matlab::matlab_function;
+pub(crate) use pinocchio::pinocchio_module;
 pub(crate) use python::python_module;
 pub(crate) use rust::rust_module;
 
@@ -21,6 +27,13 @@ pub(crate) struct Source<'a> {
     pub(crate) robot: &'a RobotModel,
     pub(crate) equations: &'a Equations,
     pub(crate) notes: &'a [String],
+    /// Numbers of 32 bits in place of 64; in C, C++ and Rust.
+    pub(crate) float32: bool,
+}
+
+/// A number that parses to the same bits; with 32 bits the nearest number of 32 bits.
+fn number(value: f64, float32: bool) -> String {
+    if float32 { format!("{:?}", value as f32) } else { format!("{value:?}") }
 }
 
 impl Source<'_> {
@@ -43,7 +56,9 @@ impl Source<'_> {
         let units = "SI units: rad, Nm (m, N at joints that slide); joint vectors in this order:".to_owned();
         let joints = self.robot.model().joints().iter().enumerate();
         let joints = joints.map(|(place, joint)| format!("  {place}  {}", joint.name));
-        let lines = [title, units].into_iter().chain(joints).chain(self.notes.iter().cloned());
+        let names = self.equations.parameters.iter().enumerate();
+        let parameters = names.map(|(place, name)| format!("  parameter {place}: {name}"));
+        let lines = [title, units].into_iter().chain(joints).chain(self.notes.iter().cloned()).chain(parameters);
         lines.map(|line| format!("{mark} {}", dynident_text::comment(&line))).collect::<Vec<_>>().join("\n")
     }
 }

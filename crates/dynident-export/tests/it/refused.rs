@@ -1,8 +1,8 @@
 //! Errors of models that cannot be exported.
 
 use super::common::{all_terms, tree};
-use dynident_export::{RobotModel, Target, export};
-use dynident_model::terms::{CoulombShape, LoadFriction, MaxwellSlip, Offset, Stribeck, TorqueTerm};
+use dynident_export::{CodeOptions, RobotModel, Target, export, export_with};
+use dynident_model::terms::{Coulomb, CoulombShape, MaxwellSlip, Offset, Stribeck, TorqueTerm};
 use dynident_model::{InertialParameters, read_urdf};
 
 fn message(term: TorqueTerm) -> String {
@@ -13,10 +13,46 @@ fn message(term: TorqueTerm) -> String {
 
 #[test]
 fn terms_that_need_more_than_the_motion() {
-    let load = message(TorqueTerm::Load(LoadFriction { joint: 1, shape: CoulombShape::Smooth { width: 0.1 } }));
-    assert!(load.contains("fl2 (load)") && load.contains("the torque that the gear carries"), "{load}");
     let slip = message(TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: 0.01 }));
     assert!(slip.contains("slip1_0.01 (maxwell-slip)") && slip.contains("the motion before"), "{slip}");
+}
+
+#[test]
+fn options_of_other_forms() {
+    let with = |target, options| export_with(&tree(), target, options, &[]).unwrap_err().to_string();
+    let float32 = CodeOptions { float32: true, ..CodeOptions::default() };
+    let message = with(Target::Python, float32);
+    assert_eq!(message, "the form python has no option float32: omit the option, or use one of c, cpp, rust");
+    let regressor = CodeOptions { regressor: true, ..CodeOptions::default() };
+    assert!(with(Target::Urdf, regressor).contains("the form urdf has no option regressor"));
+    let width = |width| CodeOptions { step_width: Some(width), ..CodeOptions::default() };
+    assert!(with(Target::Json, width(0.1)).contains("step-width"));
+    for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(with(Target::C, width(wrong)).contains("is not a positive finite number"));
+    }
+    // A number of 32 bits ends at 3.4e38.
+    let model = tree().model().clone();
+    let large = RobotModel::new(model, vec![TorqueTerm::Offset(Offset { joint: 0 })], vec![1e39]).unwrap();
+    assert!(export_with(&large, Target::C, float32, &[]).is_err() && export(&large, Target::C, &[]).is_ok());
+}
+
+/// Signs and narrow steps get the requested width, wider steps keep theirs.
+#[test]
+fn steps_have_the_requested_width() {
+    let model = tree().model().clone();
+    let step = |joint, shape| TorqueTerm::Coulomb(Coulomb { joint, shape });
+    let shapes = [
+        CoulombShape::Sign { dead_band: 0.01 },
+        CoulombShape::Smooth { width: 1e-4 },
+        CoulombShape::Smooth { width: 0.5 },
+    ];
+    let terms = shapes.into_iter().enumerate().map(|(joint, shape)| step(joint, shape)).collect();
+    let robot = RobotModel::new(model, terms, vec![1.0, 2.0, 3.0]).unwrap();
+    let options = CodeOptions { step_width: Some(0.125), ..CodeOptions::default() };
+    let text = export_with(&robot, Target::C, options, &[]).unwrap().text;
+    for line in ["tanh(8.0 * dq[0])", "2.0 * tanh(8.0 * dq[1])", "3.0 * tanh(2.0 * dq[2])"] {
+        assert!(text.contains(line), "{line}: {text}");
+    }
 }
 
 #[test]

@@ -29,7 +29,7 @@ pub struct FormFit {
 
 /// Fits the terms of every class to the training recordings `training` and tests them on the held-out recordings.
 /// `parameters` are all parameters of the identified model `robot`: ten for each body and one for each term. The bodies
-/// are kept. For each joint `j` with terms of its own `x_j`,
+/// are kept, and so is the load of load-dependent friction. For each joint `j` with terms of its own `x_j`,
 ///
 /// ```text
 /// min_x Σ ‖τ_j − W_j θ_bodies − A_j x_j‖²,    x_j ≥ 0 where the term cannot be negative
@@ -43,7 +43,7 @@ pub struct FormFit {
 pub fn form_fits(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
-    robot: &ParametricModel,
+    robot: &RegressorModel,
     parameters: &[f64],
     training: &[usize],
     resting: &[usize],
@@ -90,35 +90,37 @@ struct WideModel<'a> {
 }
 
 impl<'a> WideModel<'a> {
-    fn new(robot: &'a ParametricModel, parameters: &'a [f64]) -> Result<Self, IdentificationError> {
+    fn new(identified: &'a RegressorModel, parameters: &'a [f64]) -> Result<Self, IdentificationError> {
+        let robot = &identified.parametric;
         let mut terms: Vec<TorqueTerm> = robot.terms().to_vec();
         for class in TermClass::ALL {
-            for joint in 0..robot.dof() {
-                for term in class.terms_of_joint(robot.model(), robot.terms(), joint).into_iter().flatten() {
-                    if !terms.contains(&term) {
-                        terms.push(term);
-                    }
+            let of_joints = (0..robot.dof())
+                .flat_map(|joint| class.terms_of_joint(robot.model(), robot.terms(), joint).into_iter().flatten());
+            let shared = robot.terms().iter().filter(|term| term.own_joint().is_none());
+            for term in of_joints.chain(shared.map(|term| class.in_form(robot.model(), term))) {
+                if !terms.contains(&term) {
+                    terms.push(term);
                 }
             }
         }
-        terms.retain(|term| !term.has_memory() && !term.needs_temperature());
+        terms.retain(|term| !term.needs_temperature());
         sort_terms(&mut terms);
         let parametric = robot.with_terms(terms)?;
         let bodies = parameters.len() - robot.terms().len();
         let mut rigid = parameters[..bodies].to_vec();
         rigid.resize(bodies + parametric.terms().len(), 0.0);
         let theta_bodies = parametric.base().values(&rigid);
-        let mut model = RegressorModel::from(parametric);
-        if model.needs_load() {
-            model.load_parameters = Some(theta_bodies.clone());
-        }
+        let model = match &identified.load_parameters {
+            Some(load) => RegressorModel::from(parametric).with_load_of(identified, load),
+            None => RegressorModel::from(parametric),
+        };
         Ok(Self { robot, parameters, model, theta_bodies })
     }
 
-    /// The value of a term in the identified model; zero if it has no such term.
+    /// The value of a term in the identified model, there possibly with another step; zero if it has no such term.
     fn value(&self, term: &TorqueTerm) -> f64 {
         let bodies = self.parameters.len() - self.robot.terms().len();
-        let place = self.robot.terms().iter().position(|own| own == term);
+        let place = self.robot.terms().iter().position(|own| own.symbol() == term.symbol());
         place.map_or(0.0, |place| self.parameters[bodies + place])
     }
 
@@ -147,9 +149,10 @@ impl<'a> WideModel<'a> {
         let is_held = |term: &&TorqueTerm| term.own_joint().is_none() || is_spring(term);
         for term in self.robot.terms().iter().filter(is_held) {
             if class.holds(term) {
-                let value = self.value(term);
-                self.add(&mut theta, term, value);
-                fit.terms.push(term.clone());
+                let (value, held) = (self.value(term), class.in_form(self.robot.model(), term));
+                self.add(&mut theta, &held, value);
+                fit.is_refitted |= held != *term;
+                fit.terms.push(held);
                 fit.values.push(value);
             } else {
                 fit.is_refitted = true;
@@ -212,7 +215,12 @@ impl<'a> WideModel<'a> {
             }
             column[0]
         };
-        let is_fitted = |term: &&TorqueTerm| term.own_joint() == Some(joint) && term.is_joint_friction();
+        // Friction that both have and that depends on more than the velocity keeps its value.
+        let is_kept = |term: &TorqueTerm| {
+            (term.has_memory() || term.needs_load()) && terms.iter().any(|kept| kept.symbol() == term.symbol())
+        };
+        let is_fitted =
+            |term: &&TorqueTerm| term.own_joint() == Some(joint) && term.is_joint_friction() && !is_kept(term);
         let fitted: Vec<&TorqueTerm> = terms.iter().filter(is_fitted).collect();
         let own: Vec<&TorqueTerm> =
             self.robot.terms().iter().filter(is_fitted).filter(|term| !term.needs_temperature()).collect();

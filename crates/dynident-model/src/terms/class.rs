@@ -13,13 +13,21 @@ pub enum TermClass {
     DampingAndFriction,
     /// The same with the drive inertia and the spring of each joint: MJCF.
     DampingFrictionAndInertia,
-    /// All terms that are functions of the current position, velocity and acceleration: code.
+    /// All terms that are functions of the current position, velocity and acceleration, with smooth steps: code.
     FunctionsOfMotion,
+    /// The same and friction with memory: the function with state in code.
+    WithState,
 }
 
 impl TermClass {
     /// All classes.
-    pub const ALL: [Self; 3] = [Self::DampingAndFriction, Self::DampingFrictionAndInertia, Self::FunctionsOfMotion];
+    pub const ALL: [Self; 4] =
+        [Self::DampingAndFriction, Self::DampingFrictionAndInertia, Self::FunctionsOfMotion, Self::WithState];
+
+    /// Least width of the steps of the code classes, rad/s or m/s of a typical arm
+    /// ([`CharacteristicScale::velocity`](crate::CharacteristicScale::velocity)). A sign and a narrower step get this
+    /// width, so that equal joints have equal steps and no code switches at a velocity of zero.
+    pub const CODE_STEP_WIDTH: f64 = 0.002;
 
     /// The terms of joint `joint`, without its spring, in a form of this class, for a robot with the terms `terms`.
     /// Several lists are alternatives: the one with the smallest residual should be taken.
@@ -38,13 +46,16 @@ impl TermClass {
                 let drive = TorqueTerm::DriveInertia(DriveInertia { joint });
                 vec![simple().into_iter().chain(own().find(|term| *term == drive)).collect()]
             }
-            Self::FunctionsOfMotion => {
-                let kept: Vec<TorqueTerm> = own().filter(Self::is_function_of_motion).collect();
-                let has_step = kept.iter().any(|term| term.is_joint_friction() && term.step().is_some());
-                if has_step || own().all(|term| Self::is_function_of_motion(&term)) {
+            Self::FunctionsOfMotion | Self::WithState => {
+                let is_held =
+                    |term: &TorqueTerm| !term.needs_temperature() && (self == Self::WithState || !term.has_memory());
+                let kept: Vec<TorqueTerm> = own().filter(is_held).map(|term| self.in_form(model, &term)).collect();
+                let is_step = |term: &TorqueTerm| term.step().is_some() && !term.needs_load() || term.has_memory();
+                let has_step = kept.iter().any(|term| term.is_joint_friction() && is_step(term));
+                if has_step || own().all(|term| is_held(&term)) {
                     return vec![kept];
                 }
-                // Friction with memory is Coulomb friction until the joint reverses; friction under load has its sign.
+                // Friction with memory is Coulomb friction until the joint reverses.
                 let is_rotary = model.joints()[joint].is_rotary();
                 let widths = STEP_WIDTHS.map(|width| model.characteristic_scale().velocity(is_rotary, width));
                 let with_step = |width: f64| {
@@ -63,13 +74,26 @@ impl TermClass {
             Self::DampingAndFriction | Self::DampingFrictionAndInertia => {
                 matches!(term, TorqueTerm::Viscous(_) | TorqueTerm::Coulomb(_))
             }
-            Self::FunctionsOfMotion => Self::is_function_of_motion(&term),
+            Self::FunctionsOfMotion => !term.has_memory() && !term.needs_temperature(),
+            Self::WithState => !term.needs_temperature(),
         }
     }
 
-    /// Whether a term depends only on the current motion: not on earlier motion, the load of the gear or a temperature.
-    fn is_function_of_motion(term: &TorqueTerm) -> bool {
-        !term.has_memory() && !term.needs_load() && !term.needs_temperature()
+    /// The term as forms of this class contain it: in code with a smooth step of at least
+    /// [`CODE_STEP_WIDTH`](Self::CODE_STEP_WIDTH).
+    #[must_use]
+    pub fn in_form(self, model: &Model, term: &TorqueTerm) -> TorqueTerm {
+        match self {
+            Self::DampingAndFriction | Self::DampingFrictionAndInertia => term.clone(),
+            Self::FunctionsOfMotion | Self::WithState => {
+                let is_rotary = term.joints().first().is_none_or(|&joint| model.joints()[joint].is_rotary());
+                let least = model.characteristic_scale().velocity(is_rotary, Self::CODE_STEP_WIDTH);
+                term.clone().with_step(|step| match step {
+                    CoulombShape::Sign { .. } => CoulombShape::Smooth { width: least },
+                    CoulombShape::Smooth { width } => CoulombShape::Smooth { width: width.max(least) },
+                })
+            }
+        }
     }
 
     /// Whether the class can hold a coupling of two joints or a spring, with its value.
@@ -78,10 +102,10 @@ impl TermClass {
         match self {
             Self::DampingAndFriction => false,
             Self::DampingFrictionAndInertia => is_spring,
-            Self::FunctionsOfMotion => true,
+            Self::FunctionsOfMotion | Self::WithState => true,
         }
     }
 }
 
-/// Candidate widths of the smooth step that replaces friction with memory or under load, rad/s or m/s of a usual arm.
+/// Candidate widths of the smooth step that replaces friction with memory, rad/s or m/s of a usual arm.
 const STEP_WIDTHS: [f64; 4] = [0.005, 0.02, 0.05, 0.1];

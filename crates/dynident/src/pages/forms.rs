@@ -10,7 +10,9 @@ pub(super) fn forms(page: &mut Report, r: &ResultFile) {
         return;
     }
     let percent = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2} %"));
-    let rows = r.forms.iter().flat_map(|form| {
+    // Without friction with memory, code with state is that without.
+    let shown = r.forms.iter().filter(|form| form.class != TermClass::WithState || form.has_memory());
+    let rows = shown.flat_map(|form| {
         // The columns of the table "What each form can hold" of the book (docs/src/export.md).
         let (held, refitted) = match form.class {
             TermClass::DampingAndFriction => {
@@ -21,13 +23,19 @@ pub(super) fn forms(page: &mut Report, r: &ResultFile) {
                 "damping, friction and drive inertia of each joint",
             ),
             TermClass::FunctionsOfMotion => (
-                "all terms that depend on the current motion",
-                "joints that have friction with memory, under load or with temperature",
+                "all terms that depend on the current motion, with smooth steps",
+                "joints with friction that has memory or depends on temperature, with a sign or with a narrow step",
+            ),
+            TermClass::WithState => (
+                "the same, and friction with memory",
+                "joints with friction that depends on temperature, with a sign or with a narrow step",
             ),
         };
         let refitted = if form.refitted { refitted } else { "nothing: all terms are kept" };
         let row = move |log: &str, error: Option<f64>, model: Option<f64>| {
-            let cells = [form.forms.join(", "), held.to_owned(), refitted.to_owned(), log.to_owned()];
+            let names = form.forms.join(", ");
+            let names = if form.class == TermClass::WithState { format!("function step of {names}") } else { names };
+            let cells = [names, held.to_owned(), refitted.to_owned(), log.to_owned()];
             let errors = [percent(error), percent(model)];
             cells.into_iter().chain(errors).map(Into::into).collect::<Vec<_>>()
         };

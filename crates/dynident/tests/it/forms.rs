@@ -2,11 +2,11 @@
 
 use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
 use dynident::dynamics::{Workspace, inverse_dynamics};
-use dynident::export_stored;
 use dynident::model::{Model, load_robot};
 use dynident::result::{FormResult, ResultFile};
+use dynident::{export_result, export_stored};
 use dynident_export::Target;
-use dynident_model::terms::TermClass;
+use dynident_model::terms::{Coulomb, CoulombShape, TermClass, TorqueTerm};
 use std::path::Path;
 
 /// Standard deviation of the torque noise, Nm.
@@ -147,8 +147,55 @@ fn friction_with_memory_is_replaced_in_code() {
     }
     let code = form(&found.result, TermClass::FunctionsOfMotion);
     assert!(code.refitted && code.terms.iter().all(|one| !one.term.has_memory()));
+    // The function with state holds the whole model.
+    let with_state = form(&found.result, TermClass::WithState);
+    assert!(!with_state.refitted && with_state.has_memory() && with_state.forms.contains(&"c".to_owned()));
+    let of_state = &with_state.held_out[0];
+    let (own, model) = (of_state.relative_error_percent.unwrap(), of_state.model_relative_error_percent.unwrap());
+    // The same prediction, summed in another order.
+    assert!((own / model - 1.0).abs() < 1e-9, "{own} and {model}");
+    let c = export_stored(&found.result, &path, Target::C).unwrap();
+    assert!(c.text.contains("_step(") && c.text.contains("_reset("));
+    assert!(c.notes.iter().any(|note| note.starts_with("Held-out torque error of the function step: ")));
     // The true friction is a smooth step, so the step that replaces the slip is at least as good.
     let error = &code.held_out[0];
     let (form, model) = (error.relative_error_percent.unwrap(), error.model_relative_error_percent.unwrap());
     assert!(form < 1.05 * model, "{form} and {model}");
+}
+
+/// Code holds friction under load: nothing is fitted again, and the error is that of the model.
+#[test]
+fn friction_under_load_is_held_by_code() {
+    let (folder, description) = (tempfile::tempdir().unwrap(), repository("robots/planar2r.urdf"));
+    let truth = Truth::near(&description, 0.1, false);
+    recorded(&folder.path().join("train.csv"), &truth, 1);
+    recorded(&folder.path().join("test.csv"), &truth, 2);
+    let drive = "friction = \"stated\"\nviscous = true\nlaws = [{ law = \"load\", width = 0.05 }]";
+    let job = Job::new(folder.path(), &study(&description, truth.drive.len(), drive));
+    let found = job.identify();
+    let code = form(&found.result, TermClass::FunctionsOfMotion);
+    assert!(!code.refitted && code.terms.iter().any(|one| one.term.needs_load()));
+    let error = &code.held_out[0];
+    let (form, model) = (error.relative_error_percent.unwrap(), error.model_relative_error_percent.unwrap());
+    assert!((form / model - 1.0).abs() < 1e-9, "{form} and {model}");
+    // The load is the same with and without the study.
+    let path = folder.path().join("result.json");
+    let stored = export_stored(&found.result, &path, Target::C).unwrap().text;
+    assert!(stored.contains("_load_friction("));
+    let with_study = export_result(&found.result, &path, &job.study, &job.path, None, Target::C).unwrap();
+    assert_eq!(stored, with_study.text);
+}
+
+/// Two equal joints get equal steps, even if one was identified with a sign and the other with a narrow step.
+#[test]
+fn equal_joints_have_equal_steps() {
+    let model = load_robot(repository("robots/ur10.urdf")).unwrap().model;
+    let step = |joint, shape| TorqueTerm::Coulomb(Coulomb { joint, shape });
+    let terms = [step(0, CoulombShape::Sign { dead_band: 0.01 }), step(1, CoulombShape::Smooth { width: 1.2e-4 })];
+    for class in [TermClass::FunctionsOfMotion, TermClass::WithState] {
+        let widths = [0, 1].map(|joint| class.terms_of_joint(&model, &terms, joint)[0][0].step_width().unwrap());
+        assert!(widths[0] == widths[1] && widths[0] > 1e-3 && widths[0] < 5e-3, "{widths:?}");
+        let wide = step(2, CoulombShape::Smooth { width: 0.3 });
+        assert_eq!(class.in_form(&model, &wide), wide);
+    }
 }

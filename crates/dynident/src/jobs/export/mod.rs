@@ -9,16 +9,32 @@ pub use validation::{EXPORT_VALIDATION_SUFFIX, export_validation, payload_valida
 use crate::error::Error;
 use crate::jobs::recorded_velocities::recorded_velocities;
 use crate::jobs::violations::violations;
-use crate::result::ResultFile;
+use crate::result::{FormResult, ResultFile};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_export::{
-    ControllerBrand, ExportError, Exported, PayloadBody, RobotModel, Target, export, notes_on_omitted, payload_command,
+    CodeOptions, ControllerBrand, ExportError, Exported, PayloadBody, RobotModel, Target, export_with,
+    notes_on_omitted, payload_command,
 };
 use dynident_identification::Role;
 use dynident_identification::payload::{ControllerPayload, ControllerValue, PayloadResult};
-use dynident_model::terms::TorqueTerm;
+use dynident_model::terms::{TermClass, TorqueTerm};
 use dynident_model::{InertialParameters, Mat3, Vec3};
 use std::path::Path;
+
+/// A form with options.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExportSettings {
+    /// The form.
+    pub target: Target,
+    /// Options of code.
+    pub code: CodeOptions,
+}
+
+impl From<Target> for ExportSettings {
+    fn from(target: Target) -> Self {
+        Self { target, code: CodeOptions::default() }
+    }
+}
 
 /// Exports the model of a `result.json` to `target`: bodies, friction and drives as in `identified.urdf` (physically
 /// consistent unless the study disables this). `study` is the study of the result; its robot is also searched in the
@@ -31,9 +47,9 @@ pub fn export_model(
     study: &Study,
     study_path: &Path,
     data: Option<&Path>,
-    target: Target,
+    form: impl Into<ExportSettings>,
 ) -> Result<Exported, Error> {
-    export_result(&ResultFile::read(result_path)?, result_path, study, study_path, data, target)
+    export_result(&ResultFile::read(result_path)?, result_path, study, study_path, data, form)
 }
 
 /// Like [`export_model()`] with a result in memory; `result_path` is its name in messages.
@@ -46,17 +62,21 @@ pub fn export_result(
     study: &Study,
     study_path: &Path,
     data: Option<&Path>,
-    target: Target,
+    form: impl Into<ExportSettings>,
 ) -> Result<Exported, Error> {
     let robot = robot_model(stored, result_path, study, study_path, data)?;
-    written(stored, result_path, &robot, target)
+    written(stored, result_path, &robot, form.into())
 }
 
 /// As [`export_result()`] without the study: for a result that holds its robot.
 ///
 /// # Errors
 /// A result of an older version, which does not hold its robot; [`Error::Export`] for what the form cannot hold at all.
-pub fn export_stored(stored: &ResultFile, result_path: &Path, target: Target) -> Result<Exported, Error> {
+pub fn export_stored(
+    stored: &ResultFile,
+    result_path: &Path,
+    form: impl Into<ExportSettings>,
+) -> Result<Exported, Error> {
     let Some(model) = &stored.model else {
         let message = "does not contain the robot: name the study that the result was made with (--study STUDY.toml)";
         return Err(Error::Result { path: result_path.to_owned(), message: message.to_owned() });
@@ -69,29 +89,58 @@ pub fn export_stored(stored: &ResultFile, result_path: &Path, target: Target) ->
     }
     let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
     let robot = model.robot().and_then(|robot| with_velocities(stored, robot)).map_err(cannot)?;
-    written(stored, result_path, &robot, target)
+    written(stored, result_path, &robot, form.into())
 }
 
 /// The identified robot in a form, with the terms that were fitted for the class of the form.
-fn written(stored: &ResultFile, result_path: &Path, robot: &RobotModel, target: Target) -> Result<Exported, Error> {
+fn written(
+    stored: &ResultFile,
+    result_path: &Path,
+    robot: &RobotModel,
+    settings: ExportSettings,
+) -> Result<Exported, Error> {
+    let ExportSettings { target, code } = settings;
     let mut notes = reservations(stored);
-    let form = target.class().and_then(|class| stored.forms.iter().find(|form| form.class == class));
-    let made = match form {
-        None => export(robot, target, &notes),
-        Some(form) => {
-            if form.refitted {
-                let note = "This form cannot contain all torque terms of the result: friction and drives were fitted \
-                            again to the training logs.";
-                notes.push(note.to_owned());
-            }
-            notes.extend(form.sentences());
-            let terms: Vec<TorqueTerm> = form.terms.iter().map(|one| one.term.clone()).collect();
-            notes.extend(notes_on_omitted(robot, &terms));
-            let values = form.terms.iter().map(|one| one.value).collect();
-            RobotModel::new(robot.model().clone(), terms, values).and_then(|robot| export(&robot, target, &notes))
+    let of_class = |class| stored.forms.iter().find(|form| form.class == class);
+    let form = target.class().and_then(of_class);
+    let with_state = of_class(TermClass::WithState).filter(|form| target.has_state() && form.has_memory());
+    if let Some(form) = form {
+        if form.refitted {
+            let note = "This form cannot contain all torque terms or steps of the result: friction and drives were \
+                        fitted again to the training logs.";
+            notes.push(note.to_owned());
         }
+        notes.extend(form.sentences("this file"));
+        let terms: Vec<TorqueTerm> = form.terms.iter().map(|one| one.term.clone()).collect();
+        notes.extend(notes_on_omitted(robot, &terms));
+    }
+    if let Some(form) = with_state {
+        notes.push("Friction with memory is contained in the function step, which has a state.".to_owned());
+        notes.extend(form.sentences("the function step"));
+    }
+    if let Some(width) = code.step_width {
+        notes.push(format!("Steps near zero velocity have a width of at least {width:?} rad/s (m/s), as requested; the errors are those of the fitted widths."));
+    }
+    let terms_of = |form: &FormResult| -> (Vec<TorqueTerm>, Vec<f64>) {
+        form.terms.iter().map(|one| (one.term.clone(), one.value)).unzip()
     };
-    made.map_err(|source| Error::Export { path: result_path.to_owned(), source: Box::new(source) })
+    let made = || {
+        let (terms, values) = match (form, target.class()) {
+            (Some(form), _) => terms_of(form),
+            // Without fitted terms, those of the result with the steps of the class.
+            (None, Some(class)) => {
+                robot.terms().map(|(term, value)| (class.in_form(robot.model(), term), value)).unzip()
+            }
+            (None, None) => return export_with(robot, target, code, &notes),
+        };
+        let mut robot = robot.with_terms(terms, values)?;
+        if let Some((terms, values)) = with_state.map(terms_of) {
+            robot = robot.with_state_terms(terms, values)?;
+        }
+        let robot = if form.is_some() && !target.is_code() { robot } else { with_velocities(stored, robot)? };
+        export_with(&robot, target, code, &notes)
+    };
+    made().map_err(|source| Error::Export { path: result_path.to_owned(), source: Box::new(source) })
 }
 
 fn reservations(stored: &ResultFile) -> Vec<String> {
@@ -144,7 +193,12 @@ fn robot_model(
             violations.join("; ")
         )));
     }
+    let load = stored.regressor_model(path, &robot.parametric)?.load_bodies();
     let made = RobotModel::new(model, robot.terms().to_vec(), values);
+    let made = made.and_then(|made| match load {
+        Some(bodies) => made.with_load(bodies),
+        None => Ok(made),
+    });
     made.and_then(|made| with_velocities(stored, made))
         .map_err(|source| Error::Export { path: path.to_owned(), source: Box::new(source) })
 }

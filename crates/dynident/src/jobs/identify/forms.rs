@@ -7,7 +7,7 @@ use dynident_export::{ModelFile, RobotModel, Target};
 use dynident_identification::Identification;
 use dynident_identification::forms::FormFit;
 use dynident_model::InertialParameters;
-use dynident_model::terms::TorqueTerm;
+use dynident_model::terms::{TermClass, TorqueTerm};
 
 /// The results of all classes of forms.
 pub(super) fn form_results(found: &Identification) -> Vec<FormResult> {
@@ -25,7 +25,10 @@ fn form_result(found: &Identification, form: &FormFit) -> FormResult {
             joints: FormJointError::of_joints(report, model),
         })
     };
-    let has_class = |target: &Target| target.class() == Some(form.class);
+    let has_class = |target: &Target| match form.class {
+        TermClass::WithState => target.has_state(),
+        class => target.class() == Some(class),
+    };
     FormResult {
         class: form.class,
         forms: Target::ALL.into_iter().filter(has_class).map(|target| target.name().to_owned()).collect(),
@@ -45,7 +48,12 @@ pub(super) fn stored_model(
     let values = &found.consistent.parameters[model.model().inertial_count()..];
     let robot = model.model().with_inertials(inertials).ok()?.with_missing_limits(|joint| study.joint_limits(joint));
     let robot = RobotModel::new(robot, model.terms().to_vec(), values.to_vec()).ok()?;
-    Some(StoredModel { robot: ModelFile::of(&robot, &[]), terms: form_terms(model.terms(), values) })
+    let load_bodies = found.model().load_bodies().filter(|_| found.model().needs_load());
+    Some(StoredModel {
+        robot: ModelFile::of(&robot, &[]),
+        terms: form_terms(model.terms(), values),
+        load_bodies: load_bodies.map(|bodies| bodies.iter().map(|body| body.0).collect()),
+    })
 }
 
 fn form_terms(terms: &[TorqueTerm], values: &[f64]) -> Vec<FormTerm> {

@@ -200,7 +200,9 @@ impl ModelFiles {
     pub(super) fn with_provenance(self, provenance: &Provenance, forms: &[FormResult]) -> Self {
         let errors = |class: TermClass| -> String {
             let form = forms.iter().find(|form| form.class == class);
-            form.map_or_else(String::new, |form| form.sentences().map(|sentence| format!(". {sentence}")).collect())
+            form.map_or_else(String::new, |form| {
+                form.sentences("this file").map(|sentence| format!(". {sentence}")).collect()
+            })
         };
         let line = provenance_line(provenance, &errors(TermClass::DampingAndFriction));
         let line_of_mjcf = provenance_line(provenance, &errors(TermClass::DampingFrictionAndInertia));
