@@ -102,7 +102,8 @@ pub(crate) fn frictions(
 }
 
 /// Notes on the terms of the identified robot that a form with the terms `kept` leaves out or replaces. Friction that
-/// other friction of the same joint replaces is noted if it depends on load or memory. A term with another step is kept.
+/// other friction of the same joint replaces is noted if it depends on load or memory. A term with another step is
+/// kept.
 pub fn notes_on_omitted(robot: &RobotModel, kept: &[TorqueTerm]) -> Vec<String> {
     let omitted = robot.terms().filter(|(term, _)| kept.iter().all(|one| one.symbol() != term.symbol()));
     omitted

@@ -33,8 +33,8 @@ impl From<Target> for ExportSettings {
     }
 }
 
-/// Exports the model of a `result.json` in the form `form`: bodies, friction and drives as in `identified.urdf` (physically
-/// consistent unless the study disables this). `study` is the study of the result; its robot is also searched in the
+/// Exports the model of a `result.json` in the form `form`: bodies, friction and drives as in `identified.urdf`
+/// (physically consistent unless the study disables this). `study` is the study of the result; its robot is also searched in the
 /// folder `data`.
 ///
 /// # Errors
