@@ -34,8 +34,8 @@ impl From<Target> for ExportSettings {
 }
 
 /// Exports the model of a `result.json` in the form `form`: bodies, friction and drives as in `identified.urdf`
-/// (physically consistent unless the study disables this). `study` is the study of the result; its robot is also searched in the
-/// folder `data`.
+/// (physically consistent unless the study disables this). `study` is the study of the result; its robot is also
+/// searched in the folder `data`.
 ///
 /// # Errors
 /// If the result does not belong to the study's robot; [`Error::Export`] if the form cannot represent the model.
