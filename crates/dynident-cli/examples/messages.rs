@@ -14,7 +14,9 @@ const MARK: &str = "<!-- The tables below are generated: cargo run -p dynident-c
 /// Error types with the heading of their section and the page that helps, in the order of the page.
 pub(crate) const SECTIONS: &[(&str, &str, &str)] = &[
     ("Error", "Files and jobs", "commands.md"),
+    ("StudyFileError", "Studies and the files that they name", "study.md"),
     ("StudyError", "Study file", "study.md"),
+    ("ResultFileError", "Result files", "schemas.md"),
     ("NewStudyError", "Writing a study", "your-robot.md"),
     ("FormatError", "Log format in a study", "log-formats.md"),
     ("RecordingError", "Reading logs", "logs.md"),
@@ -48,8 +50,8 @@ pub(crate) const SECTIONS: &[(&str, &str, &str)] = &[
     ("EstimatorError", "Estimators", "estimation.md"),
     ("NoStartError", "Start values of estimators", "estimation.md"),
     ("PeriodError", "Periodic motion", "estimation.md"),
-    ("PhysicalError", "Physically consistent fit", "estimation.md"),
-    ("ConsistencyError", "Physically consistent model", "estimation.md"),
+    ("PhysicalError", "Physically consistent fit", "consistent-fit.md"),
+    ("ConsistencyError", "Physically consistent model", "consistent-fit.md"),
     ("PayloadError", "Payloads", "payload.md"),
     ("NoBodyError", "Body of a payload", "payload.md"),
     ("ThresholdError", "Thresholds", "study.md"),

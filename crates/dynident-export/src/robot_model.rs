@@ -85,7 +85,9 @@ impl RobotModel {
             return Err(ExportError::StepWidth { width });
         }
         let usual = |term: &TorqueTerm| {
-            let least = TermClass::FunctionsOfMotion.in_form(&self.model, term).step_width().unwrap_or(0.0);
+            // The width that a sign gets.
+            let sign = term.clone().with_step(|_| CoulombShape::Sign { dead_band: 0.0 });
+            let least = TermClass::FunctionsOfMotion.in_form(&self.model, &sign).step_width().unwrap_or(0.0);
             let is_narrow = term.step_width().is_some_and(|own| own <= least);
             term.clone().with_step(|step| match step {
                 CoulombShape::Smooth { width: own } if !is_narrow => CoulombShape::Smooth { width: own.max(width) },

@@ -50,7 +50,9 @@ fn steps_have_the_requested_width() {
     let robot = RobotModel::new(model, terms, vec![1.0, 2.0, 3.0]).unwrap();
     let options = CodeOptions { step_width: Some(0.125), ..CodeOptions::default() };
     let text = export_with(&robot, Target::C, options, &[]).unwrap().text;
-    for line in ["tanh(8.0 * dq[0])", "2.0 * tanh(8.0 * dq[1])", "3.0 * tanh(2.0 * dq[2])"] {
+    for line in
+        ["tau[0] = tanh(dq[0] * 8.0);", "tau[1] = tanh(dq[1] * 8.0) * 2.0;", "tau[2] = tanh(dq[2] * 2.0) * 3.0;"]
+    {
         assert!(text.contains(line), "{line}: {text}");
     }
 }

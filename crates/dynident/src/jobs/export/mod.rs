@@ -36,12 +36,12 @@ impl From<Target> for ExportSettings {
     }
 }
 
-/// Exports the model of a `result.json` to `target`: bodies, friction and drives as in `identified.urdf` (physically
-/// consistent unless the study disables this). `study` is the study of the result; its robot is also searched in the
-/// folder `data`.
+/// Exports the model of a `result.json` in the form `form`: bodies, friction and drives as in `identified.urdf`
+/// (physically consistent unless the study disables this). `study` is the study of the result; its robot is also
+/// searched in the folder `data`.
 ///
 /// # Errors
-/// If the result does not belong to the study's robot; [`Error::Export`] if the target cannot represent the model.
+/// If the result does not belong to the study's robot; [`Error::Export`] if the form cannot represent the model.
 pub fn export_model(
     result_path: &Path,
     study: &Study,
