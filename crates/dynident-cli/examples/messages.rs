@@ -262,8 +262,7 @@ fn template(attribute: &str, has_cause: bool) -> Result<String, String> {
         let name = rest[at + 1..end].split(':').next().unwrap_or_default();
         let name = match name {
             "" => arguments.next().unwrap_or_default(),
-            "0" if has_cause => "cause".to_owned(),
-            "source" | "fault" | "problem" if has_cause => "cause".to_owned(),
+            "0" | "source" | "fault" | "problem" if has_cause => "cause".to_owned(),
             "0" => "value".to_owned(),
             name => name.to_owned(),
         };

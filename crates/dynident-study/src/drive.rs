@@ -61,8 +61,8 @@ pub struct DriveSection {
     /// Laws that the selection may use in addition to viscous friction and the Coulomb step: `asymmetric viscous`,
     /// `asymmetric coulomb`, `sigmoid`, `stribeck`, `cube-root`, `quadratic`, `load`, `maxwell-slip`. All by default.
     pub candidates: Option<Vec<String>>,
-    /// Selects only friction that this exported form holds without a loss. No restriction by default: each exported form
-    /// is then fitted to what it can hold.
+    /// Selects only friction that this exported form holds without a loss. No restriction by default: each exported
+    /// form is then fitted to what it can hold.
     pub exportable: Option<ExportableForm>,
     /// Exceptions, by joint name.
     pub joints: BTreeMap<String, JointDrive>,

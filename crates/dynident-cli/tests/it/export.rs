@@ -163,7 +163,8 @@ fn a_payload_becomes_a_command() {
 
 fn sha256(path: &Path) -> String {
     use sha2::{Digest, Sha256};
-    Sha256::digest(std::fs::read(path).unwrap()).iter().map(|byte| format!("{byte:02x}")).collect()
+    let hash = Sha256::digest(std::fs::read(path).unwrap());
+    hash.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
 }
 
 /// Each model of `identify` and each exported file has its own held-out error next to it.
@@ -189,14 +190,11 @@ fn the_error_of_a_file_is_next_to_it() {
             .iter()
             .find(|one| one["forms"].as_array().unwrap().contains(&json!(form)));
         let logs = found["held_out"].as_array().unwrap();
-        match class {
-            Some(class) => {
-                assert_eq!((&found["held_out"], &found["refitted"]), (&class["held_out"], &class["refitted"]))
-            }
-            None => {
-                let of_model = &result["validation"][0]["physical"]["relative_error_percent"];
-                assert_eq!((&logs[0]["relative_error_percent"], &found["left_out"]), (of_model, &json!([])));
-            }
+        if let Some(class) = class {
+            assert_eq!((&found["held_out"], &found["refitted"]), (&class["held_out"], &class["refitted"]));
+        } else {
+            let of_model = &result["validation"][0]["physical"]["relative_error_percent"];
+            assert_eq!((&logs[0]["relative_error_percent"], &found["left_out"]), (of_model, &json!([])));
         }
         assert_eq!((logs.len(), logs[0]["joints"].as_array().unwrap().len()), (1, 2), "{found}");
         // Terms of the model are in the file or listed.
@@ -245,7 +243,7 @@ fn samples_of_a_test_are_written() {
         )
     );
     let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
-    let robot = dynident::load_robot(&at.join("r/identified.urdf"), &Default::default()).unwrap();
+    let robot = dynident::load_robot(&at.join("r/identified.urdf"), &dynident::LoadSettings::default()).unwrap();
     let model = &robot.model;
     let taps: Vec<f64> = held_out["taps"].as_array().unwrap().iter().map(|tap| tap.as_f64().unwrap()).collect();
     let taps = if taps.is_empty() { vec![1.0] } else { taps };

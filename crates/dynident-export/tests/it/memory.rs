@@ -219,7 +219,9 @@ fn in_rust(dof: usize, columns: usize, real: &str) -> String {
 fn check(compiler: &[&str], files: [(&str, &str); 2], last: &[&str], log: &Log, tolerance: f64) {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    files.iter().for_each(|(name, text)| std::fs::write(at.join(name), text).unwrap());
+    for (name, text) in files {
+        std::fs::write(at.join(name), text).unwrap();
+    }
     let main = files[1].0;
     let output = Command::new(compiler[0])
         .args(&compiler[1..])

@@ -60,8 +60,8 @@ pub struct FrictionSearch {
     /// of the inflation. Unlimited by default. An iteration, which does not converge while a parameter is poorly
     /// determined, uses [`MOST_INFLATION`](Self::MOST_INFLATION).
     pub most_inflation: Option<f64>,
-    /// Names of the laws that may be selected ([`CandidateLaw::name`]). Viscous friction and the Coulomb step are always
-    /// permitted. All laws by default.
+    /// Names of the laws that may be selected ([`CandidateLaw::name`]). Viscous friction and the Coulomb step are
+    /// always permitted. All laws by default.
     pub laws: Option<Vec<String>>,
     /// Only laws that an exported file of this class holds without a loss. All laws by default.
     pub exportable: Option<TermClass>,

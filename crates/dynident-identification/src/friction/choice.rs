@@ -104,8 +104,8 @@ pub(crate) fn choose_friction(
             if speed < MIN_SPEED * scale.velocity {
                 return Ok((refused(joint, "the joint does not move in the training logs"), Vec::new()));
             }
-            // The stated model as far as it is excited, without this joint's friction, and with the selected friction of
-            // other joints.
+            // The stated model as far as it is excited, without this joint's friction, and with the selected friction
+            // of other joints.
             let chosen_before = |other: usize| choose.iter().position(|&c| c == other).and_then(|c| before[c].as_ref());
             let kept = |index: &usize| match &model.layout().columns()[*index] {
                 Column::Term(term) if term.is_joint_friction() => {

@@ -9,8 +9,8 @@
 //! Statistical Learning*, 7.10). The standard error is that of the difference by block, because blocks differ far more
 //! than candidates.
 //!
-//! A law with memory or under load costs more than its parameters: not every controller and simulator can hold it. It is
-//! selected if its gain over the best selection without such laws is clear
+//! A law with memory or under load costs more than its parameters: not every controller and simulator can hold it. It
+//! is selected if its gain over the best selection without such laws is clear
 //! ([`FrictionThresholds`](crate::FrictionThresholds)).
 //!
 //! A constant of a term (a width, a velocity) may lie between two neighbours of its grid, whose columns together

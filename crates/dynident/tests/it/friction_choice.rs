@@ -104,6 +104,37 @@ fn the_friction_that_was_put_in_is_chosen_and_the_model_can_be_tested_again() {
     assert_eq!(threads.estimate.values, found.estimate.values);
 }
 
+/// The elbow has Stribeck friction, the shoulder friction under load. Restricted laws give a larger error, which the
+/// result states; the elbow is unrestricted if the study names its law.
+#[test]
+fn restricted_laws_are_obeyed_and_their_cost_is_stated() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = arm(folder.path());
+    write_loaded_log(&folder.path().join("a.csv"), &arm, (3000, 1), 1.0, (1.5, 0.3));
+    write_loaded_log(&folder.path().join("b.csv"), &arm, (1000, 2), 1.0, (1.5, 0.3));
+    let free = job(folder.path(), "friction = \"auto\"").identify().result;
+    assert!(free.friction_choice[0].chosen.contains("load"), "{:?}", free.friction_choice[0]);
+    assert!(free.friction_choice.iter().all(|joint| joint.unrestricted.is_none()));
+    for (keys, of_elbow) in [("exportable = \"urdf\"", None), ("candidates = [\"stribeck\"]", Some("stribeck"))] {
+        let found = job(folder.path(), keys).identify().result;
+        let [shoulder, elbow] = &found.friction_choice[..] else { panic!("two joints") };
+        assert_eq!(shoulder.chosen, "viscous + coulomb", "{keys}");
+        let cost = shoulder.unrestricted.as_ref().unwrap();
+        assert!(cost.chosen.contains("load") && cost.restricted_cv_error_nm > 1.5 * cost.cv_error_nm, "{cost:?}");
+        assert!(shoulder.restriction().unwrap().contains("which the study excludes"));
+        assert_eq!(elbow.chosen.contains("stribeck"), of_elbow.is_some(), "{keys}: {}", elbow.chosen);
+        assert_eq!(elbow.restriction().is_some(), of_elbow.is_none(), "{keys}: {elbow:?}");
+    }
+    for (bad, message) in [
+        ("candidates = [\"dahl\"]", "drive.candidates: unknown law `dahl`; known: "),
+        ("exportable = \"code\"\nfriction = \"stated\"", "it restricts the selection of friction"),
+    ] {
+        let text = format!("robot.file = \"arm.urdf\"\n[drive]\n{bad}");
+        let refused = dynident::Study::parse(&text, Path::new("study.toml")).unwrap_err().to_string();
+        assert!(refused.contains(message), "{refused}");
+    }
+}
+
 /// The difference between the written model and the estimate depends on torque noise only: both have the same selected
 /// constants, whose uncertainty is irrelevant here.
 #[test]

@@ -200,9 +200,9 @@ impl ModelFiles {
     pub(super) fn with_provenance(self, provenance: &Provenance, forms: &[FormResult]) -> Self {
         let errors = |class: TermClass| -> String {
             let form = forms.iter().find(|form| form.class == class);
-            form.map_or_else(String::new, |form| {
-                form.sentences("this file").map(|sentence| format!(". {sentence}")).collect()
-            })
+            form.into_iter()
+                .flat_map(|form| form.sentences("this file"))
+                .fold(String::new(), |all, one| all + ". " + &one)
         };
         let line = provenance_line(provenance, &errors(TermClass::DampingAndFriction));
         let line_of_mjcf = provenance_line(provenance, &errors(TermClass::DampingFrictionAndInertia));

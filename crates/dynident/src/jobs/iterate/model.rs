@@ -113,7 +113,7 @@ pub(super) fn robot_found(
     }
     outcome.result.seal();
     let mut files = vec![
-        (RESULT, outcome.result.to_json().map_err(not_json)?.into_bytes()),
+        (RESULT, outcome.result.to_json().map_err(|error| not_json(&error))?.into_bytes()),
         (CONTROLLER, json(&controller(last, &parameters).map_err(failed)?)?),
         (PAGE, outcome.report()?.into_bytes()),
     ];
@@ -127,11 +127,11 @@ pub(super) fn robot_found(
 }
 
 fn json(value: &serde_json::Value) -> Result<Vec<u8>, Error> {
-    let text = dynident_text::json::to_string_pretty(value).map_err(not_json)?;
+    let text = dynident_text::json::to_string_pretty(value).map_err(|error| not_json(&error))?;
     Ok((text + "\n").into_bytes())
 }
 
-fn not_json(error: serde_json::Error) -> Error {
+fn not_json(error: &serde_json::Error) -> Error {
     Error::Result { path: PathBuf::from(RESULT), message: error.to_string() }
 }
 
