@@ -34,7 +34,10 @@ run 0 "$dynident" log examples/ur10_simulated/train.csv
 run 0 "$dynident" log golden/formats/two_clocks.mcap --json
 run 0 "$dynident" log golden/formats/bag
 run 0 "$dynident" new --robot robots/ur10.urdf --log examples/ur10_simulated/train.csv examples/ur10_simulated/test.csv --out "$out/new.toml"
+run 0 "$dynident" check "$out/new.toml"
 run 0 "$dynident" identify "$out/new.toml" --out "$out/new"
+run 0 "$dynident" export "$out/new" --to c --out "$out/arm.h"
+run 0 "${CC:-cc}" -std=c99 -Wall -Wextra -Werror -fsyntax-only -x c "$out/arm.h"
 run 0 "$venv/bin/python" .ci/first_minutes.py "$dynident" "$out/first_minutes"
 # An exporter error negates all first moments: it is reported, and corrected in a copy.
 sed -E 's/(i[xyz][xyz]=")([1-9]|0\.0*[1-9])/\1-\2/g' robots/iiwa14.urdf >"$out/slip.urdf"

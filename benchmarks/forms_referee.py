@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Evaluates exported files as their readers do, and compares the errors with those that Dynident prints.
 
-    forms_referee.py DYNIDENT SCRATCH [STUDY.toml ..]
+    forms_referee.py DYNIDENT SCRATCH [--data FOLDER] [STUDY.toml ..]
 
 For each study (by default the example sets of examples/): `dynident identify`, `dynident export --to urdf`, `mjcf` and `c`, and `dynident validate --samples`, which writes positions, velocities,
 accelerations and torques of every log as the test uses them, and the filter. Everything else is computed here:
@@ -165,15 +165,15 @@ def run(dynident, *arguments):
     assert done.returncode < 2, f"{arguments}: {done.stderr}"
 
 
-def refereed(dynident, scratch, study):
+def refereed(dynident, scratch, study, data):
     """Rows of the table of one study."""
     folder = scratch / study.stem
-    run(dynident, "identify", study, "--out", folder, "--quiet")
+    run(dynident, "identify", study, *data, "--out", folder, "--quiet")
     result = json.loads((folder / "result.json").read_text())
     files = {form: folder / f"model.{end}" for form, end in (("urdf", "urdf"), ("mjcf", "xml"), ("c", "h"))}
     for form, path in files.items():
         run(dynident, "export", folder, "--to", form, "--out", path, "--quiet")
-    run(dynident, "validate", folder / "result.json", "--study", study, "--samples", folder / "samples", "--quiet")
+    run(dynident, "validate", folder / "result.json", "--study", study, *data, "--samples", folder / "samples", "--quiet")
     samples = json.loads((folder / "samples" / "samples.json").read_text())
     names = samples["joints"]
     logs = [Log(folder / "samples", entry, len(names)) for entry in samples["logs"]]
@@ -214,13 +214,15 @@ def main():
     parser.add_argument("dynident")
     parser.add_argument("scratch", type=pathlib.Path)
     parser.add_argument("study", nargs="*", type=pathlib.Path, default=[EXAMPLES / f"{name}.toml" for name in NAMES])
+    parser.add_argument("--data", help="the folder of the public recordings")
     options = parser.parse_args()
+    data = ["--data", options.data] if options.data else []
     options.scratch.mkdir(parents=True, exist_ok=True)
     print("| study | form | printed % | referee % | relative difference | ratio |\n| --- | --- | --- | --- | --- | --- |")
     failed = 0
     for study in options.study:
         try:
-            for name, form, printed, own, ratio in refereed(options.dynident, options.scratch, study):
+            for name, form, printed, own, ratio in refereed(options.dynident, options.scratch, study, data):
                 difference = abs(printed / own - 1)
                 failed += difference > SAME or (form != "c" and ratio > BEST)
                 print(f"| `{name}` | {form} | {printed:.4f} | {own:.4f} | {difference:.1e} | {ratio:.4f} |", flush=True)
