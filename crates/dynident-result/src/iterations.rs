@@ -92,7 +92,7 @@ impl IterationsFile {
     /// The text of `iterations.json`.
     ///
     /// # Errors
-    /// As [`serde_json::to_string_pretty`].
+    /// As [`dynident_text::json::to_string_pretty`].
     pub fn to_json(&self) -> serde_json::Result<String> {
         dynident_text::json::to_string_pretty(self)
     }

@@ -11,7 +11,7 @@ impl ResultFile {
     /// The text of `result.json`.
     ///
     /// # Errors
-    /// As [`serde_json::to_string_pretty`].
+    /// As [`dynident_text::json::to_string_pretty`].
     pub fn to_json(&self) -> serde_json::Result<String> {
         Ok(dynident_text::json::to_string_pretty(self)? + "\n")
     }
