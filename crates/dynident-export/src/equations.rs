@@ -1,7 +1,8 @@
 //! The functions of all languages as graphs: runs the recursive Newton-Euler and composite-rigid-body algorithms over
 //! symbols.
 
-use crate::drive_torque::{Drives, SymbolMotion};
+use crate::drive_torque::Drives;
+use crate::equation::{Equation, Inputs, StepEquation};
 use crate::error::ExportError;
 use crate::forward::{forward, mass_matrix};
 use crate::graph::{Graph, Input};
@@ -11,34 +12,6 @@ use crate::symbol::{Symbol, record};
 use dynident_dynamics::inverse_dynamics_over;
 use dynident_lanes::Scalar;
 use dynident_model::{Model, Vec3};
-
-/// One function: inputs are joint vectors, the output is a vector or a row-major matrix.
-#[derive(Debug)]
-pub(crate) struct Equation {
-    pub(crate) name: &'static str,
-    pub(crate) about: &'static str,
-    pub(crate) inputs: &'static [Input],
-    pub(crate) output: &'static str,
-    /// Number of columns of a matrix; `None` for a vector.
-    pub(crate) columns: Option<usize>,
-    pub(crate) values: Vec<Symbol>,
-}
-
-impl Equation {
-    pub(crate) fn arguments(&self) -> String {
-        self.inputs.iter().map(|input| input.name()).collect::<Vec<_>>().join(", ")
-    }
-}
-
-/// The function with state: torque of a motion, and the deflections of the elements with memory after it.
-#[derive(Debug)]
-pub(crate) struct StepEquation {
-    /// Inputs are the motion; positions and deflections before it are further inputs of the values. The torque is
-    /// followed by the deflections.
-    pub(crate) equation: Equation,
-    /// Number of elements with memory.
-    pub(crate) elements: usize,
-}
 
 #[derive(Debug)]
 pub(crate) struct Equations {
@@ -75,31 +48,6 @@ impl Equations {
             Some(value) => Err(ExportError::Overflow { value }),
             None => Ok(Self { dof: robot.model().dof(), graph, functions, step, parameters }),
         }
-    }
-}
-
-pub(crate) struct Inputs {
-    pub(crate) q: Vec<Symbol>,
-    pub(crate) dq: Vec<Symbol>,
-    pub(crate) ddq: Vec<Symbol>,
-    pub(crate) tau: Vec<Symbol>,
-    pub(crate) rest: Vec<Symbol>,
-}
-
-impl Inputs {
-    fn new(dof: usize) -> Self {
-        let [q, dq, ddq, tau] = [Input::Position, Input::Velocity, Input::Acceleration, Input::Torque]
-            .map(|input| Symbol::inputs(input, dof));
-        Self { q, dq, ddq, tau, rest: vec![Symbol::ZERO; dof] }
-    }
-
-    /// Torque of the load bodies, empty without them.
-    fn load(&self, load: Option<&Model>) -> Vec<Symbol> {
-        load.map_or_else(Vec::new, |load| inverse_dynamics_over(load, &self.q, &self.dq, &self.ddq))
-    }
-
-    fn motion<'a>(&'a self, load: &'a [Symbol]) -> SymbolMotion<'a> {
-        SymbolMotion { q: &self.q, dq: &self.dq, ddq: &self.ddq, load }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Accelerations for given torques, as symbols.
 
 use crate::drive_torque::Drives;
-use crate::equations::Inputs;
+use crate::equation::Inputs;
 use crate::error::ExportError;
 use crate::symbol::Symbol;
 use dynident_dynamics::{inverse_dynamics_over, mass_matrix_over};

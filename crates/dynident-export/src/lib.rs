@@ -33,6 +33,7 @@
 mod declared_torque;
 mod descriptions;
 mod drive_torque;
+mod equation;
 mod equations;
 mod error;
 mod exported;

@@ -1,7 +1,7 @@
 //! The regressor of the base parameters, as symbols.
 
 use crate::drive_torque::{SymbolMotion, unit_torque};
-use crate::equations::Equation;
+use crate::equation::Equation;
 use crate::error::ExportError;
 use crate::graph::Input;
 use crate::robot_model::{RobotModel, with_exact_right_angles};

@@ -1,7 +1,7 @@
 //! C99 in one header: functions of fixed size, no allocation, only math.h.
 
 use super::{Source, number, unused};
-use crate::equations::{Equation, StepEquation};
+use crate::equation::{Equation, StepEquation};
 use crate::graph::{Function, Function2, Input, Node};
 use crate::statements::{Statements, Syntax};
 use core::fmt::Write;

@@ -1,7 +1,7 @@
 //! Python with CasADi: every function as a `casadi.Function` over symbols.
 
 use super::Source;
-use crate::equations::{Equation, StepEquation};
+use crate::equation::{Equation, StepEquation};
 use crate::graph::{Function, Function2, Input, Node};
 use crate::statements::Syntax;
 use core::fmt::Write;

@@ -2,7 +2,7 @@
 
 use super::Source;
 use super::c::{CSyntax, write_lines};
-use crate::equations::{Equation, StepEquation};
+use crate::equation::{Equation, StepEquation};
 use crate::graph::Node;
 use crate::statements::Syntax;
 use core::fmt::Write;

@@ -2,7 +2,7 @@
 //! one function.
 
 use super::Source;
-use crate::equations::StepEquation;
+use crate::equation::StepEquation;
 use crate::graph::{Function, Function2, Input, Node};
 use crate::statements::Syntax;
 use core::fmt::Write;

@@ -18,7 +18,8 @@ pub(crate) use pinocchio::pinocchio_module;
 pub(crate) use python::python_module;
 pub(crate) use rust::rust_module;
 
-use crate::equations::{Equation, Equations};
+use crate::equation::Equation;
+use crate::equations::Equations;
 use crate::graph::Input;
 use crate::robot_model::RobotModel;
 use crate::statements::{Statements, Syntax, statements};

@@ -1,7 +1,7 @@
 //! Python with NumPy: one state or arrays of states, with joints on the last axis.
 
 use super::Source;
-use crate::equations::{Equation, StepEquation};
+use crate::equation::{Equation, StepEquation};
 use crate::graph::{Function, Function2, Input, Node};
 use crate::statements::Syntax;
 use core::fmt::Write;

@@ -1,7 +1,7 @@
 //! Rust without `std` and without dependencies. `core` has no sine, so the caller provides elementary functions.
 
 use super::{Source, number, unused};
-use crate::equations::{Equation, StepEquation};
+use crate::equation::{Equation, StepEquation};
 use crate::graph::{Function, Function2, Graph, Input, Node};
 use crate::statements::{Statements, Syntax};
 use core::fmt::Write;

@@ -165,7 +165,7 @@ fn sdf_notes_unsupported_contents() {
         assert!(exported.text.contains(said), "{said}");
     }
     let slanted = export(&all_terms("ur10.urdf"), Target::Sdf, &[]).unwrap();
-    assert!(slanted.text.contains("it is [1.0, -3.0, -9.0] m/s² in the base frame"));
+    assert!(slanted.text.contains("set the gravity of the world to [1.0, -3.0, -9.0] m/s² (in the base frame)"));
 }
 
 #[test]

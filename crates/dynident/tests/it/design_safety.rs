@@ -296,6 +296,7 @@ workspace = {{ lower = {LOWER:?}, upper = {UPPER:?}, tool = [0.0, 0.0, 0.4] }}
 [iteration.rehearsal]
 delay_s = 0.004
 robots = 2
+uncertainty_percent = 15.0
 postures = 50
 "#
     );
