@@ -14,9 +14,10 @@ use dynident_model::{InertialParameters, Mat3, Vec3};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Density of the sphere, kg/m³. Between packed boxes (about 500 kg/m³) and machined aluminium (2700 kg/m³). The moment
-/// of inertia changes with the power −2/3: a factor of 3 in density is a factor of 2.1 in inertia.
-const DENSITY_KG_M3: f64 = 1000.0;
+/// Density of the sphere, kg/m³: that of packed boxes. Grippers and machined parts are denser, but long: their moments
+/// are above those of a sphere of their density. The moment of inertia changes with the power −2/3: a factor of 3 in
+/// density is a factor of 2.1 in inertia.
+const DENSITY_KG_M3: f64 = 500.0;
 /// Standard deviation of the logarithm of the moment of the sphere: a factor of 2, which is a factor of 3 in density.
 const LOG_MOMENT_STD: f64 = 0.7;
 /// Searched range of the moment: this factor in both directions, and the number of steps in each.
@@ -84,7 +85,7 @@ pub struct ControllerValue {
 /// The body for a controller. `nearest` is the consistent body nearest to the estimate, its ten parameters about the
 /// origin; `figures` are the estimates of mass, centre of mass and inertia about it.
 ///
-/// With the mass m and the centre of mass of `nearest`, a sphere of density 1000 kg/m³ has the radius
+/// With the mass m and the centre of mass of `nearest`, a sphere of density 500 kg/m³ has the radius
 /// `r = (3 m / (4 π ρ))^(1/3)` and the moment `J = 2/5 m r²`. If the logs determine all ten parameters, J is the most
 /// probable moment for the estimated inertia Î with covariance V,
 ///
@@ -347,11 +348,11 @@ mod tests {
         }
     }
 
-    /// A sphere of water has the moment of the rule.
+    /// A sphere of half the density of water has the moment of the rule.
     #[test]
-    fn the_size_is_that_of_water() {
-        // 4/3 π 0.1³ m³ of 1000 kg/m³, moment 2/5 m r².
-        let mass = 4.0 / 3.0 * PI;
+    fn the_size_is_that_of_packed_boxes() {
+        // 4/3 π 0.1³ m³ of 500 kg/m³, moment 2/5 m r².
+        let mass = 2.0 / 3.0 * PI;
         assert!((sphere_moment(mass) - 0.4 * mass * 0.01).abs() < 1e-15);
     }
 }
