@@ -117,8 +117,7 @@ const MAX_MOVE_ERROR_BARS: f64 = 1.0;
 /// Least squares on a measured motion treats the motion as exact. Position noise then enters the torque residual of
 /// heavy links: it is coloured, correlated across joints, and can be as large as the torque noise. Here the motion
 /// (for example Fourier coefficients) is also unknown, and positions and torques are weighted by their precision.
-/// There must be far fewer unknowns than rows for consistent σ_c. If every instant has its own unknowns, use
-/// [`maximum_likelihood`](crate::maximum_likelihood()) with known covariances.
+/// There must be far fewer unknowns than rows for consistent σ_c.
 ///
 /// Gauss-Newton steps; a step that increases the sum is halved. The rows are linearised again after the first step and
 /// then only if steps do not shrink to a quarter or move further than an error bar. The noise colour comes from the
