@@ -7,6 +7,7 @@ mod free_gains;
 mod gain_error;
 mod gains;
 mod known_arm;
+mod measured;
 mod refit;
 mod result;
 mod round_body;
@@ -16,8 +17,9 @@ pub use error::PayloadError;
 pub use free_gains::with_free_gains;
 pub use gains::DriveGain;
 pub use known_arm::KnownArm;
+pub use measured::Measured;
 pub use refit::Refit;
-pub use result::{ConsistentPayload, Measured, PayloadParameter, PayloadResult, payload_results};
+pub use result::{ConsistentPayload, PayloadParameter, PayloadResult, payload_results};
 pub use round_body::{ControllerPayload, ControllerValue};
 
 pub(crate) use columns::SeenColumns;

@@ -2,24 +2,13 @@
 
 use super::body::{Determined, NoBodyError, at_centre_of_mass, jacobian};
 use super::columns::{LoadColumns, Payload, PayloadColumns};
+use super::measured::Measured;
 use super::round_body::{ControllerPayload, controller_payload};
 use dynident_estimation::Estimate;
 use dynident_model::INERTIAL_NAMES;
 use dynident_rows::Recording;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-
-/// A value with its error bar.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct Measured {
-    /// Value.
-    pub value: f64,
-    /// Standard deviation.
-    pub std: f64,
-    /// Half width of the 95 % interval.
-    pub half_width_95: f64,
-}
 
 /// A parameter of a payload, or a sum of parameters, that the logs determine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

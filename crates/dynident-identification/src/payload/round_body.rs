@@ -6,7 +6,7 @@
 //! with the payload's mass is the prior of the inertia about the centre of mass.
 
 use super::body::{Determined, NoBodyError, at_centre_of_mass};
-use super::result::Measured;
+use super::measured::Measured;
 use core::f64::consts::PI;
 use dynident_estimation::TriangularFactor;
 use dynident_estimation::consistent::{BaseMap, PhysicalBody, PhysicalProblem, PhysicalSettings, physical_fit};
