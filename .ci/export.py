@@ -82,7 +82,7 @@ def check_memory(dynident, study, folder):
     text = text.replace('"../robots/', f'"{pathlib.Path("robots").resolve()}/')
     laws = '[{ law = "load" }, { law = "maxwell-slip", yield_displacements = [0.01] }]'
     own = folder / "memory.toml"
-    own.write_text(text + f'\n[drive]\nfriction = "stated"\nviscous = true\ncoulomb = true\nlaws = {laws}\n')
+    own.write_text(text + f'\n[drive]\nfriction = "stated"\nviscous = true\nlaws = {laws}\n')
     # The verdict may be negative: the logs are of another friction.
     told = subprocess.run([dynident, "identify", str(own), "--out", str(folder / "memory")], capture_output=True, text=True)
     assert told.returncode in (0, 1), told.stderr
