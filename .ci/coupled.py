@@ -46,12 +46,14 @@ def main():
     tree = mujoco.MjModel.from_xml_path(str(scratch / "arm.xml"))
     tree.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     tree.dof_damping[:] = 0
-    # The MJCF has drive inertia that was fitted together with its simpler friction; the code has that of the result.
+    # The MJCF has drive inertia that was fitted together with its simpler friction; the code has that of its own fit.
     tree.dof_armature[:] = 0
+    result = json.loads((found / "result.json").read_text())
+    of_code = next({term["symbol"]: term["value"] for term in form["terms"]} for form in result["forms"] if form["class"] == "functions-of-motion")
     for joint in joints:
         for term in joint["terms"]:
             if term["kind"] == "drive-inertia":
-                tree.dof_armature[tree.joint(joint["name"]).dofadr[0]] = term["value"]
+                tree.dof_armature[tree.joint(joint["name"]).dofadr[0]] = of_code[term["symbol"]]
     own = mujoco.MjData(tree)
     rng = np.random.default_rng(1)
     worst, open_by = 0.0, 0.0
