@@ -23,7 +23,7 @@ pub struct TestSamplesFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TestedLog {
-    /// The log.
+    /// Name of the log, as in the result and in `NAME.validation.json`.
     pub log: String,
     /// Its role.
     pub role: Role,

@@ -234,6 +234,7 @@ fn samples_of_a_test_are_written() {
     let result: Value = serde_json::from_str(&std::fs::read_to_string(at.join("r/result.json")).unwrap()).unwrap();
     let logs = samples["logs"].as_array().unwrap();
     let held_out = logs.iter().find(|log| log["role"] == "validate").unwrap();
+    assert_eq!(held_out["log"], result["forms"][0]["held_out"][0]["log"]);
     let table = std::fs::read_to_string(at.join("samples").join(held_out["file"].as_str().unwrap())).unwrap();
     let mut lines = table.lines();
     assert_eq!(

@@ -50,19 +50,16 @@ impl TermClass {
                 let is_held =
                     |term: &TorqueTerm| !term.needs_temperature() && (self == Self::WithState || !term.has_memory());
                 let kept: Vec<TorqueTerm> = own().filter(is_held).map(|term| self.in_form(model, &term)).collect();
-                let is_step = |term: &TorqueTerm| term.step().is_some() && !term.needs_load() || term.has_memory();
-                let has_step = kept.iter().any(|term| term.is_joint_friction() && is_step(term));
-                if has_step || own().all(|term| is_held(&term)) {
+                if own().all(|term| is_held(&term)) {
                     return vec![kept];
                 }
-                // Friction with memory is Coulomb friction until the joint reverses.
                 let is_rotary = model.joints()[joint].is_rotary();
                 let widths = STEP_WIDTHS.map(|width| model.characteristic_scale().velocity(is_rotary, width));
-                let with_step = |width: f64| {
-                    let shape = CoulombShape::Smooth { width };
-                    kept.iter().cloned().chain([TorqueTerm::Coulomb(Coulomb { joint, shape })]).collect()
-                };
-                widths.map(with_step).to_vec()
+                let mut lists: Vec<_> = widths.iter().map(|&width| without_memory(&kept, joint, Some(width))).collect();
+                if kept.iter().any(is_coulomb) {
+                    lists.push(without_memory(&kept, joint, None));
+                }
+                lists
             }
         }
     }
@@ -105,6 +102,26 @@ impl TermClass {
             Self::FunctionsOfMotion | Self::WithState => true,
         }
     }
+}
+
+/// The terms that replace those of a joint whose friction with memory is left out: such friction is Coulomb friction
+/// until the joint reverses, and its presliding resembles viscous friction. `kept` are the other terms; Coulomb terms
+/// get steps of this width.
+fn without_memory(kept: &[TorqueTerm], joint: usize, width: Option<f64>) -> Vec<TorqueTerm> {
+    let shape = |step| width.map_or(step, |width| CoulombShape::Smooth { width });
+    let one = |term: &TorqueTerm| if is_coulomb(term) { term.clone().with_step(shape) } else { term.clone() };
+    let mut terms: Vec<TorqueTerm> = kept.iter().map(one).collect();
+    if !terms.iter().any(is_coulomb) {
+        terms.push(TorqueTerm::Coulomb(Coulomb { joint, shape: shape(CoulombShape::Sign { dead_band: 0.0 }) }));
+    }
+    if !terms.iter().any(|term| matches!(term, TorqueTerm::Viscous(_) | TorqueTerm::DirectionalViscous(_))) {
+        terms.push(TorqueTerm::Viscous(Viscous { joint }));
+    }
+    terms
+}
+
+fn is_coulomb(term: &TorqueTerm) -> bool {
+    matches!(term, TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_))
 }
 
 /// Candidate widths of the smooth step that replaces friction with memory, rad/s or m/s of a usual arm.

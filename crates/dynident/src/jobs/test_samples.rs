@@ -49,7 +49,7 @@ pub fn test_samples(
             let is_held_out = recording.role == Role::Validate;
             let filter = if is_held_out { band.unwrap_or(fit) } else { fit };
             description.logs.push(TestedLog {
-                log: recording.label(),
+                log: recording.name.clone(),
                 role: recording.role,
                 file: file.clone(),
                 rate_hz: table.rate_hz,
