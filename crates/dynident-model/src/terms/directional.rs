@@ -81,7 +81,8 @@ impl VelocityLaw for DirectionalViscous {
 }
 
 impl DirectionalViscous {
-    fn both(joint: usize) -> Vec<TorqueTerm> {
+    /// The terms of both directions.
+    pub(super) fn both(joint: usize) -> Vec<TorqueTerm> {
         Direction::BOTH.map(|direction| TorqueTerm::DirectionalViscous(Self { joint, direction })).to_vec()
     }
 }
@@ -161,7 +162,8 @@ impl VelocityLaw for DirectionalCoulomb {
 }
 
 impl DirectionalCoulomb {
-    fn both(joint: usize, shape: CoulombShape) -> Vec<TorqueTerm> {
+    /// The terms of both directions.
+    pub(super) fn both(joint: usize, shape: CoulombShape) -> Vec<TorqueTerm> {
         Direction::BOTH.map(|direction| TorqueTerm::DirectionalCoulomb(Self { joint, direction, shape })).to_vec()
     }
 
