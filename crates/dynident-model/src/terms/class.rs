@@ -1,8 +1,6 @@
 //! Which torque terms a form of the model can hold.
 
-use super::{
-    Coulomb, CoulombShape, DirectionalCoulomb, DirectionalViscous, DriveInertia, JointProperty, TorqueTerm, Viscous,
-};
+use super::{Coulomb, CoulombShape, DriveInertia, JointProperty, TorqueTerm, Viscous};
 use crate::Model;
 use serde::{Deserialize, Serialize};
 
@@ -56,15 +54,12 @@ impl TermClass {
                     return vec![kept];
                 }
                 let is_rotary = model.joints()[joint].is_rotary();
-                let own_step = kept.iter().filter(|term| is_simple(term)).find_map(TorqueTerm::step);
                 let widths = STEP_WIDTHS.map(|width| model.characteristic_scale().velocity(is_rotary, width));
-                let steps = widths.map(|width| CoulombShape::Smooth { width }).into_iter().chain(own_step);
-                // Such friction is Coulomb friction until the joint reverses, and its presliding resembles damping.
-                let others = || kept.iter().filter(|term| !is_simple(term)).cloned();
-                let viscous = || DirectionalViscous::both(joint);
-                steps
-                    .map(|step| others().chain(viscous()).chain(DirectionalCoulomb::both(joint, step)).collect())
-                    .collect()
+                let mut lists: Vec<_> = widths.iter().map(|&width| without_memory(&kept, joint, Some(width))).collect();
+                if kept.iter().any(is_coulomb) {
+                    lists.push(without_memory(&kept, joint, None));
+                }
+                lists
             }
         }
     }
@@ -109,10 +104,24 @@ impl TermClass {
     }
 }
 
-/// Whether a term is viscous or Coulomb friction of one or both directions.
-fn is_simple(term: &TorqueTerm) -> bool {
-    use TorqueTerm as T;
-    matches!(term, T::Viscous(_) | T::Coulomb(_) | T::DirectionalViscous(_) | T::DirectionalCoulomb(_))
+/// The terms that replace those of a joint whose friction with memory is left out: such friction is Coulomb friction
+/// until the joint reverses, and its presliding resembles viscous friction. `kept` are the other terms; Coulomb terms
+/// get steps of this width.
+fn without_memory(kept: &[TorqueTerm], joint: usize, width: Option<f64>) -> Vec<TorqueTerm> {
+    let shape = |step| width.map_or(step, |width| CoulombShape::Smooth { width });
+    let one = |term: &TorqueTerm| if is_coulomb(term) { term.clone().with_step(shape) } else { term.clone() };
+    let mut terms: Vec<TorqueTerm> = kept.iter().map(one).collect();
+    if !terms.iter().any(is_coulomb) {
+        terms.push(TorqueTerm::Coulomb(Coulomb { joint, shape: shape(CoulombShape::Sign { dead_band: 0.0 }) }));
+    }
+    if !terms.iter().any(|term| matches!(term, TorqueTerm::Viscous(_) | TorqueTerm::DirectionalViscous(_))) {
+        terms.push(TorqueTerm::Viscous(Viscous { joint }));
+    }
+    terms
+}
+
+fn is_coulomb(term: &TorqueTerm) -> bool {
+    matches!(term, TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_))
 }
 
 /// Candidate widths of the smooth step that replaces friction with memory, rad/s or m/s of a usual arm.

@@ -81,8 +81,7 @@ impl VelocityLaw for DirectionalViscous {
 }
 
 impl DirectionalViscous {
-    /// The terms of both directions.
-    pub(super) fn both(joint: usize) -> Vec<TorqueTerm> {
+    fn both(joint: usize) -> Vec<TorqueTerm> {
         Direction::BOTH.map(|direction| TorqueTerm::DirectionalViscous(Self { joint, direction })).to_vec()
     }
 }
@@ -162,8 +161,7 @@ impl VelocityLaw for DirectionalCoulomb {
 }
 
 impl DirectionalCoulomb {
-    /// The terms of both directions.
-    pub(super) fn both(joint: usize, shape: CoulombShape) -> Vec<TorqueTerm> {
+    fn both(joint: usize, shape: CoulombShape) -> Vec<TorqueTerm> {
         Direction::BOTH.map(|direction| TorqueTerm::DirectionalCoulomb(Self { joint, direction, shape })).to_vec()
     }
 

@@ -200,26 +200,27 @@ fn equal_joints_have_equal_steps() {
     }
 }
 
-/// Friction with memory is replaced by viscous and Coulomb friction of each direction, also next to a Stribeck term,
-/// whose step would otherwise be the only one.
+/// Friction with memory is replaced by viscous and Coulomb friction, also next to a Stribeck term, whose step would
+/// otherwise be the only one.
 #[test]
 fn friction_with_memory_is_replaced_next_to_other_steps() {
     let model = load_robot(repository("robots/ur10.urdf")).unwrap().model;
     let narrow = CoulombShape::Smooth { width: 0.03 };
     let slip = TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: 0.01 });
     let stribeck = TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 1.0, shape: narrow });
-    let coulomb = TorqueTerm::Coulomb(Coulomb { joint: 0, shape: narrow });
+    let coulomb = |width| TorqueTerm::Coulomb(Coulomb { joint: 0, shape: CoulombShape::Smooth { width } });
     let class = TermClass::FunctionsOfMotion;
-    for own in [vec![stribeck.clone(), slip.clone()], vec![coulomb, slip.clone()]] {
-        let (mut widths, is_kept) = (Vec::new(), own.contains(&stribeck));
-        for list in class.terms_of_joint(&model, &own, 0) {
-            let is_coulomb = |term: &&TorqueTerm| matches!(term, TorqueTerm::DirectionalCoulomb(_));
-            assert_eq!(list.iter().filter(is_coulomb).count(), 2, "{list:?}");
-            assert_eq!(list.len(), 4 + usize::from(is_kept), "{list:?}");
-            assert!(!list.iter().any(TorqueTerm::has_memory) && is_kept == list.contains(&stribeck));
+    for own in [vec![stribeck.clone(), slip.clone()], vec![coulomb(0.03), slip.clone()]] {
+        let lists = class.terms_of_joint(&model, &own, 0);
+        let mut widths = Vec::new();
+        for list in &lists {
+            let is_coulomb = |term: &&TorqueTerm| matches!(term, TorqueTerm::Coulomb(_));
+            assert_eq!(list.iter().filter(is_coulomb).count(), 1, "{list:?}");
+            assert!(list.iter().any(|term| matches!(term, TorqueTerm::Viscous(_))), "{list:?}");
+            assert!(!list.iter().any(TorqueTerm::has_memory) && own.contains(&stribeck) == list.contains(&stribeck));
             widths.push(list.iter().find(is_coulomb).unwrap().step_width().unwrap());
         }
-        assert!(widths.len() >= 4 && (is_kept || widths.contains(&0.03)), "{widths:?}");
+        assert!(widths.len() >= 4 && (own.contains(&stribeck) || widths.contains(&0.03)), "{widths:?}");
         assert_eq!(TermClass::WithState.terms_of_joint(&model, &own, 0), [own]);
     }
 }
