@@ -214,6 +214,9 @@ mod tests {
             ("q_d[3]", Some(Position), Number(3), Source::Commanded, None),
             ("msrJointTorque2", Some(Torque), Number(2), Source::Measured, None),
             ("position_deg[4]", Some(Position), Number(4), Source::Unstated, Some("deg")),
+            ("J2 torque [Nm]", Some(Torque), Number(2), Source::Unstated, Some("N m")),
+            ("axis 3 act angle [deg]", Some(Position), Number(3), Source::Unstated, Some("deg")),
+            ("Joint 4 angle (deg)", Some(Position), Number(4), Source::Unstated, Some("deg")),
             ("joint_1", None, Joint(3), Source::Unstated, None),
         ];
         for (name, quantity, joint, source, unit) in cases {

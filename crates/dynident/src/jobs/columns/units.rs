@@ -63,14 +63,29 @@ pub(in crate::jobs) fn unit(name: &str) -> Option<&'static str> {
 
 /// Splits a lower-case name into the part before its unit (with any index in brackets), the unit, and its quantity.
 pub(super) fn ended(lower: &str) -> Option<(String, &'static str, Option<Quantity>)> {
+    if let Some((before, inside)) = in_brackets(lower)
+        && let Some((_, unit, quantity)) = ENDINGS.iter().find(|(ending, ..)| *ending == inside)
+        // `effort[a]` is the effort of a joint a.
+        && (inside.len() > 1 || before.ends_with(' ') || !lower.ends_with(']'))
+    {
+        return Some((before.trim_end().to_owned(), unit, *quantity));
+    }
     // In `tau_Nm[3]` the unit precedes the index.
     let (name, index) = indexed(lower);
-    let name = name.trim_end_matches([')', ']', ' ']);
+    let name = name.trim_end();
     let before = |ending: &str| {
-        name.strip_suffix(ending).filter(|before| before.ends_with(|c: char| "_ ([/-".contains(c)) && before.len() > 1)
+        name.strip_suffix(ending).filter(|before| before.ends_with(|c: char| "_ /-".contains(c)) && before.len() > 1)
     };
     let found = ENDINGS.iter().find_map(|(ending, unit, quantity)| Some((before(ending)?, *unit, *quantity)));
     found.map(|(before, unit, quantity)| (format!("{before}{index}"), unit, quantity))
+}
+
+/// The parts of `time [ms]`, `time (ms)` or `time {ms}` before and in the brackets at its end.
+fn in_brackets(name: &str) -> Option<(&str, &str)> {
+    let pairs = [('[', ']'), ('(', ')'), ('{', '}')];
+    let of = |(open, close): (char, char)| name.trim_end().strip_suffix(close)?.rsplit_once(open);
+    let (before, inside) = pairs.into_iter().find_map(of)?;
+    Some((before, inside.trim()))
 }
 
 fn indexed(name: &str) -> (&str, &str) {
@@ -84,7 +99,8 @@ fn indexed(name: &str) -> (&str, &str) {
 pub(in crate::jobs) fn time_unit_s(name: &str) -> Option<f64> {
     let lower = name.to_lowercase();
     let own = lower.rsplit(['.', '/']).next().unwrap_or(&lower);
-    let (word, unit) = own.rsplit_once('_').unwrap_or((own, ""));
+    let (word, unit) = in_brackets(own).or_else(|| own.rsplit_once('_')).unwrap_or((own, ""));
+    let word = word.trim_end();
     let named = |word: &str| matches!(word, "t" | "time" | "timestamp" | "stamp" | "log_time" | "elapsed" | "seconds");
     match (named(own), named(word), unit) {
         (true, _, _) | (_, true, "s" | "sec") => Some(1.0),
@@ -118,6 +134,20 @@ mod tests {
         assert_eq!(unit("alpha"), None);
         assert_eq!(time_unit_s("t_ms"), Some(1e-3));
         assert_eq!(time_unit_s("/arm.header.stamp"), Some(1.0));
+        for (name, unit_s) in [("Time [ms]", 1e-3), ("Timestamp (ms)", 1e-3), ("t [s]", 1.0), ("time {us}", 1e-6)] {
+            assert_eq!(time_unit_s(name), Some(unit_s), "{name}");
+        }
+        for (name, expected) in [
+            ("J1 torque [Nm]", Some("N m")),
+            ("axis 2 act angle (deg)", Some("deg")),
+            ("current [A]", Some("A")),
+            ("q3[rad]", Some("rad")),
+            ("speed {deg/s}", Some("deg/s")),
+            // The effort of a joint that is called a.
+            ("effort[a]", None),
+        ] {
+            assert_eq!(unit(name), expected, "{name}");
+        }
         assert_eq!(time_unit_s("tau"), None);
         assert_eq!(time_as_toml("t_us"), "{ column = \"t_us\", unit = \"us\" }");
     }
