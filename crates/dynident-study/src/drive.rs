@@ -38,8 +38,8 @@ pub struct DriveSection {
     pub coulomb_width: Option<f64>,
     /// Velocity below which the sign is zero, rad/s or m/s; 0 by default.
     pub coulomb_dead_band: f64,
-    /// A constant torque. On by default.
-    pub offset: bool,
+    /// A constant torque. On by default, except with `exportable = "urdf"` or `"mjcf"`, which cannot hold it.
+    pub offset: Option<bool>,
     /// Whether training logs share their offsets (`"shared"`, the default).
     pub offsets: OffsetChoice,
     /// Source of the torque gains (Nm per unit of logged torque). Those of the format (`"stated"`) by default.
@@ -61,8 +61,9 @@ pub struct DriveSection {
     /// Laws that the selection may use in addition to viscous friction and the Coulomb step: `asymmetric viscous`,
     /// `asymmetric coulomb`, `sigmoid`, `stribeck`, `cube-root`, `quadratic`, `load`, `maxwell-slip`. All by default.
     pub candidates: Option<Vec<String>>,
-    /// Selects only friction that this exported form holds without a loss. No restriction by default: each exported
-    /// form is then fitted to what it can hold.
+    /// Uses only torque terms that this exported form holds without a loss: friction laws, and offsets and drive
+    /// inertia unless their keys state them. Bodies are then fitted together with these terms. No restriction by
+    /// default: the terms of each exported form are then fitted with the bodies of the complete model.
     pub exportable: Option<ExportableForm>,
     /// Exceptions, by joint name.
     pub joints: BTreeMap<String, JointDrive>,
@@ -76,7 +77,7 @@ impl Default for DriveSection {
             coulomb: CoulombChoice::Smooth,
             coulomb_width: None,
             coulomb_dead_band: 0.0,
-            offset: true,
+            offset: None,
             offsets: OffsetChoice::Shared,
             gains: GainChoice::Stated,
             gain_std_percent: None,
@@ -141,7 +142,14 @@ pub struct CouplingSection {
 impl DriveSection {
     /// Stated drive inertia of this joint; `None` if no key states it.
     pub(crate) fn drive_inertia_of(&self, joint: &str) -> Option<bool> {
-        self.joints.get(joint).and_then(|own| own.drive_inertia).or(self.drive_inertia)
+        let in_form = (self.exportable == Some(ExportableForm::Urdf)).then_some(false);
+        self.joints.get(joint).and_then(|own| own.drive_inertia).or(self.drive_inertia).or(in_form)
+    }
+
+    /// Whether a joint has a constant torque.
+    pub(crate) fn offset_of(&self, joint: &str) -> bool {
+        let in_form = !matches!(self.exportable, Some(ExportableForm::Urdf | ExportableForm::Mjcf));
+        self.joints.get(joint).and_then(|own| own.offset).or(self.offset).unwrap_or(in_form)
     }
 
     /// Stated source of this joint's friction model; `None` if all friction keys have their default values.

@@ -50,6 +50,7 @@ impl JointDrive {
 mod tests {
     use super::*;
     use crate::DriveSection;
+    use crate::friction::ExportableForm;
     use crate::robot_model::torque_terms;
     use dynident_model::load_robot;
     use dynident_model::terms::{
@@ -96,9 +97,29 @@ mod tests {
         for law in laws {
             let terms = law.concat();
             let mut drive = DriveSection { viscous: false, coulomb: CoulombChoice::None, ..DriveSection::default() };
-            drive.offset = false;
+            drive.offset = Some(false);
             drive.joints.insert(model.joints()[joint].name.clone(), JointDrive::stating(&terms));
             assert_eq!(torque_terms(&drive, &[], &model).unwrap(), terms);
         }
+    }
+
+    /// With `exportable` the model has no term that the form cannot hold, unless a key states it.
+    #[test]
+    fn models_for_a_form_have_its_terms() {
+        let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/ur10.urdf");
+        let model = load_robot(&robot).unwrap().model;
+        let terms = |exportable, offset, drive_inertia| {
+            let drive = DriveSection { exportable, offset, drive_inertia, ..DriveSection::default() };
+            torque_terms(&drive, &[], &model).unwrap()
+        };
+        let has_offset = |terms: &[TorqueTerm]| terms.iter().any(|term| matches!(term, TorqueTerm::Offset(_)));
+        assert!(has_offset(&terms(None, None, None)) && has_offset(&terms(Some(ExportableForm::Code), None, None)));
+        for form in [ExportableForm::Urdf, ExportableForm::Mjcf] {
+            assert!(!has_offset(&terms(Some(form), None, None)) && has_offset(&terms(Some(form), Some(true), None)));
+        }
+        // Not tested by `identify`, because the form answers the question.
+        let drive = DriveSection { exportable: Some(ExportableForm::Urdf), ..DriveSection::default() };
+        assert_eq!(drive.drive_inertia_of(&model.joints()[0].name), Some(false));
+        assert_eq!(DriveSection::default().drive_inertia_of(&model.joints()[0].name), None);
     }
 }

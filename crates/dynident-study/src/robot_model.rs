@@ -223,7 +223,7 @@ pub(crate) fn drive_choice(drive: &DriveSection, model: &Model, joint: usize) ->
         drive_inertia: drive.drive_inertia_of(name).unwrap_or(false),
         viscous: own.viscous.unwrap_or(drive.viscous),
         coulomb: shape(own.coulomb.unwrap_or(drive.coulomb), drive, own, width(drive, own, model, joint)),
-        offset: own.offset.unwrap_or(drive.offset),
+        offset: drive.offset_of(name),
     }
 }
 
