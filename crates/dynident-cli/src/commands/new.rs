@@ -70,7 +70,10 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         terminal::remark(&format!("check {}", unsure.sentence()));
     }
     if !context.json && !context.quiet {
-        terminal::remark(&format!("written: {0}; next: dynident identify {0} --out result", options.out.display()));
+        let path = options.out.display();
+        terminal::remark(&format!(
+            "written: {path}; next: dynident check {path}, dynident identify {path} --out result"
+        ));
     }
     Ok(if found.unsure.is_empty() { Verdict::Good } else { Verdict::Negative })
 }

@@ -4,7 +4,6 @@ use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation
 use super::validation::{residuals, written};
 use core::fmt::Write;
 use dynident::ResultFile;
-use dynident::identification::CutoffCandidate;
 use dynident::identification::consistent::ParameterInterval;
 use dynident::identification::examination::{LagKind, LogValidation};
 use dynident::identification::friction::FrictionCandidate;
@@ -118,15 +117,9 @@ fn headline(r: &ResultFile) -> String {
 fn bands(r: &ResultFile) -> String {
     let in_force = r.method.motion.differentiator.cutoff_hz();
     let (Some(motion_hz), Some(cutoff_hz)) = (r.method.motion_hz, in_force) else { return String::new() };
-    let candidates = r.method.cutoff.as_ref().map_or(&[][..], |choice| &choice.candidates);
-    let error = |candidate: &CutoffCandidate| format!("{:.2}\u{a0}%", candidate.predicted_error_percent);
-    let of = |hz: f64| candidates.iter().find(|candidate| candidate.cutoff_hz == hz).map(error);
-    let predicted = of(cutoff_hz).zip(of(motion_hz)).map_or(String::new(), |(chosen, other)| {
-        format!(" (predicted error of the model {chosen}, at the motion's cut-off of {motion_hz:.1}\u{a0}Hz {other})")
-    });
     wrapped(
         &format!(
-            "positions filtered at {cutoff_hz:.1}\u{a0}Hz{predicted}; held-out errors: torque below {:.1}\u{a0}Hz, the band of the motion",
+            "positions filtered at {cutoff_hz:.1}\u{a0}Hz; held-out errors: torque below {:.1}\u{a0}Hz, the band of the motion",
             0.7 * motion_hz
         ),
         2,
@@ -275,7 +268,7 @@ fn parameters(r: &ResultFile) -> String {
     let counted = |limit: f64| order.iter().filter(|index| error(**index) <= limit).count();
     let mut text = wrapped(
         &format!(
-            "95 % error bars: {} of {} base parameters known to 10 %, {} to 30 %. The best:",
+            "95 % error bars: {} of {} base parameters are known to 10 % or better, {} to 30 % or better. The best:",
             counted(10.0),
             r.base_parameters.len(),
             counted(30.0)

@@ -106,8 +106,8 @@ fn written(
     let with_state = of_class(TermClass::WithState).filter(|form| target.has_state() && form.has_memory());
     if let Some(form) = form {
         if form.refitted {
-            let note = "This form cannot contain all torque terms or steps of the result: friction and drives were \
-                        fitted again to the training logs.";
+            let note = "Friction and drives were fitted again to the training logs, because this form lacks torque terms \
+                        of the result or has wider steps near zero velocity.";
             notes.push(note.to_owned());
         }
         notes.extend(form.sentences("this file"));
