@@ -109,7 +109,7 @@ mod tests {
         let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/ur10.urdf");
         let model = load_robot(&robot).unwrap().model;
         let terms = |exportable, offset, drive_inertia| {
-            let drive = DriveSection { exportable, offset, drive_inertia, ..DriveSection::default() };
+            let drive = DriveSection { drive_inertia, offset, exportable, ..DriveSection::default() };
             torque_terms(&drive, &[], &model).unwrap()
         };
         let has_offset = |terms: &[TorqueTerm]| terms.iter().any(|term| matches!(term, TorqueTerm::Offset(_)));
