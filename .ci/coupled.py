@@ -46,7 +46,7 @@ def main():
     tree = mujoco.MjModel.from_xml_path(str(scratch / "arm.xml"))
     tree.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     tree.dof_damping[:] = 0
-    # The MJCF has drive inertia that was fitted together with its simpler friction; the code has that of its own fit.
+    # The drive inertia of the MJCF was fitted together with its simpler friction, so that of the code is used.
     tree.dof_armature[:] = 0
     result = json.loads((found / "result.json").read_text())
     of_code = next({term["symbol"]: term["value"] for term in form["terms"]} for form in result["forms"] if form["class"] == "functions-of-motion")
