@@ -143,7 +143,9 @@ class Check:
             write = "; ".join(change["line"] for change in finding["write"])
             return f"{finding['level']}: {finding['what']}: {finding['evidence']}" + (f" Write: {write}" if write else "")
 
-        return "\n".join(map(line, self.findings)) or "study, robot and logs fit together"
+        unexplained = self.result["check"].get("unexplained_percent")
+        shares = "" if unexplained is None else f" ({unexplained:.1f} % of all torque is unexplained)"
+        return "\n".join(map(line, self.findings)) or f"no mistake found in study, robot and logs{shares}"
 
 
 @dataclass(frozen=True, eq=False)

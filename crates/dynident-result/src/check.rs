@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of `check --json`.
 pub const CHECK_SCHEMA: &str = "dynident/check/1";
 
+/// Share of a torque that is most of it, percent.
+const MOST_PERCENT: f64 = 50.0;
+
 /// Result of `check`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -34,6 +37,16 @@ pub struct StudyCheck {
     pub best: Option<HypothesisResult>,
     /// Number of tested hypotheses.
     pub tried: usize,
+    /// Torque of all joints without explanation by the best hypothesis, percent (root mean squares); null if the
+    /// hypotheses could not be compared, and in results of older versions.
+    #[serde(default)]
+    pub unexplained_percent: Option<f64>,
+    /// Share of each joint's torque that noise explains, percent; empty in results of older versions.
+    #[serde(default)]
+    pub noise_percent: Vec<f64>,
+    /// The same for all joints together; null in results of older versions.
+    #[serde(default)]
+    pub noise_of_all_percent: Option<f64>,
 }
 
 /// One thing that was found.
@@ -81,6 +94,16 @@ pub struct HypothesisResult {
 }
 
 impl StudyCheck {
+    /// Joints with more than half of their torque (root mean square) unexplained by the best hypothesis and by noise,
+    /// with the unexplained percentage.
+    pub fn mostly_unexplained(&self) -> Vec<(&str, f64)> {
+        let left = self.best.as_ref().or(self.as_written.as_ref()).map_or(&[][..], |result| &result.left_percent);
+        let noise = |joint: usize| self.noise_percent.get(joint).copied().unwrap_or(0.0);
+        let is_far = |joint: usize, left: f64| left.powi(2) - noise(joint).powi(2) > MOST_PERCENT.powi(2);
+        let all = self.joints.iter().zip(left).enumerate();
+        all.filter(|(joint, (_, left))| is_far(*joint, **left)).map(|(_, (name, left))| (&name[..], *left)).collect()
+    }
+
     /// Findings that make an identification unreliable.
     pub fn problems(&self) -> impl Iterator<Item = String> + '_ {
         self.findings.iter().filter(|finding| finding.level == Level::Problem).map(CheckFinding::sentence)

@@ -1,9 +1,11 @@
 //! Reasons against loading a result's model into a robot.
 
 use super::{CheckFinding, LogSummary, ResultFile, StudyCheck};
+use dynident_identification::Role;
 use dynident_identification::estimators::{NoiseInRegressor, NoiseVerdict};
 use dynident_identification::examination::LogValidation;
 use dynident_recording::Level;
+use dynident_recording::log::Quantity;
 use dynident_study::{Expected, StudyError};
 
 /// Thresholds of [`ResultFile::problems_of_the_model_with`].
@@ -23,6 +25,9 @@ pub struct ProblemSettings {
     pub max_held_out_ratio_if_inconsistent: f64,
     /// Unexplained torque of a held-out log below which its residual ratio is ignored, percent. Default 1.
     pub min_held_out_percent: f64,
+    /// Range of every position (rad, m) in all training logs below which the robot is at rest. Default 0.01: motions of
+    /// the examples with real logs have ranges above 0.3.
+    pub max_range_at_rest: f64,
     /// Smallest torque of a joint for the comparison of errors, relative to the largest joint torque. Default 1e-3:
     /// smaller torques are friction only.
     pub min_torque_share: f64,
@@ -37,6 +42,7 @@ impl Default for ProblemSettings {
             max_held_out_ratio: 4.0,
             max_held_out_ratio_if_inconsistent: 2.0,
             min_held_out_percent: 1.0,
+            max_range_at_rest: 0.01,
             min_torque_share: 1.0e-3,
         }
     }
@@ -55,6 +61,7 @@ impl ProblemSettings {
             ("max_held_out_ratio", self.max_held_out_ratio),
             ("max_held_out_ratio_if_inconsistent", self.max_held_out_ratio_if_inconsistent),
             ("min_held_out_percent", self.min_held_out_percent),
+            ("max_range_at_rest", self.max_range_at_rest),
             ("min_torque_share", self.min_torque_share),
         ] {
             Expected::Positive.check(key, value)?;
@@ -97,6 +104,7 @@ impl ResultFile {
             ));
         }
         problems.extend(self.noise_in_regressor.as_ref().and_then(|noise| self.noise_problem(noise)));
+        problems.extend(self.at_rest(settings));
         problems.extend(self.unexplained(settings));
         let tested = self.validation.iter().filter_map(|log| {
             let [free, written] = [&log.model, log.physical.as_ref()?].map(|report| Errors {
@@ -154,6 +162,28 @@ impl ResultFile {
         ))
     }
 
+    /// Training logs in which no joint moves.
+    fn at_rest(&self, settings: &ProblemSettings) -> Option<String> {
+        let logs = self.logs.iter().filter(|log| log.role == Role::Identify);
+        let positions = logs
+            .flat_map(|log| &log.import.channels)
+            .filter(|channel| channel.channel == Quantity::Position)
+            .collect::<Vec<_>>();
+        let range = |joint: &str| {
+            let of_joint = positions.iter().filter(|channel| channel.joint == joint);
+            let [low, high] = of_joint.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], channel| {
+                [low.min(channel.min), high.max(channel.max)]
+            });
+            high - low
+        };
+        let largest = positions.iter().map(|channel| range(&channel.joint)).fold(0.0, f64::max);
+        (!positions.is_empty() && largest < settings.max_range_at_rest).then(|| {
+            format!(
+                "the training logs are at rest: no position changes by more than {largest:.1e} rad (m). They determine only the torque that                  holds this posture, and no mass, inertia or friction; small errors on logs in the same posture do not validate the model.                  Record a motion: `dynident design` computes one from the robot and its limits"
+            )
+        })
+    }
+
     /// A model that leaves most of the training or held-out torque unexplained.
     fn unexplained(&self, settings: &ProblemSettings) -> Option<String> {
         let physical = self.training.physical.as_ref().map(|physical| physical.relative_error_percent);
@@ -164,18 +194,31 @@ impl ResultFile {
             (percent > most).then(|| {
                 format!(
                     "{percent:.0} % of the torque of log `{}` is unexplained: the model does not fit this robot, or the log is of another robot \
-                     or motion; run `dynident check`",
-                    log.log
+                     or motion; {}",
+                    log.log,
+                    self.advice()
                 )
             })
         };
         let of_training = (percent > most).then(|| {
             format!(
                 "{percent:.0} % of the training torque is unexplained: the study does not describe this robot or these logs, or position \
-                 noise exceeds the motion; run `dynident check`, and see `position_noise` of the logs"
+                 noise exceeds the motion (`position_noise` of the logs); {}",
+                self.advice()
             )
         });
         of_training.or_else(|| self.validation.iter().find_map(tested))
+    }
+
+    /// What to do about unexplained torque, by the result of `check`.
+    fn advice(&self) -> &'static str {
+        let Some(check) = &self.check else { return "run `dynident check`" };
+        if check.problems().next().is_some() {
+            "correct the problems that `check` found"
+        } else {
+            "no mistake that `check` tests explains it: compare clock, columns and units of the log with its recorder, and the kind of \
+             the robot with `file` under [robot]"
+        }
     }
 
     /// A held-out log with a much larger error than the training logs.

@@ -1,4 +1,4 @@
-//! Checks that validation logs contain no training data.
+//! Checks that no sample is used twice: validation logs contain no training data, and training logs differ.
 
 use super::Study;
 use super::log_source::StudyLogSource;
@@ -6,6 +6,9 @@ use crate::error::StudyError;
 use dynident_identification::{Recording, Role, Samples};
 use dynident_recording::LogFormat;
 use dynident_recording::log::LogSamples;
+
+/// Largest number of training logs whose samples are compared with each other: all of them are in memory.
+const MAX_COMPARED_LOGS: usize = 8;
 
 impl Study {
     /// Checks that no sample is used for both fit and validation: two logs with different roles must not be the same
@@ -32,10 +35,7 @@ impl Study {
         }
 
         // Each log is read once. A log that cannot be read is reported later by its reader.
-        let read = |index: usize| match &recordings[index].samples {
-            Samples::Log(log) => LogSamples::read(log).ok().flatten(),
-            Samples::Motion(_) => None,
-        };
+        let read = |index: usize| samples_of(&recordings[index]);
         let is_needed = |index: usize| others.iter().any(|pair| pair.contains(&index));
         let tests: Vec<(usize, LogSamples)> = held_out_logs
             .iter()
@@ -53,6 +53,46 @@ impl Study {
             }
         }
         Ok(())
+    }
+
+    /// Checks that no sample is in two training logs, which would make the error bars too small. Samples of up to eight
+    /// training logs are compared.
+    ///
+    /// # Errors
+    /// [`StudyError::RepeatedRows`] with the names and rows of both logs.
+    pub fn check_repeated_rows(&self, sources: &[StudyLogSource], recordings: &[Recording]) -> Result<(), StudyError> {
+        let logs = self.logs_of_role(Role::Identify);
+        if !(2..=MAX_COMPARED_LOGS).contains(&logs.len()) {
+            return Ok(());
+        }
+        let mut before: Vec<(usize, LogSamples)> = Vec::new();
+        for second in logs {
+            let Some(samples) = samples_of(&recordings[second]) else { continue };
+            for (first, earlier) in &before {
+                let is_same_file = sources[*first].has_content_of(&sources[second]);
+                if is_same_file && !may_share_rows(&self.format_of(*first), &self.format_of(second)) {
+                    continue;
+                }
+                if let Some(shared) = earlier.shared_with(&samples) {
+                    return Err(StudyError::RepeatedRows {
+                        first: self.log_name(*first),
+                        first_row: shared.row,
+                        second: self.log_name(second),
+                        second_row: shared.other_row,
+                    });
+                }
+            }
+            before.push((second, samples));
+        }
+        Ok(())
+    }
+}
+
+/// The samples of a log; `None` for prepared motions, long logs, and logs that cannot be read.
+fn samples_of(recording: &Recording) -> Option<LogSamples> {
+    match &recording.samples {
+        Samples::Log(log) => LogSamples::read(log).ok().flatten(),
+        Samples::Motion(_) => None,
     }
 }
 

@@ -77,6 +77,7 @@ use explanation::Explanation;
 use held_out_logs::{HeldOutLogs, TrainingResult, held_out_logs};
 use inconsistent_torque::inconsistent_torques;
 use noise_torque::torque_of_noise;
+use span::dot;
 use training::{SearchedLogs, searched_logs};
 
 /// Findings about study, robot and logs.
@@ -96,6 +97,11 @@ pub struct Diagnosis {
     pub lost_signs: bool,
     /// Torques that are inconsistent with the others under the best hypothesis.
     pub inconsistent_torques: Vec<InconsistentTorque>,
+    /// Share of each joint's torque that noise explains, 0 to 1 (root mean squares): white noise of the torque and,
+    /// where the best hypothesis leaves most of the torque unexplained, noise of the positions.
+    pub noise: Vec<f64>,
+    /// The same for the torque of all joints together.
+    pub noise_of_all: f64,
 }
 
 impl Diagnosis {
@@ -103,6 +109,12 @@ impl Diagnosis {
     /// description is of another robot, or the study has several mistakes.
     pub fn is_unexplained(&self) -> bool {
         self.search.believed().is_unexplained()
+    }
+
+    /// Share of all torque that neither the best hypothesis nor noise explains, 0 to 1.
+    pub fn unexplained_beyond_noise(&self) -> f64 {
+        let left = self.search.believed().left_of_all.min(1.0);
+        (left.powi(2) - self.noise_of_all.powi(2)).max(0.0).sqrt()
     }
 }
 
@@ -138,7 +150,7 @@ pub fn diagnose(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
 
 /// [`diagnose`] at one cut-off.
 fn diagnose_at_cutoff(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
-    let SearchedLogs { search, study, consistency, compensated_s } = searched_logs(task)?;
+    let SearchedLogs { search, study, consistency, compensated_s, torque_noise } = searched_logs(task)?;
     let DiagnosisTask { logs, training, theta, settings, .. } = task;
     let settings = &settings.diagnosis_limits;
     let (robot, model) = (&study.robot, RegressorModel::from(study.robot.clone()));
@@ -170,6 +182,17 @@ fn diagnose_at_cutoff(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisErr
         let share = |(noise, torque): (&f64, &f64)| if *torque > 0.0 { noise / torque } else { 0.0 };
         Ok::<_, DiagnosisError>(noise.iter().zip(&explained.torque).map(share).collect())
     };
+    let mut squares: Vec<f64> = torque_noise.iter().map(|noise| noise.powi(2)).collect();
+    let torques: Vec<f64> = best.rows.tau.iter().map(|tau| dot(tau, tau) / tau.len().max(1) as f64).collect();
+    if search.believed().left_of_all > settings.score.max_unexplained {
+        let of_positions = noise(&Explanation::new(&best.robot, &best.rows, None)?)?;
+        for ((square, share), torque) in squares.iter_mut().zip(of_positions).zip(&torques) {
+            *square += share.powi(2) * torque;
+        }
+    }
+    let share = |noise: f64, torque: f64| if torque > 0.0 { (noise / torque).sqrt().min(1.0) } else { 0.0 };
+    let noise_of_all = share(squares.iter().sum(), torques.iter().sum());
+    let noise_shares = squares.iter().zip(&torques).map(|(noise, torque)| share(*noise, *torque)).collect();
     let inconsistent_torques = inconsistent_torques(search.believed(), &best.robot, &best.rows, noise)?;
     Ok(Diagnosis {
         search,
@@ -179,5 +202,7 @@ fn diagnose_at_cutoff(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisErr
         duplicate_channels,
         lost_signs,
         inconsistent_torques,
+        noise: noise_shares,
+        noise_of_all,
     })
 }

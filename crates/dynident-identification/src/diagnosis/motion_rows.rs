@@ -8,6 +8,11 @@ use dynident_rows::{LogError, Logs, ParallelFilterSettings, RegressorModel, moti
 /// Number of instants; more do not improve the accuracy.
 pub(super) const INSTANTS: usize = 300;
 
+/// Standard deviation of a normal distribution over the median of its magnitude.
+const NORMAL_DEVIATION_OF_MEDIAN: f64 = 1.4826;
+/// Variance of the third difference of white noise of variance 1.
+const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
+
 /// Number of the `most` instants that are taken from log number `place` of `logs`: equal for all logs, or one from
 /// evenly chosen logs if there are more logs than instants.
 pub(super) fn share_of_log(most: usize, place: usize, logs: usize) -> usize {
@@ -119,6 +124,16 @@ impl MotionSamples {
         let count = all.len();
         let chosen: Vec<usize> = if count > most { (0..most).map(|k| all[k * count / most]).collect() } else { all };
         self.selected(&chosen, count)
+    }
+
+    /// Standard deviation of the white noise of a joint's torque in these samples, Nm (N), from third differences:
+    /// `σ = 1.4826 median |Δ³τ| / √20`. A smooth torque has none, and the median ignores steps.
+    pub(super) fn torque_noise(&self, joint: usize) -> f64 {
+        let difference = |tau: &[f64]| (tau[3] - 3.0 * tau[2] + 3.0 * tau[1] - tau[0]).abs();
+        let mut differences: Vec<f64> = self.rows.tau[joint].windows(4).map(difference).collect();
+        differences.sort_by(f64::total_cmp);
+        let median = differences.get(differences.len() / 2).copied().unwrap_or(0.0);
+        NORMAL_DEVIATION_OF_MEDIAN * median / THIRD_DIFFERENCE_VARIANCE.sqrt()
     }
 
     /// Duration of the longest uninterrupted piece, s.
@@ -289,6 +304,31 @@ mod tests {
         let marked = [true, false, true, true, false, false, true];
         assert_eq!(interpolated_torque(&tau, &marked), [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
         assert_eq!(interpolated_torque(&tau, &[]), tau);
+    }
+
+    #[test]
+    fn noise_is_distinguished_from_smooth_torque_and_steps() {
+        let noise = |row: usize| ((row as f64 * 12.9898).sin() * 43_758.547).fract();
+        let smooth = |row: usize| 20.0 * (0.05 * row as f64).sin() + if row % 100 < 50 { 5.0 } else { -5.0 };
+        let deviation = (0..2000).map(|row| noise(row).powi(2)).sum::<f64>() / 2000.0;
+        let of = |tau: Vec<f64>| {
+            let rows = MotionRows { tau: vec![tau], ..MotionRows::empty(1) };
+            let samples = MotionSamples {
+                rows,
+                pieces: vec![0],
+                spacing_s: 0.1,
+                rows_of_fit: 1.0,
+                interpolated: Vec::new(),
+                max_interpolated: 0.3,
+            };
+            samples.torque_noise(0)
+        };
+        let found = of((0..2000).map(|row| smooth(row) + noise(row)).collect());
+        // The median of 2000 third differences varies by about 2 %; uniform noise has another ratio of median and
+        // deviation, and its differences overlap.
+        assert!((found / deviation.sqrt() - 1.0).abs() < 0.15, "{found}");
+        assert!(of((0..2000).map(smooth).collect()) < 0.05);
+        assert_eq!(of(vec![1.0, 2.0]), 0.0);
     }
 
     #[test]

@@ -35,6 +35,8 @@ pub(super) struct SearchedLogs {
     pub(super) consistency: ConsistencySettings,
     /// The compensated lag of each joint's torque, s.
     pub(super) compensated_s: Vec<f64>,
+    /// Standard deviation of the white noise of each joint's torque at the instants, Nm (N).
+    pub(super) torque_noise: Vec<f64>,
 }
 
 /// Searches the mistake that explains the training recordings best.
@@ -49,6 +51,7 @@ pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, Dia
     for (place, one) in samples.iter().enumerate() {
         rows.append(&one.instants(share_of_log(INSTANTS, place, samples.len())));
     }
+    let torque_noise = torque_noise(&samples, robot.dof());
     // Identification estimates unstated drive inertia; without it a mistake would have to explain this torque.
     let robot = with_drives_left_to_the_logs(robot, settings)?;
     // Scores need an accuracy of 0.01.
@@ -62,7 +65,16 @@ pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, Dia
     let search = select_search(searches, &study);
     let again = unless_confirmed(&written, &search.corrected(&study), &search, &consistency)?;
     let (study, search) = again.unwrap_or((study, search));
-    Ok(SearchedLogs { search, study, consistency, compensated_s })
+    Ok(SearchedLogs { search, study, consistency, compensated_s, torque_noise })
+}
+
+/// Root mean square, over the recordings, of the white noise of each joint's torque.
+fn torque_noise(samples: &[MotionSamples], dof: usize) -> Vec<f64> {
+    let of_joint = |joint: usize| {
+        let squares: f64 = samples.iter().map(|samples| samples.torque_noise(joint).powi(2)).sum();
+        (squares / samples.len().max(1) as f64).sqrt()
+    };
+    (0..dof).map(of_joint).collect()
 }
 
 struct SearchResults {

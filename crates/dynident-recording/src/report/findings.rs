@@ -25,6 +25,17 @@ impl Findings {
     }
 }
 
+/// Smallest number of different rounded stamps that determine the rate. With fewer, rate and velocities have errors of
+/// 1 % or more, and inertias twice as much.
+const MIN_DIFFERENT_STAMPS: u64 = 100;
+/// Largest range of a position at rest (rad, m): 20 steps of an encoder with 17 bits.
+const MAX_RANGE_AT_REST: f64 = 1e-3;
+
+/// Whether a joint rests at zero: its encoder changes by a few steps.
+fn is_at_rest_at_zero(channel: &ChannelReport) -> bool {
+    channel.channel == Quantity::Position && channel.max - channel.min < MAX_RANGE_AT_REST
+}
+
 /// Name of a channel in findings, and whether every log has this channel.
 struct Channel {
     name: String,
@@ -104,18 +115,22 @@ impl ImportReport {
 
     fn check_stamps(&self, findings: &mut Findings) {
         if self.duplicate_stamps > 0 {
-            let what = if self.clock.repeats_rows {
-                "rows repeat the one before, stamp and positions; they are left out, and the rate is that of the others"
+            let different = self.rows.saturating_sub(self.duplicate_stamps).max(1);
+            let (level, what) = if self.clock.repeats_rows {
+                let what = "rows repeat the one before, stamp and positions; they are left out, and the rate is that of the others";
+                (Level::Warning, what.to_owned())
+            } else if 2 * self.duplicate_stamps > self.rows && different < MIN_DIFFERENT_STAMPS {
+                let what = format!(
+                    "stamps equal the one before: {different} different stamps give the rate only to 1 part in {different}: select the \
+                     time column with the fractions of a second, or state `rate_hz` instead of the time column"
+                );
+                (Level::Problem, what)
             } else {
-                "stamps equal the one before; rounded stamps are harmless, because the rate is the number of all rows \
-                 over the time span"
+                let what = "stamps equal the one before; rounded stamps are harmless, because the rate is the number of all rows \
+                            over the time span";
+                (Level::Warning, what.to_owned())
             };
-            findings.add(
-                "import-duplicate-stamps",
-                Level::Warning,
-                "time",
-                format!("{} {what}", self.duplicate_stamps),
-            );
+            findings.add("import-duplicate-stamps", level, "time", format!("{} {what}", self.duplicate_stamps));
         }
         if self.backward_stamps > 0 {
             findings.add(
@@ -181,7 +196,7 @@ impl ImportReport {
         if channel.constant() {
             let level = if measured { Level::Problem } else { Level::Warning };
             findings.add("import-dead", level, &name, format!("dead: constantly {}", channel.min));
-        } else if channel.zero_share > 0.5 {
+        } else if channel.zero_share > 0.5 && !is_at_rest_at_zero(channel) {
             let message = format!("mostly dead: {:.1} % of the samples are exactly zero", 100.0 * channel.zero_share);
             findings.add("import-mostly-dead", if measured { Level::Problem } else { Level::Warning }, &name, message);
         }

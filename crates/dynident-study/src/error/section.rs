@@ -144,6 +144,20 @@ pub enum StudyError {
         /// First common row of the held-out log, 0-based.
         held_out_row: u64,
     },
+    /// Two training logs that contain the same samples, so that error bars would be too small.
+    #[error(
+        "training logs `{first}` and `{second}` contain the same samples: row {second_row} of `{second}` and the following equal those of `{first}` from row {first_row}, which would make the error bars too small: remove one of the logs, or select rows that do not overlap"
+    )]
+    RepeatedRows {
+        /// The first training log.
+        first: String,
+        /// First common row of the first log, 0-based.
+        first_row: u64,
+        /// The second training log.
+        second: String,
+        /// First common row of the second log, 0-based.
+        second_row: u64,
+    },
     /// Exclusive keys.
     #[error("{} are both given: keep one", keys.join(" and "))]
     Exclusive {

@@ -62,18 +62,25 @@ impl StudyKeys {
         })
     }
 
-    /// `scale` of the torque columns, times the factor of each joint; a joint without one gets the median.
+    /// `scale` of the torque columns, times the factor of each joint. A joint without a factor keeps its scale, and a
+    /// comment states the numbers of these columns.
     pub fn torque_scale(&self, factors: &[Option<f64>]) -> KeyChange {
         let (group, table) = self.group(Channels::Torque);
-        let mut known: Vec<f64> = factors.iter().flatten().copied().collect();
-        known.sort_by(f64::total_cmp);
-        let usual = known.get(known.len() / 2).copied().unwrap_or(1.0);
-        let value = |place: usize| {
+        let factor = |place: usize| {
             let mut own = self.places.iter().zip(factors).filter(|(own, _)| **own == place);
-            let factor = own.find_map(|(_, factor)| *factor);
-            significant(factor.map_or(usual, |factor| factor * at(group.scale.as_ref(), place, 1.0)))
+            own.find_map(|(_, factor)| *factor)
         };
-        KeyChange { table, line: format!("scale = {}", list((0..factors.len()).map(value))) }
+        let value = |place: usize| {
+            let scale = at(group.scale.as_ref(), place, 1.0);
+            factor(place).map_or_else(|| format!("{scale:?}"), |factor| significant(factor * scale))
+        };
+        let unknown = (0..self.columns).filter(|&place| factor(place).is_none()).map(|place| (place + 1).to_string());
+        let unknown = unknown.collect::<Vec<_>>().join(", ");
+        let comment = match &unknown[..] {
+            "" => String::new(),
+            unknown => format!("   # number {unknown} not estimated: take it from the data sheet"),
+        };
+        KeyChange { table, line: format!("scale = {}{comment}", list((0..self.columns).map(value))) }
     }
 
     /// `scale` of the torque columns in one unit of `unit` Nm (N): one number if all columns have the same scale in the

@@ -60,12 +60,20 @@ pub(super) fn study_check(
     if findings.is_empty() && search.believed().left_of_all > thresholds.min_unrelated_share {
         findings.push(unrelated_torques(search));
     }
+    let is_problem = |finding: &CheckFinding| finding.level == Level::Problem;
+    let is_unexplained = diagnosis.unexplained_beyond_noise() > thresholds.max_unexplained_beyond_noise;
+    if is_unexplained && !findings.iter().any(is_problem) {
+        findings.push(mostly_unexplained(diagnosis, &joints));
+    }
     StudyCheck {
         findings,
         as_written: Some(hypothesis_result(&search.as_written, &joints)),
         best: best.map(|best| hypothesis_result(best, &joints)),
         joints,
         tried: search.tried,
+        unexplained_percent: Some(100.0 * search.believed().left_of_all),
+        noise_percent: diagnosis.noise.iter().map(|noise| 100.0 * noise).collect(),
+        noise_of_all_percent: Some(100.0 * diagnosis.noise_of_all),
     }
 }
 
@@ -123,13 +131,36 @@ fn unexplained(search: &Search, joints: &[String]) -> CheckFinding {
         "description",
         "the robot description is of another robot, or the study has several mistakes".to_owned(),
         format!(
-            "none of {} hypotheses (signs, orders, zeros, mounting) explains the logs with this robot: {:.0} % of the torque of `{}` is unexplained; \
+            "none of {} hypotheses (signs, orders, zeros, mounting) explains the logs with this robot: {} of the torque of `{}` is unexplained; \
              check link lengths, axes and the kind of the robot",
             search.tried,
-            100.0 * left[worst],
+            percent(left[worst]),
             joints[worst]
         ),
     )
+}
+
+/// Most of the torque is unexplained although no tested mistake explains more of it.
+fn mostly_unexplained(diagnosis: &Diagnosis, joints: &[String]) -> CheckFinding {
+    let search = &diagnosis.search;
+    let believed = search.believed();
+    let shares = believed.left.iter().zip(joints).map(|(left, joint)| format!("{joint} {}", percent(*left)));
+    finding(
+        "torque",
+        "most of the torque is unexplained, and no tested mistake of the study explains it".to_owned(),
+        format!(
+            "with the best of {} hypotheses, {} of all torque is unexplained, of which noise explains {} ({}): plot torque against position. Check              that each row contains torque and position of the same instant (recorders with different rates), that the torque does not              overflow or saturate, and that `columns` and `file` under [robot] are those of this robot",
+            search.tried,
+            percent(believed.left_of_all),
+            percent(diagnosis.noise_of_all),
+            shares.collect::<Vec<_>>().join(", "),
+        ),
+    )
+}
+
+/// A share in percent; a share above ten is not meaningful as a number.
+fn percent(share: f64) -> String {
+    if share > 10.0 { "more than 1000 %".to_owned() } else { format!("{:.0} %", 100.0 * share) }
 }
 
 fn unrelated_torques(search: &Search) -> CheckFinding {

@@ -11,7 +11,7 @@ pub use settings::CheckSettings;
 use crate::error::Error;
 use crate::inputs::InputFiles;
 use crate::jobs::options::RunOptions;
-use crate::result::{CHECK_SCHEMA, CheckFile, CheckFinding, StudyCheck};
+use crate::result::{CHECK_SCHEMA, CheckFile, CheckFinding, StudyChange, StudyCheck};
 use crate::study::{Study, StudyFile, StudyRobot};
 use dynident_identification::diagnosis::Diagnosis;
 use dynident_identification::{IdentificationError, IdentificationSettings, StudyExamination, examine_study};
@@ -56,6 +56,7 @@ pub fn check_with(
     let task = study.task_with(settings, &robot, &folders)?;
     let sources = study.log_sources(&folders)?;
     study.check_overlap(&sources, &task.recordings).map_err(Error::study(study.path))?;
+    study.check_repeated_rows(&sources, &task.recordings).map_err(Error::study(study.path))?;
     let examined = files.while_unchanged(|| examine_study(&task, options.execution()).map_err(in_study))?;
 
     let mut check = examined.diagnosis.as_ref().map_or_else(
@@ -143,7 +144,8 @@ pub(super) fn diagnosis_check(
 ) -> StudyCheck {
     let mut check = study_check(study, robot, settings, diagnosis, thresholds);
     if let Some(currents) = currents_without_scale(study, settings) {
-        check.findings.retain(|finding| finding.kind != "unit" || finding.what.contains("position"));
+        let is_of_torque = |change: &StudyChange| change.table.ends_with("torque");
+        check.findings.retain(|finding| finding.kind != "unit" || !finding.write.iter().all(is_of_torque));
         check.findings.insert(0, currents);
     }
     check

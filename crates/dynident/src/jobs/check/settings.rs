@@ -12,6 +12,9 @@ pub struct CheckSettings {
     /// Unexplained share of all torque above which torque and motion are unrelated. Default 0.92: a correct study with
     /// a noisy log of a slow pendulum has 0.81.
     pub min_unrelated_share: f64,
+    /// Share of all torque that neither the best hypothesis nor noise explains, above which the study does not fit.
+    /// Default 0.6, the limit of `identify`; the examples with real logs have 0.02 to 0.3.
+    pub max_unexplained_beyond_noise: f64,
     /// Largest ratio between joint factors for one common unit or motor currents. Default 10: motor constants times
     /// gear ratios of one arm differ by at most 5.
     pub max_factor_ratio: f64,
@@ -28,6 +31,7 @@ impl Default for CheckSettings {
             max_unexplained_share: 0.3,
             max_unexplained_ratio: 0.75,
             min_unrelated_share: 0.92,
+            max_unexplained_beyond_noise: 0.6,
             max_factor_ratio: 10.0,
             too_few_equations: 2,
             few_equations: 3,
@@ -44,6 +48,7 @@ impl CheckSettings {
         Expected::Range(0.0, 1.0).check("max_unexplained_share", self.max_unexplained_share)?;
         Expected::Range(0.0, 1.0).check("max_unexplained_ratio", self.max_unexplained_ratio)?;
         Expected::Range(0.0, 1.0).check("min_unrelated_share", self.min_unrelated_share)?;
+        Expected::Range(0.0, 1.0).check("max_unexplained_beyond_noise", self.max_unexplained_beyond_noise)?;
         Expected::Range(1.0, 1e6).check("max_factor_ratio", self.max_factor_ratio)?;
         let few = self.few_equations as f64;
         Expected::Range(0.0, few).check("too_few_equations", self.too_few_equations as f64)

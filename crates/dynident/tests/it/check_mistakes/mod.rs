@@ -1,6 +1,7 @@
 //! Corpus of study mistakes: `check` names each with the key that corrects it, and correct logs give no problem. Before
 //! this test 17 of 43 mistakes passed unnoticed.
 
+mod of_advice;
 mod of_descriptions;
 mod of_honest_logs;
 mod of_one_column;
@@ -60,6 +61,12 @@ fn checked(case: &Case) -> StudyCheck {
 
 /// The same with the mistake in the rows of some logs only.
 fn checked_in(case: &Case, spoilt: &[&str]) -> StudyCheck {
+    let (folder, study) = prepared(case, spoilt);
+    check_text(folder.path(), &study)
+}
+
+/// A folder with the logs, and the text of the study.
+fn prepared(case: &Case, spoilt: &[&str]) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
     let mut study = study
@@ -83,7 +90,7 @@ fn checked_in(case: &Case, spoilt: &[&str]) -> StudyCheck {
         }
         std::fs::write(folder.path().join(name), text).unwrap();
     }
-    check_text(folder.path(), &study)
+    (folder, study)
 }
 
 fn check_text(folder: &Path, study: &str) -> StudyCheck {

@@ -81,3 +81,51 @@ fn a_model_is_not_confirmed_by_what_it_was_fitted_to() {
     let doubted = validate(&result_path, &again, &path, &options()).unwrap();
     assert!(doubted.problems.iter().any(|problem| problem.contains("is the training log")), "{:?}", doubted.problems);
 }
+
+#[test]
+fn training_rows_are_given_once() {
+    let (header, rows) = read("train.csv");
+    let others = [("the same rows", rows.clone(), 9), ("overlapping rows", rows[600..].to_vec(), 5)];
+    for (name, second, digits) in others {
+        let folder = tempfile::tempdir().unwrap();
+        let path = study_with(folder.path(), &read("test.csv").1, 9);
+        write_rows(&folder.path().join("second.csv"), &header, &second, digits);
+        let text = std::fs::read_to_string(&path).unwrap() + "\n[[log]]\nfile = \"second.csv\"\n";
+        std::fs::write(&path, text).unwrap();
+        let study = Study::load(&path).unwrap();
+        for refused in [check(&study, &path, &options()).map(|_| ()), identify(&study, &path, &options()).map(|_| ())] {
+            let Err(Error::Study(StudyFileError::Study { source, .. })) = refused else {
+                panic!("{name}: {refused:?}")
+            };
+            assert!(matches!(*source, StudyError::RepeatedRows { .. }), "{name}: {source}");
+        }
+    }
+}
+
+#[test]
+fn logs_at_rest_are_a_problem() {
+    let (header, rows) = read("train.csv");
+    let folder = tempfile::tempdir().unwrap();
+    let path = study_with(folder.path(), &read("test.csv").1, 9);
+    // The posture of the first row, with an encoder that changes by one step.
+    let noise = |row: usize, column: usize| ((row * 13 + column) as f64 * 12.9898).sin();
+    let rest: Vec<Row> = rows
+        .iter()
+        .enumerate()
+        .map(|(number, row)| {
+            core::array::from_fn(|column| match column {
+                0 => row[0],
+                1..=6 => rows[0][column] + if noise(number, column) > 0.5 { 5e-5 } else { 0.0 },
+                _ => rows[0][column] + 0.1 * noise(number, column),
+            })
+        })
+        .collect();
+    write_rows(&folder.path().join("train.csv"), &header, &rest, 9);
+    let study = Study::load(&path).unwrap();
+    let problems = match identify(&study, &path, &options()) {
+        Ok(found) => found.result.problems,
+        Err(error) => vec![error.to_string()],
+    };
+    let named = problems.iter().any(|problem| problem.contains("at rest") && problem.contains("dynident design"));
+    assert!(named, "{problems:?}");
+}
