@@ -179,7 +179,9 @@ impl ResultFile {
         let largest = positions.iter().map(|channel| range(&channel.joint)).fold(0.0, f64::max);
         (!positions.is_empty() && largest < settings.max_range_at_rest).then(|| {
             format!(
-                "the training logs are at rest: no position changes by more than {largest:.1e} rad (m). They determine only the torque that                  holds this posture, and no mass, inertia or friction; small errors on logs in the same posture do not validate the model.                  Record a motion: `dynident design` computes one from the robot and its limits"
+                "the training logs are at rest: no position changes by more than {largest:.1e} rad (m). They determine only the torque that \
+                 holds this posture, and no mass, inertia or friction; small errors on logs in the same posture do not validate the model. \
+                 Record a motion: `dynident design` computes one from the robot and its limits"
             )
         })
     }

@@ -5,90 +5,69 @@ use super::log_source::StudyLogSource;
 use crate::error::StudyError;
 use dynident_identification::{Recording, Role, Samples};
 use dynident_recording::LogFormat;
-use dynident_recording::log::LogSamples;
+use dynident_recording::log::{LogSamples, SharedSamples};
 
-/// Largest number of training logs whose samples are compared with each other: all of them are in memory.
-const MAX_COMPARED_LOGS: usize = 8;
+/// Values of training logs that are kept for the comparison with later training logs: 128 MB.
+const MAX_KEPT_VALUES: usize = 1 << 24;
 
 impl Study {
-    /// Checks that no sample is used for both fit and validation: two logs with different roles must not be the same
-    /// file (or copies) with common rows, nor contain the same samples in another file. `sources` and `recordings` are
-    /// the study's logs.
+    /// Checks that no sample is used twice, for fit and validation or twice for the fit: two logs must not be the same
+    /// file (or copies) with common rows, nor contain the same samples in another file. Held-out logs are not compared
+    /// with each other. `sources` and `recordings` are the study's logs.
     ///
     /// # Errors
-    /// [`StudyError::Overlap`] and [`StudyError::SameSamples`] with the names of both logs.
+    /// [`StudyError::Overlap`], [`StudyError::SameSamples`] and [`StudyError::RepeatedRows`] with the names of both
+    /// logs.
     pub fn check_overlap(&self, sources: &[StudyLogSource], recordings: &[Recording]) -> Result<(), StudyError> {
-        let held_out_logs = self.logs_of_role(Role::Validate);
-        let training_logs = self.logs_of_role(Role::Identify);
-        let names = |logs: [usize; 2]| logs.map(|index| self.log_name(index));
-        // Pairs of different files, whose samples have to be compared.
-        let mut others = Vec::new();
+        let [training_logs, held_out_logs] = [Role::Identify, Role::Validate].map(|role| self.logs_of_role(role));
+        let is_same_file = |a: usize, b: usize| sources[a].has_content_of(&sources[b]);
+        let may_share = |a: usize, b: usize| may_share_rows(&self.format_of(a), &self.format_of(b));
         for &held_out in &held_out_logs {
-            for &training in &training_logs {
-                let is_same_file = sources[training].has_content_of(&sources[held_out]);
-                if is_same_file && may_share_rows(&self.format_of(training), &self.format_of(held_out)) {
-                    let [training, held_out] = names([training, held_out]);
-                    return Err(StudyError::Overlap { training, held_out });
-                }
-                others.extend((!is_same_file).then_some([training, held_out]));
+            let same = training_logs.iter().find(|log| is_same_file(**log, held_out) && may_share(**log, held_out));
+            if let Some(&training) = same {
+                let [training, held_out] = [training, held_out].map(|index| self.log_name(index));
+                return Err(StudyError::Overlap { training, held_out });
             }
         }
 
-        // Each log is read once. A log that cannot be read is reported later by its reader.
-        let read = |index: usize| samples_of(&recordings[index]);
-        let is_needed = |index: usize| others.iter().any(|pair| pair.contains(&index));
-        let tests: Vec<(usize, LogSamples)> = held_out_logs
-            .iter()
-            .filter(|&&index| is_needed(index))
-            .filter_map(|&index| Some((index, read(index)?)))
-            .collect();
-        for &training in training_logs.iter().filter(|&&index| !tests.is_empty() && is_needed(index)) {
-            let Some(fitted) = read(training) else { continue };
-            for (held_out, tested) in tests.iter().filter(|(held_out, _)| others.contains(&[training, *held_out])) {
-                if let Some(shared) = fitted.shared_with(tested) {
-                    let [training, held_out] = names([training, *held_out]);
-                    let (training_row, held_out_row) = (shared.row, shared.other_row);
-                    return Err(StudyError::SameSamples { training, training_row, held_out, held_out_row });
+        let is_compared = |a: usize, b: usize| a != b && (!is_same_file(a, b) || may_share(a, b));
+        let is_needed = |log: usize, others: &[usize]| others.iter().any(|other| is_compared(log, *other));
+        let tests = held_out_logs.iter().copied().filter(|&log| is_needed(log, &training_logs));
+        let mut before: Vec<(usize, LogSamples)> =
+            tests.filter_map(|log| Some((log, samples_of(&recordings[log])?))).collect();
+        let mut kept = 0;
+        for &training in &training_logs {
+            if !is_needed(training, &training_logs) && !is_needed(training, &held_out_logs) {
+                continue;
+            }
+            let Some(samples) = samples_of(&recordings[training]) else { continue };
+            for (other, others) in before.iter().filter(|(other, _)| is_compared(*other, training)) {
+                if let Some(shared) = others.shared_with(&samples) {
+                    return Err(self.same_samples([*other, training], shared));
                 }
+            }
+            kept += samples.values();
+            if kept <= MAX_KEPT_VALUES {
+                before.push((training, samples));
             }
         }
         Ok(())
     }
 
-    /// Checks that no sample is in two training logs, which would make the error bars too small. Samples of up to eight
-    /// training logs are compared.
-    ///
-    /// # Errors
-    /// [`StudyError::RepeatedRows`] with the names and rows of both logs.
-    pub fn check_repeated_rows(&self, sources: &[StudyLogSource], recordings: &[Recording]) -> Result<(), StudyError> {
-        let logs = self.logs_of_role(Role::Identify);
-        if !(2..=MAX_COMPARED_LOGS).contains(&logs.len()) {
-            return Ok(());
+    /// The error of samples that another log shares with a training log.
+    fn same_samples(&self, [other, training]: [usize; 2], shared: SharedSamples) -> StudyError {
+        let [name, training] = [other, training].map(|index| self.log_name(index));
+        let SharedSamples { row, other_row } = shared;
+        if self.logs_of_role(Role::Validate).contains(&other) {
+            StudyError::SameSamples { training, training_row: other_row, held_out: name, held_out_row: row }
+        } else {
+            StudyError::RepeatedRows { first: name, first_row: row, second: training, second_row: other_row }
         }
-        let mut before: Vec<(usize, LogSamples)> = Vec::new();
-        for second in logs {
-            let Some(samples) = samples_of(&recordings[second]) else { continue };
-            for (first, earlier) in &before {
-                let is_same_file = sources[*first].has_content_of(&sources[second]);
-                if is_same_file && !may_share_rows(&self.format_of(*first), &self.format_of(second)) {
-                    continue;
-                }
-                if let Some(shared) = earlier.shared_with(&samples) {
-                    return Err(StudyError::RepeatedRows {
-                        first: self.log_name(*first),
-                        first_row: shared.row,
-                        second: self.log_name(second),
-                        second_row: shared.other_row,
-                    });
-                }
-            }
-            before.push((second, samples));
-        }
-        Ok(())
     }
 }
 
-/// The samples of a log; `None` for prepared motions, long logs, and logs that cannot be read.
+/// The samples of a log; `None` for prepared motions, long logs, and logs that cannot be read: these are reported later
+/// by their reader.
 fn samples_of(recording: &Recording) -> Option<LogSamples> {
     match &recording.samples {
         Samples::Log(log) => LogSamples::read(log).ok().flatten(),

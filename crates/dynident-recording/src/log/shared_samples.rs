@@ -62,10 +62,24 @@ impl LogSamples {
         Ok(Some(all))
     }
 
+    /// Number of values in memory.
+    pub fn values(&self) -> usize {
+        self.row.len() * self.values.len()
+    }
+
     /// First shared samples of both logs; `None` if there are none or the joints differ. Joints at rest are ignored,
     /// because a constant position repeats.
     pub fn shared_with(&self, other: &Self) -> Option<SharedSamples> {
-        let [row, other_row] = if self.joints == other.joints { self.rows_shared_with(other)? } else { return None };
+        if self.joints != other.joints {
+            return None;
+        }
+        // Places of the shorter log are searched in the longer one.
+        let [row, other_row] = if self.row.len() < other.row.len() {
+            let [other_row, row] = other.rows_shared_with(self)?;
+            [row, other_row]
+        } else {
+            self.rows_shared_with(other)?
+        };
         Some(SharedSamples { row: self.row[row], other_row: other.row[other_row] })
     }
 

@@ -56,7 +56,6 @@ pub fn check_with(
     let task = study.task_with(settings, &robot, &folders)?;
     let sources = study.log_sources(&folders)?;
     study.check_overlap(&sources, &task.recordings).map_err(Error::study(study.path))?;
-    study.check_repeated_rows(&sources, &task.recordings).map_err(Error::study(study.path))?;
     let examined = files.while_unchanged(|| examine_study(&task, options.execution()).map_err(in_study))?;
 
     let mut check = examined.diagnosis.as_ref().map_or_else(

@@ -12,8 +12,8 @@ pub struct CheckSettings {
     /// Unexplained share of all torque above which torque and motion are unrelated. Default 0.92: a correct study with
     /// a noisy log of a slow pendulum has 0.81.
     pub min_unrelated_share: f64,
-    /// Share of all torque that neither the best hypothesis nor noise explains, above which the study does not fit.
-    /// Default 0.6, the limit of `identify`; the examples with real logs have 0.02 to 0.3.
+    /// Share of all torque that neither the best hypothesis nor noise explains, above which `check` warns. Default 0.6,
+    /// the limit of `identify`. It is no PROBLEM: a correct study with a noisy log of a slow pendulum has 0.80.
     pub max_unexplained_beyond_noise: f64,
     /// Largest ratio between joint factors for one common unit or motor currents. Default 10: motor constants times
     /// gear ratios of one arm differ by at most 5.

@@ -132,7 +132,6 @@ fn identify_from_files(
     let task = study.task_with(settings, &robot, &folders)?;
     let sources = study.log_sources(&folders)?;
     study.check_overlap(&sources, &task.recordings).map_err(Error::study(study.path))?;
-    study.check_repeated_rows(&sources, &task.recordings).map_err(Error::study(study.path))?;
     let mut read = vec![("robot", study.robot_input(&robot))];
     read.extend(study.table_inputs(&folders));
     read.extend(sources.into_iter().map(|source| ("log", StudyInput::from(source))));
