@@ -5,7 +5,7 @@ mod clock;
 mod study_format;
 
 use crate::error::Error;
-use crate::jobs::columns::{time_unit_s, unit};
+use crate::jobs::columns::{time_unit_s, unit, with_unit};
 use crate::result::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 use channel::ChannelStatistics;
 use clock::Clock;
@@ -26,8 +26,11 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     let log = FileLog::described_by_itself(path);
     let (format, mut table) = log.open_with_format()?;
     let names = column_names(table.as_ref());
-    let (groups, notes) = (table.groups(), table.notes());
-    let times: Vec<_> = groups.iter().map(|group| time_column(group, &names[group.columns.clone()])).collect();
+    // With the units that the file states beside the names.
+    let described: Vec<_> =
+        names.iter().enumerate().map(|(column, name)| with_unit(name, table.unit(column)).into_owned()).collect();
+    let groups = table.groups();
+    let times: Vec<_> = groups.iter().map(|group| time_column(group, &described[group.columns.clone()])).collect();
     let mut read: Vec<GroupStatistics> = groups.iter().map(|group| GroupStatistics::new(group.columns.len())).collect();
     table.all_rows(&mut |group, row| read[group].add(row, times[group].map(|(column, _)| column)))?;
     let mut found = LogContents {
@@ -38,19 +41,21 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
         groups: Vec::new(),
         channels: Vec::new(),
         truncated: table.truncated().map(|place| place.to_string()),
-        notes,
+        notes: table.notes(),
         study_format: String::new(),
     };
     for (index, (group, GroupStatistics { rows, channels, clock })) in groups.iter().zip(read).enumerate() {
-        let names = &names[group.columns.clone()];
+        let columns = group.columns.clone();
+        let names = &names[columns.clone()];
         let time = times[index];
         let seconds = time.and_then(|(column, unit_s)| Some((channels[column].increase()?, unit_s)));
         let span_s = seconds.map(|(span, unit_s)| span * unit_s);
         let rate_hz = seconds.and_then(|(span, unit_s)| Some(clock.rate(rows, span)? / unit_s));
-        found.channels.extend(channels.iter().zip(names).map(|(tally, name)| LogChannel {
+        let numbers = channels.iter().zip(names).zip(columns).filter(|(_, column)| !table.is_text(*column));
+        found.channels.extend(numbers.map(|((tally, name), column)| LogChannel {
             name: name.clone(),
             group: index,
-            unit: unit(name).map(str::to_owned),
+            unit: unit(&described[column]).map(str::to_owned),
             rate_hz,
             samples: tally.samples,
             missing: rows - tally.samples,

@@ -14,7 +14,7 @@ pub(super) fn study_format(found: &LogContents) -> String {
     let mut text = "[format]\n".to_owned();
     match found.groups.get(group).and_then(|group| group.time.as_ref()) {
         Some(time) => {
-            let _ = writeln!(text, "time = {}", time_as_toml(time));
+            let _ = writeln!(text, "time = {}", time_as_toml(time, found.unit(group, time)));
         }
         None => text += "rate_hz = 0.0  # no time column recognised: give the sample rate, or time = { column = .. }\n",
     }
