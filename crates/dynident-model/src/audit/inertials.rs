@@ -27,6 +27,14 @@ pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, 
     report_equal(model, findings);
 }
 
+/// Names of the checks that give a warning or problem for the inertial of one link on a body of `length_m`.
+pub(super) fn findings_of_link(link: &str, inertial: &InertialParameters, length_m: f64) -> Vec<&'static str> {
+    let (settings, mut findings) = (AuditSettings::default(), Findings(Vec::new()));
+    check_consistent(link, inertial, &settings, &mut findings);
+    check_plausible(link, inertial, length_m, &settings, &mut findings);
+    findings.0.into_iter().filter(|finding| finding.level > Info).map(|finding| finding.check).collect()
+}
+
 fn check_consistent(link: &str, inertial: &InertialParameters, settings: &AuditSettings, findings: &mut Findings) {
     let place = || format!("link {link}");
     let mass = inertial.mass_kg();
