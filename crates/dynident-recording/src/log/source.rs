@@ -155,7 +155,8 @@ pub trait LogTable: fmt::Debug + Send {
     fn skip_row(&mut self) -> Result<bool, RecordingError>;
 
     /// Reads all remaining rows in their order in the source and passes each to `each` with its group number and the
-    /// columns of the group; text is NaN, see [`is_text`](Self::is_text). Must not follow [`select`](Self::select). Override it only for several groups.
+    /// columns of the group; text is NaN, see [`is_text`](Self::is_text). Must not follow [`select`](Self::select).
+    /// Override it only for several groups, or for text.
     ///
     /// # Errors
     /// If a row does not consist of numbers; the rows before it were passed on.

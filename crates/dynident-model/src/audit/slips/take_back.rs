@@ -5,8 +5,9 @@ use crate::audit::inertials::findings_of_link;
 use crate::inertial::InertialParameters;
 use crate::spatial::Vec3;
 
-/// Restores the stated numbers of each link whose corrected inertial has a finding of the audit that the stated one does
-/// not have: the hypothesis does not explain the numbers. A mistake without remaining corrections is removed.
+/// Restores the stated numbers of each link whose corrected inertial has a finding of the audit that the stated one
+/// does not have, unless the stated one has a worse finding: the hypothesis does not explain the numbers. A mistake
+/// without remaining corrections is removed.
 pub(super) fn implausible(search: &mut Search, stated: &[StatedInertial]) {
     for (place, original) in stated.iter().enumerate() {
         let corrected = &search.now[place];
@@ -18,7 +19,8 @@ pub(super) fn implausible(search: &mut Search, stated: &[StatedInertial]) {
         let length = lengths.map_or(f64::INFINITY, |lengths| lengths[place]);
         let before = findings_of_link(&original.link, &inertial(original), length);
         let after = findings_of_link(&original.link, &inertial(corrected), length);
-        if after.iter().all(|check| before.contains(check)) {
+        let worst = before.iter().map(|(level, _)| *level).max();
+        if after.iter().all(|check| before.contains(check) || worst > Some(check.0)) {
             continue;
         }
         search.now[place] = original.clone();
