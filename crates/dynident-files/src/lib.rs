@@ -18,7 +18,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata};
-use std::io::{self, Read};
+use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
@@ -27,11 +27,27 @@ use std::time::SystemTime;
 ///
 /// # Errors
 /// If the system reports an error, or the path is a folder, a named pipe, a device or a socket: those may block or have
-/// no end, and inputs are read more than once.
+/// no end, and inputs are read more than once. [`io::ErrorKind::InvalidData`] for a pointer of Git LFS in place of the
+/// file.
 pub fn open(path: &Path) -> io::Result<File> {
-    require_regular(&std::fs::metadata(path)?)?;
-    File::open(path)
+    let metadata = std::fs::metadata(path)?;
+    require_regular(&metadata)?;
+    let mut file = File::open(path)?;
+    if metadata.len() < MOST_POINTER_BYTES {
+        let mut start = Vec::new();
+        Read::by_ref(&mut file).take(LFS_POINTER.len() as u64).read_to_end(&mut start)?;
+        if start == LFS_POINTER {
+            let problem = "it is a Git LFS pointer, not the file itself: run `git lfs pull` in its repository";
+            return Err(io::Error::new(io::ErrorKind::InvalidData, problem));
+        }
+        file.rewind()?;
+    }
+    Ok(file)
 }
+
+/// First bytes of a pointer, and a size that no pointer reaches (the specification: less than 1024 bytes).
+const LFS_POINTER: &[u8] = b"version https://git-lfs.github.com/spec/v1\n";
+const MOST_POINTER_BYTES: u64 = 1024;
 
 /// Reads a whole regular file of at most `max_bytes`.
 ///
@@ -206,6 +222,21 @@ mod tests {
         assert_eq!(quoted("q1\n"), "q1\\n");
         assert_eq!(quoted(&"é".repeat(60)), "é".repeat(60));
         assert_eq!(quoted(&"(".repeat(200_000)), format!("{}.. (200000 characters)", "(".repeat(60)));
+    }
+
+    #[test]
+    fn a_git_lfs_pointer_is_not_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 123\n";
+        std::fs::write(&path, pointer).unwrap();
+        let error = read(&path, 1 << 20).unwrap_err();
+        assert!(error.to_string().contains("run `git lfs pull`"), "{error}");
+        // Other short files are read from their start.
+        for text in ["", "version", "version https://git-lfs.github.com/spec/v2\n"] {
+            std::fs::write(&path, text).unwrap();
+            assert_eq!(read_text(&path, 1 << 20).unwrap(), text);
+        }
     }
 
     #[cfg(unix)]

@@ -38,13 +38,14 @@ impl Array {
     }
 }
 
-/// Number of samples: the longest dimension that is shared by arrays with half of all numbers.
+/// Number of samples: the longest dimension that is shared by arrays with half of all numbers. It is the longer side of
+/// at least one array, because 7 is not the number of samples of two arrays of 2000 × 7 and 1999 × 7.
 fn length(arrays: &[Array]) -> usize {
     let numbers = |length: usize| -> usize {
         arrays.iter().filter(|array| array.shape.contains(&length)).map(|array| array.values.len()).sum()
     };
     let all: usize = arrays.iter().map(|array| array.values.len()).sum();
-    let sides = || arrays.iter().flat_map(|array| array.shape);
+    let sides = || arrays.iter().map(|array| array.shape[0].max(array.shape[1]));
     let shared = sides().filter(|side| 2 * numbers(*side) >= all).max();
     shared.or_else(|| sides().max_by_key(|side| (numbers(*side), *side))).unwrap_or(0)
 }
@@ -160,5 +161,14 @@ mod tests {
         }
         assert_eq!(rows, [[1.0, 4.0, -1.0, -4.0], [2.0, 5.0, -2.0, -5.0], [3.0, 6.0, -3.0, -6.0]]);
         assert!(ArrayTable::new(Vec::new()).is_none());
+    }
+
+    #[test]
+    fn arrays_of_different_length_do_not_become_rows_of_joints() {
+        let array = |name: &str, rows: usize| Array::row_major(name.to_owned(), [rows, 3], vec![0.0; 3 * rows]);
+        let table = ArrayTable::new(vec![array("ddq", 98), array("q", 100), array("dq", 99)]).unwrap();
+        assert_eq!(table.estimated_rows(), Some(100));
+        assert_eq!(table.names().unwrap(), ["q[0]", "q[1]", "q[2]"]);
+        assert_eq!(table.notes(), ["ddq: 98 x 3, not of 100 rows", "dq: 99 x 3, not of 100 rows"]);
     }
 }

@@ -10,8 +10,6 @@ pub(crate) fn open(path: &Path, _: Box<dyn BufRead + Send>) -> Result<Box<dyn Ta
     Err(FileError::NotBuilt { file: path.to_owned(), format: "JSON lines", feature: "json" })
 }
 
-#[cfg(feature = "bags")]
-pub(crate) use json::flattened;
 #[cfg(feature = "json")]
 pub(crate) use json::open;
 
@@ -19,44 +17,19 @@ pub(crate) use json::open;
 mod json {
     use super::{BufRead, FileError, Path, Table};
     use crate::arrays::MAX_COLUMNS;
+    use crate::json_document;
+    use crate::json_numbers::flattened;
     use crate::kind::FileFormat;
     use crate::table::slots;
-    use core::fmt::Write;
     use serde_json::Value;
     use std::collections::{HashMap, VecDeque};
     use std::io::Read;
     use std::path::PathBuf;
 
+    /// A single line may be a document.
+    const MAX_FIRST_LINE_BYTES: u64 = json_document::MAX_BYTES;
     const MAX_LINE_BYTES: u64 = 1 << 22;
     const SEARCHED_LINES: usize = 64;
-
-    /// Calls `found` for each number of `value` with its path; true and false are 1 and 0, null is a missing number.
-    pub(crate) fn flattened(value: &Value, path: &mut String, found: &mut impl FnMut(&str, f64)) {
-        let length = path.len();
-        match value {
-            Value::Number(number) => found(path, number.as_f64().unwrap_or(f64::NAN)),
-            Value::Bool(flag) => found(path, f64::from(u8::from(*flag))),
-            Value::Null => found(path, f64::NAN),
-            Value::String(_) => {}
-            Value::Array(items) => {
-                for (index, item) in items.iter().enumerate() {
-                    let _ = write!(path, "[{index}]");
-                    flattened(item, path, found);
-                    path.truncate(length);
-                }
-            }
-            Value::Object(entries) => {
-                for (key, entry) in entries {
-                    if length > 0 {
-                        path.push('.');
-                    }
-                    *path += key;
-                    flattened(entry, path, found);
-                    path.truncate(length);
-                }
-            }
-        }
-    }
 
     struct JsonLines {
         path: PathBuf,
@@ -102,6 +75,12 @@ mod json {
             });
             table.waiting.push_back((table.line, value));
         }
+        // A file with one line is a document, unless that gives no rows.
+        if let [(_, value)] = table.waiting.make_contiguous()
+            && let Some(document) = json_document::table(value)
+        {
+            return Ok(Box::new(document));
+        }
         if table.names.is_empty() {
             let fix = "each line should be an object with numbers, {\"t\": 0.0, \"q\": [0.1, 0.2]}";
             return Err(FileError::no_columns(path, FileFormat::JsonLines, "objects only", fix));
@@ -126,14 +105,15 @@ mod json {
         fn read_into(&mut self, line: &mut Vec<u8>) -> Result<Option<Value>, FileError> {
             loop {
                 line.clear();
-                let read = self.reader.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', line);
+                let most = if self.line == 0 { MAX_FIRST_LINE_BYTES } else { MAX_LINE_BYTES };
+                let read = self.reader.by_ref().take(most).read_until(b'\n', line);
                 let read = read.map_err(|source| FileError::Io { file: self.path.clone(), source })?;
                 if read == 0 {
                     return Ok(None);
                 }
                 self.line += 1;
-                if read as u64 == MAX_LINE_BYTES {
-                    return Err(self.broken("it is longer than 4 MiB"));
+                if read as u64 == most {
+                    return Err(self.broken(format!("it is longer than {} MiB", most >> 20)));
                 }
                 let text = if self.line == 1 { line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line) } else { &line[..] };
                 if text.trim_ascii().is_empty() {

@@ -12,6 +12,8 @@ pub enum FileFormat {
     ZstdText,
     /// One JSON object per line.
     JsonLines,
+    /// One JSON document: a list of objects, or an object of lists.
+    Json,
     /// One NumPy array.
     Npy,
     /// Several NumPy arrays.
@@ -42,6 +44,7 @@ impl FileFormat {
             Self::GzipText => "gzip",
             Self::ZstdText => "Zstandard",
             Self::JsonLines => "JSON lines",
+            Self::Json => "JSON",
             Self::Npy => "NumPy array",
             Self::Npz => "NumPy archive",
             Self::Mcap => "MCAP",

@@ -5,7 +5,7 @@
 //! | --- | --- | --- |
 //! | text, also compressed by gzip or Zstandard | parsed by the caller: [`Contents::Text`] | `gzip`, `zstd` |
 //! | NumPy `.npy`, `.npz` | fields of a structured array, columns of a matrix, arrays of one length | `.npz`: `gzip` |
-//! | JSON, one object per line | numbers by their path: `arm.q[0]` | `json` |
+//! | JSON, one object per line or one document | numbers by their path: `arm.q[0]` | `json` |
 //! | MCAP, rosbag2 | numbers of ROS 2 messages by topic and path: `/joint_states.position[elbow]` | `bags` |
 //! | Parquet | columns, lists with their indices | `parquet` |
 //! | LeRobot data sets | as Parquet, entries by their names: `action[elbow]`; time over all episodes | `json`,
@@ -58,7 +58,11 @@ mod bytes;
 mod diadem;
 mod error;
 mod hdf5;
+#[cfg(feature = "json")]
+mod json_document;
 mod json_lines;
+#[cfg(feature = "json")]
+mod json_numbers;
 mod kind;
 mod lerobot;
 mod limits;
@@ -149,6 +153,7 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
             match recognition::recognised(path, &inner)? {
                 FileFormat::Text => Contents::Text(Box::new(reader)),
                 FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
+                FileFormat::Json => Contents::Table(json(path, reader)?),
                 other => {
                     let problem = format!("it contains {}, which is supported only uncompressed", other.name());
                     return Err(FileError::broken(path, format, "its beginning", problem, "unpack it first"));
@@ -156,6 +161,7 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
             }
         }
         FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
+        FileFormat::Json => Contents::Table(json(path, reader)?),
         // Not compressed: an array cannot be longer than its file.
         FileFormat::Npy => Contents::Table(npy::open(path, reader, Budget::new(limits, u64::MAX))?),
         FileFormat::Npz => Contents::Table(npy::open_archive(path, budget)?),
@@ -169,6 +175,16 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
         FileFormat::Hdf5 => Contents::Table(hdf5::open(path, budget)?),
     };
     Ok(Opened { format, contents })
+}
+
+#[cfg(feature = "json")]
+fn json(path: &Path, reader: impl Read) -> Result<Box<dyn Table>, FileError> {
+    json_document::open(path, reader)
+}
+
+#[cfg(not(feature = "json"))]
+fn json(path: &Path, _: impl Read) -> Result<Box<dyn Table>, FileError> {
+    Err(FileError::NotBuilt { file: path.to_owned(), format: "JSON", feature: "json" })
 }
 
 /// The files of `path`: itself, or the parts of a rosbag2 recording, a LeRobot data set or a DIAdem recording, with

@@ -30,7 +30,9 @@ struct Field {
 }
 
 pub(crate) fn open(path: &Path, mut reader: impl Read, mut budget: Budget) -> Result<Box<dyn Table>, FileError> {
-    let arrays = arrays(path, FileFormat::Npy, "", &mut reader, &mut budget)?;
+    let Some(arrays) = arrays(path, FileFormat::Npy, "", &mut reader, &mut budget)? else {
+        return Err(nothing(path, FileFormat::Npy));
+    };
     let named = arrays.iter().all(|array| !array.name.is_empty());
     let table = ArrayTable::new(arrays).ok_or_else(|| nothing(path, FileFormat::Npy))?;
     Ok(Box::new(if named { table } else { table.nameless() }))
@@ -40,7 +42,7 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
     let io = |source| FileError::Io { file: path.to_owned(), source };
     let mut file = dynident_files::open(path).map_err(io)?;
     let members = zip::members(path, &mut file)?;
-    let (mut all, mut found) = (Vec::new(), 0);
+    let (mut all, mut notes, mut found) = (Vec::new(), Vec::new(), 0);
     for member in &members {
         let Some(name) = member.name.strip_suffix(".npy") else { continue };
         found += 1;
@@ -52,7 +54,11 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
             Err(error @ FileError::Broken { fix: SPLIT_FIX, .. }) => return Err(error),
             arrays => {
                 contents.into_inner().verify(path)?;
-                all.extend(arrays?);
+                match arrays? {
+                    Some(arrays) if !arrays.is_empty() => all.extend(arrays),
+                    Some(_) => notes.push(format!("{name}: text, or more than two dimensions")),
+                    None => notes.push(format!("{name}: Python objects (pickle), which are never loaded")),
+                }
             }
         }
     }
@@ -63,25 +69,26 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
             fix: "unpack it, or save the workbook's sheet as CSV",
         });
     }
-    Ok(Box::new(ArrayTable::new(all).ok_or_else(|| nothing(path, FileFormat::Npz))?))
+    let table = ArrayTable::new(all).ok_or_else(|| nothing(path, FileFormat::Npz))?;
+    Ok(Box::new(table.with_notes(notes)))
 }
 
 fn nothing(path: &Path, format: FileFormat) -> FileError {
     FileError::no_columns(path, format, "text, objects or complex numbers", "save columns of real numbers")
 }
 
-/// The numeric arrays in a `.npy` stream: one, or one for each field of a structured array.
+/// The numeric arrays in a `.npy` stream: one, or one for each field of a structured array; `None` for Python objects.
 fn arrays(
     path: &Path,
     format: FileFormat,
     name: &str,
     reader: &mut impl Read,
     budget: &mut Budget,
-) -> Result<Vec<Array>, FileError> {
+) -> Result<Option<Vec<Array>>, FileError> {
     let place = if name.is_empty() { "the array".to_owned() } else { format!("array `{name}`") };
     let broken =
         |problem: String| FileError::broken(path, format, place.clone(), problem, "write it again with numpy.save");
-    let header = header(reader).map_err(&broken)?;
+    let Some(header) = header(reader).map_err(&broken)? else { return Ok(None) };
     let items = header.shape.iter().try_fold(1_usize, |all, side| all.checked_mul(*side));
     let bytes = items.and_then(|items| items.checked_mul(header.item));
     let too_large = || FileError::broken(path, format, place.clone(), budget.problem(), SPLIT_FIX);
@@ -128,10 +135,11 @@ fn arrays(
         let make = if column_major { Array::column_major } else { Array::row_major };
         arrays.push(make(label, [rows, columns], values));
     }
-    Ok(arrays)
+    Ok(Some(arrays))
 }
 
-fn header(reader: &mut impl Read) -> Result<Header, String> {
+/// The header of an array; `None` if its entries are Python objects.
+fn header(reader: &mut impl Read) -> Result<Option<Header>, String> {
     let cut = |_| "its header is truncated".to_owned();
     let mut begin = [0; 8];
     reader.read_exact(&mut begin).map_err(cut)?;
@@ -160,8 +168,24 @@ fn header(reader: &mut impl Read) -> Result<Header, String> {
         _ => return Err(wrong()),
     };
     let shape = shape.collect::<Option<Vec<usize>>>().ok_or_else(wrong)?;
-    let (fields, item) = fields(entry("descr").ok_or_else(wrong)?).ok_or_else(wrong)?;
-    Ok(Header { fields, item, fortran: matches!(entry("fortran_order"), Some(Value::Word("True"))), shape })
+    let descr = entry("descr").ok_or_else(wrong)?;
+    if has_objects(descr) {
+        return Ok(None);
+    }
+    let (fields, item) = fields(descr).ok_or_else(wrong)?;
+    Ok(Some(Header { fields, item, fortran: matches!(entry("fortran_order"), Some(Value::Word("True"))), shape }))
+}
+
+/// Whether an item contains a Python object: type `|O`.
+fn has_objects(descr: &Value) -> bool {
+    match descr {
+        Value::Text(kind) => kind.contains('O'),
+        Value::List(entries) => entries.iter().any(|entry| match entry {
+            Value::List(parts) => parts.get(1).is_some_and(has_objects),
+            _ => false,
+        }),
+        _ => false,
+    }
 }
 
 /// Fields and bytes of an item.

@@ -82,6 +82,9 @@ pub(crate) fn recognised(path: &Path, head: &[u8]) -> Result<FileFormat, FileErr
     if is_json_line(head) {
         return Ok(FileFormat::JsonLines);
     }
+    if is_json_document(head) {
+        return Ok(FileFormat::Json);
+    }
     Ok(FileFormat::Text)
 }
 
@@ -93,4 +96,38 @@ fn is_json_line(head: &[u8]) -> bool {
     let begins = line.strip_prefix(b"{").is_some_and(|rest| rest.trim_ascii_start().starts_with(b"\""));
     // A line longer than the tested bytes has no end here.
     begins && (line.len() == head.len() && head.len() >= HEAD_BYTES / 2 || line.trim_ascii_end().ends_with(b"}"))
+}
+
+/// Whether these first bytes are those of a document over several lines, or of a list of objects.
+fn is_json_document(head: &[u8]) -> bool {
+    let head = head.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(head).trim_ascii_start();
+    match head {
+        [b'[', rest @ ..] => {
+            rest.trim_ascii_start().strip_prefix(b"{").is_some_and(|rest| rest.trim_ascii_start().starts_with(b"\""))
+        }
+        [b'{', rest @ ..] => {
+            let name = rest.trim_ascii_start();
+            rest[..rest.len() - name.len()].contains(&b'\n') && name.starts_with(b"\"")
+        }
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_documents_are_recognised() {
+        for (text, expected) in [
+            ("[{\"t\": 0}]", true),
+            (" [\n  { \"t\": 0}]", true),
+            ("{\n \"t\": [0, 1]}", true),
+            ("{\"t\": 0}\n", false),
+            ("[0.1, 0.2]", false),
+            ("t,q\n", false),
+        ] {
+            assert_eq!(is_json_document(text.as_bytes()), expected, "{text}");
+        }
+    }
 }

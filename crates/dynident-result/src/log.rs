@@ -29,6 +29,14 @@ pub struct LogContents {
     pub study_format: String,
 }
 
+impl LogContents {
+    /// Unit of the channel with this name in a group.
+    pub fn unit(&self, group: usize, name: &str) -> Option<&str> {
+        let found = self.channels.iter().find(|channel| channel.group == group && channel.name == name);
+        found.and_then(|channel| channel.unit.as_deref())
+    }
+}
+
 /// Columns that were recorded together.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]

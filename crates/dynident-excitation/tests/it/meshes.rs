@@ -223,7 +223,7 @@ fn every_dropped_shape_is_listed_with_its_link_and_file() {
     let listed = &limits.not_checked;
     for (link, what) in [
         ("arm0", "package://nowhere/missing.stl"),
-        ("arm1", "pointer.stl: Git LFS pointer"),
+        ("arm1", "pointer.stl: cannot be read: it is a Git LFS pointer"),
         ("arm2", "cloud.ply: unknown format"),
         ("arm3", "broken.dae: malformed XML"),
         ("arm4", "empty.stl: no vertices"),

@@ -2,7 +2,7 @@
 
 use super::part::{Channel, Encoding};
 use crate::arrays::MAX_COLUMNS;
-use crate::json_lines::flattened;
+use crate::json_numbers::flattened;
 use crate::ros::{Decoder, Definition, Leaves};
 use std::collections::HashMap;
 

@@ -202,7 +202,7 @@ fn an_incomplete_data_set_names_the_missing_files() {
     // The pointer of Git LFS to a missing file; a table with other columns.
     let second = chunk.join("episode_000001.parquet");
     std::fs::write(&second, "version https://git-lfs.github.com/spec/v1\n").unwrap();
-    refused("episode_000001.parquet: it is not a Parquet file; download the complete data set");
+    refused("episode_000001.parquet: cannot be read (it is a Git LFS pointer");
     std::fs::copy(folder().join("snappy.parquet"), &second).unwrap();
     refused("episode_000001.parquet: its columns, or the lengths of its lists, differ from those of the first file");
 }

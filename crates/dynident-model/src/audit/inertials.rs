@@ -1,7 +1,7 @@
 //! Checks whether the inertials of the moving links are physically consistent and plausible.
 
 use super::AuditLevel::{Info, Problem, Warning};
-use super::{AuditSettings, Findings, Lengths};
+use super::{AuditLevel, AuditSettings, Findings, Lengths};
 use crate::inertial::InertialParameters;
 use crate::spatial::{Mat3, Vec3};
 use crate::tree::{Link, Model};
@@ -25,6 +25,19 @@ pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, 
     }
     report_massless(model, findings);
     report_equal(model, findings);
+}
+
+/// Checks that give a warning or problem for the inertial of one link on a body of `length_m`, with their level.
+pub(super) fn findings_of_link(
+    link: &str,
+    inertial: &InertialParameters,
+    length_m: f64,
+) -> Vec<(AuditLevel, &'static str)> {
+    let (settings, mut findings) = (AuditSettings::default(), Findings(Vec::new()));
+    check_consistent(link, inertial, &settings, &mut findings);
+    check_plausible(link, inertial, length_m, &settings, &mut findings);
+    let told = findings.0.into_iter().filter(|finding| finding.level > Info);
+    told.map(|finding| (finding.level, finding.check)).collect()
 }
 
 fn check_consistent(link: &str, inertial: &InertialParameters, settings: &AuditSettings, findings: &mut Findings) {

@@ -49,9 +49,6 @@ pub enum MeshFault {
     /// Unknown format.
     #[error("unknown format; STL (binary or text), OBJ and COLLADA (.dae) are read")]
     Format,
-    /// Git LFS has not fetched the file.
-    #[error("Git LFS pointer in place of the mesh: run `git lfs pull` in the repository of the file")]
-    LfsPointer,
     /// The file exceeds the size limit.
     #[error("larger than {} MiB", MAX_MESH_BYTES >> 20)]
     TooLarge,
@@ -110,9 +107,6 @@ pub fn read_mesh(folder: &Path, name: &str) -> Result<TriangleMesh, MeshError> {
 }
 
 fn parse(bytes: &[u8]) -> Result<TriangleMesh, MeshFault> {
-    if bytes.starts_with(b"version https://git-lfs.github.com/spec") {
-        return Err(MeshFault::LfsPointer);
-    }
     let mesh = if stl::is_binary(bytes) {
         TriangleMesh::of_corners(&stl::binary(bytes))
     } else {

@@ -11,6 +11,7 @@ mod blocks;
 mod channels;
 mod column_pattern;
 mod columns;
+mod field;
 mod file;
 mod format;
 mod found_rules;

@@ -121,7 +121,19 @@ pub trait LogTable: fmt::Debug + Send {
         vec![LogGroup { name: None, columns: 0..self.width(), time: None }]
     }
 
-    /// Contents that are not exposed as columns, with the reason for each.
+    /// Unit of a column as the file states it beside the name.
+    fn unit(&self, column: usize) -> Option<&str> {
+        let _ = column;
+        None
+    }
+
+    /// Whether [`all_rows`](Self::all_rows) found text, and no number, in all rows of a column.
+    fn is_text(&self, column: usize) -> bool {
+        let _ = column;
+        false
+    }
+
+    /// Contents that are not exposed as columns or numbers, with the reason for each; complete after all rows.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
@@ -143,7 +155,8 @@ pub trait LogTable: fmt::Debug + Send {
     fn skip_row(&mut self) -> Result<bool, RecordingError>;
 
     /// Reads all remaining rows in their order in the source and passes each to `each` with its group number and the
-    /// columns of the group. Must not follow [`select`](Self::select). Override it only for several groups.
+    /// columns of the group; text is NaN, see [`is_text`](Self::is_text). Must not follow [`select`](Self::select).
+    /// Override it only for several groups, or for text.
     ///
     /// # Errors
     /// If a row does not consist of numbers; the rows before it were passed on.

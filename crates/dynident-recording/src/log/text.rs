@@ -1,29 +1,60 @@
-//! Reads text tables (CSV and similar): detects delimiter and header, parses rows of numbers.
+//! Reads text tables (CSV and similar): detects delimiter, header and a row of units, parses rows of numbers.
 
 use super::columns::column_label;
+use super::field::{entry, list_length, number};
 use super::format::Header;
 use super::lines::Lines;
-use super::plain_row::{plain_decimal, read_plain_row};
+use super::plain_row::read_plain_row;
 use super::source::LogTable;
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 use std::io::Read;
 use std::path::Path;
 
+/// Maximum number of entries of a list that become columns.
+const MAX_ENTRIES: usize = 1024;
+/// Fields, in any case and with or without brackets, of a row of units.
+const UNITS: [&str; 20] = [
+    "s", "sec", "seconds", "ms", "us", "ns", "rad", "deg", "degrees", "rad/s", "deg/s", "rpm", "m", "mm", "nm", "n m",
+    "n", "a", "ma", "v",
+];
+
+/// A column: a field, or an entry of the list in a field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Column {
+    field: usize,
+    /// Index of the entry, and length of the list.
+    entry: Option<(usize, usize)>,
+}
+
+/// Fields of a column without a number, in a pass over all rows.
+#[derive(Clone, Debug)]
+struct TextFields {
+    count: u64,
+    first_line: u64,
+    first: String,
+}
+
 #[derive(Debug)]
 pub(super) struct TextTable {
     label: String,
     lines: Lines,
     delimiter: u8,
+    header_line: u64,
     names: Option<Vec<String>>,
-    width: usize,
+    /// Fields of the row below the header, if it contains units.
+    units: Option<Vec<String>>,
+    columns: Vec<Column>,
+    /// Number of fields of a row.
+    field_count: usize,
     first_row_is_pending: bool,
-    wanted: Vec<usize>,
-    /// For each field, its index among the requested fields; empty if the delimiter is blanks.
+    wanted: Vec<Column>,
+    /// For each field, its index among the requested fields; empty if rows need the general parser.
     places: Vec<Option<usize>>,
     fields: Vec<(usize, usize)>,
     rows: u64,
     truncated_line: Option<u64>,
+    text: Vec<Option<TextFields>>,
 }
 
 impl TextTable {
@@ -46,42 +77,68 @@ impl TextTable {
             return Err(RecordingError::CarriageReturns { file: path.to_owned(), line: lines.number() });
         }
         let delimiter = delimiter.map_or_else(|| guessed_delimiter(first), |delimiter| delimiter as u8);
+        let comma = delimiter != b',';
+        let texts = |line: &[u8], fields: &[(usize, usize)]| -> Vec<String> {
+            fields.iter().map(|(from, to)| String::from_utf8_lossy(&line[*from..*to]).into_owned()).collect()
+        };
         let mut fields = Vec::new();
         split(first, delimiter, &mut fields);
         let has_header = match header {
             Header::Present => true,
             Header::Absent => false,
-            Header::Auto => !fields.iter().all(|(from, to)| number(&first[*from..*to]).is_some()),
+            Header::Auto => !fields.iter().all(|(from, to)| number(&first[*from..*to], comma).is_some()),
         };
-        let names = has_header.then(|| {
-            fields.iter().map(|(from, to)| String::from_utf8_lossy(&first[*from..*to]).into_owned()).collect()
-        });
-        Ok(Self {
+        let header_line = lines.number();
+        let (mut names, mut units, mut first_row_is_pending) = (None, None, true);
+        let mut row = fields.clone();
+        if has_header {
+            names = Some(texts(first, &fields));
+            first_row_is_pending = lines.advance()?;
+            split(lines.line(), delimiter, &mut row);
+            if first_row_is_pending && row.len() == fields.len() && are_units(lines.line(), &row) {
+                units = Some(texts(lines.line(), &row));
+                first_row_is_pending = lines.advance()?;
+                split(lines.line(), delimiter, &mut row);
+            }
+        }
+        let columns = columns(lines.line(), &row, fields.len());
+        let names = names.map(|names: Vec<String>| columns.iter().map(|column| column.name(&names)).collect());
+        let mut table = Self {
             label,
             delimiter,
+            header_line,
             names,
-            width: fields.len(),
-            first_row_is_pending: !has_header,
+            units,
+            text: vec![None; columns.len()],
+            columns,
+            field_count: fields.len(),
+            first_row_is_pending,
             wanted: Vec::new(),
             places: Vec::new(),
             fields,
             rows: 0,
             truncated_line: None,
             lines,
-        })
+        };
+        table.select(&[]);
+        Ok(table)
     }
 
     fn place_of_line(&self, line: u64) -> LogPlace {
         LogPlace::Line { log: self.label.clone(), line }
     }
 
-    fn not_a_number(&self, field: usize) -> RecordingError {
-        let text = self.shown(field);
+    fn not_a_number(&self, column: Column) -> RecordingError {
+        let text = self.shown(column.field);
         let comma = text.contains(',') && text.bytes().all(|b| b.is_ascii_digit() || matches!(b, b',' | b'-' | b'+'));
         let first_row = self.rows == 0;
         RecordingError::NotANumber {
             place: self.place(),
-            column: column_label(self.names.as_deref(), field),
+            column: self
+                .columns
+                .iter()
+                .position(|known| *known == column)
+                .map_or_else(String::new, |place| column_label(self.names.as_deref(), place)),
             text,
             fix: if comma {
                 "write decimal points instead of decimal commas"
@@ -106,19 +163,94 @@ impl TextTable {
     }
 }
 
+impl TextTable {
+    /// Reads the next row, with NaN for an empty field; `unread` gets a field without a number and decides about it.
+    fn read_row(
+        &mut self,
+        values: &mut [f64],
+        mut unread: impl FnMut(&mut Self, usize) -> Result<(), RecordingError>,
+    ) -> Result<bool, RecordingError> {
+        if !(core::mem::take(&mut self.first_row_is_pending) || self.lines.advance()?) {
+            return Ok(false);
+        }
+        if !self.places.is_empty() && read_plain_row(self.lines.line(), self.delimiter, &self.places, values) {
+            self.rows += 1;
+            return Ok(true);
+        }
+        split(self.lines.line(), self.delimiter, &mut self.fields);
+        if self.fields.len() != self.field_count {
+            if self.fields.len() < self.field_count && self.rows > 0 && self.lines.at_end()? {
+                self.truncated_line = Some(self.lines.number());
+                return Ok(false);
+            }
+            return Err(RecordingError::RaggedRow {
+                place: self.place(),
+                expected: self.field_count,
+                found: self.fields.len(),
+                hint: if self.delimiter == b',' && self.fields.len() == 2 * self.field_count {
+                    " (decimal commas? write decimal points)"
+                } else {
+                    ""
+                },
+            });
+        }
+        for (place, value) in values.iter_mut().enumerate() {
+            let column = self.wanted[place];
+            let (from, to) = self.fields[column.field];
+            *value = match column.value(&self.lines.line()[from..to], self.delimiter != b',') {
+                Some(value) => value,
+                None if from == to => f64::NAN,
+                None if !self.lines.complete() && self.rows > 0 => {
+                    self.truncated_line = Some(self.lines.number());
+                    return Ok(false);
+                }
+                None => {
+                    unread(self, place)?;
+                    f64::NAN
+                }
+            };
+        }
+        self.rows += 1;
+        Ok(true)
+    }
+}
+
 impl LogTable for TextTable {
     fn width(&self) -> usize {
-        self.width
+        self.columns.len()
     }
 
     fn names(&self) -> Option<&[String]> {
         self.names.as_deref()
     }
 
+    fn unit(&self, column: usize) -> Option<&str> {
+        self.units.as_ref()?.get(self.columns[column].field).map(String::as_str)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let units = self.units.iter().map(|units| format!("row of units below the header: {}", units.join(", ")));
+        let text = self.text.iter().enumerate().filter_map(|(column, text)| {
+            let TextFields { count, first_line, first } = text.as_ref()?;
+            let label = column_label(self.names.as_deref(), column);
+            Some(if *count == self.rows {
+                format!("column {label} contains text: `{first}`")
+            } else {
+                format!("column {label}: {count} fields are not numbers, the first is `{first}` in line {first_line}")
+            })
+        });
+        units.chain(text).collect()
+    }
+
+    fn is_text(&self, column: usize) -> bool {
+        self.text[column].as_ref().is_some_and(|text| text.count == self.rows)
+    }
+
     fn select(&mut self, fields: &[usize]) {
-        self.wanted = fields.to_vec();
+        self.wanted = fields.iter().map(|column| self.columns[*column]).collect();
+        let is_plain = self.delimiter != b' ' && self.columns.iter().all(|column| column.entry.is_none());
         let place = |field| fields.iter().position(|wanted| *wanted == field);
-        self.places = if self.delimiter == b' ' { Vec::new() } else { (0..self.width).map(place).collect() };
+        self.places = if is_plain { (0..self.field_count).map(place).collect() } else { Vec::new() };
     }
 
     fn skip_row(&mut self) -> Result<bool, RecordingError> {
@@ -128,53 +260,34 @@ impl LogTable for TextTable {
     }
 
     fn next_row(&mut self, values: &mut [f64]) -> Result<bool, RecordingError> {
-        if !(core::mem::take(&mut self.first_row_is_pending) || self.lines.advance()?) {
-            return Ok(false);
+        self.read_row(values, |table, place| Err(table.not_a_number(table.wanted[place])))
+    }
+
+    /// Fields without a number are NaN, because nobody asked for their column; [`notes`](Self::notes) names them.
+    fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), RecordingError> {
+        let columns: Vec<usize> = (0..self.columns.len()).collect();
+        self.select(&columns);
+        let mut row = vec![0.0; columns.len()];
+        let count_text = |table: &mut Self, column: usize| {
+            let line = table.lines.number();
+            let first = table.shown(table.columns[column].field);
+            let text = table.text[column].get_or_insert(TextFields { count: 0, first_line: line, first });
+            text.count += 1;
+            Ok(())
+        };
+        while self.read_row(&mut row, count_text)? {
+            each(0, &row);
         }
-        if !self.places.is_empty() && read_plain_row(self.lines.line(), self.delimiter, &self.places, values) {
-            self.rows += 1;
-            return Ok(true);
-        }
-        split(self.lines.line(), self.delimiter, &mut self.fields);
-        if self.fields.len() != self.width {
-            if self.fields.len() < self.width && self.rows > 0 && self.lines.at_end()? {
-                self.truncated_line = Some(self.lines.number());
-                return Ok(false);
-            }
-            return Err(RecordingError::RaggedRow {
-                place: self.place(),
-                expected: self.width,
-                found: self.fields.len(),
-                hint: if self.delimiter == b',' && self.fields.len() == 2 * self.width {
-                    " (decimal commas? write decimal points)"
-                } else {
-                    ""
-                },
-            });
-        }
-        let line = self.lines.line();
-        for (value, &field) in values.iter_mut().zip(&self.wanted) {
-            let (from, to) = self.fields[field];
-            *value = match number(&line[from..to]) {
-                Some(value) => value,
-                None if from == to => f64::NAN,
-                None if !self.lines.complete() && self.rows > 0 => {
-                    self.truncated_line = Some(self.lines.number());
-                    return Ok(false);
-                }
-                None => return Err(self.not_a_number(field)),
-            };
-        }
-        self.rows += 1;
-        Ok(true)
+        Ok(())
     }
 
     fn place(&self) -> LogPlace {
-        self.place_of_line(self.lines.number())
+        let is_before_rows = self.rows == 0 && self.first_row_is_pending;
+        self.place_of_line(if is_before_rows { self.header_line } else { self.lines.number() })
     }
 
-    fn field_text(&self, field: usize) -> Option<String> {
-        Some(self.shown(field))
+    fn field_text(&self, column: usize) -> Option<String> {
+        Some(self.shown(self.columns[column].field))
     }
 
     fn truncated(&self) -> Option<LogPlace> {
@@ -232,11 +345,43 @@ fn trimmed(line: &[u8], mut from: usize, mut to: usize) -> (usize, usize) {
     (from, to)
 }
 
-/// A number in the syntax of the standard library, including `nan` and `inf`.
-fn number(field: &[u8]) -> Option<f64> {
-    match plain_decimal(field) {
-        Some((value, length)) if length == field.len() => Some(value),
-        _ => core::str::from_utf8(field).ok()?.parse().ok(),
+impl Column {
+    fn name(self, names: &[String]) -> String {
+        let name = &names[self.field];
+        self.entry.map_or_else(|| name.clone(), |(place, _)| format!("{name}[{place}]"))
+    }
+
+    fn value(self, field: &[u8], comma: bool) -> Option<f64> {
+        match self.entry {
+            None => number(field, comma),
+            Some((place, count)) => entry(field, place, count),
+        }
+    }
+}
+
+/// The columns of a table with this first row: one for each field, or one for each entry of a list in it.
+fn columns(line: &[u8], row: &[(usize, usize)], fields: usize) -> Vec<Column> {
+    let of_field = |field: usize| {
+        let list = row.get(field).and_then(|(from, to)| list_length(&line[*from..*to]));
+        let list = list.filter(|count| *count <= MAX_ENTRIES);
+        (0..list.unwrap_or(1)).map(move |place| Column { field, entry: list.map(|count| (place, count)) })
+    };
+    (0..fields).flat_map(of_field).collect()
+}
+
+/// Whether most fields of a row name units, and none is a number.
+fn are_units(line: &[u8], row: &[(usize, usize)]) -> bool {
+    let fields = || row.iter().map(|(from, to)| &line[*from..*to]).filter(|field| !field.is_empty());
+    let is_unit = |field: &[u8]| UNITS.iter().any(|unit| bare(field).eq_ignore_ascii_case(unit.as_bytes()));
+    let units = fields().filter(|field| is_unit(field)).count();
+    2 * units > fields().count() && fields().all(|field| number(field, true).is_none() && list_length(field).is_none())
+}
+
+/// A unit without the brackets around it.
+fn bare(field: &[u8]) -> &[u8] {
+    match field {
+        [b'[', inner @ .., b']'] | [b'(', inner @ .., b')'] => inner,
+        _ => field,
     }
 }
 
@@ -257,10 +402,74 @@ mod tests {
         assert_eq!(fields("1;2,5;", b';'), ["1", "2,5", ""]);
     }
 
+    fn table(text: &str) -> TextTable {
+        let text = Box::new(std::io::Cursor::new(text.as_bytes().to_vec()));
+        TextTable::open(Path::new("log"), text, Header::Auto, None).unwrap()
+    }
+
+    fn all(table: &mut TextTable) -> Vec<Vec<f64>> {
+        let mut rows = Vec::new();
+        table.all_rows(&mut |_, row| rows.push(row.to_vec())).unwrap();
+        rows
+    }
+
     #[test]
-    fn numbers_are_read_as_the_standard_library_does() {
-        assert_eq!(number(b"-0").map(f64::is_sign_negative), Some(true));
-        assert_eq!([number(b"1e5"), number(b"+1"), number(b"1.5")], [Some(1e5), Some(1.0), Some(1.5)]);
-        assert_eq!([number(b""), number(b"1..2"), number(b"1,5")], [None; 3]);
+    fn a_column_of_text_does_not_hide_the_others() {
+        let mut log = table("t,q1,mode,moving\n0,1,RUNNING,True\n1,2,STOP,False\n2,3x,STOP,True\n");
+        let rows = all(&mut log);
+        assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), [0.0, 1.0, 2.0]);
+        assert_eq!(rows.iter().map(|row| row[3]).collect::<Vec<_>>(), [1.0, 0.0, 1.0]);
+        assert!(rows.iter().all(|row| row[2].is_nan()) && rows[1][1] == 2.0 && rows[2][1].is_nan());
+        assert_eq!([0, 1, 2, 3].map(|column| log.is_text(column)), [false, false, true, false]);
+        let notes = log.notes();
+        assert!(notes[0].contains("`q1`") && notes[0].contains("`3x` in line 4"), "{notes:?}");
+        assert!(notes[1].contains("`mode`") && notes[1].contains("RUNNING"), "{notes:?}");
+    }
+
+    #[test]
+    fn a_requested_column_of_text_is_an_error() {
+        let mut log = table("t,mode\n0,RUNNING\n");
+        log.select(&[1]);
+        let error = log.next_row(&mut [0.0]).unwrap_err().to_string();
+        assert!(error.contains("log:2, column `mode` (1): `RUNNING`"), "{error}");
+    }
+
+    #[test]
+    fn lists_become_columns() {
+        let mut log = table("t,q,mode\n0,\"[0.5, -1]\",A\n1,\"[2 3]\",B\n2,\"[4]\",B\n");
+        assert_eq!(log.names().unwrap(), ["t", "q[0]", "q[1]", "mode"]);
+        let rows = all(&mut log);
+        assert_eq!(rows[0][..3], [0.0, 0.5, -1.0]);
+        assert_eq!(rows[1][..3], [1.0, 2.0, 3.0]);
+        assert!(rows[2][1].is_nan() && rows[2][2].is_nan(), "{rows:?}");
+        let mut log = table("0,\"[0.5, -1]\"\n1,\"[2, 3]\"\n");
+        log.select(&[1]);
+        assert!(log.next_row(&mut [0.0]).unwrap());
+    }
+
+    #[test]
+    fn a_row_of_units_is_no_data() {
+        let mut log = table("t,q1,tau1\ns,[deg],Nm\n0,1,2\n1,2,3\n");
+        assert_eq!([0, 1, 2].map(|column| log.unit(column)), [Some("s"), Some("[deg]"), Some("Nm")]);
+        assert_eq!(all(&mut log), [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]]);
+        // Text that names no unit is data.
+        assert_eq!(all(&mut table("mode,state\nA,B\nC,D\n")).len(), 2);
+    }
+
+    #[test]
+    fn decimal_commas_are_read_where_they_do_not_separate_fields() {
+        assert_eq!(all(&mut table("t;q1\n0,004;-1,5\n0,008;2\n")), [[0.004, -1.5], [0.008, 2.0]]);
+        assert_eq!(all(&mut table("0,5\t1,5\n1,5\t2,5\n")), [[0.5, 1.5], [1.5, 2.5]]);
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        let mut log = table("# a comment\nt,q1\n\n0,1\n1\n2,3\n");
+        assert_eq!(log.place().to_string(), "log:2");
+        log.select(&[0]);
+        assert!(log.next_row(&mut [0.0]).unwrap());
+        assert!(log.next_row(&mut [0.0]).unwrap_err().to_string().contains("log:5: 1 fields where 2"));
+        let mut empty = table("t,q1\n");
+        assert!(!empty.next_row(&mut []).unwrap() && !empty.skip_row().unwrap());
     }
 }

@@ -3,12 +3,14 @@
 //! Hypotheses are tried in a fixed order, because mistakes can occur together: slots and signs of the numbers
 //! ([`NegatedMoments`](SlipKind::NegatedMoments) to [`LowerTriangle`](SlipKind::LowerTriangle)), units, reference point
 //! of the moments, then comparison with other links and a stated total. Each hypothesis uses the numbers corrected by
-//! the previous ones. A mistake is corrected only if exactly one hypothesis explains the numbers.
+//! the previous ones. A mistake is corrected only if exactly one hypothesis explains the numbers, and if the corrected
+//! body has no finding of the audit that the stated one does not have.
 
 mod about_origin;
 mod defaults;
 mod settings;
 mod slots;
+mod take_back;
 mod total_mass;
 mod twins;
 mod units;
@@ -124,13 +126,16 @@ pub fn slips_with(
 ) -> Result<Slips, UrdfError> {
     let stated = stated_inertials(text)?;
     let lengths = body_lengths(&stated, model, settings.max_joint_offset_m);
-    let mut search = Search { settings: settings.clone(), now: stated.clone(), lengths, found: Vec::new() };
+    let moving = || model.bodies().iter().flat_map(|body| &body.links);
+    let moves = stated.iter().map(|one| moving().any(|link| link.name == one.link)).collect();
+    let mut search = Search { settings: settings.clone(), now: stated.clone(), lengths, moves, found: Vec::new() };
     slots::find(&mut search);
     defaults::find(&mut search);
     units::find(&mut search);
     about_origin::find(&mut search);
     twins::find(&mut search);
     total_mass::find(&mut search, text, total_kg);
+    take_back::implausible(&mut search, &stated);
     Ok(Slips { found: search.found, stated, corrected: search.now })
 }
 
@@ -140,6 +145,8 @@ struct Search {
     /// Size of each link's body, m; `None` if all joints are implausibly far apart, so that no length is available for
     /// comparison.
     lengths: Option<Vec<f64>>,
+    /// Whether each link belongs to a moving body. The size of the others is not that of the joints' distances.
+    moves: Vec<bool>,
     found: Vec<DescriptionError>,
 }
 

@@ -43,8 +43,8 @@ impl Units {
 /// Tests all links together; if their figures are plausible, tests each link alone.
 pub(super) fn find(search: &mut Search) {
     let Some(lengths) = search.lengths.clone() else { return };
-    let places: Vec<usize> =
-        search.with_mass().into_iter().filter(|&place| search.now[place].moments != DEFAULT_MOMENTS).collect();
+    let is_tested = |place: &usize| search.moves[*place] && search.now[*place].moments != DEFAULT_MOMENTS;
+    let places: Vec<usize> = search.with_mass().into_iter().filter(is_tested).collect();
     if places.len() >= 2 && explain(search, &places, &lengths, false) {
         return;
     }

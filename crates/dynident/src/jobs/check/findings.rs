@@ -142,7 +142,8 @@ fn unexplained(search: &Search, joints: &[String]) -> CheckFinding {
 
 /// Most of the torque is unexplained although no tested mistake explains more of it.
 ///
-/// A warning, because friction and position noise of an honest log can cause it: `check` fits at a few hundred instants.
+/// A warning, because friction and position noise of an honest log can cause it: `check` fits at a few hundred
+/// instants.
 fn mostly_unexplained(diagnosis: &Diagnosis, joints: &[String]) -> CheckFinding {
     let search = &diagnosis.search;
     let believed = search.believed();

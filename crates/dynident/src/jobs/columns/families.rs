@@ -2,6 +2,7 @@
 
 use super::meaning::{JointKey, Meaning, Source, meaning, of_file};
 use super::quantity::Quantity;
+use super::units::with_unit;
 use crate::result::LogContents;
 use std::path::Path;
 
@@ -29,7 +30,8 @@ pub(in crate::jobs) fn families<'a>(
         let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         let (of_file, source_of_file) = of_file(&stem);
         for channel in contents.channels.iter().filter(|channel| channel.samples > 0) {
-            let Meaning { quantity, joint, source, unit, stem } = meaning(&channel.name, joints);
+            let Meaning { quantity, joint, source, unit, stem } =
+                meaning(&with_unit(&channel.name, channel.unit.as_deref()), joints);
             // The file name gives the quantity of columns that are named by joints alone.
             let bare = quantity.is_none() && matches!(joint, JointKey::Joint(_)) && stem.is_empty();
             let (quantity, source) = if bare { (of_file, source_of_file) } else { (quantity, source) };

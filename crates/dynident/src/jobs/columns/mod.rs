@@ -10,4 +10,4 @@ pub(in crate::jobs) use families::{Family, best, families};
 pub(in crate::jobs) use meaning::{JointKey, Source};
 pub(in crate::jobs) use quantity::Quantity;
 pub(in crate::jobs) use spelling::column_list;
-pub(in crate::jobs) use units::{time_as_toml, time_unit_s, unit};
+pub(in crate::jobs) use units::{time_as_toml, time_unit_s, unit, with_unit};

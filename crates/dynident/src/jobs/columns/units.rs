@@ -1,6 +1,7 @@
 //! Units from the endings of column names.
 
 use super::quantity::Quantity;
+use std::borrow::Cow;
 
 /// Ending, unit in study notation, and joint quantity with this unit; longest ending first.
 const ENDINGS: [(&str, &str, Option<Quantity>); 30] = [
@@ -111,9 +112,20 @@ pub(in crate::jobs) fn time_unit_s(name: &str) -> Option<f64> {
     }
 }
 
-/// The time column as the value of a study's `time`.
-pub(in crate::jobs) fn time_as_toml(name: &str) -> String {
-    let unit = match time_unit_s(name) {
+/// The name with the unit that the file states beside it: `q1 [deg]`. A name that contains a unit is not changed.
+pub(in crate::jobs) fn with_unit<'a>(name: &'a str, stated: Option<&str>) -> Cow<'a, str> {
+    match stated {
+        Some(stated) if unit(name).is_none() => {
+            let stated = stated.trim_matches(|c: char| "[](){} ".contains(c));
+            Cow::Owned(format!("{name} [{stated}]"))
+        }
+        _ => Cow::Borrowed(name),
+    }
+}
+
+/// The time column as the value of a study's `time`; `unit` is that of its channel.
+pub(in crate::jobs) fn time_as_toml(name: &str, unit: Option<&str>) -> String {
+    let unit = match time_unit_s(&with_unit(name, unit)) {
         Some(1e-3) => ", unit = \"ms\"",
         Some(1e-6) => ", unit = \"us\"",
         Some(1e-9) => ", unit = \"ns\"",

@@ -5,13 +5,19 @@ mod clock;
 mod study_format;
 
 use crate::error::Error;
-use crate::jobs::columns::{time_unit_s, unit};
+use crate::jobs::columns::{time_unit_s, unit, with_unit};
 use crate::result::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 use channel::ChannelStatistics;
 use clock::Clock;
 use dynident_recording::RecordingError;
 use dynident_recording::log::{FileLog, LogGroup, LogTable};
 use std::path::Path;
+
+/// Units of time stamps, s; the largest plausible one is taken where the name states none.
+const TIME_UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
+/// Sample rates of robot logs, Hz: slower logs contain no acceleration, faster ones do not exist.
+const MIN_RATE_HZ: f64 = 2.0;
+const MAX_RATE_HZ: f64 = 2e4;
 
 /// Reads a recording of any format once and summarises its contents, with constant memory.
 ///
@@ -26,8 +32,11 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     let log = FileLog::described_by_itself(path);
     let (format, mut table) = log.open_with_format()?;
     let names = column_names(table.as_ref());
-    let (groups, notes) = (table.groups(), table.notes());
-    let times: Vec<_> = groups.iter().map(|group| time_column(group, &names[group.columns.clone()])).collect();
+    // With the units that the file states beside the names.
+    let described: Vec<_> =
+        names.iter().enumerate().map(|(column, name)| with_unit(name, table.unit(column)).into_owned()).collect();
+    let groups = table.groups();
+    let times: Vec<_> = groups.iter().map(|group| time_column(group, &described[group.columns.clone()])).collect();
     let mut read: Vec<GroupStatistics> = groups.iter().map(|group| GroupStatistics::new(group.columns.len())).collect();
     table.all_rows(&mut |group, row| read[group].add(row, times[group].map(|(column, _)| column)))?;
     let mut found = LogContents {
@@ -38,19 +47,31 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
         groups: Vec::new(),
         channels: Vec::new(),
         truncated: table.truncated().map(|place| place.to_string()),
-        notes,
+        notes: table.notes(),
         study_format: String::new(),
     };
     for (index, (group, GroupStatistics { rows, channels, clock })) in groups.iter().zip(read).enumerate() {
-        let names = &names[group.columns.clone()];
+        let columns = group.columns.clone();
+        let names = &names[columns.clone()];
         let time = times[index];
-        let seconds = time.and_then(|(column, unit_s)| Some((channels[column].increase()?, unit_s)));
+        let is_stated =
+            |column: usize| group.time.is_some() || unit(&described[group.columns.start + column]).is_some();
+        let seconds = time.and_then(|(column, unit_s)| {
+            let span = channels[column].increase()?;
+            let of_rate = || clock.rate(rows, span).and_then(unit_of_rate);
+            Some((span, if is_stated(column) { unit_s } else { of_rate().unwrap_or(unit_s) }))
+        });
         let span_s = seconds.map(|(span, unit_s)| span * unit_s);
         let rate_hz = seconds.and_then(|(span, unit_s)| Some(clock.rate(rows, span)? / unit_s));
-        found.channels.extend(channels.iter().zip(names).map(|(tally, name)| LogChannel {
+        let time_unit = |column: usize| {
+            let (time, (_, unit_s)) = (time?.0 + group.columns.start, seconds?);
+            (column == time).then(|| TIME_UNITS.iter().find(|(_, s)| *s == unit_s).map(|(name, _)| *name))?
+        };
+        let numbers = channels.iter().zip(names).zip(columns).filter(|(_, column)| !table.is_text(*column));
+        found.channels.extend(numbers.map(|((tally, name), column)| LogChannel {
             name: name.clone(),
             group: index,
-            unit: unit(name).map(str::to_owned),
+            unit: unit(&described[column]).or_else(|| time_unit(column)).map(str::to_owned),
             rate_hz,
             samples: tally.samples,
             missing: rows - tally.samples,
@@ -67,6 +88,12 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     }
     found.study_format = study_format::study_format(&found);
     Ok(found)
+}
+
+/// The time unit, s, with which a clock of `rate` rows per unit records a robot.
+fn unit_of_rate(rate: f64) -> Option<f64> {
+    let is_of_robot = |unit_s: f64| (MIN_RATE_HZ..=MAX_RATE_HZ).contains(&(rate / unit_s));
+    TIME_UNITS.iter().map(|(_, unit_s)| *unit_s).find(|unit_s| is_of_robot(*unit_s))
 }
 
 /// Names of the columns in a study: their names, or their 0-based indices.
@@ -111,6 +138,20 @@ impl GroupStatistics {
         self.channels.iter_mut().zip(row).for_each(|(tally, value)| tally.add(*value));
         if let Some(column) = time {
             self.clock.add(row[column]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_unit_of_a_clock_follows_from_its_rate() {
+        for (step, expected) in
+            [(0.004, Some(1.0)), (4.0, Some(1e-3)), (20_080.0, Some(1e-6)), (1e6, Some(1e-9)), (1e-9, None)]
+        {
+            assert_eq!(unit_of_rate(1.0 / step), expected, "{step}");
         }
     }
 }

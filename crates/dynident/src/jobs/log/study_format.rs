@@ -1,6 +1,6 @@
 //! Proposed `[format]` of a study for a recording.
 
-use crate::jobs::columns::{Quantity, best, column_list, families, time_as_toml};
+use crate::jobs::columns::{JointKey, Quantity, best, column_list, families, time_as_toml};
 use crate::result::LogContents;
 use core::fmt::Write;
 use std::path::Path;
@@ -14,7 +14,7 @@ pub(super) fn study_format(found: &LogContents) -> String {
     let mut text = "[format]\n".to_owned();
     match found.groups.get(group).and_then(|group| group.time.as_ref()) {
         Some(time) => {
-            let _ = writeln!(text, "time = {}", time_as_toml(time));
+            let _ = writeln!(text, "time = {}", time_as_toml(time, found.unit(group, time)));
         }
         None => text += "rate_hz = 0.0  # no time column recognised: give the sample rate, or time = { column = .. }\n",
     }
@@ -26,7 +26,11 @@ pub(super) fn study_format(found: &LogContents) -> String {
         let names: Vec<String> = family.columns.iter().map(|(_, name)| name.clone()).collect();
         let unit = family.unit.filter(|unit| *unit != usual);
         let unit = unit.map_or(String::new(), |unit| format!(", unit = \"{unit}\""));
-        let _ = writeln!(text, "{key} = {{ columns = {}{unit} }}", column_list(&names));
+        // Names of joints, but no robot that gives their order.
+        let is_named = family.columns.iter().any(|(key, _)| matches!(key, JointKey::Name(_)));
+        let order =
+            if is_named { "  # in the order of the log; `dynident new` finds the order of the robot" } else { "" };
+        let _ = writeln!(text, "{key} = {{ columns = {}{unit} }}{order}", column_list(&names));
     }
     text
 }

@@ -131,6 +131,7 @@ struct RecognisedColumns {
     velocity_columns: Option<Vec<String>>,
     /// Recordings with these columns; recordings with torques only belong to one of them.
     files: Vec<usize>,
+    /// The value of `time`, and the mean rate, Hz.
     time: Option<(String, Option<f64>)>,
 }
 
@@ -180,8 +181,12 @@ impl RecognisedColumns {
             let log = &logs[*file].1;
             if is_pair { *file == position.file } else { has(log, &of_position) && has(log, &of_torque) }
         };
-        let group = logs[position.file].1.groups.get(position.group);
-        let time = group.and_then(|group| Some((group.time.clone()?, group.rate_hz)));
+        let contents = &logs[position.file].1;
+        let group = contents.groups.get(position.group);
+        let time = group.and_then(|group| {
+            let name = group.time.as_ref()?;
+            Some((time_as_toml(name, contents.unit(position.group, name)), group.rate_hz))
+        });
         let files = (0..logs.len()).filter(holds).collect();
         Ok(Self {
             thresholds: thresholds.clone(),
@@ -258,9 +263,9 @@ impl RecognisedColumns {
     fn time_table(&self, request: &NewStudy) -> Table {
         let table = Table::new("[format]", "");
         match (&self.time, request.rate_hz) {
-            (Some((name, rate_hz)), _) => {
+            (Some((time, rate_hz)), _) => {
                 let reason = rate_hz.map_or_else(String::new, |rate_hz| format!("{rate_hz:.4} Hz on average"));
-                table.with("time", time_as_toml(name), reason)
+                table.with("time", time.clone(), reason)
             }
             (None, Some(rate_hz)) => {
                 table.with("rate_hz", format!("{rate_hz:?}"), "As given: no time column recognised by name")
