@@ -202,7 +202,7 @@ impl ResultFile {
     }
 
     /// Residual of a held-out log relative to the training logs, without the torque that friction at rest and the
-    /// low-pass of the positions explain ([`JointResiduals::rmse_in_motion_nm`]). `None` if the held-out error is small.
+    /// low-pass of the positions explain ([`JointResiduals::rmse_in_motion_nm`]). `None` for a small held-out error.
     fn held_out_ratio(&self, log: &LogValidation, settings: &ProblemSettings) -> Option<f64> {
         // Both must use the same band: in the band of the fit, only the unconstrained estimate has figures.
         let written = || self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
