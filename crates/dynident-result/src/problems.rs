@@ -228,7 +228,8 @@ impl ResultFile {
                 joints += 1;
             }
         }
-        let is_good = torque > 0.0 && 100.0 * (unexplained / torque).sqrt() < settings.min_held_out_percent;
+        // Without torque there is no relative error.
+        let is_good = torque <= 0.0 || 100.0 * (unexplained / torque).sqrt() < settings.min_held_out_percent;
         (!is_good).then(|| (squares / f64::from(joints.max(1))).sqrt())
     }
 }
