@@ -16,6 +16,9 @@ pub struct ExaminationSettings {
     /// Smallest negative friction relative to the residual of the joint; 0.5. Less may be an unmodelled effect, as for
     /// a wrist whose torque is measured behind the gear and is mostly noise.
     pub min_friction_ratio: f64,
+    /// Ratio of a higher cut-off of the differentiator to that of the fit; 4. The torque predicted with both shows the
+    /// error from motion above the cut-off of the fit.
+    pub finer_cutoff_ratio: f64,
 }
 
 impl Default for ExaminationSettings {
@@ -25,6 +28,7 @@ impl Default for ExaminationSettings {
             max_nominal_residual_percent: 50.0,
             min_friction_deviations: 5.0,
             min_friction_ratio: 0.5,
+            finer_cutoff_ratio: 4.0,
         }
     }
 }
@@ -40,6 +44,7 @@ impl ExaminationSettings {
             ("max_nominal_residual_percent", self.max_nominal_residual_percent),
             ("min_friction_deviations", self.min_friction_deviations),
             ("min_friction_ratio", self.min_friction_ratio),
+            ("finer_cutoff_ratio", self.finer_cutoff_ratio),
         ])
     }
 }

@@ -3,7 +3,7 @@
 use super::{CheckFinding, LogSummary, ResultFile, StudyCheck};
 use dynident_identification::Role;
 use dynident_identification::estimators::{NoiseInRegressor, NoiseVerdict};
-use dynident_identification::examination::LogValidation;
+use dynident_identification::examination::{JointResiduals, LogValidation};
 use dynident_recording::Level;
 use dynident_recording::log::Quantity;
 use dynident_study::{Expected, StudyError};
@@ -246,7 +246,8 @@ impl ResultFile {
             .map(CheckFinding::sentence)
     }
 
-    /// Residual of a held-out log relative to the training logs; `None` if the held-out error is small.
+    /// Residual of a held-out log relative to the training logs, without the torque that friction at rest and the
+    /// low-pass of the positions explain ([`JointResiduals::rmse_in_motion_nm`]). `None` for a small held-out error.
     fn held_out_ratio(&self, log: &LogValidation, settings: &ProblemSettings) -> Option<f64> {
         // Both must use the same band: in the band of the fit, only the unconstrained estimate has figures.
         let written = || self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
@@ -254,11 +255,27 @@ impl ResultFile {
             Some(report) => (&self.training.joints, report),
             None => (written(), log.physical.as_ref().unwrap_or(&log.model)),
         };
-        let pairs = fitted.iter().zip(&held_out.joints).filter(|(fitted, _)| fitted.rmse_nm > 0.0);
-        let squares: Vec<f64> = pairs.map(|(fitted, held)| (held.rmse_nm / fitted.rmse_nm).powi(2)).collect();
-        let times = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
-        let is_good = held_out.relative_error_percent.is_none_or(|percent| percent < settings.min_held_out_percent);
-        (!is_good).then_some(times)
+        // The residuals are those of the estimate; results of older versions have none in motion.
+        let estimated = &log.in_fit_band.as_ref().unwrap_or(&log.model).joints;
+        let in_motion = |joint: usize| {
+            let residuals: &JointResiduals = log.residuals.get(joint)?;
+            let of_motion = residuals.rmse_in_motion_nm?;
+            let of_all = estimated.get(joint)?.rmse_nm;
+            (of_all > 0.0).then(|| (of_motion / of_all).min(1.0))
+        };
+        let (mut squares, mut joints, mut unexplained, mut torque) = (0.0, 0, 0.0, 0.0);
+        for (joint, (fitted, held)) in fitted.iter().zip(&held_out.joints).enumerate() {
+            let rmse_nm = held.rmse_nm * in_motion(joint).unwrap_or(1.0);
+            unexplained += rmse_nm * rmse_nm;
+            torque += torque_norm(&(&held.name, held.rmse_nm, held.relative_error_percent)).powi(2);
+            if fitted.rmse_nm > 0.0 {
+                squares += (rmse_nm / fitted.rmse_nm).powi(2);
+                joints += 1;
+            }
+        }
+        // Without torque there is no relative error.
+        let is_good = torque <= 0.0 || 100.0 * (unexplained / torque).sqrt() < settings.min_held_out_percent;
+        (!is_good).then(|| (squares / f64::from(joints.max(1))).sqrt())
     }
 }
 

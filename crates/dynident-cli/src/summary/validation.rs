@@ -71,7 +71,9 @@ const MIN_REPORTED_SHARE: f64 = 0.3;
 
 /// Reports the joint whose rest contributes much of the error: stiction at rest is not determined by the positions.
 fn at_rest(log: &LogValidation) -> String {
-    let all: f64 = log.model.joints.iter().map(|joint| joint.samples as f64 * joint.rmse_nm.powi(2)).sum();
+    // The residuals have the band of the fit.
+    let report = log.in_fit_band.as_ref().unwrap_or(&log.model);
+    let all: f64 = report.joints.iter().map(|joint| joint.samples as f64 * joint.rmse_nm.powi(2)).sum();
     let most = log
         .residuals
         .iter()

@@ -1,5 +1,6 @@
 //! Test of a model on a recording that was not used for its fit.
 
+use super::finer_motion::{FinerRows, finer_rows};
 use super::motion_band::MotionBand;
 use super::nominal_agreement::{AgreementAccumulator, PriorAgreement};
 use super::residuals::{JointResiduals, ResidualAccumulator, Uncertainty};
@@ -70,16 +71,18 @@ struct HeldOutTest<'a> {
     trace: Option<TraceConsumer<'a>>,
     buffer: Vec<f64>,
     counted: Vec<f64>,
+    /// Rows of each joint with a higher cut-off, and the number of rows before the current ones.
+    finer: Option<Vec<(FinerRows, usize)>>,
 }
 
 impl HeldOutTest<'_> {
     /// Adds errors and residuals of used rows.
-    fn add_errors(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+    fn add_errors(&mut self, rows: &JointRows<'_>, finer: &[[f64; 2]]) -> Result<(), LogError> {
         let columns = self.rows_of.layout().joint_columns(rows.joint);
         let measured = &rows.panel[columns.len() * rows.rows..];
         predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
         self.model.add_joint(rows.joint, measured, &self.buffer).map_err(|source| self.failed(source))?;
-        self.residuals[rows.joint].add(rows.panel, rows.rows, &self.buffer);
+        self.residuals[rows.joint].add(rows.panel, rows.rows, &self.buffer, finer);
         for (prior, validation) in [&mut self.prior, &mut self.physical].into_iter().flatten() {
             predicted_torque(rows.panel, rows.rows, columns, prior, &mut self.buffer);
             let added = validation.add_joint(rows.joint, measured, &self.buffer);
@@ -91,6 +94,18 @@ impl HeldOutTest<'_> {
         Ok(())
     }
 
+    /// Prediction with the higher cut-off and friction at rest, of every valid row; empty if unknown.
+    fn finer_of(&mut self, rows: &JointRows<'_>) -> Vec<[f64; 2]> {
+        let Some((finer, from)) = self.finer.as_mut().and_then(|joints| joints.get_mut(rows.joint)) else {
+            return Vec::new();
+        };
+        let first = *from;
+        *from += rows.rows;
+        let of = |row: usize| Some([*finer.predicted.get(first + row)?, *finer.held.get(first + row)?]);
+        let all: Option<Vec<[f64; 2]>> = (0..rows.rows).filter(|&row| rows.counts(row)).map(of).collect();
+        all.unwrap_or_default()
+    }
+
     fn failed(&self, source: dynident_estimation::EstimationError) -> LogError {
         LogError::Rows { log: self.log.clone(), source }
     }
@@ -99,7 +114,8 @@ impl HeldOutTest<'_> {
 impl RowConsumer for HeldOutTest<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         let mut counted = core::mem::take(&mut self.counted);
-        let added = self.add_errors(&rows.counted(&mut counted));
+        let finer = self.finer_of(rows);
+        let added = self.add_errors(&rows.counted(&mut counted), &finer);
         self.counted = counted;
         added?;
         // The trace also needs the unused rows.
@@ -179,7 +195,9 @@ pub(crate) fn tested_on(
     // The motion band needs the samples of a log.
     let is_whole = matches!(recording.samples, Samples::Log(_));
     let sets = [Some(theta), physical, nominal].into_iter().flatten().collect();
+    let finer = if is_whole { finer_rows(logs, model, theta, index, limits.finer_cutoff_ratio)? } else { None };
     let mut test = HeldOutTest {
+        finer: finer.map(|joints| joints.into_iter().map(|rows| (rows, 0)).collect()),
         motion_band: if is_whole { MotionBand::of(logs, model, sets) } else { None },
         rows_of: model,
         log: recording.label(),

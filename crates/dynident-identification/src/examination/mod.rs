@@ -1,5 +1,6 @@
 //! Tests of an estimate on the logs: lags and sign of the torque, residuals, prediction errors on held-out logs.
 
+mod finer_motion;
 mod friction_sign;
 mod held_out;
 mod motion_band;

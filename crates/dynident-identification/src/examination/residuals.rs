@@ -23,15 +23,20 @@ pub struct JointResiduals {
     pub normality: Option<NormalityReport>,
     /// Residual by velocity; `None` if the model has no viscous friction, so that the rows do not contain the velocity.
     pub regimes: Option<SpeedRangesReport>,
+    /// Root mean square of the residual that neither friction at rest nor the low-pass of the positions explains, Nm
+    /// (N): of `|r| − |d| − F` where it is positive, with d and F as in [`TorqueBand`]. `None` without rows.
+    #[serde(default)]
+    pub rmse_in_motion_nm: Option<f64>,
     /// The 95 % band of the predicted torque; `None` without a covariance. Written as `torque_band` of a result, since
     /// the test of an existing model has no band.
     #[serde(skip)]
     pub band: Option<TorqueBand>,
 }
 
-/// Coverage of the predicted 95 % band `τ̂ ± (t κ √(w V wᵀ + σ²) + F)` for the torque of one joint on a held-out log. F
-/// is the largest dry friction of the model near rest while the joint rests (|q̇| below 0.005 rad/s for an arm of usual
-/// size), and zero in motion.
+/// Coverage of the predicted 95 % band `τ̂ ± (t κ √(w V wᵀ + σ²) + |d| + F)` for the torque of one joint on a held-out
+/// log. d is the change of the prediction if the cut-off of the differentiator is four times as high: motion above the
+/// cut-off, and the smearing of reversals and pauses. F is the largest torque that friction at rest adds to the
+/// filtered row (speed below 0.005 rad/s for an arm of usual size), and zero in motion. Without a cut-off d is zero.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueBand {
@@ -87,6 +92,10 @@ pub(crate) struct ResidualAccumulator {
     inside: usize,
     samples: usize,
     widths: f64,
+    /// Number of columns of the joint.
+    columns: usize,
+    /// Squares of the residual beyond friction at rest and the error of the motion, N² m² (N²).
+    moving_squares: f64,
 }
 
 impl ResidualAccumulator {
@@ -137,12 +146,15 @@ impl ResidualAccumulator {
             inside: 0,
             samples: 0,
             widths: 0.0,
+            columns: columns.len(),
+            moving_squares: 0.0,
         }
     }
 
-    /// Adds rows of the joint: its panel (columns, then torque) and the predicted torque.
-    pub(crate) fn add(&mut self, panel: &[f64], rows: usize, predicted: &[f64]) {
-        let columns = self.own.ncols();
+    /// Adds rows of the joint: its panel (columns, then torque) and the predicted torque. `finer` has for each row the
+    /// prediction from positions with a higher cut-off and the friction at rest; empty if unknown.
+    pub(crate) fn add(&mut self, panel: &[f64], rows: usize, predicted: &[f64], finer: &[[f64; 2]]) {
+        let columns = self.columns;
         for row in 0..rows {
             let residual = panel[columns * rows + row] - predicted[row];
             self.samples += 1;
@@ -154,12 +166,18 @@ impl ResidualAccumulator {
                 self.regimes.add(speed / self.usual_speed, residual);
                 rests = speed.abs() < SpeedRanges::REST_BELOW * self.usual_speed;
             }
+            // Friction at rest, and the error of the motion.
+            let explained = match finer.get(row) {
+                Some([finer, held]) => held + (finer - predicted[row]).abs(),
+                None if rests => self.stiction.level(panel, rows, row, predicted[row]),
+                None => 0.0,
+            };
+            self.moving_squares += (residual.abs() - explained).max(0.0).powi(2);
             if let Some((sigma, width)) = self.sigma {
                 let variance: f64 = (0..self.own.nrows())
                     .map(|k| (0..columns).map(|c| self.own[(k, c)] * panel[c * rows + row]).sum::<f64>().powi(2))
                     .sum();
-                let held = if rests { self.stiction.level(panel, rows, row, predicted[row]) } else { 0.0 };
-                let half = width * (variance + sigma * sigma).sqrt() + held;
+                let half = width * (variance + sigma * sigma).sqrt() + explained;
                 self.widths += half;
                 self.inside += usize::from(residual.abs() <= half);
             }
@@ -174,6 +192,7 @@ impl ResidualAccumulator {
             whiteness: self.whiteness.report(),
             normality: self.normality.report(),
             regimes: (!self.speed.is_empty()).then(|| self.regimes.report()),
+            rmse_in_motion_nm: (self.samples > 0).then(|| (self.moving_squares / samples).sqrt()),
             band: counted.then(|| TorqueBand {
                 log: log.to_owned(),
                 joint: name.to_owned(),

@@ -23,6 +23,7 @@ mod factors;
 mod forms;
 mod friction_choice;
 mod friction_cutoff;
+mod held_out_motion;
 mod in_memory;
 mod input_files;
 mod instruments;

@@ -1,0 +1,4 @@
+//! Integration tests of the crate.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
+mod pauses;
