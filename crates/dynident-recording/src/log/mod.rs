@@ -26,6 +26,7 @@ mod row_rules;
 mod shared_samples;
 mod source;
 mod text;
+mod text_columns;
 mod units;
 
 pub(crate) use blocks::RawBlocks;
