@@ -161,6 +161,9 @@ mod tests {
             assert_eq!(unit(name), expected, "{name}");
         }
         assert_eq!(time_unit_s("tau"), None);
-        assert_eq!(time_as_toml("t_us"), "{ column = \"t_us\", unit = \"us\" }");
+        assert_eq!(time_as_toml("t_us", None), "{ column = \"t_us\", unit = \"us\" }");
+        // A unit beside the name, as in a row of units.
+        assert_eq!(time_as_toml("t", Some("[ms]")), "{ column = \"t\", unit = \"ms\" }");
+        assert_eq!([with_unit("q1", Some("[deg]")), with_unit("q1_rad", Some("deg"))], ["q1 [deg]", "q1_rad"]);
     }
 }
