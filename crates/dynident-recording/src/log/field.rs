@@ -39,10 +39,7 @@ pub(super) fn list_length(field: &[u8]) -> Option<usize> {
 }
 
 fn entries(field: &[u8]) -> Option<impl Iterator<Item = &[u8]>> {
-    let inner = match field {
-        [b'[', inner @ .., b']'] | [b'(', inner @ .., b')'] => inner,
-        _ => return None,
-    };
+    let ([b'[', inner @ .., b']'] | [b'(', inner @ .., b')']) = field else { return None };
     let between = |byte: &u8| matches!(byte, b',' | b';') || byte.is_ascii_whitespace();
     Some(inner.split(between).filter(|entry| !entry.is_empty()))
 }

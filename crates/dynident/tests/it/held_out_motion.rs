@@ -69,7 +69,8 @@ fn problems(training: &Truth, tested: &[(&str, &Truth, f64)]) -> Vec<(String, Ve
             logs.push(file);
         }
     }
-    let list: String = logs.iter().map(|file| format!(", {{ file = {file:?}, role = \"validate\" }}")).collect();
+    let entry = |file: &String| format!(", {{ file = {file:?}, role = \"validate\" }}");
+    let list = logs.iter().map(entry).collect::<Vec<_>>().concat();
     let text = format!(
         "robot.file = {:?}\nlog = [{{ file = \"training.csv\" }}{list}]\n\
          [format]\ntime = {{ column = \"t\" }}\nposition = {{ columns = \"q{{1..2}}\" }}\n\
