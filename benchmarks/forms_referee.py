@@ -234,7 +234,7 @@ def main():
         except AssertionError as error:
             failed += 1
             print(f"| `{study.stem}` | failed: {error} | | | | | |", flush=True)
-    sys.exit(failed > 0)
+    sys.exit(int(failed > 0))
 
 
 if __name__ == "__main__":

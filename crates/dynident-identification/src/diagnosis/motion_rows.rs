@@ -308,7 +308,13 @@ mod tests {
 
     #[test]
     fn noise_is_distinguished_from_smooth_torque_and_steps() {
-        let noise = |row: usize| ((row as f64 * 12.9898).sin() * 43_758.547).fract();
+        // White and uniform between -1 and 1: the generator SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
+        let noise = |row: usize| {
+            let mut bits = (row as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
         let smooth = |row: usize| 20.0 * (0.05 * row as f64).sin() + if row % 100 < 50 { 5.0 } else { -5.0 };
         let deviation = (0..2000).map(|row| noise(row).powi(2)).sum::<f64>() / 2000.0;
         let of = |tau: Vec<f64>| {
