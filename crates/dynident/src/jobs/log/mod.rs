@@ -18,6 +18,8 @@ const TIME_UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("
 /// Sample rates of robot logs, Hz: slower logs contain no acceleration, faster ones do not exist.
 const MIN_RATE_HZ: f64 = 2.0;
 const MAX_RATE_HZ: f64 = 2e4;
+/// Smallest number of rows whose rate tells the unit: a list of events has no rate.
+const MIN_ROWS_OF_CLOCK: u64 = 50;
 
 /// Reads a recording of any format once and summarises its contents, with constant memory.
 ///
@@ -58,7 +60,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
             |column: usize| group.time.is_some() || unit(&described[group.columns.start + column]).is_some();
         let seconds = time.and_then(|(column, unit_s)| {
             let span = channels[column].increase()?;
-            let of_rate = || clock.rate(rows, span).and_then(unit_of_rate);
+            let of_rate = || clock.rate(rows, span).filter(|_| rows >= MIN_ROWS_OF_CLOCK).and_then(unit_of_rate);
             Some((span, if is_stated(column) { unit_s } else { of_rate().unwrap_or(unit_s) }))
         });
         let span_s = seconds.map(|(span, unit_s)| span * unit_s);
