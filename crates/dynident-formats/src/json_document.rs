@@ -14,6 +14,9 @@ use std::path::Path;
 /// Maximum length of a document. Its numbers need up to 16 times as much memory.
 pub(crate) const MAX_BYTES: u64 = 1 << 25;
 
+/// Maximum number of numbers in a table: each needs two bytes in the document, unless columns have gaps.
+const MAX_NUMBERS: usize = (MAX_BYTES / 2) as usize;
+
 const FIX: &str =
     "write one object per line (pandas: `frame.to_json(\"log.jsonl\", orient=\"records\", lines=True)`), or CSV";
 
@@ -39,7 +42,7 @@ pub(crate) fn open(path: &Path, reader: impl Read) -> Result<Box<dyn Table>, Fil
 pub(crate) fn table(value: &Value) -> Option<ArrayTable> {
     let mut arrays = Vec::new();
     match value {
-        Value::Array(rows) => arrays.extend(columns(rows)),
+        Value::Array(rows) => arrays.extend(columns(rows)?),
         Value::Object(entries) => match split_frame(entries) {
             Some(columns) => arrays.extend(columns),
             None => lists(entries, &mut String::new(), &mut arrays),
@@ -53,11 +56,16 @@ fn vector(name: String, values: Vec<f64>) -> Array {
     Array::row_major(name, [values.len(), 1], values)
 }
 
-/// One column for each number in the objects `rows`, by its path; NaN where an object does not have it.
-fn columns(rows: &[Value]) -> Vec<Array> {
+/// One column for each number in the objects `rows`, by its path; NaN where an object does not have it. `None` for
+/// objects with so few common names that the table would be larger than the document.
+fn columns(rows: &[Value]) -> Option<Vec<Array>> {
+    let most = MAX_NUMBERS / rows.len().max(1);
     let (mut names, mut columns) = (HashMap::<String, usize>::new(), Vec::<(String, Vec<f64>)>::new());
     for (row, value) in rows.iter().enumerate() {
         flattened(value, &mut String::new(), &mut |name, number| {
+            if columns.len() > most {
+                return;
+            }
             let column = *names.entry(name.to_owned()).or_insert_with(|| {
                 columns.push((name.to_owned(), Vec::new()));
                 columns.len() - 1
@@ -66,17 +74,23 @@ fn columns(rows: &[Value]) -> Vec<Array> {
             columns[column].1.push(number);
         });
     }
+    if columns.len() > most {
+        return None;
+    }
     let full = columns.into_iter().map(|(name, mut values)| {
         values.resize(rows.len(), f64::NAN);
         vector(name, values)
     });
-    full.collect()
+    Some(full.collect())
 }
 
 /// The columns of `{"columns": ["t", ..], "data": [[0.0, ..], ..]}`, which pandas writes with `orient="split"`.
 fn split_frame(entries: &Map<String, Value>) -> Option<Vec<Array>> {
     let names = entries.get("columns")?.as_array()?;
     let rows = entries.get("data")?.as_array()?;
+    if names.len() > MAX_NUMBERS / rows.len().max(1) {
+        return None;
+    }
     let column = |place: usize, name: &Value| {
         let values = rows.iter().map(|row| row.get(place).and_then(number).unwrap_or(f64::NAN)).collect();
         Some(vector(name.as_str()?.to_owned(), values))
@@ -108,7 +122,8 @@ fn list(name: &str, items: &[Value]) -> Option<Array> {
         return (!values.is_empty()).then(|| vector(name.to_owned(), values));
     }
     let width = items.first()?.as_array()?.len();
-    let mut values = Vec::with_capacity(items.len() * width);
+    // Grows with the numbers, not with the length of the first row.
+    let mut values = Vec::new();
     for item in items {
         let row = item.as_array().filter(|row| row.len() == width)?;
         for entry in row {
@@ -175,6 +190,19 @@ mod tests {
 
     #[test]
     fn documents_without_a_table_are_refused() {
+        // Tables that would be much larger than their documents: names that no two rows share, empty rows, a long row.
+        let rows = 20_000;
+        let different: Vec<String> = (0..rows).map(|row| format!("{{\"a{row}\":1}}")).collect();
+        let names = vec!["\"a\""; rows].join(",");
+        let empty = vec!["[]"; rows].join(",");
+        let long = vec!["1"; rows].join(",");
+        for text in [
+            format!("[{}]", different.join(",")),
+            format!("{{\"columns\":[{names}],\"data\":[{empty}]}}"),
+            format!("{{\"q\":[[{long}],{empty}]}}"),
+        ] {
+            assert!(open(Path::new("log.json"), text.as_bytes()).is_err(), "{}", &text[..40]);
+        }
         for text in ["[{\"t\": 0}]", "{\n\"robot\": \"ur10\"}", "[{\"t\": 0}, ", "[]"] {
             assert!(open(Path::new("log.json"), text.as_bytes()).is_err(), "{text}");
         }

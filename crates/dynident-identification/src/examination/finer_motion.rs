@@ -96,7 +96,7 @@ pub(crate) fn finer_rows(
         return Ok(None);
     }
     let mut motion = logs.motion.clone();
-    // A causal filter also changes the delay, and other differentiators have no band of their own.
+    // A causal filter also changes the delay, and other differentiators have no cut-off.
     let (DifferentiatorSettings::Butterworth { cutoff_hz, .. }
     | DifferentiatorSettings::FrequencyDomain { cutoff_hz, .. }) = &mut motion.differentiator
     else {

@@ -121,7 +121,7 @@ pub trait LogTable: fmt::Debug + Send {
         vec![LogGroup { name: None, columns: 0..self.width(), time: None }]
     }
 
-    /// Unit of a column as the file states it beside the name.
+    /// Unit of a column, if the file states it separately from the name.
     fn unit(&self, column: usize) -> Option<&str> {
         let _ = column;
         None

@@ -112,7 +112,7 @@ pub(in crate::jobs) fn time_unit_s(name: &str) -> Option<f64> {
     }
 }
 
-/// The name with the unit that the file states beside it: `q1 [deg]`. A name that contains a unit is not changed.
+/// The name with the unit that the file states separately: `q1 [deg]`. A name that contains a unit is not changed.
 pub(in crate::jobs) fn with_unit<'a>(name: &'a str, stated: Option<&str>) -> Cow<'a, str> {
     match stated {
         Some(stated) if unit(name).is_none() => {
@@ -162,7 +162,7 @@ mod tests {
         }
         assert_eq!(time_unit_s("tau"), None);
         assert_eq!(time_as_toml("t_us", None), "{ column = \"t_us\", unit = \"us\" }");
-        // A unit beside the name, as in a row of units.
+        // A unit in a row of units.
         assert_eq!(time_as_toml("t", Some("[ms]")), "{ column = \"t\", unit = \"ms\" }");
         assert_eq!([with_unit("q1", Some("[deg]")), with_unit("q1_rad", Some("deg"))], ["q1 [deg]", "q1_rad"]);
     }

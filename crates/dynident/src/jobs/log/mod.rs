@@ -34,7 +34,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     let log = FileLog::described_by_itself(path);
     let (format, mut table) = log.open_with_format()?;
     let names = column_names(table.as_ref());
-    // With the units that the file states beside the names.
+    // With the units that the file states separately from the names.
     let described: Vec<_> =
         names.iter().enumerate().map(|(column, name)| with_unit(name, table.unit(column)).into_owned()).collect();
     let groups = table.groups();
