@@ -16,6 +16,8 @@ import sys
 import numpy as np
 import pinocchio
 
+from simulated_arms import correlated_noise, fourier, slip
+
 HERE = pathlib.Path(__file__).resolve().parent
 ROBOTS = HERE.parent / "robots"
 FORMS = ["urdf", "sdf", "mjcf", "ros2-yaml", "json", "c", "cpp", "rust", "python", "matlab", "casadi", "jax", "pinocchio"]
@@ -56,29 +58,11 @@ def written(scratch, name, parts, links):
     return path
 
 
-def slip(q, yields):
-    """Maxwell slip: the sum of elements, each of which sticks until its displacement."""
-    state, out = np.zeros((len(yields), q.shape[1])), np.empty_like(q)
-    for k in range(len(q)):
-        step = q[k] - q[max(k - 1, 0)]
-        for i, most in enumerate(yields):
-            state[i] = np.clip(state[i] + step / most, -1, 1)
-        out[k] = state.mean(axis=0)
-    return out
-
-
 def simulated(model, truth, random):
     """Time, positions and torques."""
-    data, n, t = model.createData(), model.nv, np.arange(SAMPLES) * DT
+    data, t = model.createData(), np.arange(SAMPLES) * DT
     low, high = np.maximum(model.lowerPositionLimit, -2.5), np.minimum(model.upperPositionLimit, 2.5)
-    omega = 2 * np.pi * BASE_HZ * np.arange(1, HARMONICS + 1)
-    a, b = random.normal(size=(HARMONICS, n)), random.normal(size=(HARMONICS, n))
-    total = np.abs(a).sum(0) + np.abs(b).sum(0)
-    a, b, amplitude = a / total, b / total, 0.9 * (high - low) / 2
-    sine, cosine = np.sin(np.outer(t, omega)), np.cos(np.outer(t, omega))
-    q = (low + high) / 2 + amplitude * (sine @ a + cosine @ b)
-    v = amplitude * ((cosine * omega) @ a - (sine * omega) @ b)
-    acc = -amplitude * ((sine * omega**2) @ a + (cosine * omega**2) @ b)
+    q, v, acc = fourier(t, (low + high) / 2, 0.9 * (high - low) / 2, HARMONICS, BASE_HZ, random)
     rigid = np.array([pinocchio.rnea(model, data, *row) for row in zip(q, v, acc)])
     size = np.sqrt((rigid**2).mean(axis=0)) + 0.5
     step, viscous = np.tanh(v / 0.005), 0.1 * size * v
@@ -88,9 +72,7 @@ def simulated(model, truth, random):
         "load": lambda: (0.1 * size + 0.08 * np.abs(rigid)) * step,
         "slip": lambda: 0.15 * size * slip(q, (0.005, 0.05)),
     }[truth]()
-    error = random.normal(size=q.shape)
-    for k in range(1, SAMPLES):
-        error[k] = 0.8 * error[k - 1] + 0.6 * error[k]
+    error = correlated_noise(q.shape, random)
     return np.column_stack([t, q + 2e-5 * random.normal(size=q.shape), rigid + viscous + friction + 0.01 * size * error])
 
 

@@ -17,6 +17,8 @@ import sys
 import numpy as np
 import pinocchio
 
+from simulated_arms import correlated_noise, fourier
+
 ROBOTS = pathlib.Path(__file__).resolve().parent.parent / "robots"
 # Description, link of the payload, viscous friction, Coulomb friction and torque noise of each joint.
 ARMS = {
@@ -46,19 +48,10 @@ def simulated(arm, seed, box=None):
     is_limited = high - low < 6
     middle = np.where(is_limited, (low + high) / 2, START[:n])
     amplitude = 1.6 * np.minimum(0.9, np.where(is_limited, (high - low) / 3, 0.9))
-    omega = 2 * np.pi * BASE_HZ * np.arange(1, HARMONICS + 1)
-    a, b = random.normal(size=(HARMONICS, n)), random.normal(size=(HARMONICS, n))
-    total = np.abs(a).sum(0) + np.abs(b).sum(0)
-    a, b = a / total, b / total
-    sine, cosine = np.sin(np.outer(t, omega)), np.cos(np.outer(t, omega))
-    q = middle + amplitude * (sine @ a + cosine @ b)
-    v = amplitude * ((cosine * omega) @ a - (sine * omega) @ b)
-    acc = -amplitude * ((sine * omega**2) @ a + (cosine * omega**2) @ b)
+    q, v, acc = fourier(t, middle, amplitude, HARMONICS, BASE_HZ, random)
     tau = np.array([pinocchio.rnea(model, data, *row) for row in zip(q, v, acc)])
     tau += np.array(viscous) * v + np.array(coulomb) * np.tanh(v / 0.01)
-    error = random.normal(size=tau.shape)
-    for k in range(1, SAMPLES):
-        error[k] = 0.8 * error[k - 1] + 0.6 * error[k]
+    error = correlated_noise(tau.shape, random)
     return np.column_stack([t, q + 2e-5 * random.normal(size=q.shape), tau + np.array(noise) * error])
 
 

@@ -16,33 +16,12 @@ import subprocess
 import numpy as np
 import pinocchio
 
+from simulated_arms import fourier, slip
+
 ROBOTS = pathlib.Path(__file__).resolve().parent.parent / "robots"
 TRUTHS = ["stiff", "smooth", "stribeck", "load", "held", "slip"]
 SPEEDS = [0.5, 1.0, 2.0]
 DT, TRAIN_S, TEST_S, HARMONICS, BASE_HZ = 0.004, 30.0, 48.0, 5, 0.1
-
-
-def slip(q, yields):
-    """Maxwell slip: the mean of elements, each of which sticks until its displacement."""
-    state, out = np.zeros((len(yields), q.shape[1])), np.empty_like(q)
-    for k in range(len(q)):
-        step = q[k] - q[max(k - 1, 0)]
-        for i, most in enumerate(yields):
-            state[i] = np.clip(state[i] + step / most, -1, 1)
-        out[k] = state.mean(axis=0)
-    return out
-
-
-def fourier(low, high, random):
-    t, n = np.arange(0, TRAIN_S, DT), len(low)
-    omega = 2 * np.pi * BASE_HZ * np.arange(1, HARMONICS + 1)
-    a, b = random.normal(size=(HARMONICS, n)), random.normal(size=(HARMONICS, n))
-    total = np.abs(a).sum(0) + np.abs(b).sum(0)
-    a, b, amplitude = a / total, b / total, 0.9 * (high - low) / 2
-    sine, cosine = np.sin(np.outer(t, omega)), np.cos(np.outer(t, omega))
-    q = (low + high) / 2 + amplitude * (sine @ a + cosine @ b)
-    v = amplitude * ((cosine * omega) @ a - (sine * omega) @ b)
-    return q, v, -amplitude * ((sine * omega**2) @ a + (cosine * omega**2) @ b)
 
 
 def strokes(low, high, speed, pause_s, random):
@@ -97,7 +76,7 @@ def case(scratch, robot, truth, random):
     path, name = ROBOTS / f"{robot}.urdf", f"{robot}_{truth}"
     model = pinocchio.buildModelFromUrdf(str(path))
     low, high = np.maximum(model.lowerPositionLimit, -2.0), np.minimum(model.upperPositionLimit, 2.0)
-    training = fourier(low, high, random)
+    training = fourier(np.arange(0, TRAIN_S, DT), (low + high) / 2, 0.9 * (high - low) / 2, HARMONICS, BASE_HZ, random)
     tau, size = torque(model, truth, None, training, random)
     write(scratch / f"{name}_train.csv", training[0], tau, random)
     peak, logs = np.abs(training[1]).max(axis=0), {}
