@@ -46,6 +46,13 @@ run 0 "$dynident" inspect "$out/slip.urdf" --fix "$out/mended.urdf"
 run 0 cmp "$out/mended.urdf" robots/iiwa14.urdf
 run 0 "$dynident" identify examples/ur10_simulated.toml --out "$out/result"
 run 0 "$dynident" validate "$out/result/result.json" --study examples/ur10_simulated.toml
+run 0 "$dynident" view robots/ur10.urdf --out "$out/view.html"
+run 0 "$dynident" view examples/ur10_simulated.toml --out "$out/logs.html"
+run 0 "$dynident" plot "$out/result" --figure parameters --out "$out/parameters.svg" --out "$out/parameters.csv" --out "$out/parameters.tex" --out "$out/parameters.md"
+run 0 "$dynident" plot "$out/result" --figure friction --width-mm 180 --out "$out/friction.svg"
+run 0 "$dynident" plot "$out/result" --figure residuals --study examples/ur10_simulated.toml --out "$out/residuals.svg"
+run 0 "$dynident" compare "$out/result"
+run 0 "$dynident" compare "$out/result" "$out/new" --out "$out/changes.html" --robot robots/ur10.urdf
 # Factors of logs, in two files and in one file, give the same model.
 run 2 "$dynident" reduce examples/ur10_simulated.toml --out "$out/train.factors"
 run 0 "$dynident" reduce examples/ur10_simulated.toml --like "$out/result/result.json" --out "$out/train.factors"

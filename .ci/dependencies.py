@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 # Permissive licences only: the binary may be linked into anything.
-ALLOWED = {"MIT", "Apache-2.0", "Apache-2.0 WITH LLVM-exception", "BSD-2-Clause", "BSD-3-Clause", "CC0-1.0", "ISC", "Unicode-3.0", "Unlicense", "Zlib"}
+ALLOWED = {"MIT", "Apache-2.0", "Apache-2.0 WITH LLVM-exception", "BSD-2-Clause", "BSD-3-Clause", "CC0-1.0", "ISC", "Unicode-3.0", "Unlicense", "Zlib", "bzip2-1.0.6"}
 REGISTRY = "registry+https://github.com/rust-lang/crates.io-index"
 
 

@@ -9,8 +9,9 @@ scratch=$1
 # eight minutes of processor time for linking (docs/decisions/0012-builds-and-packages.md).
 # Released wheels have no symbols either.
 export MATURIN_PEP517_ARGS="--profile release --strip"
-# Measured 16.1 MB. Released wheels have link-time optimisation and are smaller.
-most_bytes=16500000
+# Measured 17.0 MB with the robot in three dimensions and the readers of ROS 1, ULog and CBOR; identification from commands, figures and the live
+# page add 3 % to the command. Released wheels have link-time optimisation and are smaller.
+most_bytes=18200000
 
 # interpreters: the installed Python versions as `minor path`, oldest first.
 interpreters() {

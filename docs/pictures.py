@@ -32,13 +32,23 @@ COLOURS = """
     .page { fill: #0d1117; stroke: #30363d } .ink { fill: #e6edf3 } .prompt { fill: #79c0ff } .left { fill: #9198a1 }
   }"""
 
-# Places of the upper part of the report, up to its first picture, and of the held-out torque of the second joint.
-PLACES = """(() => {
+# Places of the upper part of the report, up to the picture of the robot, and of the held-out torque of the second joint.
+REPORT = """(async () => {
   const place = (top, bottom) => ({ x: 0, y: scrollY + top - 4, width: innerWidth, height: bottom - top + 8, scale: 1 });
-  const first = document.querySelector("section.picture svg, section.plot svg").getBoundingClientRect();
+  const stage = document.querySelector(".stage").getBoundingClientRect();
   const plots = [...document.querySelectorAll("section.plot")];
   const torque = plots.find((one) => one.querySelector("h3")?.textContent.startsWith("shoulder_lift_joint")).getBoundingClientRect();
-  return { report: place(4 - scrollY, first.bottom), torque: place(torque.top, torque.bottom) };
+  return { report: place(4 - scrollY, stage.bottom), torque: place(torque.top, torque.bottom) };
+})()"""
+
+# The robot in the middle of its designed motion, with the limits of its joints.
+DESIGN = """(async () => {
+  const slider = document.querySelector("input[type=range]");
+  slider.value = slider.max * 0.45;
+  slider.dispatchEvent(new Event("input"));
+  await new Promise((done) => setTimeout(done, 500));
+  const [stage, gauges] = [".stage", ".gauges"].map((name) => document.querySelector(name).getBoundingClientRect());
+  return { "design-robot": { x: 0, y: scrollY + stage.top - 4, width: innerWidth, height: gauges.bottom - stage.top + 8, scale: 1 } };
 })()"""
 
 # A mistake for `check`: the sign of the third torque.
@@ -102,8 +112,8 @@ def words(svg):
     return re.sub(r"\s+", " ", re.sub(r"[-+]?\d[\d.,e+-]*", "#", text))
 
 
-def photograph(chromium, page):
-    """Writes the upper part of a report and one of its plots as WebP."""
+def photograph(chromium, page, places):
+    """Writes parts of a report as WebP."""
     from pages import SCROLL, Browser
 
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
@@ -116,7 +126,7 @@ def photograph(chromium, page):
         # Draw all plots first, because drawing changes their places.
         browser.value(SCROLL)
         browser.value("new Promise((done) => setTimeout(done, 1500))")
-        for name, clip in browser.value(PLACES).items():
+        for name, clip in browser.value(places).items():
             shot = browser.call("Page.captureScreenshot", format="webp", quality=85, clip=clip, captureBeyondViewport=True)
             (IMAGES / f"{name}.webp").write_bytes(base64.b64decode(shot["data"]))
         browser.close()
@@ -139,7 +149,8 @@ def main():
                 wrong.append(path.name)
         if not check:
             (IMAGES / "motion.svg").write_bytes((folder / "ur10_motion" / "path.svg").read_bytes())
-            photograph(arguments[1], folder / "result" / "report.html")
+            photograph(arguments[1], folder / "result" / "report.html", REPORT)
+            photograph(arguments[1], folder / "ur10_motion" / "report.html", DESIGN)
     if check:
         print(f"differs from the output of the commands: {', '.join(wrong)}" if wrong else "the sessions agree with the output of the commands")
     sys.exit(bool(wrong))

@@ -7,10 +7,12 @@ programs. Seeded. Every file contains the same motion of two joints, if its form
 """
 import argparse
 import gzip
+import importlib.metadata
 import io
 import json
 import pathlib
 import sqlite3
+import struct
 
 import h5py
 import numpy as np
@@ -20,10 +22,14 @@ import pyarrow.parquet as pq
 import scipy
 import scipy.io
 import zstandard
+import cbor2
 import mcap
 from mcap.writer import CompressionType
 from mcap.writer import Writer as RawWriter
+from mcap_ros1.writer import Writer as Ros1Writer
 from mcap_ros2.writer import Writer as Ros2Writer
+from rosbags.rosbag1 import Writer as BagWriter
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from write_json import write
 
@@ -405,6 +411,210 @@ def folder(out):
     return {"bag": STATE_COLUMNS}
 
 
+ROS1_OWN = """uint8 MODE_IDLE=0
+bool moving
+char letter
+byte step
+time measured
+duration waited
+Inner[] inner
+float32[3] force
+"""
+ROS1_INNER = "string label\nfloat64 value\n"
+ROS1_STATE = f"""Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+{SEPARATOR}
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+"""
+
+
+def ros1_messages():
+    """Messages of a joint state and of an own type, serialised by rosbags, with the definitions."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg(ROS1_OWN, "own_msgs/msg/Own"))
+    store.register(get_types_from_msg(ROS1_INNER, "own_msgs/msg/Inner"))
+    of = lambda name: store.types[name]
+    stamp = lambda ns: of("builtin_interfaces/msg/Time")(sec=ns // 10**9, nanosec=ns % 10**9)
+    states, own = [], []
+    for i in range(ROWS):
+        head = of("std_msgs/msg/Header")(seq=i, stamp=stamp(STAMPS[i]), frame_id="base")
+        order = [0, 1] if i % 3 else [1, 0]
+        state = of("sensor_msgs/msg/JointState")(
+            header=head, name=[JOINTS[j] for j in order], position=Q[order, i], velocity=DQ[order, i], effort=TAU[order, i]
+        )
+        states.append(bytes(store.serialize_ros1(state, "sensor_msgs/msg/JointState")))
+        inner = [of("own_msgs/msg/Inner")(label="a" * (i % 4), value=float(Q[0, i])) for _ in range(2)]
+        message = of("own_msgs/msg/Own")(
+            moving=bool(i % 2), letter=200, step=-i, measured=stamp(STAMPS[i]), waited=of("builtin_interfaces/msg/Duration")(sec=1, nanosec=500_000_000),
+            inner=inner, force=F32[0, i] * np.ones(3, np.float32),
+        )
+        own.append(bytes(store.serialize_ros1(message, "own_msgs/msg/Own")))
+    return store, states, own
+
+
+class Ros1Message:
+    """A message as the classes of genpy, for the writer of mcap-ros1-support."""
+
+    _type = "sensor_msgs/JointState"
+    _full_text = ROS1_STATE
+
+    def __init__(self, data):
+        self.data = data
+
+    def serialize(self, buffer):
+        buffer.write(self.data)
+
+
+def ros1_bags(out):
+    """ROS 1 bags with every compression, a bag without chunks, and MCAP with messages of ROS 1 and in CBOR."""
+    store, states, own = ros1_messages()
+    columns = {
+        "/joint_states.header.seq": np.arange(ROWS), **STATE_COLUMNS,
+        "/own.moving": np.arange(ROWS) % 2, "/own.letter": np.full(ROWS, 200), "/own.step": -np.arange(ROWS),
+        "/own.measured": seconds(STAMPS), "/own.waited": np.full(ROWS, 1.5), "/own.inner[0].value": Q[0], "/own.inner[1].value": Q[0],
+        **{f"/own.force[{k}]": F32[0] for k in range(3)},
+    }
+    for name, compression in [("plain.bag", None), ("bz2.bag", BagWriter.CompressionFormat.BZ2), ("lz4.bag", BagWriter.CompressionFormat.LZ4)]:
+        path = out / name
+        path.unlink(missing_ok=True)
+        writer = BagWriter(path)
+        if compression:
+            writer.set_compression(compression)
+        writer.chunk_threshold = 3000
+        with writer:
+            state = writer.add_connection("/joint_states", "sensor_msgs/msg/JointState", typestore=store)
+            other = writer.add_connection("/own", "own_msgs/msg/Own", typestore=store)
+            for i in range(ROWS):
+                writer.write(state, LOGGED[i], states[i])
+                writer.write(other, LOGGED[i] + 20, own[i])
+    buffer = io.BytesIO()
+    writer = Ros1Writer(buffer, compression=CompressionType.ZSTD)
+    for i in range(ROWS):
+        writer.write_message("/joint_states", Ros1Message(states[i]), log_time=LOGGED[i], publish_time=LOGGED[i])
+    writer.finish()
+    (out / "ros1.mcap").write_bytes(buffer.getvalue())
+
+    buffer = io.BytesIO()
+    writer = RawWriter(buffer, compression=CompressionType.ZSTD)
+    writer.start()
+    channel = writer.register_channel(topic="arm", message_encoding="cbor", schema_id=0)
+    for i in range(ROWS):
+        order = [0, 1] if i % 3 else [1, 0]
+        data = cbor2.dumps({"name": [JOINTS[j] for j in order], "q": [float(Q[j, i]) for j in order], "half": float(F32[0, i].astype(np.float16)), "n": -i}, canonical=True)
+        writer.add_message(channel, log_time=LOGGED[i], publish_time=LOGGED[i], data=data)
+    writer.finish()
+    (out / "cbor.mcap").write_bytes(buffer.getvalue())
+    state_columns = {name: values for name, values in columns.items() if not name.startswith("/own")}
+    return {
+        **{name: dict(columns) for name in ["plain.bag", "bz2.bag", "lz4.bag"]},
+        "ros1.mcap": state_columns,
+        "cbor.mcap": {
+            "arm.log_time": seconds(LOGGED), "arm.q[shoulder]": Q[0], "arm.q[elbow]": Q[1], "arm.half": F32[0].astype(np.float16), "arm.n": -np.arange(ROWS),
+        },
+    }
+
+
+def packed_parts(out):
+    """rosbag2 folders whose parts are compressed as whole files: SQLite and MCAP."""
+    packer = zstandard.ZstdCompressor(level=19)
+    for name, part in [("packed_database", "jazzy.db3"), ("packed_mcap", "plain.mcap")]:
+        bag = out / name
+        bag.mkdir(exist_ok=True)
+        (bag / f"{part}.zstd").write_bytes(packer.compress((out / part).read_bytes()))
+        (bag / "metadata.yaml").write_text(
+            f"rosbag2_bagfile_information:\n  version: 9\n  relative_file_paths:\n    - {part}.zstd\n"
+            "  compression_format: zstd\n  compression_mode: FILE\n",
+            encoding="utf-8",
+        )
+    return {"packed_database": STATE_COLUMNS | OWN_COLUMNS, "packed_mcap": STATE_COLUMNS}
+
+
+def ulog_file(out):
+    """Writes ULog by its specification, because pyulog writes only files that it has read; pyulog reads the result back."""
+    from pyulog import ULog
+
+    def message(kind, body):
+        return struct.pack("<HB", len(body), ord(kind)) + body
+
+    data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 1_000_000)
+    data += message("B", bytes(40))
+    data += message("I", bytes([len("char[3] sys_name")]) + b"char[3] sys_namePX4")
+    data += message("F", b"inner:float torque;uint8_t[3] _padding0;int16_t step;")
+    data += message("F", b"arm_state:uint64_t timestamp;double[2] q;inner[2] joints;char[4] note;bool moving;uint8_t[5] _padding0;")
+    data += message("A", struct.pack("<BH", 0, 7) + b"arm_state") + message("A", struct.pack("<BH", 1, 9) + b"arm_state")
+    for i in range(ROWS):
+        for instance, number in enumerate((7, 9)):
+            body = struct.pack("<HQ2d", number, 1_000_000 + 10_000 * i, *Q[:, i])
+            for j in range(2):
+                body += struct.pack("<f3sh", TAU.astype(np.float32)[j, i], b"xyz", -i)
+            body += b"abcd" + bytes([(i + instance) % 2])
+            data += message("D", body)
+        data += message("S", b"")
+    path = out / "flight.ulg"
+    path.write_bytes(data)
+    back = {f"{d.name}_{d.multi_id}": d.data for d in ULog(str(path)).data_list}
+    assert (back["arm_state_0"]["q[1]"] == Q[1]).all() and (back["arm_state_1"]["joints[1].torque"] == TAU.astype(np.float32)[1]).all()
+    columns = {}
+    for instance, topic in enumerate(["arm_state", "arm_state_1"]):
+        columns |= {
+            f"{topic}.timestamp": 1_000_000 + 10_000 * np.arange(ROWS), f"{topic}.q[0]": Q[0], f"{topic}.q[1]": Q[1],
+            f"{topic}.moving": (np.arange(ROWS) + instance) % 2,
+        }
+        columns |= {f"{topic}.joints[{j}].torque": TAU.astype(np.float32)[j] for j in range(2)}
+        columns |= {f"{topic}.joints[{j}].step": -np.arange(ROWS) for j in range(2)}
+    return {"flight.ulg": columns}
+
+
+def octave_file(out):
+    """Writes Octave's text format by its sources, because Octave is not available here."""
+    number = lambda x: repr(float(x)) if np.isfinite(x) else str(x)
+    matrix = lambda name, rows: f"# name: {name}\n# type: matrix\n# rows: {len(rows)}\n# columns: {len(rows[0])}\n" + "".join(
+        " " + " ".join(number(x) for x in row) + "\n" for row in rows
+    ) + "\n\n"
+    text = "# Created by Octave 8.4.0, Mon Nov 23 10:00:00 2026 UTC <user@host>\n"
+    text += f"# name: t\n# type: range\n# base, limit, increment\n0 {number(0.01 * (ROWS - 1))} 0.01\n\n\n"
+    text += matrix("q", Q.T) + matrix("tau", TAU)
+    text += f"# name: ticks\n# type: int32 matrix\n# ndims: 2\n {ROWS} 1\n" + "".join(f"  {i - 3}\n" for i in range(ROWS)) + "\n\n"
+    text += "# name: robot\n# type: string\n# elements: 1\n# length: 3\narm\n\n\n"
+    text += "# name: z\n# type: complex matrix\n# rows: 1\n# columns: 2\n (1,2) (3,4)\n\n\n"
+    text += "# name: log\n# type: scalar struct\n# ndims: 2\n 1 1\n# length: 2\n" + matrix("dq", DQ.T)
+    text += "# name: gain\n# type: scalar\n0.5\n\n\n\n\n"
+    (out / "octave.txt").write_text(text, encoding="utf-8")
+    return {
+        "octave.txt": {
+            "t": [0.0 + k * 0.01 for k in range(ROWS)], "q[0]": Q[0], "q[1]": Q[1], "tau[0]": TAU[0], "tau[1]": TAU[1],
+            "ticks": np.arange(ROWS) - 3, "log.dq[0]": DQ[0], "log.dq[1]": DQ[1],
+        }
+    }
+
+
+def matlab_4(out):
+    buffer = io.BytesIO()
+    scipy.io.savemat(buffer, {"t": T[:, None], "q": Q.T, "tau": TAU, "name": "arm", "z": Q.T + 1j}, format="4")
+    (out / "v4.mat").write_bytes(buffer.getvalue())
+    # The other byte order, single and whole numbers, by the documentation.
+    variable = lambda kind, name, values: struct.pack(">5i", 1000 + kind, *values.shape, 0, len(name) + 1) + name.encode() + b"\0" + values.T.tobytes()
+    (out / "v4_big_endian.mat").write_bytes(
+        variable(10, "q", F32.T.astype(">f4")) + variable(20, "ticks", (np.arange(ROWS)[:, None] - 5).astype(">i4"))
+        + variable(0, "t", T[:, None].astype(">f8"))
+    )
+    columns = {"t": T, "q[0]": Q[0], "q[1]": Q[1], "tau[0]": TAU[0], "tau[1]": TAU[1]}
+    return {"v4.mat": columns, "v4_big_endian.mat": {"q[0]": F32[0], "q[1]": F32[1], "ticks": np.arange(ROWS) - 5, "t": T}}
+
+
+def text_encodings(out):
+    text = text_table().decode()
+    (out / "utf16.csv").write_bytes(text.encode("utf-16"))
+    (out / "carriage_returns.csv").write_bytes(text.replace("\n", "\r").encode())
+    return {"utf16.csv": TEXT_COLUMNS, "carriage_returns.csv": TEXT_COLUMNS}
+
+
 def parquet_files(out):
     maybe = pa.array([None if i % 7 == 3 else float(TAU[0, i]) for i in range(ROWS)], pa.float64())
     table = pa.table({
@@ -655,9 +865,10 @@ def main():
     out = parser.parse_args().out / "formats"
     out.mkdir(parents=True, exist_ok=True)
     files = {}
-    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, parquet_files, arrow_files, lerobot_files, diadem_files, matlab_files, hdf5_files]:
+    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, packed_parts, ros1_bags, ulog_file, octave_file, matlab_4, text_encodings, parquet_files, arrow_files, lerobot_files, diadem_files, matlab_files, hdf5_files]:
         files |= make(out)
     versions = {module.__name__: module.__version__ for module in [h5py, mcap, np, pa, scipy, zstandard]}
+    versions |= {name: importlib.metadata.version(name) for name in ["cbor2", "mcap-ros1-support", "pyulog", "rosbags"]}
     files = {name: dict(columns) for name, columns in files.items()}
     write(out / "values.json", {"seed": SEED, "versions": versions, **pooled(files)})
 

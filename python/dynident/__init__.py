@@ -11,7 +11,19 @@ from . import fleet
 from ._describe import Inspection, NewStudy, inspect, new
 from ._functions import FunctionWarning
 from ._iterate import Iteration, iterate
-from ._jobs import Check, Design, ProblemWarning, Simulation, check, design, identify, log_contents, simulate, validate
+from ._jobs import (
+    Check,
+    Design,
+    ProblemWarning,
+    Simulation,
+    check,
+    design,
+    identify,
+    identify_servos,
+    log_contents,
+    simulate,
+    validate,
+)
 from ._log import Log
 from ._model import Model
 from ._native import (
@@ -29,6 +41,7 @@ from ._native import (
     Watch,
     __version__,
 )
+from ._servo import ServoModel, ServoScale, ServoValue
 from ._study import study, with_logs
 
 __all__ = [
@@ -49,6 +62,9 @@ __all__ = [
     "Robot",
     "RobotError",
     "Run",
+    "ServoModel",
+    "ServoScale",
+    "ServoValue",
     "Simulation",
     "StopRun",
     "Study",
@@ -59,6 +75,7 @@ __all__ = [
     "design",
     "fleet",
     "identify",
+    "identify_servos",
     "inspect",
     "iterate",
     "log_contents",

@@ -15,12 +15,14 @@ import numpy.typing as npt
 from . import _native
 from ._log import Log
 from ._model import Model
-from ._native import Robot, Study
+from ._native import Robot, Study, StudyError
 from ._progress import Line, Progress, is_watched
+from ._servo import ServoModel
 from ._study import study as make_study
 from ._study import with_logs
 
 Found = TypeVar("Found")
+Fitted = TypeVar("Fitted", Model, ServoModel)
 
 
 class ProblemWarning(UserWarning):
@@ -54,7 +56,7 @@ def _watched(progress: bool | Progress | None, job: Callable[[Progress | None], 
         line.end()
 
 
-def _warned(model: Model) -> Model:
+def _warned(model: Fitted) -> Fitted:
     for problem in model.problems:
         warnings.warn(problem, ProblemWarning, stacklevel=3)
     return model
@@ -78,11 +80,41 @@ def identify(
     notebook. A callable receives ``(stage, rows done, total rows or None)``. A robot file with xacro macros needs
     ``allow_command=True``: the program ``xacro`` expands them, and runs Python code of the file.
 
+    Logs with commands in place of torque need ``identify_servos``.
+
     Raises ``StudyError``, ``RobotError`` or ``LogError`` with the file, the position and the fix. Ctrl-C interrupts the
     fit.
     """
     whole = _study_of(study, logs, sections, allow_command)
+    if whole._fits_commands:
+        raise StudyError("the logs have commands in place of torque: use identify_servos, which fits drives and bodies")
     return _warned(Model(_watched(progress, lambda hear: _native._identify(whole, threads, hear))))
+
+
+def identify_servos(
+    study: Study | Robot | str | PathLike[str],
+    logs: Log | Iterable[Log] | None = None,
+    *,
+    allow_command: bool = False,
+    threads: int | None = None,
+    progress: bool | Progress | None = None,
+    **sections: Any,
+) -> ServoModel:
+    """Fits drives and bodies to logs of commands and positions, for robots that report no torque, and simulates the
+    held-out logs.
+
+    The logs have ``command`` in place of ``tau``: ``Log.from_arrays(t, q, command=c)``. Settings are the keys of
+    ``[drive.servo]``: ``drive={"servo": {"fit": {"alike": True}}}``. The result is bit-identical to that of ``dynident
+    identify`` for the same study. For the other arguments, warnings and errors, see ``identify``.
+    """
+    whole = _study_of(study, logs, sections, allow_command)
+    if not whole._fits_commands:
+        raise StudyError(
+            "identify_servos needs logs with commands and without torque: give Log.from_arrays(..., command=c), "
+            "use identify for logs with torque, or state drive={'servo': {}} for logs with both"
+        )
+    texts = _watched(progress, lambda hear: _native._identify_servos(whole, threads, hear))
+    return _warned(ServoModel(*texts))
 
 
 def check(

@@ -47,8 +47,9 @@ class Log:
         cls,
         time_s: npt.ArrayLike | None,
         q: npt.ArrayLike,
-        tau: npt.ArrayLike,
+        tau: npt.ArrayLike | None = None,
         *,
+        command: npt.ArrayLike | None = None,
         dq: npt.ArrayLike | None = None,
         ddq: npt.ArrayLike | None = None,
         temperature_c: npt.ArrayLike | None = None,
@@ -60,6 +61,7 @@ class Log:
     ) -> Log:
         """Creates a log from arrays in SI units: ``q`` and ``tau`` of shape ``(samples, n)``, rad and Nm (m and N).
 
+        For a robot that reports no torque, give the commanded positions ``command`` instead of ``tau``, rad (m).
         ``time_s`` of shape ``(samples,)`` in seconds, or None with ``rate_hz``. ``dq`` and ``ddq`` (rad/s, rad/s²) are
         compared with the derivatives of the positions but not used in the fit. Further keyword arguments are keys of
         ``[format]``, such as ``torque={"unit": "A", "scale": 11.4}`` or ``missing="drop"``.
@@ -72,6 +74,8 @@ class Log:
         columns: dict[str, npt.NDArray[np.float64]] = {}
         if (time_s is None) == (rate_hz is None):
             raise LogError(f"{name}: give either time_s or rate_hz")
+        if tau is None and command is None:
+            raise LogError(f"{name}: give tau, or command for a robot that reports no torque")
         channels: dict[str, Any] = {}
         if time_s is None:
             channels["rate_hz"] = rate_hz
@@ -84,6 +88,7 @@ class Log:
             ("velocity", "dq", dq),
             ("acceleration", "ddq", ddq),
             ("temperature", "temperature", temperature_c),
+            ("command", "command", command),
         ]
         for key, symbol, values in groups:
             if values is None:
@@ -106,7 +111,7 @@ class Log:
         cls,
         table: pd.DataFrame,
         position: Channel,
-        torque: Channel,
+        torque: Channel | None = None,
         *,
         time: str | Mapping[str, Any] | None = None,
         name: str = "log",
@@ -118,7 +123,8 @@ class Log:
         ``"q{1..6}"``, or a mapping with units as in ``[format]``: ``{"columns": "q{1..6}_deg", "unit": "deg"}``.
 
         ``time`` names the column with seconds, or is ``{"column": "t", "unit": "ms"}``. Without it the index is the
-        time if it is numeric or a date; otherwise give ``rate_hz``. Further keyword arguments are keys of ``[format]``.
+        time if it is numeric or a date; otherwise give ``rate_hz``. Further keyword arguments are keys of ``[format]``,
+        such as ``command="target{1..6}"`` in place of ``torque``.
         """
         channels = _channels(position, torque, time, format)
         columns: dict[str, npt.NDArray[np.float64]] = {}
@@ -143,7 +149,7 @@ class Log:
         cls,
         file: str | PathLike[str],
         position: Channel,
-        torque: Channel,
+        torque: Channel | None = None,
         *,
         time: str | Mapping[str, Any] | None = None,
         name: str | None = None,
@@ -208,13 +214,15 @@ class Log:
 
 
 def _channels(
-    position: Channel, torque: Channel, time: str | Mapping[str, Any] | None, further: Mapping[str, Any]
+    position: Channel, torque: Channel | None, time: str | Mapping[str, Any] | None, further: Mapping[str, Any]
 ) -> dict[str, Any]:
-    channels: dict[str, Any] = {"position": _group(position), "torque": _group(torque)}
+    channels: dict[str, Any] = {"position": _group(position)}
+    if torque is not None:
+        channels["torque"] = _group(torque)
     if time is not None:
         channels["time"] = {"column": time} if isinstance(time, str) else dict(time)
     for key, value in further.items():
-        is_group = key in ("velocity", "acceleration", "temperature")
+        is_group = key in ("velocity", "acceleration", "temperature", "command")
         channels[key] = _group(value) if is_group else value
     return channels
 

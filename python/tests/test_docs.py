@@ -10,7 +10,7 @@ import pytest
 import dynident
 
 
-@pytest.mark.parametrize("module", ["dynident", "dynident._log", "dynident._study", "dynident._jobs", "dynident._model", "dynident._describe"])
+@pytest.mark.parametrize("module", ["dynident", "dynident._log", "dynident._study", "dynident._jobs", "dynident._model", "dynident._servo", "dynident._describe"])
 def test_examples_run(module: str, root, monkeypatch: pytest.MonkeyPatch) -> None:
     # The examples use files of the repository.
     monkeypatch.chdir(root)

@@ -125,7 +125,7 @@ def test_parts_of_one_recording(planar: dynident.Robot, planar_logs: list[dynide
     log = planar_logs[0]
     parts = [log.fraction(0.0, 0.6), log.fraction(0.65, 1.0).validating()]
     assert dynident.identify(planar, parts, drive=DRIVE, friction="stated").validation_error_percent
-    with pytest.raises(dynident.StudyError, match="has samples of it"):
+    with pytest.raises(dynident.StudyError, match="contains samples of the training log"):
         dynident.identify(planar, [log, log.validating()], drive=DRIVE)
 
 

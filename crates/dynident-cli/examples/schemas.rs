@@ -7,14 +7,15 @@
 use dynident::export::{MODEL_SCHEMA, ModelFile, SIMULATOR_SCHEMA, SimulatorFile};
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
-    CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EXPORT_SCHEMA, EXPORT_VALIDATION_SCHEMA,
-    EvaluationFile, ExportFile, ExportValidationFile, FACTORS_SCHEMA, FactorsFile, INSPECTION_SCHEMA,
-    ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA, LogContents, NEW_STUDY_SCHEMA, NewStudyFile,
-    RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA, SimulationFile, TEST_SAMPLES_SCHEMA, TestSamplesFile,
-    VALIDATION_SCHEMA, ValidationFile,
+    CHECK_SCHEMA, COMPARISON_SCHEMA, CheckFile, ComparisonFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA,
+    EXPORT_SCHEMA, EXPORT_VALIDATION_SCHEMA, EvaluationFile, ExportFile, ExportValidationFile, FACTORS_SCHEMA,
+    FactorsFile, INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA, LogContents,
+    NEW_STUDY_SCHEMA, NewStudyFile, RESULT_SCHEMA, ResultFile, SERVO_DESIGN_SCHEMA, SERVO_SCHEMA, SIMULATION_SCHEMA,
+    ServoDesignFile, ServoFile, SimulationFile, TEST_SAMPLES_SCHEMA, TestSamplesFile, VALIDATION_SCHEMA,
+    ValidationFile,
 };
 use dynident_benchmark::accuracy::{BENCHMARK_SCHEMA, BenchmarkFile};
-use dynident_cli::{DOCS_SCHEMA, DocsFile};
+use dynident_cli::{DOCS_SCHEMA, DocsFile, INIT_SCHEMA, InitFile};
 use dynident_paper::{PAPER_SCHEMA, PaperFile};
 use schemars::generate::SchemaSettings;
 use schemars::transform::RecursiveTransform;
@@ -32,7 +33,9 @@ pub(crate) fn write_all(folder: &Path) -> Result<(), Box<dyn Error>> {
     let files = [
         (BENCHMARK_SCHEMA, written::<BenchmarkFile>()),
         (CHECK_SCHEMA, written::<CheckFile>()),
+        (COMPARISON_SCHEMA, written::<ComparisonFile>()),
         (DOCS_SCHEMA, written::<DocsFile>()),
+        (INIT_SCHEMA, written::<InitFile>()),
         (DESIGN_SCHEMA, written::<DesignFile>()),
         (EVALUATION_SCHEMA, written::<EvaluationFile>()),
         (EXPORT_SCHEMA, written::<ExportFile>()),
@@ -47,6 +50,8 @@ pub(crate) fn write_all(folder: &Path) -> Result<(), Box<dyn Error>> {
         (PAPER_SCHEMA, written::<PaperFile>()),
         (RESULT_SCHEMA, written::<ResultFile>()),
         (RUN_SCHEMA, written::<RunFile>()),
+        (SERVO_SCHEMA, written::<ServoFile>()),
+        (SERVO_DESIGN_SCHEMA, written::<ServoDesignFile>()),
         (SIMULATION_SCHEMA, written::<SimulationFile>()),
         (TEST_SAMPLES_SCHEMA, written::<TestSamplesFile>()),
         (VALIDATION_SCHEMA, written::<ValidationFile>()),

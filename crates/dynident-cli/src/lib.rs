@@ -7,11 +7,14 @@
 
 mod book;
 mod commands;
+mod live;
+mod packed;
 mod progress;
 mod summary;
 mod terminal;
 
 pub use commands::docs::{DOCS_SCHEMA, DocsFile, DocsMessage, DocsPage};
+pub use commands::init::{INIT_SCHEMA, InitFile};
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
@@ -33,7 +36,8 @@ use std::io::Write;
         6. load R/identified.urdf into your controller or simulator\n\n\
         dynident iterate runs a robot repeatedly, each time with a better model; simulate runs it once.\n\
         dynident reproduce reproduces the paper behind this program; dynident benchmark compares estimators.\n\
-        dynident docs prints the pages of the documentation and explains messages."
+        dynident docs prints the pages of the documentation and explains messages.\n\
+        dynident init writes an example to start with; dynident --version --verbose shows details of this program."
 )]
 struct Arguments {
     #[command(flatten)]
@@ -89,8 +93,18 @@ enum Command {
     /// Compare estimators on simulated recordings with known truth: error over the Cramér-Rao bound, coverage of error
     /// bars.
     Benchmark(commands::benchmark::Options),
+    /// Put results side by side: parameters, bodies, friction, and which parts of the robot changed.
+    Compare(commands::compare::Options),
+    /// Show a robot in three dimensions with its motions, or a result, as one page for the browser.
+    View(commands::view::Options),
+    /// Write a figure for a paper, its data, or a table: residuals, parameters, friction, convergence.
+    Plot(commands::plot::Options),
+    /// Write an example into a new folder: a robot, two short logs and their study.
+    Init(commands::init::Options),
     /// Print a page of the documentation, or explain the code of a message.
     Docs(commands::docs::Options),
+    /// Print a JSON schema: `schema study` for editors that check study files.
+    Schema(commands::schema::Options),
     /// Print a shell script that completes commands, options and files.
     Completions(commands::completions::Options),
     /// Write the manual pages: `dynident.1`, and one for each command.
@@ -110,6 +124,10 @@ enum Verdict {
 /// Runs the command line `arguments`, beginning with the program name, and returns the exit status: 0 for success, 1
 /// for a negative verdict, 2 for an error, 130 after Ctrl-C. Results go to standard output, messages to standard error.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    if commands::version::is_requested(&arguments) {
+        return ended(terminal::print(&commands::version::text()).map(|()| Verdict::Good));
+    }
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
@@ -142,7 +160,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Iterate(options) => commands::iterate::run(&options, &context),
         Command::Reproduce(options) => commands::reproduce::run(&options, &context),
         Command::Benchmark(options) => commands::benchmark::run(&options, &context),
+        Command::Compare(options) => commands::compare::run(&options, &context),
+        Command::View(options) => commands::view::run(&options, &context),
+        Command::Plot(options) => commands::plot::run(&options, &context),
+        Command::Init(options) => commands::init::run(&options, &context),
         Command::Docs(options) => commands::docs::run(&options, &context),
+        Command::Schema(options) => commands::schema::run(&options, &context),
         Command::Completions(options) => commands::completions::run(&options, Arguments::command(), &context),
         Command::Man(options) => commands::manual::run(&options, Arguments::command(), &context),
     });

@@ -1,7 +1,9 @@
 use crate::terminal;
 use dynident::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::sync::Mutex;
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Delay of the bar, and update interval of a stage without progress.
@@ -84,10 +86,111 @@ impl Progress for Bar {
     }
 }
 
+/// Interval of the lines without a terminal.
+const LINE_INTERVAL: Duration = Duration::from_secs(5);
+
+/// Progress without a terminal: a line every five seconds, also in a stage that reports none.
+pub(crate) struct Lines {
+    stage: Arc<Mutex<Option<LineStage>>>,
+    printer: Option<(Sender<()>, JoinHandle<()>)>,
+}
+
+struct LineStage {
+    name: String,
+    total: Option<u64>,
+    done: u64,
+    started: Instant,
+}
+
+impl LineStage {
+    fn line(&self) -> String {
+        let seconds = self.started.elapsed().as_secs();
+        let part = match self.total {
+            Some(total) if total > 0 => format!(", {:.0} %", 100.0 * self.done as f64 / total as f64),
+            _ if self.done > 0 => format!(", {} rows", self.done),
+            _ => String::new(),
+        };
+        format!("{}{part}, {seconds} s", self.name)
+    }
+}
+
+impl Lines {
+    pub(crate) fn new(print: fn(&str)) -> Self {
+        Self::every(LINE_INTERVAL, print)
+    }
+
+    fn every(interval: Duration, print: impl Fn(&str) + Send + 'static) -> Self {
+        let stage: Arc<Mutex<Option<LineStage>>> = Arc::default();
+        let (stop, stopped) = mpsc::channel();
+        let shown = Arc::clone(&stage);
+        let printer = std::thread::Builder::new().spawn(move || {
+            while let Err(RecvTimeoutError::Timeout) = stopped.recv_timeout(interval) {
+                let line = shown.lock().ok().and_then(|stage| stage.as_ref().map(LineStage::line));
+                if let Some(line) = line {
+                    print(&line);
+                }
+            }
+        });
+        // Without a thread nothing is printed.
+        Self { stage, printer: printer.ok().map(|printer| (stop, printer)) }
+    }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        if let Some((stop, printer)) = self.printer.take() {
+            drop(stop);
+            let _ = printer.join();
+        }
+    }
+}
+
+impl Progress for Lines {
+    fn begin(&self, stage: &str, total: Option<u64>) {
+        if let Ok(mut current) = self.stage.lock() {
+            *current = Some(LineStage { name: stage.to_owned(), total, done: 0, started: Instant::now() });
+        }
+    }
+
+    fn advance(&self, rows: u64) {
+        if let Ok(mut current) = self.stage.lock()
+            && let Some(stage) = current.as_mut()
+        {
+            stage.done += rows;
+        }
+    }
+
+    fn end(&self) {
+        if let Ok(mut current) = self.stage.lock() {
+            *current = None;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Bar;
+    use super::{Bar, Lines};
     use dynident::Progress;
+    use std::sync::mpsc;
+    use std::time::Duration;
+
+    #[test]
+    fn lines_appear_regularly_and_end_with_the_stage() {
+        let (send, lines) = mpsc::channel();
+        let progress = Lines::every(Duration::from_millis(5), move |line| drop(send.send(line.to_owned())));
+        progress.begin("2 of 5: fit", Some(200));
+        progress.advance(50);
+        let next = || lines.recv_timeout(Duration::from_secs(60)).unwrap();
+        // A line can precede the first rows.
+        let line = (0..1000).map(|_| next()).find(|line| line.contains("25 %")).unwrap();
+        assert_eq!(line, "2 of 5: fit, 25 %, 0 s");
+        progress.begin("3 of 5: silent", None);
+        assert_eq!((0..1000).map(|_| next()).find(|line| line.starts_with('3')).unwrap(), "3 of 5: silent, 0 s");
+        progress.end();
+        drop(progress);
+        // The thread has ended.
+        assert!(lines.iter().all(|line| line.starts_with("3 of 5")));
+    }
 
     #[test]
     fn a_stage_that_says_nothing_has_its_line() {

@@ -48,6 +48,12 @@ pub(crate) fn remark(message: &str) {
     let _ = writeln!(out, "note: {}", readable(&dynident::shortened_message(message)));
 }
 
+/// Prints a line about the progress of a job on standard error.
+pub(crate) fn progress(line: &str) {
+    let mut out = io::stderr().lock();
+    let _ = writeln!(out, "progress: {}", readable(line));
+}
+
 /// Prints a question on standard error; the answer is typed on the same line. It is not shortened, so that a command is
 /// shown completely before it is permitted.
 pub(crate) fn ask(question: &str) {

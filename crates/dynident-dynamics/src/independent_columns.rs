@@ -35,9 +35,9 @@ pub fn independent_columns(matrix: &DMatrix<f64>, tolerance: f64) -> Independent
     split_columns(matrix, tolerance)
 }
 
-/// As [`independent_columns`], but a column below `tolerance` of the largest is noise. For robot regressors: a column
-/// that is nonzero only because of rounded angles in the robot description (9.81 · 4e-10 for π as 3.141592654) is not
-/// independent.
+/// As [`independent_columns`], but for robot regressors: a column whose norm is below `tolerance` times the largest
+/// column norm is dependent. Such a column is nonzero only because of rounded angles in the robot description (9.81 ·
+/// 4e-10 for π as 3.141592654).
 pub(crate) fn independent_regressor_columns(matrix: &DMatrix<f64>, tolerance: f64) -> IndependentColumns {
     split_above(matrix, tolerance, ROUNDING_SHARE.max(tolerance))
 }

@@ -49,7 +49,7 @@ pub enum ParametricModelError {
         at: String,
     },
     /// A declared torque is zero everywhere.
-    #[error("torque {term} = {law}: it is zero (below 1e-9) within the joint limits: remove it")]
+    #[error("torque {term} = {law}: this torque is zero (below 1e-9) within the joint limits: remove its [[torque]]")]
     Nothing {
         /// The term's symbol.
         term: String,
@@ -58,7 +58,7 @@ pub enum ParametricModelError {
     },
     /// The name of a declared torque is invalid or already in use.
     #[error(
-        "torque {term}: the name stands among the parameters' symbols: use a unique name, a letter and then letters, digits and `_`, at most 60"
+        "torque {term}: the name is invalid, or the symbol of another parameter: use a unique name of a letter and up to 59 letters, digits and `_`"
     )]
     Symbol {
         /// The name.

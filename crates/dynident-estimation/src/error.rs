@@ -119,11 +119,17 @@ pub enum EstimationError {
     NoSimulation,
     /// The rows do not determine an unknown of the motion or a parameter.
     #[error(
-        "the rows do not determine {name} separately from the unknowns before it; remove it, use fewer unknowns for the motion, or use a longer or more exciting log"
+        "the rows do not determine {name} separately from the unknowns before it; remove {name}, use fewer unknowns for the motion, or use a longer or more exciting log"
     )]
     Undetermined {
         /// Name of the unknown.
         name: String,
+    },
+    /// A covariance is not positive definite.
+    #[error("the {what} is not positive definite; identify both results from logs that excite their parameters")]
+    NotPositive {
+        /// The covariance.
+        what: &'static str,
     },
     /// The problem has no rows.
     #[error("no rows of any joint: absorb a log before estimating")]

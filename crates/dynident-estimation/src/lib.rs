@@ -35,6 +35,7 @@
 //! | physically consistent bodies and friction | [`consistent::physical_fit`] |
 //! | intervals of physically consistent parameters | [`consistent::ConsistentIntervals`] |
 //! | removal of parameters that the data do not need | [`essential`] |
+//! | parts of a robot that differ between two estimates | [`changes::explanations`] |
 //! | validation on held-out motion | [`Validation`], [`CrossValidation`] |
 //! | residual diagnostics | [`Whiteness`], [`Normality`], [`SpeedRanges`] |
 //!
@@ -44,6 +45,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod changes;
 pub mod consistent;
 pub mod diagnostics;
 mod error;
@@ -78,7 +80,9 @@ pub use nonlinear::{
     TorqueModel, TorqueSlopes, simulated_least_squares, simultaneous_bound, simultaneous_least_squares,
     spline_motion_least_squares,
 };
-pub use uncertainty::{CovarianceMethod, Estimate, EstimateStatus, HALF_WIDTH_95, correlation, student_half_width};
+pub use uncertainty::{
+    CovarianceMethod, Estimate, EstimateStatus, HALF_WIDTH_95, correlation, normal_below, student_half_width,
+};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

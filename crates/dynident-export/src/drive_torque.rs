@@ -163,8 +163,12 @@ pub(crate) fn reference_temperatures(robot: &RobotModel) -> Vec<(String, f64)> {
 }
 
 /// Friction and offset of a joint at the velocity `dq`. Couplings, load and temperature dependence are omitted; Maxwell
-/// slip is replaced by the Coulomb friction that it reaches after a motion of twice its yield displacement.
-pub(crate) fn own_friction(robot: &RobotModel, joint: usize, dq: f64) -> f64 {
+/// slip is replaced by the Coulomb friction that it reaches after a motion of twice its yield displacement. In Nm (N);
+/// `dq` in rad/s (m/s).
+///
+/// # Panics
+/// If the robot has no joint `joint`.
+pub fn own_friction(robot: &RobotModel, joint: usize, dq: f64) -> f64 {
     own_friction_terms(robot, joint, dq, None)
 }
 

@@ -41,7 +41,7 @@ pub enum ExportError {
     )]
     Term { symbol: String, kind: &'static str, needs: &'static str },
     #[error(
-        "joint `{joint}` moves no inertia, so it has no acceleration under a torque: give its body a mass, or lock it"
+        "joint `{joint}` moves no inertia, so it has no acceleration under a torque: give its body a mass, or lock the joint"
     )]
     NoInertia { joint: String },
     #[error(

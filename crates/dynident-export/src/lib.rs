@@ -56,6 +56,7 @@ mod symbol;
 mod target;
 
 pub use descriptions::{notes_on_omitted, terms_left_out};
+pub use drive_torque::own_friction;
 pub use error::ExportError;
 pub use exported::Exported;
 pub use model_file::{

@@ -74,9 +74,9 @@ impl RobotModel {
         Ok(Self { state_terms, ..self })
     }
 
-    /// Sets the width of all signs and of all smooth steps up to the usual width of code
-    /// ([`TermClass::CODE_STEP_WIDTH`]) to `width`, rad/s (m/s). Wider steps get at least this width. Values of the
-    /// terms are kept.
+    /// Returns a copy with another width of the smooth steps that replace `sign(velocity)` in friction terms, rad/s
+    /// (m/s). Signs, and steps up to [`TermClass::CODE_STEP_WIDTH`], get the width `width`; wider steps are widened to
+    /// `width` if they are narrower. The values of the terms do not change.
     ///
     /// # Errors
     /// A width that is not a positive finite number.

@@ -16,10 +16,12 @@ pub(crate) use reading::open;
 mod reading {
     use super::{FileError, Path, Table};
     use crate::arrays::{Array, ArrayTable};
+    use crate::episodes::EpisodeTable;
     use crate::error::visible;
     use crate::kind::FileFormat;
     use crate::limits::{Budget, SPLIT_FIX};
-    use hdf5_pure::{DType, Dataset, File, Group};
+    use crate::mat::{OBJECT, OBJECT_FIX};
+    use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 
     const MAX_NESTING: usize = 8;
     const MAX_DATA_SETS: usize = 10_000;
@@ -37,11 +39,15 @@ mod reading {
             return Err(FileError::broken(path, FileFormat::Hdf5, "its data sets", problem.as_str(), SPLIT_FIX));
         }
         let others = if found.others.is_empty() { "no data sets".to_owned() } else { found.others.join(", ") };
-        let table = ArrayTable::new(found.arrays).ok_or_else(|| {
-            let fix = "save vectors or matrices of real numbers";
+        let (arrays, notes) = match EpisodeTable::new(found.arrays, found.others) {
+            Ok(episodes) => return Ok(Box::new(episodes)),
+            Err(single) => single,
+        };
+        let table = ArrayTable::new(arrays).ok_or_else(|| {
+            let fix = if others.contains(OBJECT) { OBJECT_FIX } else { "save vectors or matrices of real numbers" };
             FileError::no_columns(path, FileFormat::Hdf5, others, fix)
         })?;
-        Ok(Box::new(table.with_notes(found.others)))
+        Ok(Box::new(table.with_notes(notes)))
     }
 
     struct Found<'a> {
@@ -116,6 +122,18 @@ mod reading {
                 | DType::U64
         ) {
             return Err("not numeric".to_owned());
+        }
+        // MATLAB stores objects, texts and cells as numbers, too.
+        let class = set.attrs().ok().and_then(|attributes| match attributes.get("MATLAB_class") {
+            Some(AttrValue::String(class) | AttrValue::AsciiString(class)) => Some(class.clone()),
+            _ => None,
+        });
+        match class.as_deref() {
+            Some("table" | "timetable" | "timeseries" | "string" | "datetime" | "duration" | "categorical") => {
+                return Err(OBJECT.to_owned());
+            }
+            Some("char" | "cell" | "function_handle") => return Err("not numeric".to_owned()),
+            _ => {}
         }
         let shape = set.shape().map_err(text)?;
         let sides: Option<Vec<usize>> = shape.iter().map(|side| usize::try_from(*side).ok()).collect();

@@ -57,7 +57,7 @@ fn vector(name: String, values: Vec<f64>) -> Array {
 }
 
 /// One column for each number in the objects `rows`, by its path; NaN where an object does not have it. `None` for
-/// objects with so few common names that the table would be larger than the document.
+/// objects with few common names, whose table would be larger than the document.
 fn columns(rows: &[Value]) -> Option<Vec<Array>> {
     let most = MAX_NUMBERS / rows.len().max(1);
     let (mut names, mut columns) = (HashMap::<String, usize>::new(), Vec::<(String, Vec<f64>)>::new());

@@ -1,10 +1,28 @@
-//! The numbers of a JSON value by their paths: `arm.q[0]`.
+//! The numbers of a JSON value by their paths: `arm.q[0]`, or `arm.q[elbow]` for a message with names.
 
 use core::fmt::Write;
 use serde_json::Value;
 
 /// Calls `found` for each number of `value` with its path; true and false are 1 and 0, null is a missing number.
 pub(crate) fn flattened(value: &Value, path: &mut String, found: &mut impl FnMut(&str, f64)) {
+    add(value, path, None, found);
+}
+
+/// As [`flattened`], for a message: the entries of its arrays have the names of the accompanying array of texts.
+#[cfg(feature = "bags")]
+pub(crate) fn flattened_message(value: &Value, found: &mut impl FnMut(&str, f64)) {
+    add(value, &mut String::new(), Some(&[]), found);
+}
+
+/// The names of the entries of other arrays in `entries`, if there are any.
+fn names(entries: &serde_json::Map<String, Value>) -> Option<&[Value]> {
+    let is_names = |key: &str| key == "name" || key == "names" || key.ends_with("_names");
+    let lists = entries.iter().filter(|(key, _)| is_names(key)).filter_map(|(_, value)| value.as_array());
+    lists.into_iter().find(|list| !list.is_empty() && list.iter().all(Value::is_string)).map(Vec::as_slice)
+}
+
+/// Adds the numbers of `value`; `labels` are names of entries, `None` without them.
+fn add(value: &Value, path: &mut String, labels: Option<&[Value]>, found: &mut impl FnMut(&str, f64)) {
     let length = path.len();
     match value {
         Value::Number(number) => found(path, number.as_f64().unwrap_or(f64::NAN)),
@@ -13,18 +31,23 @@ pub(crate) fn flattened(value: &Value, path: &mut String, found: &mut impl FnMut
         Value::String(_) => {}
         Value::Array(items) => {
             for (index, item) in items.iter().enumerate() {
-                let _ = write!(path, "[{index}]");
-                flattened(item, path, found);
+                let own = labels.filter(|labels| labels.len() == items.len());
+                let _ = match own.and_then(|labels| labels[index].as_str()) {
+                    Some(label) => write!(path, "[{label}]"),
+                    None => write!(path, "[{index}]"),
+                };
+                add(item, path, labels.map(|_| &[][..]), found);
                 path.truncate(length);
             }
         }
         Value::Object(entries) => {
+            let labels = labels.map(|outer| names(entries).unwrap_or(outer));
             for (key, entry) in entries {
                 if length > 0 {
                     path.push('.');
                 }
                 *path += key;
-                flattened(entry, path, found);
+                add(entry, path, labels, found);
                 path.truncate(length);
             }
         }

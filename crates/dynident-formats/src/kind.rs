@@ -22,14 +22,24 @@ pub enum FileFormat {
     Mcap,
     /// An SQLite file of rosbag2, or a folder of rosbag2 with either storage.
     Rosbag2,
+    /// A ROS 1 bag.
+    Ros1Bag,
+    /// ULog, the log format of PX4.
+    Ulog,
     /// Parquet.
     Parquet,
     /// Folder of a LeRobot data set.
     LeRobot,
+    /// Folder of a SAGE recording: commands and measurements as text tables.
+    Sage,
     /// Arrow, in the file format (Feather) or as a stream.
     Arrow,
     /// DIAdem data, the trace format of KUKA controllers.
     Diadem,
+    /// MATLAB, `save -v4`.
+    Mat4,
+    /// Octave's text format.
+    Octave,
     /// MATLAB, `save -v6` and `-v7`.
     Mat5,
     /// HDF5, also written by MATLAB's `save -v7.3`.
@@ -49,10 +59,15 @@ impl FileFormat {
             Self::Npz => "NumPy archive",
             Self::Mcap => "MCAP",
             Self::Rosbag2 => "rosbag2",
+            Self::Ros1Bag => "ROS 1 bag",
+            Self::Ulog => "ULog",
             Self::Parquet => "Parquet",
             Self::LeRobot => "LeRobot data set",
+            Self::Sage => "SAGE recording",
             Self::Arrow => "Arrow",
             Self::Diadem => "DIAdem data (KUKA trace)",
+            Self::Mat4 => "MATLAB 4 file",
+            Self::Octave => "Octave text",
             Self::Mat5 => "MATLAB 5 file",
             Self::Hdf5 => "HDF5 file",
         }

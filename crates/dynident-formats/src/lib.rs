@@ -3,16 +3,18 @@
 //!
 //! | format | columns | feature |
 //! | --- | --- | --- |
-//! | text, also compressed by gzip or Zstandard | parsed by the caller: [`Contents::Text`] | `gzip`, `zstd` |
+//! | text, also in UTF-16, or compressed by gzip or Zstandard | parsed by the caller: [`Contents::Text`] | `gzip`, `zstd` |
 //! | NumPy `.npy`, `.npz` | fields of a structured array, columns of a matrix, arrays of one length | `.npz`: `gzip` |
 //! | JSON, one object per line or one document | numbers by their path: `arm.q[0]` | `json` |
-//! | MCAP, rosbag2 | numbers of ROS 2 messages by topic and path: `/joint_states.position[elbow]` | `bags` |
+//! | MCAP, rosbag2, ROS 1 bag, ULog | numbers of messages by topic and path: `/joint_states.position[elbow]` | `bags` |
 //! | Parquet | columns, lists with their indices | `parquet` |
 //! | LeRobot data sets | as Parquet, entries by their names: `action[elbow]`; time over all episodes | `json`,
 //! `parquet` |
+//! | SAGE recording: a folder with `control.csv` and `state_motor.csv` | parsed and joined by the caller | |
 //! | Arrow: Feather, streams | as Parquet | `arrow` |
 //! | DIAdem header and numbers (KUKA trace) | channels, of all drives: `Istmoment[A3]` | |
-//! | MATLAB 5, MATLAB 7.3 and HDF5 | variables of one length, matrices in either orientation | `gzip`, `hdf5` |
+//! | MATLAB 4 and 5, Octave text, MATLAB 7.3 and HDF5 | variables of one length, matrices in either orientation | `gzip`,
+//! `hdf5` |
 //!
 //! Columns that were recorded on different clocks (topics of a bag) are interpolated at the times of the first selected
 //! one: see [`Table::select`]. Indices in names are 0-based. Memory is limited by the length of the file and by
@@ -55,7 +57,11 @@ mod arrays;
 mod arrow;
 mod bags;
 mod bytes;
+#[cfg(feature = "bags")]
+mod cbor;
 mod diadem;
+#[cfg(feature = "hdf5")]
+mod episodes;
 mod error;
 mod hdf5;
 #[cfg(feature = "json")]
@@ -66,8 +72,11 @@ mod json_numbers;
 mod kind;
 mod lerobot;
 mod limits;
+mod line_ends;
 mod mat;
+mod mat4;
 mod npy;
+mod octave;
 mod packed;
 mod parquet;
 #[cfg(feature = "parquet")]
@@ -75,6 +84,7 @@ mod parquet_pages;
 mod recognition;
 #[cfg(feature = "bags")]
 mod ros;
+mod sage;
 mod table;
 mod zip;
 
@@ -82,6 +92,7 @@ pub use dynident_files::SeenFiles;
 pub use error::FileError;
 pub use kind::FileFormat;
 pub use limits::ReadLimits;
+pub use sage::{SAGE_FILES, sage_joints};
 pub use table::{ColumnGroup, Table};
 
 use limits::Budget;
@@ -114,7 +125,8 @@ impl core::fmt::Debug for Contents {
     }
 }
 
-/// Opens the file at `path`, or the folder of a rosbag2 recording or of a LeRobot data set, and detects its format.
+/// Opens the file at `path`, or the folder of a rosbag2 recording, a LeRobot data set or a SAGE recording, and detects
+/// its format. Of a SAGE recording it opens the measurements.
 ///
 /// # Errors
 /// If it cannot be read, is not a regular file, has an unsupported format, is corrupt in the part that names its
@@ -137,6 +149,10 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
         if path.join(bags::METADATA).is_file() {
             return Ok(Opened { format: FileFormat::Rosbag2, contents: bags::open_folder(path)? });
         }
+        if sage::is_recording(path) {
+            let opened = open_within(&path.join(SAGE_FILES[1]), limits)?;
+            return Ok(Opened { format: FileFormat::Sage, ..opened });
+        }
         return Err(refused(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
     }
     let file = dynident_files::open(path).map_err(refused)?;
@@ -145,13 +161,17 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
     let head = recognition::head(&mut reader).map_err(refused)?;
     let format = recognition::recognised(path, &head)?;
     let contents = match format {
-        FileFormat::Text => Contents::Text(Box::new(reader)),
+        // The recognition of files never returns the folder format.
+        FileFormat::Text | FileFormat::Sage => Contents::Text(line_ends::plain(reader, &head)),
         FileFormat::GzipText | FileFormat::ZstdText => {
             let unpacked = packed::unpacked(path, format, reader)?;
             let mut reader = BufReader::with_capacity(1 << 18, unpacked);
             let inner = recognition::head(&mut reader).map_err(refused)?;
             match recognition::recognised(path, &inner)? {
-                FileFormat::Text => Contents::Text(Box::new(reader)),
+                FileFormat::Text => Contents::Text(line_ends::plain(reader, &inner)),
+                recording @ (FileFormat::Mcap | FileFormat::Rosbag2 | FileFormat::Ros1Bag | FileFormat::Ulog) => {
+                    return Ok(Opened { format: recording, contents: bags::open_file(path, recording)? });
+                }
                 FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
                 FileFormat::Json => Contents::Table(json(path, reader)?),
                 other => {
@@ -165,12 +185,15 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
         // Not compressed: an array cannot be longer than its file.
         FileFormat::Npy => Contents::Table(npy::open(path, reader, Budget::new(limits, u64::MAX))?),
         FileFormat::Npz => Contents::Table(npy::open_archive(path, budget)?),
-        FileFormat::Mcap => bags::open_mcap(path)?,
-        FileFormat::Rosbag2 => bags::open_database(path)?,
+        FileFormat::Mcap | FileFormat::Rosbag2 | FileFormat::Ros1Bag | FileFormat::Ulog => {
+            bags::open_file(path, format)?
+        }
         FileFormat::Parquet => Contents::Table(parquet::open(path)?),
         FileFormat::LeRobot => Contents::Table(lerobot::open(path)?),
         FileFormat::Arrow => Contents::Table(arrow::open(path, budget)?),
         FileFormat::Diadem => Contents::Table(diadem::open(path, limits)?),
+        FileFormat::Mat4 => Contents::Table(mat4::open(path, reader, budget)?),
+        FileFormat::Octave => Contents::Table(octave::open(path, reader, budget)?),
         FileFormat::Mat5 => Contents::Table(mat::open(path, reader, budget)?),
         FileFormat::Hdf5 => Contents::Table(hdf5::open(path, budget)?),
     };
@@ -187,8 +210,8 @@ fn json(path: &Path, _: impl Read) -> Result<Box<dyn Table>, FileError> {
     Err(FileError::NotBuilt { file: path.to_owned(), format: "JSON", feature: "json" })
 }
 
-/// The files of `path`: itself, or the parts of a rosbag2 recording, a LeRobot data set or a DIAdem recording, with
-/// their metadata first.
+/// The files of `path`: itself, or the parts of a rosbag2 recording, a LeRobot data set, a SAGE recording or a DIAdem
+/// recording, with their metadata first.
 ///
 /// # Errors
 /// If a folder's list of parts cannot be read.
@@ -201,6 +224,9 @@ pub fn files(path: &Path) -> Result<Vec<std::path::PathBuf>, FileError> {
             return diadem::files(path);
         }
         return Ok(vec![path.to_owned()]);
+    }
+    if sage::is_recording(path) {
+        return Ok(sage::files(path));
     }
     let mut files = vec![path.join(bags::METADATA)];
     files.extend(bags::parts(path)?);

@@ -6,6 +6,12 @@ use crate::table::Table;
 use std::io::BufRead;
 use std::path::Path;
 
+/// A variable that only MATLAB reads.
+pub(crate) const OBJECT: &str = "a MATLAB object (table, timetable, string ..)";
+/// How to save the numbers of an object.
+pub(crate) const OBJECT_FIX: &str =
+    "convert tables in MATLAB: `s = table2struct(T, \"ToScalar\", true); save(\"log.mat\", \"-struct\", \"s\")`";
+
 #[cfg(not(feature = "gzip"))]
 pub(crate) fn open(path: &Path, _: impl BufRead, _: crate::limits::Budget) -> Result<Box<dyn Table>, FileError> {
     Err(FileError::NotBuilt { file: path.to_owned(), format: "a MATLAB 5 file", feature: "gzip" })
@@ -16,7 +22,7 @@ pub(crate) use reading::open;
 
 #[cfg(feature = "gzip")]
 mod reading {
-    use super::{BufRead, FileError, Path, Table};
+    use super::{BufRead, FileError, OBJECT, OBJECT_FIX, Path, Table};
     use crate::arrays::{Array, ArrayTable};
     use crate::bytes::{Bytes, Number};
     use crate::kind::FileFormat;
@@ -79,10 +85,10 @@ mod reading {
         let Found { arrays, others, .. } = found;
         let names = if others.is_empty() { "no variables".to_owned() } else { others.join(", ") };
         let table = ArrayTable::new(arrays).ok_or_else(|| {
-            let fix = "save vectors or matrices of real numbers (timetable: `save` its table2array)";
+            let fix = if names.contains(OBJECT) { OBJECT_FIX } else { "save vectors or matrices of real numbers" };
             FileError::no_columns(path, FileFormat::Mat5, names, fix)
         })?;
-        Ok(Box::new(table.with_notes(others.into_iter().map(|name| format!("{name}: not real numbers")).collect())))
+        Ok(Box::new(table.with_notes(others)))
     }
 
     fn number(kind: u32) -> Option<Number> {
@@ -223,6 +229,13 @@ mod reading {
             let flags = self.head(reader)?;
             let flags = Bytes::new(&flags, self.big_endian).u32().ok_or(Problem::Misfit)?;
             let (class, complex) = (flags & 0xFF, flags & 0x800 != 0);
+            // An object has a name and no dimensions.
+            if class == 17 {
+                let own = self.head(reader)?;
+                let name = name.unwrap_or_else(|| String::from_utf8_lossy(&own).into_owned());
+                self.others.push(format!("{name}: {OBJECT}"));
+                return pass_over(reader);
+            }
             let sides = self.head(reader)?;
             let mut words = Bytes::new(&sides, self.big_endian);
             let mut sides = Vec::new();
@@ -237,8 +250,10 @@ mod reading {
                     let count = sides.iter().try_fold(1_usize, |all, side| all.checked_mul(*side));
                     let values = self.numbers(reader, count)?;
                     match Array::two_sides(&sides) {
+                        // The contents of objects, in a variable without a name.
+                        _ if name.is_empty() => {}
                         Some(shape) => self.arrays.push(Array::column_major(name, shape, values)),
-                        None => self.others.push(name),
+                        None => self.others.push(format!("{name}: more than two dimensions")),
                     }
                 }
                 // struct
@@ -260,7 +275,8 @@ mod reading {
                         Self::padding(reader, tag.size)?;
                     }
                 }
-                _ => self.others.push(name),
+                6..=15 => self.others.push(format!("{name}: complex numbers, save real(x) and imag(x)")),
+                _ => self.others.push(format!("{name}: not real numbers")),
             }
             pass_over(reader)
         }

@@ -66,7 +66,7 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
         return Err(FileError::OtherFormat {
             file: path.to_owned(),
             format: "a ZIP archive without NumPy arrays (for example a workbook)",
-            fix: "unpack it, or save the workbook's sheet as CSV",
+            fix: "unpack the archive, or save the workbook's sheet as CSV",
         });
     }
     let table = ArrayTable::new(all).ok_or_else(|| nothing(path, FileFormat::Npz))?;
@@ -74,7 +74,9 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
 }
 
 fn nothing(path: &Path, format: FileFormat) -> FileError {
-    FileError::no_columns(path, format, "text, objects or complex numbers", "save columns of real numbers")
+    let found = "text, objects, complex numbers, or more than two dimensions";
+    let fix = "save real columns with numpy.savez: `x.real` of complex numbers, `x.reshape(len(x), -1)` of an array with more dimensions, each array of a dict";
+    FileError::no_columns(path, format, found, fix)
 }
 
 /// The numeric arrays in a `.npy` stream: one, or one for each field of a structured array; `None` for Python objects.

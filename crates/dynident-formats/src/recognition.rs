@@ -4,6 +4,8 @@ use crate::arrow;
 use crate::diadem;
 use crate::error::FileError;
 use crate::kind::FileFormat;
+use crate::mat4;
+use crate::octave;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -20,46 +22,107 @@ pub(crate) fn head<R: Read>(reader: &mut BufReader<R>) -> std::io::Result<Vec<u8
 const SUPPORTED: &[(&[u8], FileFormat)] = &[
     (b"\x89MCAP0\r\n", FileFormat::Mcap),
     (b"SQLite format 3\0", FileFormat::Rosbag2),
+    (b"#ROSBAG V2.0\n", FileFormat::Ros1Bag),
+    (b"ULog\x01\x12\x35", FileFormat::Ulog),
     (b"\x89HDF\r\n\x1a\n", FileFormat::Hdf5),
     (b"\x93NUMPY", FileFormat::Npy),
     (b"PAR1", FileFormat::Parquet),
     (arrow::MAGIC, FileFormat::Arrow),
     (diadem::MAGIC, FileFormat::Diadem),
+    (octave::BEGINNINGS[0], FileFormat::Octave),
+    (octave::BEGINNINGS[1], FileFormat::Octave),
     (b"PK\x03\x04", FileFormat::Npz),
     (b"\x1F\x8B", FileFormat::GzipText),
     (b"\x28\xB5\x2F\xFD", FileFormat::ZstdText),
 ];
 
-/// An unsupported format: first bytes, name, fix.
-type Unsupported = (&'static [u8], &'static str, &'static str);
+/// A format that is recognised and not read.
+struct Unsupported {
+    /// First bytes.
+    begins: &'static [u8],
+    /// Bytes among the first bytes of the file; empty for no condition.
+    contains: &'static [u8],
+    name: &'static str,
+    fix: &'static str,
+}
+
+const fn unsupported(begins: &'static [u8], name: &'static str, fix: &'static str) -> Unsupported {
+    Unsupported { begins, contains: b"", name, fix }
+}
+
+const fn archive(contains: &'static [u8], name: &'static str, fix: &'static str) -> Unsupported {
+    Unsupported { begins: b"PK\x03\x04", contains, name, fix }
+}
 
 const EXPORT_FIX: &str = "export its table as CSV (pandas: `frame.to_csv(\"log.csv\", index=False)`)";
+const EXCEL_FIX: &str = "save its sheet as CSV, or convert it in Python: `pandas.read_excel(\"log.xlsx\").to_csv(\"log.csv\", index=False)`";
+const PICKLE_FIX: &str = "a pickle can run any program, so it is never loaded; if you trust it, convert it in Python: `pandas.DataFrame(pandas.read_pickle(\"log.pkl\")).to_csv(\"log.csv\", index=False)`, or `numpy.savez` for arrays";
+const JOBLIB_FIX: &str = "it may contain pickled objects, so it is never loaded; if you trust it, convert it in Python: `numpy.savez(\"log.npz\", **joblib.load(\"log.joblib\"))`";
+const SIMULINK_FIX: &str = "it is a model without a recording; save the logged signals in MATLAB: `q = out.q.Data; tau = out.tau.Data; t = out.tout; save(\"log.mat\", \"t\", \"q\", \"tau\", \"-v7\")`";
+const MDF_FIX: &str = "convert it in Python: `asammdf.MDF(\"log.mf4\").to_dataframe(raster=0.001).to_csv(\"log.csv\")` with the step of your recording in seconds";
 const UNPACK_FIX: &str = "unpack it first";
 const UNSUPPORTED: &[Unsupported] = &[
-    (b"#ROSBAG V", "a ROS 1 bag", "convert it to MCAP (`rosbags-convert`), or export the joint states as CSV"),
-    (b"FEA1", "a Feather table of version 1", "write it as Parquet (pandas: `frame.to_parquet(\"log.parquet\")`)"),
-    (b"BZh", "a bzip2 archive", UNPACK_FIX),
-    (b"\xFD7zXZ\0", "an xz archive", UNPACK_FIX),
-    (b"\x04\x22\x4D\x18", "an LZ4 archive", UNPACK_FIX),
-    (b"\xFF\xFE", "text in UTF-16", "save it as UTF-8"),
-    (b"\xFE\xFF", "text in UTF-16", "save it as UTF-8"),
-    (b"<?xml", "an XML document", EXPORT_FIX),
-    (b"\xD0\xCF\x11\xE0", "an old workbook", "save its sheet as CSV"),
+    unsupported(b"#ROSBAG V", "a ROS 1 bag of version 1", "convert it with `rosbag fix`"),
+    unsupported(
+        b"FEA1",
+        "a Feather table of version 1",
+        "convert it in Python: `pandas.read_feather(\"log.feather\").to_parquet(\"log.parquet\")`",
+    ),
+    unsupported(
+        b"TDSm",
+        "a TDMS file of LabVIEW",
+        "convert it in Python: `nptdms.TdmsFile.read(\"log.tdms\").as_dataframe().to_csv(\"log.csv\", index=False)`",
+    ),
+    unsupported(b"MDF     ", "an MDF file (MF4)", MDF_FIX),
+    unsupported(b"UnFinMF ", "an MDF file (MF4) that was not completed", MDF_FIX),
+    unsupported(b"\x0E\x03\x13\x01", "an HDF4 file", "convert it to HDF5: `h4toh5 log.hdf log.h5`"),
+    unsupported(b"\x80\x02c", "a pickle of Python", PICKLE_FIX),
+    unsupported(b"\x80\x02}", "a pickle of Python", PICKLE_FIX),
+    unsupported(b"\x80\x02]", "a pickle of Python", PICKLE_FIX),
+    unsupported(b"\x80\x03c", "a pickle of Python", PICKLE_FIX),
+    unsupported(b"\x80\x03}", "a pickle of Python", PICKLE_FIX),
+    unsupported(b"\x80\x03]", "a pickle of Python", PICKLE_FIX),
+    unsupported(b"\x80\x04\x95", "a pickle of Python", PICKLE_FIX),
+    unsupported(b"\x80\x05\x95", "a pickle of Python", PICKLE_FIX),
+    unsupported(b"ZF0x", "a file of joblib", JOBLIB_FIX),
+    unsupported(b"\x78\x9C", "a compressed file of joblib", JOBLIB_FIX),
+    archive(b"xl/", "a workbook (xlsx)", EXCEL_FIX),
+    archive(b"opendocument.spreadsheet", "a workbook (ods)", EXCEL_FIX),
+    archive(b"simulink/", "a Simulink model (slx)", SIMULINK_FIX),
+    unsupported(b"Model {", "a Simulink model (mdl)", SIMULINK_FIX),
+    unsupported(b"\xD0\xCF\x11\xE0", "an old workbook (xls)", EXCEL_FIX),
+    unsupported(b"BZh", "a bzip2 archive", UNPACK_FIX),
+    unsupported(b"\xFD7zXZ\0", "an xz archive", UNPACK_FIX),
+    unsupported(b"\x04\x22\x4D\x18", "an LZ4 archive", UNPACK_FIX),
+    unsupported(b"7z\xBC\xAF\x27\x1C", "a 7-Zip archive", UNPACK_FIX),
+    unsupported(b"<?xml", "an XML document", EXPORT_FIX),
 ];
+
+fn contains(head: &[u8], wanted: &[u8]) -> bool {
+    wanted.is_empty() || head.windows(wanted.len()).any(|window| window == wanted)
+}
 
 /// The format of a file with these first bytes.
 ///
 /// # Errors
 /// If it is a known unsupported format.
 pub(crate) fn recognised(path: &Path, head: &[u8]) -> Result<FileFormat, FileError> {
-    if let Some((_, format)) = SUPPORTED.iter().find(|(begins, _)| head.starts_with(begins)) {
+    let is_like = |format: &&Unsupported| head.starts_with(format.begins) && contains(head, format.contains);
+    // Archives of other formats before NumPy's, which have the same first bytes.
+    let other = UNSUPPORTED.iter().find(is_like);
+    if let Some((_, format)) = SUPPORTED.iter().find(|(begins, _)| head.starts_with(begins))
+        && other.is_none_or(|other| other.contains.is_empty())
+    {
         return Ok(*format);
     }
     if arrow::begins_stream(head) {
         return Ok(FileFormat::Arrow);
     }
-    if let Some((_, format, fix)) = UNSUPPORTED.iter().find(|(begins, _, _)| head.starts_with(begins)) {
-        return Err(FileError::OtherFormat { file: path.to_owned(), format, fix });
+    if let Some(Unsupported { name, fix, .. }) = other {
+        return Err(FileError::OtherFormat { file: path.to_owned(), format: name, fix });
+    }
+    if mat4::begins(head) {
+        return Ok(FileFormat::Mat4);
     }
     // MATLAB: 116 bytes of text, then version and byte order; version 7.3 has the same text before an HDF5 file.
     if head.len() >= 128 && head.starts_with(b"MATLAB ") && matches!(&head[126..128], b"IM" | b"MI") {

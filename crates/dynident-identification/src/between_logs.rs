@@ -106,22 +106,45 @@ fn error_of_all(problem: &LinearProblem, estimate: &Estimate, between: &DMatrix<
 }
 
 fn rows_of(problem: &LinearProblem, log: usize) -> Result<LinearProblem, EstimationError> {
+    rows_of_logs(problem, |own| own == log)
+}
+
+fn rows_of_logs(problem: &LinearProblem, is_wanted: impl Fn(usize) -> bool) -> Result<LinearProblem, EstimationError> {
     let mut alone = LinearProblem::new(problem.columns().to_vec(), problem.joints().to_vec());
-    for rows in problem.equations().iter().filter(|rows| rows.log == log) {
-        alone.add(&problem.logs()[log], rows.joint, rows.columns.clone(), rows.factor.clone())?;
+    for rows in problem.equations().iter().filter(|rows| is_wanted(rows.log)) {
+        alone.add(&problem.logs()[rows.log], rows.joint, rows.columns.clone(), rows.factor.clone())?;
     }
     Ok(alone)
 }
 
-fn fit_alone(
+/// Fit to the rows of one log.
+pub(crate) fn fit_alone(
     problem: &LinearProblem,
     log: usize,
     settings: &WeightedSettings,
     estimate: &Estimate,
 ) -> Result<Estimate, EstimationError> {
-    let alone =
-        rows_of(problem, log)?.with_fallback(estimate.values.clone())?.with_unexcited(problem.unexcited().clone())?;
-    weighted_least_squares(&alone, settings)
+    fit_rows(rows_of(problem, log)?, problem, settings, estimate)
+}
+
+/// Fit to the rows of all other logs.
+pub(crate) fn fit_without(
+    problem: &LinearProblem,
+    log: usize,
+    settings: &WeightedSettings,
+    estimate: &Estimate,
+) -> Result<Estimate, EstimationError> {
+    fit_rows(rows_of_logs(problem, |own| own != log)?, problem, settings, estimate)
+}
+
+fn fit_rows(
+    rows: LinearProblem,
+    problem: &LinearProblem,
+    settings: &WeightedSettings,
+    estimate: &Estimate,
+) -> Result<Estimate, EstimationError> {
+    let rows = rows.with_fallback(estimate.values.clone())?.with_unexcited(problem.unexcited().clone())?;
+    weighted_least_squares(&rows, settings)
 }
 
 /// k of some parameters: root mean square of z over pairs of logs, each corrected for Student's distribution.

@@ -1,8 +1,10 @@
 //! Consistency of study, robot and recordings, tested before a fit.
 
+use crate::changes::{LogLoad, log_loads};
 use crate::diagnosis::{Diagnosis, DiagnosisTask, diagnose};
 use crate::doubt::have_jumps;
 use crate::error::IdentificationError;
+use crate::events::{RecordingEvents, task_without_events};
 use crate::task::IdentificationTask;
 use crate::training::training_rows;
 use dynident_estimation::{WeightedSettings, weighted_least_squares};
@@ -16,6 +18,10 @@ pub struct StudyExamination {
     pub imports: Vec<(usize, Option<ImportReport>)>,
     /// Mistakes, units of torque, payloads; `None` if jumps in a log invalidate the comparison.
     pub diagnosis: Option<Diagnosis>,
+    /// Loads that only one of several training recordings carries; empty if a mistake explains the recordings better.
+    pub loads: Vec<LogLoad>,
+    /// Events in the recordings; the diagnosis does not use intervals that are set aside.
+    pub events: Vec<RecordingEvents>,
     /// Number of rows of all joints for a fit.
     pub rows: usize,
     /// Number of base parameters for a fit.
@@ -35,11 +41,14 @@ pub fn examine_study(
 }
 
 fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<StudyExamination, IdentificationError> {
-    let IdentificationTask { robot, recordings, payloads, settings } = task;
+    let IdentificationTask { recordings, settings, .. } = task;
     let chosen = of_role(recordings, Role::Identify);
     if chosen.is_empty() {
         return Err(IdentificationError::NoTrainingLog);
     }
+    let (events, without_events) = task_without_events(task, execution)?;
+    let task = without_events.as_ref().unwrap_or(task);
+    let IdentificationTask { robot, recordings, payloads, .. } = task;
     let logs = Logs::new(robot.model(), recordings, settings.row_settings(), &chosen, None, execution)?;
     let training = training_rows(&logs, settings, robot.clone().into(), &chosen, payloads, None)?;
     let estimate = weighted_least_squares(&training.problem, &WeightedSettings::default())?;
@@ -54,6 +63,10 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     }
     let task = DiagnosisTask { logs: &logs, settings, robot, training: &chosen, theta: known };
     let diagnosis = if have_jumps(&training) { None } else { Some(diagnose(task)?) };
+    let has_mistake = diagnosis.as_ref().is_none_or(|found| found.search.best.is_some() || found.is_unexplained());
+    // Logs that do not determine the parameters cannot be compared.
+    let settings = settings.estimation.weighted();
+    let loads = if has_mistake { Vec::new() } else { log_loads(&training, &settings).unwrap_or_default() };
     let rows = training.problem.joint_rows().iter().sum();
-    Ok(StudyExamination { imports, diagnosis, rows, parameters: robot.base().count() })
+    Ok(StudyExamination { imports, diagnosis, loads, events, rows, parameters: robot.base().count() })
 }

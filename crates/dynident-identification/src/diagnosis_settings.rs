@@ -27,33 +27,36 @@ pub struct DiagnosisSettings {
 /// Limits for the comparison of hypotheses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScoreSettings {
-    /// Smallest improvement of the score from which the study is doubted; 0.6, as if one joint had 0.55 of its
-    /// unexplained torque. On seven sets of real logs the best wrong hypothesis gains 0.41.
+    /// Smallest improvement of the score for which another hypothesis replaces the study as written; 0.6, as if the
+    /// unexplained share of one joint fell to 0.55 of its value. On seven sets of real logs the best wrong hypothesis
+    /// gains 0.41.
     pub min_gain: f64,
-    /// Smallest improvement for another rate; 1.2. Rates of correct logs gain 1.1, wrong rates 2.0 and more.
+    /// Smallest improvement of the score for another sample rate; 1.2. Wrong hypotheses about correct rates gain up to
+    /// 1.1, corrections of wrong rates 2.0 and more.
     pub min_gain_of_rate: f64,
-    /// Smallest improvement of all joints from which another gain of one torque needs no further evidence; 1.2. On real
+    /// Smallest improvement of the score from which another gain of one torque needs no further evidence; 1.2. On real
     /// logs a wrong gain reaches 0.83.
     pub min_gain_of_torque_gain: f64,
-    /// Largest difference of the score of hypotheses that are not distinguishable; 0.2.
+    /// Largest difference between the scores of two hypotheses that are reported as indistinguishable; 0.2.
     pub max_indistinguishable: f64,
-    /// Weight of the residual of the nominal bodies relative to that of the best consistent bodies; 0.5, since
-    /// descriptions have errors.
+    /// Weight in the score of the residual of the bodies of the robot description, relative to that of the best
+    /// consistent bodies; 0.5, since descriptions have errors.
     pub nominal_weight: f64,
-    /// Cost of a joint beyond its limits, in units of the score; 1.
+    /// Added to the score for each joint whose positions are beyond its limits; 1, in units of the score.
     pub limit_cost: f64,
-    /// Largest mean over joints of the logarithm of the residual ratio between a consistent robot and separate
-    /// parameters of each joint; 0.9. Real logs of arms with unusual friction reach 0.55.
+    /// Largest mean over joints of `ln(residual of a consistent robot / residual of separate parameters of each joint)`
+    /// for a hypothesis that is accepted; 0.9. Real logs of arms with unusual friction reach 0.55.
     pub max_log_ratio: f64,
     /// Smallest number of independent instants per parameter of a joint; 2. With fewer, separate parameters of a joint
     /// fit the noise, and friction and elasticity without a term in the model.
     pub min_instants_per_parameter: f64,
-    /// Largest factor on the required improvement for short logs; 1.5. The best wrong hypothesis gains 0.83 in parts of
-    /// correct logs, a reversed joint of a short log 1.3.
+    /// Largest factor on `min_gain` for short logs; 1.5, so that 0.9 is required. In parts of correct logs the best
+    /// wrong hypothesis improves the score by up to 0.83; the correction of a reversed joint in a short log improves it
+    /// by 1.3.
     pub max_margin: f64,
-    /// Factor on the required improvement from which `max_log_ratio` is not tested; 1.5.
+    /// Factor on `min_gain` (because the log is short) from which `max_log_ratio` is not tested; 1.5.
     pub few_instants_margin: f64,
-    /// Unexplained share of all torque from which lower cut-offs are tried and held-out logs are not examined; 0.5.
+    /// Unexplained share of all torque above which lower cut-offs are tried and held-out logs are not examined; 0.5.
     pub max_unexplained: f64,
     /// Cut-offs that are then tried, relative to a cut-off that was chosen from the data; 0.5 and 0.25.
     pub lower_cutoffs: [f64; 2],
@@ -87,23 +90,26 @@ impl Default for ScoreSettings {
 /// Limits that a hypothesis has to keep relative to the hypothesis that it corrects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AcceptanceSettings {
-    /// Largest ratio of the unexplained shares of all torque; 1.05.
+    /// Largest ratio of the unexplained share of all torque with the correction to that without; 1.05.
     pub max_ratio_of_all: f64,
-    /// Largest ratio of the unexplained shares of one joint, in addition to `max_increase_of_joint`; 1.25.
+    /// Largest ratio of the unexplained share of any joint with the correction to that without; 1.25. A joint is
+    /// rejected only if it exceeds `max_increase_of_joint` as well.
     pub max_ratio_of_joint: f64,
-    /// Largest increase of a joint's unexplained share; 0.02.
+    /// Largest increase of the unexplained share of any joint by the correction; 0.02.
     pub max_increase_of_joint: f64,
     /// Largest logarithm of the ratio of one joint over the improvement of all joints; 0.1. It replaces
     /// `max_ratio_of_joint` where it allows more.
     pub max_share_of_gain: f64,
-    /// Unexplained share from which a joint's channels are mostly noise and prove nothing; 0.5.
+    /// Unexplained share above which the channels of a joint are mostly noise and prove nothing; 0.5.
     pub max_unexplained_of_joint: f64,
-    /// Largest ratio of the unexplained shares of a joint that proves a corrected unit; 0.8.
+    /// Largest ratio of the unexplained share of a joint with another unit to that without, for the other unit to be
+    /// proven; 0.8.
     pub max_ratio_of_unit: f64,
     /// Ratio of a joint's unexplained share by one robot to that by the joint's own parameters from which its torque is
     /// inconsistent with the other joints; 1.8.
     pub min_inconsistent_ratio: f64,
-    /// Largest ratio of a joint's residuals that proves another width of the friction step; 0.9.
+    /// Largest ratio of the residual of a joint with another width of the friction step to that without, for the other
+    /// width to be proven; 0.9.
     pub max_ratio_of_step: f64,
 }
 
@@ -125,15 +131,16 @@ impl Default for AcceptanceSettings {
 /// Limits of plausible motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionLimits {
-    /// Largest overtravel beyond a stop as a share of the joint's range; 0.02, since zeros are calibrated to about a
-    /// degree.
+    /// Largest distance beyond a position limit, as a share of the joint's range; 0.02, since zeros are calibrated to
+    /// about a degree. Beyond it the position is treated as impossible.
     pub max_overtravel: f64,
-    /// Largest ratio of a velocity to its limit; 1.5, since descriptions state rated velocities.
+    /// Largest ratio of a velocity to the velocity limit of the description; 1.5, since descriptions state rated
+    /// velocities.
     pub max_velocity_ratio: f64,
     /// Lowest and highest rate of a recorder, Hz, for an arm of usual size
     /// ([`CharacteristicScale::hertz`](dynident_model::CharacteristicScale::hertz)); 4 to 50,000.
     pub recorder_rates_hz: [f64; 2],
-    /// Largest interpolated share of a row's torque; 0.3. Rows with more are left out.
+    /// Largest share of interpolated samples in the filtered torque of a row, 0 to 1; 0.3. Rows with more are left out.
     pub max_interpolated: f64,
 }
 
@@ -152,14 +159,15 @@ impl Default for MotionLimits {
 /// ([`CharacteristicScale::seconds`](dynident_model::CharacteristicScale::seconds)), which moves at about 1 Hz.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LateChannelSettings {
-    /// Longest shift of all torques, s; 2.
+    /// Largest tried shift of all torques relative to the positions, in both directions, s; 2.
     pub max_lag_s: f64,
     /// Step of the tried shifts, s; 0.1.
     pub lag_step_s: f64,
-    /// Longest shift of one joint's channel, s; 0.5. A longer shift is half a period of its motion, which looks like
-    /// another sign.
+    /// Largest tried shift of one joint's channel, s; 0.5. A longer shift is half a period of its motion, which looks
+    /// like another sign.
     pub max_lag_of_joint_s: f64,
-    /// Longest shift as a share of the longest uninterrupted motion; 1/6, since instants need torque on both sides.
+    /// Largest tried shift as a share of the longest uninterrupted motion; 1/6, since instants need torque on both
+    /// sides.
     pub max_share_of_motion: f64,
     /// Smallest number of instants per column of a joint; 2. With fewer, parameters fit the shifts.
     pub min_instants_per_column: usize,
@@ -168,7 +176,8 @@ pub struct LateChannelSettings {
     /// Ratio of a joint's residual by one robot to that by its own parameters from which its channels are shifted
     /// alone; 1.5.
     pub min_ratio_of_joint: f64,
-    /// Largest ratio of the unexplained shares of all torque with a shift to that of the best hypothesis without; 0.8.
+    /// Largest ratio of the unexplained share of all torque with a shift to that of the best hypothesis without, for
+    /// the shift to be accepted; 0.8.
     pub max_ratio_of_all: f64,
 }
 
@@ -193,19 +202,21 @@ pub struct DescriptionSettings {
     /// Smallest share of a joint's torque, without friction, that the scaled nominal bodies explain; 0.5. With less,
     /// their scale is ignored.
     pub min_explained: f64,
-    /// Largest usual factor between torque and description; 3. A larger one, or one below the inverse, shows another
-    /// unit or a motor constant.
+    /// Largest usual factor between torque and description; 3. A factor above it, or below 1/3, shows another unit or a
+    /// motor constant.
     pub max_scale: f64,
-    /// Largest share of a joint's torque, without friction, that the best robot does not explain; 0.4. Other joints are
-    /// not compared with the description.
+    /// Largest share of a joint's torque, without friction, that the best consistent robot leaves unexplained; 0.4.
+    /// Joints with more are not compared with the description.
     pub max_unexplained: f64,
     /// Explained share of the best joint below which the description is of another robot; 0.65. On six sets of real
     /// logs the least share is 0.90; descriptions of other arms with as many joints reach 0.45. In slow or small motion
     /// correct descriptions explain less, so robots with usual errors are compared as well.
     pub min_explained_of_best: f64,
-    /// Largest relative error of the median factor from the factor of a unit; 0.15.
+    /// Largest relative difference between the median factor over the joints and the factor of a unit, for this unit to
+    /// be named; 0.15.
     pub max_unit_error: f64,
-    /// Largest relative error of a joint's factor that supports this unit; 0.8.
+    /// Largest relative difference between the factor of a joint and the factor of a unit, for the joint to support
+    /// this unit; 0.8.
     pub max_unit_spread: f64,
     /// Usual range of the ratio of a body's mass to the described mass; 0.5 to 2.
     pub usual_mass_ratios: [f64; 2],
@@ -231,7 +242,8 @@ pub struct ChannelSettings {
     /// Unexplained share of a joint from which its channels are compared with those of other joints, and from which
     /// torques without negative values are magnitudes; 0.1. Two joints may move in the same way.
     pub min_unexplained_of_duplicate: f64,
-    /// Largest undershoot of a filter relative to the largest torque of the joint; 0.05.
+    /// Largest torque of the wrong sign that a filter may add to magnitudes, relative to the largest torque of the
+    /// joint; 0.05.
     pub max_undershoot: f64,
     /// Ratio of a joint's unexplained share by one robot to that by its own parameters from which its torque is
     /// doubted; 2.4. Seven sets of real logs reach 1.8, single logs of these 2.3.
@@ -264,19 +276,19 @@ impl Default for ChannelSettings {
 /// Limits for held-out logs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldOutSettings {
-    /// Ratio of a joint's unexplained share to that in the training logs from which a log is not explained; 3. Real
-    /// sets reach 2.4 for all joints together.
+    /// Unexplained share of a joint in a held-out log, relative to that in the training logs, from which the log is
+    /// reported as not explained; 3. Real sets reach 2.4 for all joints together.
     pub min_unexplained_ratio: f64,
-    /// Improvement of the score from which a number between the candidates replaces a candidate; 0.05.
+    /// Improvement of the score from which a fitted number (such as a scale) replaces the nearest candidate; 0.05.
     pub min_gain_of_number: f64,
     /// Ratio of a torque to its measurement, or the inverse, from which another gain is tried; 1.15.
     pub min_torque_gain: f64,
-    /// Largest ratio of the residual of one robot for all logs to that with a payload or a mistake; 1.3. Up to this
-    /// ratio there is neither.
+    /// Residual of one robot for all logs, relative to that with a payload or a mistake, up to which neither is
+    /// reported; 1.3.
     pub max_ratio_of_one_robot: f64,
-    /// Largest ratio of the residual with a payload to that without; 0.6.
+    /// Largest ratio of the residual with a payload to that without, for the payload to be reported; 0.6.
     pub max_ratio_with_payload: f64,
-    /// Smallest mass of a payload in standard deviations; 5.
+    /// Smallest estimated mass of a payload, in its standard deviations, for the payload to be reported; 5.
     pub min_payload_deviations: f64,
 }
 

@@ -8,6 +8,7 @@ use crate::payload::PayloadError;
 use crate::thresholds::ThresholdError;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
+use dynident_events::EventSettingsError;
 use dynident_rows::LogError;
 use thiserror::Error;
 
@@ -16,7 +17,9 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum IdentificationError {
     /// No training log.
-    #[error("no log has the role \"identify\": there is nothing to fit to")]
+    #[error(
+        "no log has the role \"identify\", so there are no data for the fit: remove role = \"validate\" from one [[log]]"
+    )]
     NoTrainingLog,
     /// A recording gives no rows.
     #[error("{0}")]
@@ -45,6 +48,9 @@ pub enum IdentificationError {
     /// The intervals cannot be computed.
     #[error("estimator.intervals: {0}")]
     Intervals(#[source] ConsistencyError),
+    /// An invalid setting of the search for events.
+    #[error("{0}")]
+    Events(#[from] EventSettingsError),
     /// An invalid limit of diagnosis or examination.
     #[error("{0}")]
     Limit(#[from] InvalidLimit),
@@ -97,7 +103,9 @@ pub enum ReduceError {
         joint: String,
     },
     /// Load-dependent friction needs the samples again.
-    #[error("load-dependent friction needs the samples again, with the load of the previous fit: leave it out")]
+    #[error(
+        "load-dependent friction needs the samples again, with the load of the previous fit: remove the law `load`"
+    )]
     Load,
     /// Payloads, gains or offsets add columns for single logs.
     #[error("{what} cannot be estimated from reduced logs: identify them from the complete logs")]

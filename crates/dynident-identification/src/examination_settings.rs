@@ -5,16 +5,18 @@ use crate::limits::{InvalidLimit, check_limits};
 /// Limits behind the findings of the examination.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExaminationSettings {
-    /// Largest ratio of the residual with the opposite sign of the torque to that as given, for a reversed sign; 0.5.
+    /// Largest ratio of the residual with the opposite sign of the torque to that with the sign as given, for which the
+    /// sign is reported as reversed; 0.5.
     pub max_reversed_ratio: f64,
-    /// Residual of the nominal bodies from which they may belong to another robot, percent of the torque; 50. Friction,
-    /// which they do not include, is usually less.
+    /// Residual with the bodies of the robot description, in percent of the torque, from which the description may be
+    /// of another robot; 50. The residual contains the friction, which is usually less.
     pub max_nominal_residual_percent: f64,
-    /// Smallest negative friction in standard deviations; 5. On the first real logs correct joints stayed above −2.5,
-    /// dead channels were below −8.
+    /// Size of negative friction, in its standard deviations, above which a joint is reported as reversed; 5. On the
+    /// first real logs correct joints stayed above −2.5, dead channels were below −8.
     pub min_friction_deviations: f64,
-    /// Smallest negative friction relative to the residual of the joint; 0.5. Less may be an unmodelled effect, as for
-    /// a wrist whose torque is measured behind the gear and is mostly noise.
+    /// Size of negative friction relative to the residual of the joint (RMS), above which a joint is reported as
+    /// reversed; 0.5. Less may be an unmodelled effect, as for a wrist whose torque is measured behind the gear and is
+    /// mostly noise.
     pub min_friction_ratio: f64,
     /// Ratio of a higher cut-off of the differentiator to that of the fit; 4. The torque predicted with both shows the
     /// error from motion above the cut-off of the fit.

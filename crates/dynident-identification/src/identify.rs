@@ -10,6 +10,7 @@ use crate::diagnosis::Diagnosis;
 use crate::drive_inertia::DriveInertiaChoice;
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, Estimator, InstrumentSource};
+use crate::events::{RecordingEvents, task_without_events};
 use crate::examination::HeldOutExamination;
 use crate::fitted::{Fitted, fitted};
 use crate::forms::{FormFit, form_fits};
@@ -68,6 +69,8 @@ pub struct Identification {
     /// Variation between training logs beyond their own error bars, which is included in the error bars of the
     /// estimate; `None` for a single log.
     pub between_logs: Option<LogVariation>,
+    /// Events in the recordings; intervals that are set aside are not in the rows of the fit.
+    pub events: Vec<RecordingEvents>,
     /// Time of the stages.
     pub times: StageTimes,
 }
@@ -127,8 +130,9 @@ pub fn identify_with_instruments(
     execution.install(|| identified(task, execution, Job::Model(Some(source))))
 }
 
-/// Identifies payloads on a known arm and includes the arm's error bars. The task's robot has the arm's terms; the
-/// bodies of the arm are not estimated.
+/// Identifies payloads on a known arm; their error bars include those of the arm. `task.robot` must have the torque
+/// terms of the arm's own identification. The bodies of the arm are not estimated again, its friction and torque
+/// offsets only as [`KnownArm::refit`] states.
 ///
 /// # Errors
 /// As [`identify()`].
@@ -151,14 +155,18 @@ fn identified(
     execution: Execution<'_>,
     job: Job<'_>,
 ) -> Result<Identification, IdentificationError> {
-    let IdentificationTask { robot, recordings, payloads, settings } = task;
+    let IdentificationTask { recordings, settings, .. } = task;
     let chosen = of_role(recordings, Role::Identify);
     if chosen.is_empty() {
         return Err(IdentificationError::NoTrainingLog);
     }
-    settings.check_names(robot).map_err(IdentificationError::Consistency)?;
+    settings.check_names(&task.robot).map_err(IdentificationError::Consistency)?;
     settings.thresholds.validate()?;
     settings.estimation.thresholds.validate()?;
+
+    let (events, without_events) = task_without_events(task, execution)?;
+    let task = without_events.as_ref().unwrap_or(task);
+    let IdentificationTask { robot, recordings, payloads, .. } = task;
 
     let arm = job.arm();
     let Fitted { fit, choices, lag, between_logs, bars, mut times } = fitted(task, &chosen, execution, job)?;
@@ -178,7 +186,8 @@ fn identified(
         arm_is_known: arm.is_some(),
         started,
     };
-    let examined = stage.examined()?;
+    let mut examined = stage.examined()?;
+    stage.test_without_events(&mut examined, &events)?;
     let drives = choices.drives();
     let robot = drives.map_or(robot, |drives| &drives.robot);
     let diagnosis = stage.diagnosis(&examined, robot, &chosen)?;
@@ -219,6 +228,7 @@ fn identified(
         forms,
         torque_lag: lag,
         between_logs,
+        events,
         times,
     })
 }

@@ -117,6 +117,7 @@
 mod bandwidth;
 mod bars;
 mod between_logs;
+pub mod changes;
 mod check;
 mod chosen_friction;
 mod conditional;
@@ -128,6 +129,9 @@ mod doubt;
 mod drive_inertia;
 mod error;
 pub mod estimators;
+mod event_findings;
+mod event_traces;
+mod events;
 pub mod examination;
 mod examination_settings;
 mod fitted;
@@ -159,12 +163,16 @@ pub use check::{StudyExamination, examine_study};
 pub use chosen_friction::{ChosenFriction, choose_friction};
 pub use conditional::{Condition, ConditionalEstimate, conditionals, resting_joints};
 pub use drive_inertia::{DriveInertiaChoice, DriveInertiaEstimate, choose_drive_inertia};
+pub use dynident_events::{EventChoice, EventKind, EventSearch, EventSettings, EventSettingsError, LogEvent};
 pub use dynident_rows as rows;
 pub use dynident_rows::{
     Execution, LogError, Logs, MotionRecord, Progress, Recording, RegressorModel, Role, RowSettings, Samples, Silent,
 };
 pub use error::{IdentificationError, ReduceError};
 pub use estimators::EstimationSettings;
+pub use event_findings::event_findings;
+pub use event_traces::event_traces;
+pub use events::{RecordingEvents, recording_events};
 pub use identify::{Identification, identify, identify_payload, identify_with_instruments};
 pub use likelihood::bic;
 pub use log_factors::{LogFactors, log_factors};
@@ -175,8 +183,8 @@ pub use stage_times::StageTimes;
 pub use stages::{ConsistentParameters, TrainingExamination, consistent_stage};
 pub use task::IdentificationTask;
 pub use thresholds::{
-    CutoffThresholds, DecisionThresholds, DoubtThresholds, DriveInertiaThresholds, EstimationThresholds,
-    FrictionThresholds, GainThresholds, LagThresholds, LogVariationThresholds, MotionThresholds, NoiseThresholds,
-    ThresholdError,
+    CutoffThresholds, DecisionThresholds, DescriptionThresholds, DoubtThresholds, DriveInertiaThresholds,
+    EstimationThresholds, FrictionThresholds, GainThresholds, LagThresholds, LogVariationThresholds, MotionThresholds,
+    NoiseThresholds, ThresholdError,
 };
 pub use training::{Training, training_rows};

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 /// A limit that is not a finite value above zero.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[error("invalid {name}: {value}; use a finite value above zero")]
+#[error("limit {name} = {value}: give a finite number above zero")]
 pub struct InvalidLimit {
     /// The field of the settings.
     pub name: &'static str,

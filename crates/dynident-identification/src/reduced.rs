@@ -144,6 +144,7 @@ fn identified(
         diagnosis: None,
         forms: Vec::new(),
         torque_lag: LagChoice::default(),
+        events: Vec::new(),
         between_logs,
         times: StageTimes { estimation_s: started.elapsed().as_secs_f64(), ..StageTimes::default() },
         training: training_rows,

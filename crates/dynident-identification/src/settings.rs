@@ -8,6 +8,7 @@ use crate::friction::FrictionSource;
 use crate::log_noise::LogNoise;
 use crate::thresholds::DecisionThresholds;
 use dynident_dynamics::ParametricModel;
+use dynident_events::EventSettings;
 use dynident_recording::MotionSettings;
 use dynident_rows::{ParallelFilterSettings, RowSettings};
 use serde::{Deserialize, Serialize};
@@ -100,6 +101,8 @@ pub struct IdentificationSettings {
     pub diagnosis_limits: DiagnosisSettings,
     /// Limits of the examination that decide whether the fit is doubtful.
     pub examination: ExaminationSettings,
+    /// Search for intervals of the logs that no single model explains.
+    pub events: EventSettings,
 }
 
 impl Default for IdentificationSettings {
@@ -121,6 +124,7 @@ impl Default for IdentificationSettings {
             thresholds: DecisionThresholds::default(),
             diagnosis_limits: DiagnosisSettings::default(),
             examination: ExaminationSettings::default(),
+            events: EventSettings::default(),
         }
     }
 }

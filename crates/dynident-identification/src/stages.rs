@@ -1,23 +1,26 @@
 //! Stages after the estimate: consistent parameters, examination, held-out tests, diagnosis.
 
+use crate::changes::{DescriptionDifferences, RestoredBody, knowledge_of, restored_errors};
 use crate::consistent::{
-    ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
-    nearest_to_nominal, parameter_std,
+    ConsistencyError, ConsistencySettings, ParameterInterval, consistent_intervals, consistent_with_estimate,
+    inconsistent_nominal_bodies, nearest_to_nominal, parameter_std,
 };
 use crate::diagnosis::{Diagnosis, DiagnosisTask, diagnose};
 use crate::doubt::{break_limits, have_jumps, is_doubtful};
 use crate::error::IdentificationError;
+use crate::events::{RecordingEvents, left_out, without_intervals};
 use crate::examination::{
     FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty,
-    examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
+    WithoutEvents, examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
 };
 use crate::settings::{DiagnosisChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
 use crate::training::Training;
 use dynident_dynamics::ParametricModel;
-use dynident_estimation::consistent::PhysicalFit;
+use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
 use dynident_estimation::{Estimate, LinearProblem, left_out_ratios};
 use dynident_rows::{Execution, Logs, Role};
+use nalgebra::{DMatrix, DVector};
 use std::time::Instant;
 
 /// Physically consistent parameters of an estimate.
@@ -33,6 +36,12 @@ pub struct ConsistentParameters {
     /// Standard deviation of each of `parameters` ([`parameter_std`]); `None` without a consistent set, and for bodies
     /// without nominal inertia.
     pub parameter_std: Vec<Option<f64>>,
+    /// Which bodies differ from the robot description; `None` without a description of all bodies.
+    pub differences: Option<DescriptionDifferences>,
+    /// Whether the consistent set follows an explanation of these differences by one or two bodies.
+    pub follows_explanation: bool,
+    /// Torque error after each body is restored to the description, by body; empty without `differences`.
+    pub restored: Vec<RestoredBody>,
     /// Intervals of all parameters over all consistent sets that the data do not reject, if requested.
     pub intervals: Option<Vec<ParameterInterval>>,
     /// Bodies whose nominal inertia is not physically consistent, with the smallest eigenvalue of their pseudo-inertia.
@@ -110,6 +119,36 @@ impl Stage<'_> {
         Ok(Examined { consistent, estimation_s, held_out: held_out?, examination })
     }
 
+    /// Tests the held-out logs again without the intervals of clear events.
+    pub(crate) fn test_without_events(
+        &self,
+        examined: &mut Examined,
+        events: &[RecordingEvents],
+    ) -> Result<(), IdentificationError> {
+        let Self { task, logs, settings, training, estimate, .. } = *self;
+        let Some(recordings) = without_intervals(&task.recordings, events, Role::Validate) else { return Ok(()) };
+        let logs = &logs.with_recordings(&recordings);
+        let physical = examined.consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
+        for held_out in &mut examined.held_out {
+            let index = held_out.index;
+            let Some(of_log) = events.iter().find(|of_log| of_log.index == index) else { continue };
+            let left_out_s = left_out(&of_log.search);
+            if left_out_s.is_empty() {
+                continue;
+            }
+            let (theta, physical) = values_of_log(training, estimate, physical, index);
+            let tested =
+                ModelUnderTest { theta: &theta, physical: physical.as_deref(), uncertainty: None, traced: false };
+            let limits = (&settings.estimation, &settings.examination);
+            let LogValidation { model, physical, .. } =
+                tested_on(logs, limits, &training.model, index, &tested, false)?.validation;
+            let set_aside = of_log.search.events.iter().filter(|event| event.set_aside);
+            let left_out_share = set_aside.map(|event| event.share).sum();
+            held_out.validation.without_events = Some(WithoutEvents { left_out_s, left_out_share, model, physical });
+        }
+        Ok(())
+    }
+
     /// Tests for mistakes in the study, if the settings require it or an examination gives reason for doubt.
     pub(crate) fn diagnosis(
         &self,
@@ -167,6 +206,9 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
         failure: Some("the arm is known from an earlier result, which contains its bodies and its URDF".to_owned()),
         parameters: nearest_to_nominal(robot, &estimate.values[..training.columns.base()]),
         parameter_std: vec![None; robot.nominal().len()],
+        differences: None,
+        follows_explanation: false,
+        restored: Vec::new(),
         intervals: None,
         inconsistent_nominal: settings.map_or_else(Vec::new, |settings| inconsistent_nominal_bodies(robot, settings)),
     }
@@ -187,12 +229,24 @@ pub fn consistent_stage(
     let (alone, arm) = arm_alone(training, estimate)?;
     let problem = alone.as_ref().unwrap_or(&training.problem);
     let plain = settings.estimation.estimator.is_plain();
-    let fit =
-        settings.consistency.as_ref().map(|knowledge| consistent_with_estimate(robot, problem, &arm, plain, knowledge));
+    let knowledge = settings.consistency.as_ref();
+    let fit = knowledge.map(|knowledge| consistent_with_estimate(robot, problem, &arm, plain, knowledge));
     let (fit, failure) = match fit.transpose() {
         Ok(fit) => (fit, None),
         Err(reason) => (None, Some(reason.to_string())),
     };
+    let limits = &settings.thresholds.description;
+    let differences = match knowledge.filter(|_| fit.is_some()) {
+        Some(knowledge) => description_differences(robot, &arm, knowledge),
+        None => None,
+    };
+    let followed = knowledge.zip(differences.as_ref()).zip(fit.as_ref()).and_then(|((knowledge, differences), fit)| {
+        let own = knowledge_of(differences, differences.followed(limits)?, robot, knowledge, limits);
+        let followed = consistent_with_estimate(robot, problem, &arm, plain, &own).ok()?;
+        is_as_good(&followed, fit, &arm).then_some(followed)
+    });
+    let follows_explanation = followed.is_some();
+    let fit = followed.or(fit);
     let intervals = match &settings.consistency {
         // A missing consistent set is explained by `failure`.
         Some(knowledge) if settings.intervals && fit.is_some() => {
@@ -203,21 +257,54 @@ pub fn consistent_stage(
         _ => None,
     };
     let parameters = fit.as_ref().map(|fit| fit.parameters.clone());
-    let knowledge = settings.consistency.as_ref();
     // A successful fit implies a valid problem.
-    let parameter_std = match knowledge.filter(|_| fit.is_some()) {
+    let mut parameter_std = match knowledge.filter(|_| fit.is_some()) {
         Some(knowledge) => parameter_std(robot, problem, &arm, knowledge).map_err(IdentificationError::Consistency)?,
         None => vec![None; robot.nominal().len()],
     };
+    let mut restored = Vec::new();
+    if let Some((differences, written)) = differences.as_ref().zip(parameters.as_ref())
+        && let Some(uncertainty) = differences.uncertainty(written, robot.nominal())
+    {
+        for (std, averaged) in parameter_std.iter_mut().zip(uncertainty.std()) {
+            *std = Some(averaged);
+        }
+        restored = restored_errors(differences, &uncertainty, robot, problem, written, limits);
+    }
     Ok(ConsistentParameters {
         parameters: parameters.unwrap_or_else(|| nearest_to_nominal(robot, &arm.values)),
         parameter_std,
+        differences,
+        follows_explanation,
+        restored,
         inconsistent_nominal: knowledge
             .map_or_else(Vec::new, |knowledge| inconsistent_nominal_bodies(robot, knowledge)),
         fit,
         failure,
         intervals,
     })
+}
+
+/// Explanations of the difference of an estimate from the description; `None` without a complete description, and if
+/// the covariance is singular.
+fn description_differences(
+    robot: &ParametricModel,
+    arm: &Estimate,
+    knowledge: &ConsistencySettings,
+) -> Option<DescriptionDifferences> {
+    let is_fixed = |row: &usize| arm.rank.fixed.iter().any(|fixed| fixed.column == *row);
+    let rows: Vec<usize> = (0..robot.base().count()).filter(|row| !is_fixed(row)).collect();
+    let values = DVector::from_fn(rows.len(), |k, _| arm.values[rows[k]]);
+    let all = arm.joint_covariance();
+    let covariance = DMatrix::from_fn(rows.len(), rows.len(), |a, b| all[(rows[a], rows[b])]);
+    DescriptionDifferences::new(robot, &rows, &values, &covariance, knowledge).ok().flatten()
+}
+
+/// Whether a consistent set under an explanation fits the logs as well as the set without it: they do not contradict
+/// it, or not more than they contradict the other one.
+fn is_as_good(followed: &PhysicalFit, fit: &PhysicalFit, arm: &Estimate) -> bool {
+    let is_rejected = followed.difference(arm).is_none_or(|test| test.is_significant);
+    followed.status == PhysicalStatus::Solved && (!is_rejected || followed.moved_sigma <= fit.moved_sigma)
 }
 
 /// The problem and the estimate without the columns of payloads and offsets of single logs; `None` if the problem has
@@ -261,6 +348,19 @@ fn examine_all_training(
     Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new() })
 }
 
+/// Base parameters for a log: those of the estimate, and those of the consistent set if there is one.
+fn values_of_log(
+    training: &Training,
+    estimate: &Estimate,
+    physical: Option<&[f64]>,
+    index: usize,
+) -> (Vec<f64>, Option<Vec<f64>>) {
+    let columns = &training.columns;
+    let further = &estimate.values[columns.base()..];
+    let physical = physical.map(|values| columns.base_values(index, &[values, further].concat()));
+    (columns.base_values(index, &estimate.values), physical)
+}
+
 /// Number of time blocks of the training logs; each is predicted by the fit to the others. With few blocks, they differ
 /// in temperature and motion as a new log does.
 const VALIDATION_BLOCKS: usize = 4;
@@ -273,15 +373,13 @@ fn examine_all_held_out(
     estimate: &Estimate,
     physical: Option<&[f64]>,
 ) -> Result<Vec<HeldOutExamination>, IdentificationError> {
-    let columns = &training.columns;
     let held_out = logs.of_role(Role::Validate);
     let ratios =
         if held_out.is_empty() { Vec::new() } else { left_out_ratios(&training.problem, estimate, VALIDATION_BLOCKS)? };
     let one = |&index: &usize| -> Result<_, IdentificationError> {
-        let theta = columns.base_values(index, &estimate.values);
+        let columns = &training.columns;
+        let (theta, physical) = values_of_log(training, estimate, physical, index);
         let uncertainty = Uncertainty::of(estimate, columns.base_covariance(index, &estimate.covariance), &ratios);
-        let physical =
-            physical.map(|values| columns.base_values(index, &[values, &estimate.values[columns.base()..]].concat()));
         let tested = ModelUnderTest {
             theta: &theta,
             physical: physical.as_deref(),

@@ -37,15 +37,40 @@ pub struct DecisionThresholds {
     pub friction: FrictionThresholds,
     /// Reasons to test alternative hypotheses.
     pub doubt: DoubtThresholds,
+    /// Bodies that differ from the robot description.
+    pub description: DescriptionThresholds,
+}
+
+/// Thresholds for bodies that differ from the robot description
+/// ([`DescriptionDifferences`](crate::changes::DescriptionDifferences)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct DescriptionThresholds {
+    /// Probability of all explanations by one or two bodies from which the written model follows the most probable one:
+    /// bodies that did not change keep the values of the description, and a load is written in the body that carries
+    /// it. 0.7 by default: in simulations the probability is above 0.74 with one or two changed bodies, because noisy
+    /// logs do not exclude small differences of all bodies, and in five of six draws below 0.6 with differences of
+    /// every body.
+    pub min_probability: f64,
+    /// Largest relative difference (standard deviation) that all bodies may have while one or two bodies explain the
+    /// rest. 0.03 by default: masses of good descriptions are accurate to a few percent.
+    pub max_small_share: f64,
+}
+
+impl Default for DescriptionThresholds {
+    fn default() -> Self {
+        Self { min_probability: 0.7, max_small_share: 0.03 }
+    }
 }
 
 /// Threshold of the test for drive inertia.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DriveInertiaThresholds {
-    /// Standard deviations from which drive inertia is accepted. 3.0 by default: by chance once in 740 studies.
-    /// Accepting a drive that is absent adds a column and widens the other error bars; missing one loses its torque. A
-    /// stricter limit would exclude a single drive whose deviation has three degrees of freedom: thirty of its standard
+    /// Minimum statistic of the test for drive inertia, in standard deviations of its distribution without drive
+    /// inertia; from this value on, drive inertia is added to the model. 3.0 by default: exceeded by chance once in 740
+    /// studies. An added inertia that is absent widens the other error bars; a missing one loses its torque. A stricter
+    /// limit would exclude a single drive whose deviation has three degrees of freedom: thirty of its standard
     /// deviations are 3.7 normal ones.
     pub min_std: f64,
 }
@@ -60,16 +85,17 @@ impl Default for DriveInertiaThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CutoffThresholds {
-    /// Ratio from which two cut-offs are different enough to select friction again. 1.2 by default; candidates are √2
-    /// apart.
+    /// Ratio of the larger to the smaller of two cut-offs from which friction is selected again at the new cut-off. 1.2
+    /// by default; candidates are √2 apart.
     pub min_friction_ratio: f64,
-    /// Ratio of velocity noise (standard deviation) to step width above which noise smears the step. 0.05 by default;
-    /// noise widens a smooth step by half the square of this ratio.
+    /// Standard deviation of the velocity noise relative to the width of a friction step, above which the noise smears
+    /// the step. 0.05 by default; noise widens a smooth step by half the square of this ratio.
     pub max_step_noise_ratio: f64,
-    /// Ratio of the regressor's cut-off to that of the instruments if both are automatic. 2.0 by default: positions are
-    /// hardly smoothed inside the instruments' band.
+    /// Cut-off of the regressor relative to that of the instruments, used if the study states neither. 2.0 by default:
+    /// positions are hardly smoothed inside the instruments' band.
     pub instruments_ratio: f64,
-    /// Ratio of new to old cut-off above which the old one is kept after `auto` selected instruments. 0.8 by default.
+    /// After `auto` selected instruments, a new cut-off replaces the old one only if it is at most this share of the
+    /// old one. 0.8 by default.
     pub max_lowered_ratio: f64,
 }
 
@@ -83,14 +109,15 @@ impl Default for CutoffThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct FrictionThresholds {
-    /// Critical values of Wald's test for a further term with 1, 2 and 3 degrees of freedom. By default χ² at 5 %:
-    /// stricter tests drop terms that improve the prediction although they are not the true ones.
+    /// Critical values of Wald's test for a further friction term with 1, 2 and 3 degrees of freedom; a term with a
+    /// smaller statistic is not added. By default χ² at 5 %: stricter tests drop terms that improve the prediction
+    /// although they are not the true ones.
     pub term_chi_square: [f64; 3],
     /// The same for terms that only a second selection from the same motion adds. By default χ² at 1 %, because every
     /// term is then tested twice.
     pub second_selection_chi_square: [f64; 3],
-    /// Minimum sum of squares of a Stribeck term's column, `Σ e^{-2|q̇/v_s|^δ}`, for supporting rows. 1.0 by default,
-    /// the value of one row at rest.
+    /// Minimum of `Σ e^{-2|q̇/v_s|^δ}` over the rows of a joint, the sum of squares of the column of a Stribeck term;
+    /// with less, the term is not tried. 1.0 by default, the value of one row at rest.
     pub min_column_square_sum: f64,
     /// Minimum gain of a law with memory or with load-dependent friction: the decrease of the joint's root mean square
     /// error in cross-validation, as a share of the error with the best laws without memory and load. 0.02 by default:
@@ -114,14 +141,14 @@ impl Default for FrictionThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DoubtThresholds {
-    /// Mean over joints of `ln(residual of a consistent robot / residual of separate joint parameters)`. 0.1 by
-    /// default; simulated and well-described robots stay below 0.05.
+    /// Mean over joints of `ln(residual of a consistent robot / residual of separate joint parameters)` above which
+    /// alternative hypotheses are tested. 0.1 by default; simulated and well-described robots stay below 0.05.
     pub max_log_residual_ratio: f64,
-    /// Minimum number of rows per parameter of a joint. 4/3 by default; with fewer rows the separate fit follows the
-    /// noise.
+    /// Number of rows per parameter of a joint below which alternative hypotheses are tested. 4/3 by default; with
+    /// fewer rows the separate fit follows the noise.
     pub min_rows_per_parameter: f64,
-    /// Ratio of held-out residual to noise of the fit. 1.7 by default; friction that changes with the motion causes
-    /// less.
+    /// Residual of a held-out log relative to the noise of the fit, above which alternative hypotheses are tested. 1.7
+    /// by default; friction that changes with the motion causes less.
     pub max_held_out_ratio: f64,
 }
 
@@ -137,8 +164,10 @@ impl DecisionThresholds {
     /// # Errors
     /// The first invalid value.
     pub fn validate(&self) -> Result<(), ThresholdError> {
-        let Self { drive_inertia, cutoff, friction, doubt } = self;
+        let Self { drive_inertia, cutoff, friction, doubt, description } = self;
         check(&[
+            ("description.min_probability", description.min_probability, 0.5),
+            ("description.max_small_share", description.max_small_share, 0.0),
             ("drive_inertia.min_std", drive_inertia.min_std, 0.0),
             ("cutoff.min_friction_ratio", cutoff.min_friction_ratio, 1.0),
             ("cutoff.max_step_noise_ratio", cutoff.max_step_noise_ratio, 0.0),
@@ -177,12 +206,14 @@ pub struct EstimationThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LagThresholds {
-    /// Minimum shift of a parameter, relative to its error bar, for a lag to be compensated. 0.3 by default.
+    /// Smallest change of a parameter by a lag correction, in error bars of the parameter, for which the lag is
+    /// corrected. 0.3 by default.
     pub min_parameter_shift: f64,
-    /// Standard deviations of χ² above which one common lag is rejected. 4.0 by default.
+    /// χ² of the joint lags about their common lag, in standard deviations above its mean, above which one common lag
+    /// is rejected and joints may get separate lags. 4.0 by default.
     pub max_scatter_std: f64,
-    /// Minimum share of the squared residual that a joint's own lag explains for a separate lag. 0.5 by default;
-    /// unmodelled friction looks like a lag but explains less.
+    /// Share of the squared residual of a joint that its separate lag has to explain; with less, the joint keeps the
+    /// common lag. 0.5 by default; unmodelled friction looks like a lag but explains less.
     pub min_own_share: f64,
     /// Prior standard deviation of a lag of a drive or a bus, in seconds for an arm of usual size
     /// ([`CharacteristicScale`](dynident_model::CharacteristicScale)). 5 ms by default: drives and buses are as fast as
@@ -208,18 +239,22 @@ impl Default for LagThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct NoiseThresholds {
-    /// Coefficient of the torque on the fast motion below which the fast motion is mostly noise. 0.75 by default.
+    /// Coefficient of the measured torque on the torque of the fast motion (1 if the robot really makes this motion, 0
+    /// for noise), below which the fast motion is mostly noise. 0.75 by default.
     pub max_followed: f64,
-    /// Maximum difference of two equal estimates, in error bars of the better one, root mean square over the
-    /// parameters. 1.5 by default; two independent estimates with the same error bars differ by 1.4.
+    /// Root mean square over the parameters of the difference of two estimates, in error bars of the more accurate one,
+    /// up to which the estimates agree. 1.5 by default; two independent estimates with the same error bars differ by
+    /// 1.4.
     pub max_contrast_rms: f64,
-    /// The same for the largest difference. 3.0 by default.
+    /// Largest difference of one parameter between two estimates, in error bars of the more accurate one, up to which
+    /// the estimates agree. 3.0 by default.
     pub max_contrast: f64,
-    /// Share of the torque of the fast motion above which lower bands are always tried. 0.1 by default; the instruments
-    /// of the first band may then contain much noise themselves.
+    /// Torque of the fast motion as a share of the whole torque, above which instruments with lower cut-offs are always
+    /// tried. 0.1 by default; the instruments of the first cut-off may then contain much noise themselves.
     pub max_fast_torque_share: f64,
-    /// Minimum shift of the parameters in error bars (root mean square) for noise to matter; the shift is at most
-    /// `√(Σ_j ‖V_j θ‖² / σ_j² / p)`. 0.3 by default, because large noise also reduces θ and this bound.
+    /// Smallest shift of the parameters by the noise, in error bars (root mean square over the parameters), for which
+    /// the noise matters; the shift is at most `√(Σ_j ‖V_j θ‖² / σ_j² / p)`. 0.3 by default, because large noise also
+    /// reduces θ and this bound.
     pub min_parameter_shift: f64,
 }
 
@@ -239,12 +274,16 @@ impl Default for NoiseThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LogVariationThresholds {
-    /// Minimum number of parameter pairs to estimate the variation of a kind. 5 by default.
+    /// Minimum number of pairs (one parameter in two logs) for the variation of one kind of parameters; with fewer, the
+    /// variation is not estimated. 5 by default.
     pub min_pairs: usize,
-    /// Minimum degrees of freedom of a single log's variance. 4.5 by default.
+    /// Minimum degrees of freedom of a parameter's variance in the fit of a single log; a pair with less is left out.
+    /// 4.5 by default.
     pub min_degrees_of_freedom: f64,
-    /// Upper limit of z² of one pair, relative to the typical value of its kind. 25.0 by default: one wrong log is not
-    /// a variation of all logs.
+    /// Largest `z²` of a pair relative to the typical one, where z is the difference of a parameter between two logs
+    /// over the standard deviation of this difference, and the typical `z²` follows from the median over all pairs of
+    /// bodies or of friction. Larger values are reduced to this limit. 25.0 by default, so that one wrong log does not
+    /// look like a variation of all logs.
     pub max_relative_square: f64,
 }
 
@@ -258,9 +297,10 @@ impl Default for LogVariationThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MotionThresholds {
-    /// Maximum residual of the positions from the Fourier series relative to their size. 0.1 by default.
+    /// Largest residual of the positions from their Fourier series, relative to the size of the motion; above it the
+    /// motion is not periodic, and the method is refused. 0.1 by default.
     pub max_series_residual: f64,
-    /// Minimum size of a motion, rad (m). 1e-4 by default.
+    /// Smallest size of the motion of a joint, rad (m); below it the joint is at rest. 1e-4 by default.
     pub min_motion: f64,
     /// Maximum ratio of filtered residuals to those of weighted least squares for the spline fit. 1.25 by default.
     /// Above it the correlated part of the torque residuals is model error, and the whitening filter has removed a part
@@ -278,7 +318,8 @@ impl Default for MotionThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct GainThresholds {
-    /// Maximum relative half width of a gain's interval for a determined gain. 0.5 by default.
+    /// Largest half width of the 95 % interval of a gain, relative to the gain; above it the gain is reported as not
+    /// identified. 0.5 by default.
     pub max_half_width: f64,
 }
 

@@ -94,7 +94,7 @@ pub use policy::convergence::UnmetCondition;
 pub use policy::friction_chosen::friction_chosen;
 pub use policy::next_step::{Next, RunPlan};
 pub use policy::record::{RunRecord, UsedController};
-pub use policy::supervision::{NextMotion, NextWays, Supervisor};
+pub use policy::supervision::{BegunMotion, NextMotion, NextWays, Supervisor};
 pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunPurpose, RunRequest, SimulatedRobot, StopSignal};
 pub use runs::course::{IterationOutcome, iterate, iterate_supervised};
 pub use runs::iteration::Iteration;

@@ -86,7 +86,9 @@ pub use error::ModelError;
 pub use inertial::{INERTIAL_NAMES, InertialParameters};
 pub use joint::{Joint, JointKind, JointLimits, JointMap, JointSpring, Mimic, MimicSource};
 pub use loops::{LoopClosure, LoopError};
-pub use mjcf::{MjcfError, MjcfFault, MjcfNotice, MjcfRobot, MjcfWriteError, read_mjcf, read_mjcf_with, rewrite_mjcf};
+pub use mjcf::{
+    MjcfError, MjcfFault, MjcfNotice, MjcfRobot, MjcfWriteError, read_mjcf, read_mjcf_in, read_mjcf_with, rewrite_mjcf,
+};
 pub use place::{Located, line_and_column};
 pub use read::{
     DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, has_xacro_macros, load_robot, load_robot_with,
@@ -101,6 +103,7 @@ pub use urdf::{
     JointChange, LinkChange, StatedInertial, UnreadElement, UrdfError, UrdfFault, UrdfIrregularity, UrdfRobot,
     UrdfWriteError, link_changes, read_urdf, rewrite_inertials, rewrite_urdf, stated_inertials, write_urdf,
 };
+pub use xacro::required_xacro_arguments;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,7 +1,7 @@
 //! Reads a robot from a URDF, MJCF, SDF or D-H table, distinguished by file name or content.
 
 use crate::dh::{DhError, read_dh};
-use crate::mjcf::{MjcfError, MjcfNotice, included_from, is_mjcf, read_mjcf_with};
+use crate::mjcf::{MjcfError, MjcfNotice, is_mjcf, read_mjcf_in};
 use crate::place::line_and_column;
 use crate::sdf::{SdfError, SdfNotice, is_sdf, read_sdf};
 use crate::tree::Model;
@@ -152,7 +152,7 @@ pub fn read_robot(text: String, path: &Path) -> Result<Robot, ReadError> {
         }
         DescriptionFormat::Mjcf => {
             let folder = path.parent().unwrap_or(Path::new(""));
-            let robot = read_mjcf_with(&text, included_from(folder))
+            let robot = read_mjcf_in(&text, folder)
                 .map_err(|error| ReadError::Mjcf { path: named(), source: Box::new(error) })?;
             notices = robot.notices;
             robot.model

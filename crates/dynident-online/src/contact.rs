@@ -7,9 +7,9 @@ use crate::error::{OnlineError, check, check_positive};
 pub struct ContactSettings {
     /// Sampling rate, Hz.
     pub rate_hz: f64,
-    /// Time constant of the collision detection, s.
+    /// Time constant of the mean of the residual that detects collisions, s.
     pub collision_s: f64,
-    /// Time constant of the detection of persistent loads (a payload or a hand), s.
+    /// Time constant of the mean of the residual that detects persistent loads (a payload or a hand), s.
     pub payload_s: f64,
     /// Allowed false alarms per hour, for all joints and both time scales together.
     pub false_alarms_per_hour: f64,

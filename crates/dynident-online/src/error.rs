@@ -15,7 +15,9 @@ pub enum OnlineError {
     Number { what: &'static str, value: f64, fix: &'static str },
     #[error("the covariance of the start is not positive definite: give that of an identified model")]
     Covariance,
-    #[error("joint {joint}: its friction follows its temperature, which samples do not have: identify without it")]
+    #[error(
+        "joint {joint}: its friction depends on the temperature, which samples do not contain: identify without the law `temperature`"
+    )]
     Temperature { joint: String },
     /// No consistent parameters were found.
     #[error("{0}")]

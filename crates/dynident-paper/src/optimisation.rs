@@ -30,8 +30,8 @@ pub(crate) fn optimised(arm: &Arm, seed: u64, options: &RunOptions<'_>) -> Resul
     let windowed =
         outcome.file.windowed.as_ref().filter(|file| file.optimum_strokes.len() == 2 && file.strokes.len() == 2);
     let Some((file, optimum_fitness)) = windowed.and_then(|file| Some((file, file.optimum?))) else {
-        let (key, fix) = ("design".to_owned(), "the search found no motion inside the limits (18)");
-        return Err(StudyFileError::study(&arm.design)(StudyError::Conflict { key, fix }).into());
+        let error = StudyError::conflict("design", "the search found no motion inside the limits (18)");
+        return Err(StudyFileError::study(&arm.design)(error).into());
     };
     let [optimum, genetic] =
         [&file.optimum_strokes, &file.strokes].map(|strokes| ["joint1", "joint2"].map(|joint| stroke(strokes, joint)));

@@ -9,7 +9,7 @@ const REFERENCES: &[(usize, &str, &str, &str)] = &[
         7,
         "Atkeson et al.",
         "a finite polynomial as the motion, low-pass filtered positions; condition number of the observation matrix",
-        "`method = \"low-pass\"`, families `quintic` and `b-spline`, `criterion = \"condition-number\"`; book: Ways from q to q̇ and q̈, Design",
+        "`method = \"low-pass\"`, families `quintic` and `b-spline`, `criterion = \"condition-number\"`; book: Differentiators, Design",
     ),
     (
         8,

@@ -14,8 +14,8 @@ use dynident::iteration::{RobotRun, RunRecord, StopSignal};
 use dynident::result::StudyChange;
 use dynident::{
     CorrectedDescription, Error, InspectSettings, IterationWatch, NewStudy, OutputSet, ProgramPermission, RunOptions,
-    XacroSettings, check, design_study, identify, inspect_robot, iterate_study, iterate_with_robot, log_contents,
-    mended_robot, new_study, simulate_study, validate_result,
+    XacroSettings, check, design_study, identify, identify_servos, inspect_robot, iterate_study, iterate_with_robot,
+    log_contents, mended_robot, new_study, simulate_study, validate_result,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -61,6 +61,23 @@ pub(crate) fn _identify(
     of_study(study, threads, progress, |study, path, options, _| {
         let outcome = identify(&study, &path, options)?;
         Ok(FittedModel::found(study, path, callables, outcome))
+    })
+}
+
+/// Drives and bodies from commands: JSON, the report, and the robot description with the new values as MJCF or URDF.
+type FoundServos = (String, String, Option<String>, Option<String>);
+
+/// Fits a study's drives and bodies to commands and positions, and simulates the held-out logs.
+#[pyfunction]
+#[pyo3(signature = (study, threads=None, progress=None))]
+pub(crate) fn _identify_servos(
+    study: &Bound<'_, Study>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<FoundServos> {
+    of_study(study, threads, progress, |study, path, options, _| {
+        let outcome = identify_servos(&study, &path, options)?;
+        Ok((json(&outcome.result)?, outcome.report()?, outcome.mjcf, outcome.urdf))
     })
 }
 

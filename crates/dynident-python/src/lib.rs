@@ -30,8 +30,8 @@ mod _native {
     use crate::function_robot::Run;
     #[pymodule_export]
     use crate::functions::{
-        _check, _command, _design, _identify, _inspect, _iterate, _log_contents, _new, _simulate, _validate,
-        _write_files,
+        _check, _command, _design, _identify, _identify_servos, _inspect, _iterate, _log_contents, _new, _simulate,
+        _validate, _write_files,
     };
     #[pymodule_export]
     use crate::model::FittedModel;

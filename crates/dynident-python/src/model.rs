@@ -10,8 +10,8 @@ use dynident::identification::examination::LogTrace;
 use dynident::model::terms::JointMotion;
 use dynident::online::WatchSettings;
 use dynident::{
-    IdentificationOutcome, ResultFile, TorquePredictor, export_payload_of, export_result, export_simulator_of,
-    identification_report,
+    IdentificationOutcome, ResultFile, RobotAppearance, TorquePredictor, export_payload_of, export_result,
+    export_simulator_of, identification_report,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -43,7 +43,7 @@ pub(crate) struct FittedModel {
 
 enum Page {
     /// To be generated from the torques over time, which the result does not contain.
-    Of(Vec<LogTrace>),
+    Of(Vec<LogTrace>, Box<RobotAppearance>),
     Written(String),
 }
 
@@ -55,9 +55,17 @@ impl FittedModel {
         callables: Callables,
         outcome: IdentificationOutcome,
     ) -> Self {
-        let IdentificationOutcome { result, urdf, table, mjcf, sdf, traces, .. } = outcome;
+        let IdentificationOutcome { result, urdf, table, mjcf, sdf, traces, robot, .. } = outcome;
         let descriptions = [urdf, table, mjcf, sdf];
-        Self { study, path, callables, result, descriptions, page: Page::Of(traces), predictor: OnceLock::new() }
+        Self {
+            study,
+            path,
+            callables,
+            result,
+            descriptions,
+            page: Page::Of(traces, Box::new(robot)),
+            predictor: OnceLock::new(),
+        }
     }
 
     pub(crate) fn result(&self) -> &ResultFile {
@@ -120,8 +128,8 @@ impl FittedModel {
     fn report(&self, py: Python<'_>) -> PyResult<Cow<'_, str>> {
         match &self.page {
             Page::Written(text) => Ok(Cow::Borrowed(text)),
-            Page::Of(traces) => {
-                let made = identification_report(&self.result, traces);
+            Page::Of(traces, robot) => {
+                let made = identification_report(&self.result, traces, Some(robot));
                 made.map(Cow::Owned).map_err(|error| errors::job(py, &error))
             }
         }

@@ -145,6 +145,12 @@ impl Study {
         Ok(Self { study, path: self.path.clone(), callables: self.callables.clone() })
     }
 
+    /// Whether the logs contain commands, so that `identify_servos` applies.
+    #[getter]
+    fn _fits_commands(&self) -> bool {
+        self.study.fits_commands()
+    }
+
     /// All sections as JSON.
     fn to_json(&self) -> PyResult<String> {
         serde_json::to_string(&self.study).map_err(|error| errors::Error::new_err(error.to_string()))

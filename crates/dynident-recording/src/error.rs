@@ -78,7 +78,9 @@ pub enum RecordingError {
         limit: usize,
     },
     /// Two columns have the requested name.
-    #[error("{place}: duplicate column name `{name}` (columns {first} and {second}); address it by its 0-based index")]
+    #[error(
+        "{place}: duplicate column name `{name}` (columns {first} and {second}); give its 0-based index instead of the name"
+    )]
     DuplicateColumn {
         /// Place of the column names.
         place: LogPlace,
@@ -126,7 +128,9 @@ pub enum RecordingError {
         fix: &'static str,
     },
     /// A field is empty, NaN or infinite under `missing = "error"`.
-    #[error("{place}, column {column}: `{text}` is not a finite number; set missing = \"drop\" to leave such rows out")]
+    #[error(
+        "{place}, column {column}: `{text}` is not a finite number; set missing = \"drop\" in [format] to leave such rows out"
+    )]
     Missing {
         /// The place.
         place: LogPlace,
@@ -138,7 +142,7 @@ pub enum RecordingError {
     /// A channel exceeds 1e60 or is not finite after unit, scale, matrix and offset.
     #[error(
         "{log}, row {row}: {group} of joint `{joint}` is beyond 1e60 or not finite after scaling; \
-         check the factors of `{group}` and the raw value"
+         check unit, scale and offset of `{group}` in [format], and the raw value"
     )]
     Overflow {
         /// Label of the log.
@@ -160,6 +164,24 @@ pub enum RecordingError {
         /// A longer file.
         other: String,
     },
+    /// Files of one log have different times in the same row.
+    #[error(
+        "{other}: in data row {row}, `{column}` is {difference_s:.3} s from that of {log}: the files are of different \
+         recordings, or rows are missing in one of them; use files of one recording, or raise time.max_difference_s if \
+         their clocks differ"
+    )]
+    ForeignFile {
+        /// File with the time column.
+        log: String,
+        /// The other file.
+        other: String,
+        /// The time column.
+        column: String,
+        /// 0-based data row.
+        row: u64,
+        /// Difference, s.
+        difference_s: f64,
+    },
     /// A channel group names a file although the log is not a file.
     #[error("{log}: `{key}.file` is not available for a log in memory; remove the key")]
     NoFolder {
@@ -177,7 +199,9 @@ pub enum RecordingError {
         problem: String,
     },
     /// The row or time range contains no row.
-    #[error("{log}: the selection ({selection}) leaves no row after {rows} rows were read; widen it")]
+    #[error(
+        "{log}: the selection ({selection}) leaves no row after {rows} rows were read; select a larger part of the log"
+    )]
     EmptySelection {
         /// Label of the log.
         log: String,
@@ -275,7 +299,7 @@ pub enum FilterError {
         fix: &'static str,
     },
     /// The cut-off is not below half the sampling rate.
-    #[error("cut-off {cutoff_hz} Hz is not below half the sampling rate of {rate_hz} Hz; lower it")]
+    #[error("cut-off {cutoff_hz} Hz is not below half the sampling rate of {rate_hz} Hz; lower the cut-off")]
     AboveNyquist {
         /// The cut-off.
         cutoff_hz: f64,

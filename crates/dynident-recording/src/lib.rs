@@ -9,6 +9,7 @@
 //! | the same for arrays in memory | [`JointSamples`], or [`MemoryLog`] for a table with a format |
 //! | the same for any other source of rows | a type that implements [`LogSource`], converted to a [`Log`] |
 //! | the samples as logged, without a filter | [`LogReader`] |
+//! | commanded and measured positions as logged | [`Log::commanded_motion`], [`check_commands`] |
 //! | another differentiator | [`DifferentiatorSettings`] (list: [`derivative`]); a new one: [`Differentiator`] |
 //! | differentiators that use the commanded motion | [`Reference`], [`MotionStream::following`] |
 //! | gaps, dead channels, lags and other findings | [`MotionStream::report`], [`report`] |
@@ -66,6 +67,8 @@
 
 mod cleaning;
 pub mod clock;
+pub mod command_check;
+mod commanded;
 pub mod derivative;
 mod error;
 pub mod filter;
@@ -77,12 +80,16 @@ pub mod reference;
 pub mod report;
 
 pub use cleaning::{CleaningSettings, Reason, RejectedSamples};
+pub use command_check::{CommandCheckSettings, CommandFinding, check_commands};
+pub use commanded::CommandedMotion;
 pub use derivative::{Derivatives, Differentiator, DifferentiatorSettings, Place, SampleRanges};
-pub use dynident_formats::FileError;
+pub use dynident_formats::{FileError, FileFormat};
 pub use error::{FilterError, FormatError, RecordingError};
 pub use filter::{DecimationSettings, Decimator, cutoff, position_noise};
-pub use log::{FileLog, JointSamples, Log, LogFormat, LogReader, LogSource, LogTable, MemoryLog, RawBlock};
-pub use motion::{ImportLimits, MotionBlock, MotionSettings, MotionStream};
+pub use log::{
+    FileLog, IgnoredTorque, JointSamples, Log, LogFormat, LogReader, LogSource, LogTable, MemoryLog, RawBlock,
+};
+pub use motion::{ImportLimits, MotionBlock, MotionSettings, MotionStream, unsettled_samples};
 pub use place::LogPlace;
 pub use reference::{LogisticPath, Reference, ReferenceSettings};
 pub use report::{Finding, ImportReport, Level, best_lag};

@@ -3,7 +3,8 @@
 //! `cargo run -p dynident-report --example gallery -- gallery.html`
 
 use dynident_report::{
-    BarPlot, Cell, ConvergencePlot, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone,
+    BarPlot, BodyMotion, Cell, Colouring, ConvergencePlot, Ellipsoid, Gauge, Heading, HeatMap, KeyFigures, LinePlot,
+    Report, Scene, SceneBody, SceneMotion, Surface, Table, Text, Tone,
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -30,6 +31,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         vec!["elbow".into(), "2.10".into(), Cell::judged("fine", Tone::Good)],
         vec!["wrist".into(), "0.31".into(), Cell::judged("doubtful", Tone::Warning)],
     ]));
+    page.add(Heading::new("A robot"));
+    page.add(robot());
     page.add(Heading::new("Plots"));
     page.add(
         LinePlot::new("Torque of the elbow", "t, s", "Nm", time.clone())
@@ -61,4 +64,76 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     page.add(HeatMap::new("Correlation", names.clone(), names, values).limit(1.0));
     std::fs::write(path, page.html()?)?;
     Ok(())
+}
+
+const UPRIGHT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// A base and four links that turn about z and y in turn.
+fn robot() -> Scene {
+    let mut base =
+        SceneBody { name: "base".into(), rotation: UPRIGHT, pose: (UPRIGHT, [0.0; 3]), ..SceneBody::default() };
+    base.surface = Surface::cuboid([0.3, 0.3, 0.06]);
+    base.surface.join(&Surface::cylinder(0.09, 0.2).placed(&UPRIGHT, [0.0, 0.0, 0.1]));
+    let mut bodies = vec![base];
+    let lengths = [0.2, 0.45, 0.4, 0.12];
+    let mut height = 0.2;
+    for (k, length) in lengths.into_iter().enumerate() {
+        let start = if k == 0 { 0.2 } else { lengths[k - 1] };
+        bodies.push(SceneBody {
+            name: format!("link {}", k + 1),
+            parent: Some(k),
+            rotation: UPRIGHT,
+            translation_m: [0.0, 0.0, start],
+            motion: BodyMotion::Turns,
+            axis: if k % 2 == 0 { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] },
+            drivers: vec![(k, 1.0)],
+            surface: Surface::rod([0.0; 3], [0.0, 0.0, length], 0.06),
+            ellipsoids: vec![Ellipsoid {
+                centre: [0.0, 0.0, 0.5 * length],
+                shape: [[0.05, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, 0.0, 0.4 * length]],
+                earlier: false,
+            }],
+            pose: (UPRIGHT, [0.0, 0.0, height]),
+            ..SceneBody::default()
+        });
+        height += length;
+    }
+    let times_s: Vec<f64> = (0..500).map(|k| 0.02 * f64::from(k)).collect();
+    let wave = |joint: usize| times_s.iter().map(|t| (t * (0.6 + 0.3 * joint as f64)).sin()).collect::<Vec<f64>>();
+    let q: Vec<Vec<f64>> = (0..4).map(wave).collect();
+    let gauge = Gauge { name: "position, rad".into(), values: q.clone(), limits: vec![Some([-1.0, 1.0]); 4] };
+    Scene {
+        title: "A robot of four joints".into(),
+        note: "the second link is heavier than described".into(),
+        words: "an upright arm".into(),
+        joints: (1..=4).map(|k| format!("joint {k}")).collect(),
+        posture: vec![0.0; 4],
+        colourings: vec![
+            Colouring {
+                name: "how well each body is known".into(),
+                classes: vec![("measured".into(), 2), ("partly".into(), 0), ("nominal".into(), 1)],
+                of: vec![None, Some(2), Some(0), Some(1), Some(1)],
+                words: ["", "nominal", "2.3 ± 0.1 kg", "1.1 ± 0.4 kg", "0.2 ± 0.1 kg"].map(Into::into).to_vec(),
+                gauge: None,
+            },
+            Colouring {
+                name: "position along the motion".into(),
+                classes: vec![("zero".into(), 0), ("at a limit".into(), 1)],
+                of: vec![None; 5],
+                words: vec![String::new(); 5],
+                gauge: Some(0),
+            },
+        ],
+        motions: vec![SceneMotion {
+            name: "waves".into(),
+            times_s,
+            ghost: q.iter().rev().cloned().collect(),
+            q,
+            gauges: vec![gauge],
+        }],
+        floor_m: Some(-0.03),
+        column_m: Some([0.6, 0.0, 0.1]),
+        boxes_m: vec![[[Some(-0.8), Some(0.8)], [Some(-0.8), Some(0.8)], [Some(0.0), None]]],
+        bodies,
+    }
 }

@@ -1,5 +1,6 @@
 //! Bars with error bars.
 
+use crate::curve_picture::{COLOURS, Place};
 use crate::error::ReportError;
 use crate::pen::tenth;
 use crate::ticks::{short, shortened, ticks};
@@ -14,6 +15,11 @@ const WIDTH: f64 = 800.0;
 const LABEL_WIDTH: f64 = 270.0;
 const FIGURE_WIDTH: f64 = 140.0;
 const ROW_HEIGHT: f64 = 22.0;
+/// Width of a character in a printed figure, px, and largest share of the width for the labels.
+const PRINT_CHAR_WIDTH: f64 = 6.6;
+const MAX_PRINT_LABEL_SHARE: f64 = 0.4;
+/// Width of the axis for each tick, px.
+const TICK_WIDTH: f64 = 60.0;
 
 /// One bar.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,52 +104,102 @@ impl BarPlot {
     /// # Errors
     /// If the template fails.
     pub fn svg(&self) -> Result<String, ReportError> {
-        let finite = |value: f64| value.is_finite() && value.abs() < 1e300;
-        let ends = self.bars.iter().filter(|bar| finite(bar.value)).flat_map(|bar| {
-            let half = bar.half_width.filter(|half| finite(*half)).unwrap_or(0.0);
-            [bar.value - half, bar.value + half].into_iter().chain(bar.reference.filter(|value| finite(*value)))
+        self.picture([WIDTH, LABEL_WIDTH, FIGURE_WIDTH], MAX_LABEL_CHARS, Place::Page)
+    }
+
+    /// Renders the plot with a width of `width` px for a printed figure.
+    pub(crate) fn printed(&self, width: f64) -> Result<String, ReportError> {
+        let longest = |lengths: &mut dyn Iterator<Item = usize>| lengths.max().unwrap_or(0) as f64;
+        let figures = longest(&mut self.bars.iter().map(|bar| bar.figure().chars().count()));
+        let labels = longest(&mut self.bars.iter().map(|bar| bar.label.chars().count())).max(self.label.len() as f64);
+        let most = MAX_PRINT_LABEL_SHARE * width;
+        let labels = (PRINT_CHAR_WIDTH * labels + 4.0).min(most);
+        let chars = (labels / PRINT_CHAR_WIDTH) as usize;
+        self.picture([width, labels, PRINT_CHAR_WIDTH * figures + 12.0], chars.max(2), Place::Print)
+    }
+
+    /// Height of the picture, px.
+    pub(crate) fn height(&self) -> f64 {
+        26.0 + ROW_HEIGHT * self.bars.len() as f64 + 8.0
+    }
+
+    /// Renders the plot with the widths of all, the labels and the figures, px.
+    fn picture(
+        &self,
+        [width, labels, figures]: [f64; 3],
+        label_chars: usize,
+        place: Place,
+    ) -> Result<String, ReportError> {
+        let ends = self.bars.iter().filter(|bar| is_drawn(bar.value)).flat_map(|bar| {
+            let half = bar.drawn_half_width().unwrap_or(0.0);
+            [bar.value - half, bar.value + half].into_iter().chain(bar.reference.filter(|value| is_drawn(*value)))
         });
         let [low, high] = ends.fold([0.0_f64, 0.0_f64], |[a, b], x| [a.min(x), b.max(x)]);
         let high = if high > low { high } else { low + 1.0 };
-        let (left, right) = (LABEL_WIDTH + 8.0, WIDTH - FIGURE_WIDTH);
+        let (left, right) = (labels + 8.0, width - figures);
         let at = |x: f64| tenth(left + (x - low) / (high - low) * (right - left));
         let bars = self.bars.iter().enumerate().map(|(k, bar)| {
-            let shown = finite(bar.value).then_some(bar.value);
-            let half = bar.half_width.filter(|half| finite(*half) && shown.is_some());
+            let shown = is_drawn(bar.value).then_some(bar.value);
             BarView {
                 y: 26.0 + ROW_HEIGHT * k as f64,
-                label: shortened(&bar.label, MAX_LABEL_CHARS),
+                label: shortened(&bar.label, label_chars),
                 whole: &bar.label,
                 from: at(shown.unwrap_or(0.0).min(0.0)),
                 length: (at(shown.unwrap_or(0.0).max(0.0)) - at(shown.unwrap_or(0.0).min(0.0))).max(0.0),
-                whisker: half.map(|half| [at(bar.value - half), at(bar.value + half)]),
-                mark: bar.reference.filter(|value| finite(*value)).map(at),
-                figure: match half {
-                    Some(half) => format!("{} ± {}", short(bar.value, 4), short(half, 2)),
-                    None => short(bar.value, 4),
-                },
+                whisker: bar.drawn_half_width().map(|half| [at(bar.value - half), at(bar.value + half)]),
+                mark: bar.reference.filter(|value| is_drawn(*value)).map(at),
+                figure: bar.figure(),
                 reference: bar.reference.map(|value| short(value, 4)),
             }
         });
+        let [bar_colour, mark_colour, paper, grid] = match place {
+            Place::Page => ["var(--c0, #0072b2)", "var(--c1, #c24e00)", "var(--paper, #fff)", "#8884"],
+            Place::Document | Place::Print => [COLOURS[0], COLOURS[1], "#fff", "#ddd"],
+        };
         let view = Picture {
-            plot: self.label.as_str(),
+            plot: self.label.clone(),
             title: &self.title,
             words: self.in_words(),
-            width: WIDTH,
-            height: 26.0 + ROW_HEIGHT * self.bars.len() as f64 + 8.0,
+            width,
+            height: self.height(),
             right,
-            labels: LABEL_WIDTH,
+            labels,
             zero: at(0.0),
-            ticks: ticks(low, high, 5).into_iter().map(|x| (at(x), short(x, 3))).collect(),
+            ticks: ticks(low, high, ((right - left) / TICK_WIDTH).clamp(2.0, 5.0) as usize)
+                .into_iter()
+                .map(|x| (at(x), short(x, 3)))
+                .collect(),
             bars: bars.collect(),
+            ink: place.ink(),
+            colours: [bar_colour, mark_colour],
+            paper,
+            grid,
         };
         crate::templates::rendered("bar_plot.svg", &view)
     }
 }
 
+fn is_drawn(value: f64) -> bool {
+    value.is_finite() && value.abs() < 1e300
+}
+
+impl Bar {
+    fn drawn_half_width(&self) -> Option<f64> {
+        self.half_width.filter(|half| is_drawn(*half) && is_drawn(self.value))
+    }
+
+    /// The value with its error bar as text.
+    fn figure(&self) -> String {
+        match self.drawn_half_width() {
+            Some(half) => format!("{} ± {}", short(self.value, 4), short(half, 2)),
+            None => short(self.value, 4),
+        }
+    }
+}
+
 #[derive(Serialize)]
 struct Picture<'a> {
-    plot: &'a str,
+    plot: String,
     title: &'a str,
     words: String,
     width: f64,
@@ -153,6 +209,11 @@ struct Picture<'a> {
     zero: f64,
     ticks: Vec<(f64, String)>,
     bars: Vec<BarView<'a>>,
+    ink: &'static str,
+    /// Colours of bars and reference marks.
+    colours: [&'static str; 2],
+    paper: &'static str,
+    grid: &'static str,
 }
 
 #[derive(Serialize)]

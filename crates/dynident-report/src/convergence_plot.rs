@@ -2,7 +2,7 @@
 
 use crate::curve_picture::{Curve, CurvePicture};
 use crate::error::ReportError;
-use crate::plot_data::{CurveData, PlotData, check_length, rounded};
+use crate::plot_data::{CurveData, PlotData, check_length, embedded, rounded};
 
 /// Figures by run (or iteration), with optional error bars.
 ///
@@ -96,6 +96,7 @@ impl ConvergencePlot {
             curves: self.curves.iter().map(curve).collect(),
             log_y: self.log_y,
             difference: None,
+            shaded: &[],
             counts: true,
         }
     }
@@ -122,16 +123,16 @@ impl ConvergencePlot {
                 Ok(CurveData { name, y, dashed: false, points: true, broad: false, bars })
             })
             .collect::<Result<Vec<_>, ReportError>>()?;
-        PlotData {
+        embedded(&PlotData {
             x: self.axis(),
             curves,
             strip: None,
+            shaded: &[],
             x_label: &self.x_label,
             y_label: &self.y_label,
             log: self.log_y,
             counts: true,
-        }
-        .embedded()
+        })
     }
 }
 

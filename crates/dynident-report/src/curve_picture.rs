@@ -46,6 +46,8 @@ pub(crate) struct CurvePicture<'a> {
     pub(crate) log_y: bool,
     /// Name of the difference, and indices of minuend and subtrahend.
     pub(crate) difference: Option<(&'a str, [usize; 2])>,
+    /// Shaded intervals of the x axis.
+    pub(crate) shaded: &'a [[f64; 2]],
     /// Integers on the x axis, with a margin on both sides.
     pub(crate) counts: bool,
 }
@@ -56,13 +58,24 @@ pub(crate) enum Place {
     Document,
     /// Section of a page: colours of the light or dark theme.
     Page,
+    /// Part of a printed figure: white background, title, black text.
+    Print,
 }
 
 impl Place {
-    fn colour(self, curve: usize) -> String {
+    pub(crate) fn colour(self, curve: usize) -> String {
         match self {
-            Self::Document => COLOURS[curve % COLOURS.len()].to_owned(),
+            Self::Document | Self::Print => COLOURS[curve % COLOURS.len()].to_owned(),
             Self::Page => format!("var(--c{})", curve % COLOURS.len()),
+        }
+    }
+
+    /// Colour of text and axes.
+    pub(crate) fn ink(self) -> &'static str {
+        match self {
+            Self::Document => "#444",
+            Self::Page => "currentColor",
+            Self::Print => "#000",
         }
     }
 }
@@ -152,6 +165,12 @@ impl CurvePicture<'_> {
         words + &format!("; in {}", self.y_label)
     }
 
+    /// Height of the strip with its gap, px; zero without a strip.
+    pub(crate) fn strip_height(&self) -> f64 {
+        let has_strip = self.difference.is_some_and(|(_, of)| of.iter().all(|curve| *curve < self.curves.len()));
+        if has_strip { STRIP_GAP + STRIP_HEIGHT } else { 0.0 }
+    }
+
     fn strip(&self) -> Option<(&str, Vec<f64>)> {
         let (name, [of, less]) = self.difference?;
         let (of, less) = (&self.curves.get(of)?.values, &self.curves.get(less)?.values);
@@ -168,7 +187,7 @@ impl CurvePicture<'_> {
         let [from, to] = self.x_range();
 
         let (left, right) = (64.0, width - 12.0);
-        let titled = if place == Place::Document { 18.0 } else { 0.0 };
+        let titled = if place == Place::Page { 0.0 } else { 18.0 };
         let legend = self.legend(left, right, titled + 12.0);
         let top = legend.last().map_or(titled, |entry| entry.y) + 8.0;
         let frame = Frame { left, right, top, bottom: height - 42.0, from, to, low, high };
@@ -183,14 +202,15 @@ impl CurvePicture<'_> {
         let lines = lines.collect();
         let strip =
             strip.map(|(name, values)| strip_view(name, &values, place.colour(self.curves.len()), &samples, &frame));
-        let grown = strip.as_ref().map_or(0.0, |_| STRIP_GAP + STRIP_HEIGHT);
+        let grown = self.strip_height();
         let whole = |x: &f64| !self.counts || (*x == x.round() && *x >= from && *x <= to);
         let count = if self.counts { ((to - from) as usize).clamp(1, 12) } else { 8 };
         let exact = |y: f64| if self.log_y { 10.0_f64.powf(y) } else { y };
         let view = Picture {
             title: self.title,
             words: self.in_words(),
-            document: place == Place::Document,
+            document: place != Place::Page,
+            ink: place.ink(),
             width,
             height: height + grown,
             frame: [left, top, right, frame.bottom],
@@ -203,6 +223,7 @@ impl CurvePicture<'_> {
             y_ticks: ticks(low, high, 5).into_iter().map(|y| (tenth(frame.at_y(y)), short(exact(y), 3))).collect(),
             lines,
             strip,
+            shaded: self.shaded(&frame),
             legend: legend.into_iter().enumerate().map(|(k, entry)| (entry, place.colour(k))).collect(),
         };
         crate::templates::rendered("line_plot.svg", &view)
@@ -215,6 +236,15 @@ impl CurvePicture<'_> {
             true => f64::NAN,
             false => y,
         }
+    }
+
+    /// Left end and width of each shaded interval inside the frame, px.
+    fn shaded(&self, frame: &Frame) -> Vec<[f64; 2]> {
+        let inside = |[from, to]: &[f64; 2]| {
+            let [left, right] = [from, to].map(|x| frame.at_x(x.clamp(frame.from, frame.to)));
+            (right > left).then(|| [tenth(left), tenth(right - left)])
+        };
+        self.shaded.iter().filter_map(inside).collect()
     }
 
     fn x_range(&self) -> [f64; 2] {
@@ -290,6 +320,7 @@ struct Picture<'a> {
     title: &'a str,
     words: String,
     document: bool,
+    ink: &'static str,
     width: f64,
     height: f64,
     frame: [f64; 4],
@@ -300,6 +331,7 @@ struct Picture<'a> {
     y_ticks: Vec<(f64, String)>,
     lines: Vec<CurveView>,
     strip: Option<StripView>,
+    shaded: Vec<[f64; 2]>,
     legend: Vec<(LegendView, String)>,
 }
 

@@ -34,6 +34,17 @@ pub enum ReportError {
         /// The value.
         value: f64,
     },
+    /// A printed figure without room for its plots.
+    #[error(
+        "a figure of {width_mm} mm with text of {font_pt} pt cannot hold a plot: give a width of at least 6 mm for each \
+         point of the text (88 mm and 180 mm with 8 pt are usual)"
+    )]
+    PrintSize {
+        /// Width of the figure, mm.
+        width_mm: f64,
+        /// Size of the text, pt.
+        font_pt: f64,
+    },
     /// A template that failed, a bug in this crate.
     #[error("a template of the page failed: {0}")]
     Template(#[from] minijinja::Error),

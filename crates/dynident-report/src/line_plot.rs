@@ -3,7 +3,7 @@
 use crate::curve_picture::{Curve, CurvePicture, Place};
 use crate::decimation::kept_samples;
 use crate::error::ReportError;
-use crate::plot_data::{CurveData, PlotData, StripData, check_axis, check_length, rounded, rounded_time};
+use crate::plot_data::{CurveData, PlotData, StripData, check_axis, check_length, embedded, rounded, rounded_time};
 
 const PIXEL_COLUMNS: usize = 1200;
 
@@ -44,6 +44,10 @@ pub struct LinePlot {
     pub log_y: bool,
     /// Strip with the difference of two curves on a separate scale: name, and indices of minuend and subtrahend.
     pub difference: Option<(String, [usize; 2])>,
+    /// Joint of the plot; choosing another joint in the picture of the robot hides it. Empty for none.
+    pub joint: String,
+    /// Shaded intervals of the x axis.
+    pub shaded: Vec<[f64; 2]>,
 }
 
 impl LinePlot {
@@ -58,7 +62,16 @@ impl LinePlot {
             lines: Vec::new(),
             log_y: false,
             difference: None,
+            joint: String::new(),
+            shaded: Vec::new(),
         }
+    }
+
+    /// Sets the joint of the plot.
+    #[must_use]
+    pub fn of_joint(mut self, joint: impl Into<String>) -> Self {
+        self.joint = joint.into();
+        self
     }
 
     /// Sets the note below the title.
@@ -103,6 +116,13 @@ impl LinePlot {
         self
     }
 
+    /// Shades an interval of the x axis.
+    #[must_use]
+    pub fn shaded(mut self, from: f64, to: f64) -> Self {
+        self.shaded.push([from, to]);
+        self
+    }
+
     /// Makes the y axis logarithmic.
     #[must_use]
     pub fn log_y(mut self) -> Self {
@@ -110,7 +130,7 @@ impl LinePlot {
         self
     }
 
-    fn check(&self) -> Result<(), ReportError> {
+    pub(crate) fn check(&self) -> Result<(), ReportError> {
         check_axis(&self.title, &self.x)?;
         if let Some((name, of)) = &self.difference {
             let largest = of.iter().max().map_or(0, |largest| largest + 1);
@@ -132,7 +152,7 @@ impl LinePlot {
         let curves: Vec<&[f64]> = self.lines.iter().map(|line| &line.values[..]).chain(strip.as_deref()).collect();
         let kept = kept_samples(&self.x, &curves, PIXEL_COLUMNS);
         let curve = |line: &Line| kept.iter().map(|&i| rounded(self.drawn(line.values[i]))).collect();
-        PlotData {
+        embedded(&PlotData {
             x: kept.iter().map(|&i| rounded_time(self.x[i])).collect(),
             curves: self
                 .lines
@@ -147,12 +167,12 @@ impl LinePlot {
                 })
                 .collect(),
             strip: self.difference.as_ref().map(|(name, of)| StripData { name, of: *of }),
+            shaded: &self.shaded,
             x_label: &self.x_label,
             y_label: &self.y_label,
             log: self.log_y,
             counts: false,
-        }
-        .embedded()
+        })
     }
 
     /// Renders the plot as a static SVG of `width` by `height` px, for documents.
@@ -183,6 +203,7 @@ impl LinePlot {
                 .collect(),
             log_y: self.log_y,
             difference: self.difference.as_ref().map(|(name, of)| (&name[..], *of)),
+            shaded: &self.shaded,
             counts: false,
         }
     }
@@ -223,6 +244,19 @@ mod tests {
         assert!(pair.data().unwrap().contains("\"of\":[1,0]"));
         let none = plot().difference("of nothing", 0, 3);
         assert!(none.data().is_err() && none.svg(300.0, 100.0).is_err());
+    }
+
+    #[test]
+    fn a_shaded_interval_is_clipped_to_the_axis() {
+        let plot = plot().shaded(1.0, 9.0);
+        assert!(plot.data().unwrap().contains("\"shaded\":[[1.0,9.0]]"));
+        let svg = plot.svg(400.0, 200.0).unwrap();
+        // The axis is from 64 to 388 px, for 0 to 3 s.
+        let shade = svg.split_once("class=\"shaded\"").unwrap().1;
+        assert!(shade.starts_with(" x=\"172.0\"") && shade.contains("width=\"216.0\""), "{svg}");
+        assert!(!self::plot().svg(400.0, 200.0).unwrap().contains("shaded"));
+        let odd = self::plot().shaded(f64::NAN, 2.0).shaded(7.0, 8.0).svg(400.0, 200.0).unwrap();
+        assert!(!odd.contains("NaN") && !odd.contains("shaded"), "{odd}");
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::heading::Heading;
 use crate::heat_map::HeatMap;
 use crate::key_figures::KeyFigures;
 use crate::line_plot::LinePlot;
+use crate::scene::Scene;
 use crate::table::Table;
 use crate::templates::{TEMPLATES, rendered};
 use crate::text::Text;
@@ -36,6 +37,8 @@ pub enum Section {
     HeatMap(HeatMap),
     /// Boxes, arrows and words.
     Diagram(Diagram),
+    /// A robot in three dimensions.
+    Scene(Scene),
 }
 
 macro_rules! sections {
@@ -47,7 +50,7 @@ macro_rules! sections {
         })*
     };
 }
-sections!(Heading, Text, KeyFigures, Table, LinePlot, ConvergencePlot, BarPlot, HeatMap, Diagram);
+sections!(Heading, Text, KeyFigures, Table, LinePlot, ConvergencePlot, BarPlot, HeatMap, Diagram, Scene);
 
 /// A page: title and sections.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,9 +65,15 @@ pub struct Report {
 
 const STATIC_PLOT_SIZE: [f64; 2] = [1040.0, 300.0];
 
+/// Largest number of rows of a table that is open at the start.
+const MAX_OPEN_ROWS: usize = 15;
+
 const UPLOT_JS: &str = include_str!("../vendor/uplot/uPlot.iife.min.js");
 const UPLOT_CSS: &str = include_str!("../vendor/uplot/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("../vendor/uplot/LICENSE");
+
+const OGL_JS: &str = include_str!("../vendor/ogl/ogl.min.js");
+const OGL_LICENCE: &str = include_str!("../vendor/ogl/LICENSE");
 
 impl Report {
     /// Creates a page without sections.
@@ -109,11 +118,15 @@ impl Report {
                 contents,
                 parts,
                 plots => self.sections.iter().any(|s| matches!(s, Section::LinePlot(_) | Section::ConvergencePlot(_))),
+                scenes => self.sections.iter().any(|section| matches!(section, Section::Scene(_))),
                 style => safe(source("report.css")),
                 script => safe(source("report.js")),
                 uplot_style => safe(UPLOT_CSS),
                 uplot_script => safe(UPLOT_JS),
                 uplot_licence => safe(UPLOT_LICENCE),
+                scene_script => safe(source("scene.js")),
+                ogl_script => safe(OGL_JS),
+                ogl_licence => safe(OGL_LICENCE),
             },
         )
     }
@@ -144,6 +157,7 @@ impl Section {
             Self::BarPlot(plot) => &plot.title,
             Self::HeatMap(map) => &map.title,
             Self::Diagram(diagram) => &diagram.title,
+            Self::Scene(scene) => &scene.title,
         }
     }
 
@@ -152,11 +166,11 @@ impl Section {
             let svg = Value::from_safe_string(svg);
             rendered("picture.html", &context! { number, title, note, svg, legend })
         };
-        let plot = |title: &str, note: &str, data: String, picture: CurvePicture<'_>| {
+        let plot = |title: &str, note: &str, joint: &str, data: String, picture: CurvePicture<'_>| {
             let data = Value::from_safe_string(data);
             let svg = Value::from_safe_string(picture.svg(STATIC_PLOT_SIZE[0], STATIC_PLOT_SIZE[1], Place::Page)?);
             let words = picture.in_words();
-            rendered("plot.html", &context! { number, title, note, data, svg, words })
+            rendered("plot.html", &context! { number, title, note, joint, data, svg, words })
         };
         match self {
             Self::Heading(heading) => rendered("heading.html", &context! { number, text => heading.text }),
@@ -168,16 +182,24 @@ impl Section {
                 if let Some(to) = targets.into_iter().find(|to| !links.contains_key(to)) {
                     return Err(ReportError::Link { section: table.title.clone(), to: to.to_owned() });
                 }
-                rendered("table.html", &context! { number, table, links, numeric => table.numeric() })
+                let folded = Some(table.rows.len()).filter(|rows| *rows > MAX_OPEN_ROWS);
+                rendered("table.html", &context! { number, table, links, folded, numeric => table.numeric() })
             }
-            Self::LinePlot(section) => plot(&section.title, &section.note, section.data()?, section.picture()),
+            Self::LinePlot(section) => {
+                plot(&section.title, &section.note, &section.joint, section.data()?, section.picture())
+            }
             Self::ConvergencePlot(section) => {
                 let axis = section.axis();
-                plot(&section.title, &section.note, section.data()?, section.picture(&axis))
+                plot(&section.title, &section.note, "", section.data()?, section.picture(&axis))
             }
             Self::BarPlot(section) => picture(&section.title, &section.note, section.svg()?, &section.reference_label),
             Self::HeatMap(section) => picture(&section.title, &section.note, section.svg()?, ""),
             Self::Diagram(section) => picture(&section.title, &section.note, section.picture(Place::Page)?, ""),
+            Self::Scene(scene) => {
+                let (data, svg) = (Value::from_safe_string(scene.data()?), Value::from_safe_string(scene.svg(false)?));
+                let Scene { title, note, words, .. } = scene;
+                rendered("scene.html", &context! { number, title, note, words, data, svg })
+            }
         }
     }
 }

@@ -10,6 +10,8 @@ pub(crate) struct PlotData<'a> {
     pub(crate) curves: Vec<CurveData<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) strip: Option<StripData<'a>>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    pub(crate) shaded: &'a [[f64; 2]],
     pub(crate) x_label: &'a str,
     pub(crate) y_label: &'a str,
     pub(crate) log: bool,
@@ -34,12 +36,10 @@ pub(crate) struct StripData<'a> {
     pub(crate) of: [usize; 2],
 }
 
-impl PlotData<'_> {
-    /// JSON for a script element: without `<`, which could end it, and without `>` and `&`.
-    pub(crate) fn embedded(&self) -> Result<String, ReportError> {
-        let json = dynident_text::json::to_string(self)?;
-        Ok(json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"))
-    }
+/// JSON for a script element: without `<`, which could end it, and without `>` and `&`.
+pub(crate) fn embedded(data: &impl Serialize) -> Result<String, ReportError> {
+    let json = dynident_text::json::to_string(data)?;
+    Ok(json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"))
 }
 
 /// Seven significant digits, to reduce the size of the page.

@@ -5,8 +5,9 @@ use dynident_text::visible;
 use minijinja::{AutoEscape, Environment, HtmlEscape, Value};
 use serde::Serialize;
 use std::borrow::Cow;
+use std::path::Path;
 
-pub(crate) const TEMPLATES: [(&str, &str); 16] = [
+pub(crate) const TEMPLATES: [(&str, &str); 20] = [
     ("page.html", include_str!("templates/page.html")),
     ("heading.html", include_str!("templates/heading.html")),
     ("text.html", include_str!("templates/text.html")),
@@ -21,6 +22,10 @@ pub(crate) const TEMPLATES: [(&str, &str); 16] = [
     ("motion_picture.svg", include_str!("templates/motion_picture.svg")),
     ("path_picture.svg", include_str!("templates/path_picture.svg")),
     ("fitness_picture.svg", include_str!("templates/fitness_picture.svg")),
+    ("print_figure.svg", include_str!("templates/print_figure.svg")),
+    ("scene.html", include_str!("templates/scene.html")),
+    ("scene.svg", include_str!("templates/scene.svg")),
+    ("scene.js", include_str!("templates/scene.js")),
     ("report.css", include_str!("templates/report.css")),
     ("report.js", include_str!("templates/report.js")),
 ];
@@ -38,6 +43,11 @@ fn prose(text: &str) -> Value {
     Value::from_safe_string(parts.iter().enumerate().map(part).collect())
 }
 
+/// Whether a file is rendered; scripts and styles are included as they are.
+fn is_template(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|kind| kind == "html" || kind == "svg")
+}
+
 /// Renders a template; everything that is not marked as safe is escaped, in HTML and SVG. Invisible characters are
 /// shown as escape sequences.
 pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, ReportError> {
@@ -46,7 +56,7 @@ pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, Repo
     environment.add_filter("prose", prose);
     environment.set_trim_blocks(true);
     environment.set_lstrip_blocks(true);
-    for (name, source) in TEMPLATES.iter().filter(|(name, _)| !name.starts_with("report.")) {
+    for (name, source) in TEMPLATES.iter().filter(|(name, _)| is_template(name)) {
         environment.add_template(name, source)?;
     }
     let text = environment.get_template(name)?.render(view)?;

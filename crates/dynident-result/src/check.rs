@@ -47,6 +47,9 @@ pub struct StudyCheck {
     /// The same for all joints together; null in results of older versions.
     #[serde(default)]
     pub noise_of_all_percent: Option<f64>,
+    /// Number of logs without torque whose commands were compared with the positions; 0 in results of older versions.
+    #[serde(default)]
+    pub commanded_logs: usize,
 }
 
 /// One thing that was found.
@@ -56,7 +59,7 @@ pub struct CheckFinding {
     /// Severity.
     pub level: Level,
     /// Kind of mistake: `sign`, `order`, `offset`, `unit`, `coupling`, `lag`, `mounting`, `payload`, `description`,
-    /// `torque`, `limits`, `samples`, `rows` or `log`.
+    /// `torque`, `limits`, `samples`, `rows`, `command` or `log`.
     pub kind: String,
     /// Description, with the names of joints.
     pub what: String,

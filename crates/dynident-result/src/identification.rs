@@ -1,6 +1,7 @@
 //! Output of `identify`: the schema of `result.json`.
 
 use super::check::StudyCheck;
+use super::comparison::DescriptionComparison;
 use super::error_terms::ErrorTermResult;
 use super::forms::{FormResult, StoredModel};
 use super::numbers::{number, rows};
@@ -17,7 +18,7 @@ use dynident_identification::examination::{
 use dynident_identification::friction::{FrictionCandidate, FrictionConstant, UnrestrictedFriction};
 use dynident_identification::payload::{DriveGain, PayloadResult};
 use dynident_identification::rows::VelocityHistogram;
-use dynident_identification::{Condition, CutoffByError, DriveInertiaChoice, LogVariation, Role};
+use dynident_identification::{Condition, CutoffByError, DriveInertiaChoice, LogEvent, LogVariation, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use dynident_study::JointDrive;
 use serde::{Deserialize, Serialize};
@@ -72,8 +73,18 @@ pub struct ResultFile {
     #[serde(default, deserialize_with = "rows")]
     #[cfg_attr(feature = "schema", schemars(with = "Vec<Vec<Option<f64>>>"))]
     pub base_parameter_covariance: Vec<Vec<f64>>,
+    /// Covariance of the base parameters for tests of several parameters together, as `compare` makes them: with few
+    /// segments `base_parameter_covariance` has too small eigenvalues, so white errors are mixed in. Empty in results
+    /// of earlier versions.
+    #[serde(default, deserialize_with = "rows", skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "schema", schemars(with = "Vec<Vec<Option<f64>>>"))]
+    pub base_parameter_joint_covariance: Vec<Vec<f64>>,
     /// The bodies: of all full sets with these base parameters the nearest to the prior.
     pub bodies: Vec<BodyResult>,
+    /// Which bodies differ from the robot description, with the torque error after each is restored; null without a
+    /// description of all bodies, and in results of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description_differences: Option<DescriptionComparison>,
     /// Interval of every body and term parameter over the physically consistent sets that the data do not reject; null
     /// unless requested.
     pub possible_intervals: Option<Vec<ParameterInterval>>,
@@ -316,9 +327,12 @@ pub struct BodyResult {
     /// Source of each of the ten values; null in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sources: Option<[ValueSource; 10]>,
-    /// Standard deviation of each of the ten values from the logs and the robot description with 30 % uncertainty: that
-    /// of the logs for an identified value, that of the robot description for an unidentified one. Null for a body that
-    /// is not described, and if the bodies are not the physically consistent set.
+    /// Standard deviation of each of the ten values from the logs and the robot description: that of the logs for an
+    /// identified value, that of the robot description for an unidentified one. 1.96 times it is the
+    /// half width of the interval that contains 95 % of the mixture over all explanations of the difference from the
+    /// description, so that a description that the logs contradict widens it; without a complete description, nominal
+    /// values have 30 % uncertainty. Null for a body that is not described, and if the
+    /// bodies are not the physically consistent set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub std: Option<[f64; 10]>,
 }
@@ -533,6 +547,9 @@ pub struct LogSummary {
     /// Findings from the model.
     #[serde(default)]
     pub model_findings: Vec<Finding>,
+    /// Intervals and slow changes that no single model explains; missing without any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub events: Vec<LogEvent>,
 }
 
 /// Time of creation, and computing times in seconds. Only these differ when a result is reproduced.

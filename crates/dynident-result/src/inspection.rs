@@ -110,6 +110,9 @@ pub struct BaseSummary {
     pub count: usize,
     /// Expressions, with the shortest factors that convert back to the same number.
     pub expressions: Vec<String>,
+    /// Names: the expressions with six digits, without factors that rounded angles cause.
+    #[serde(default)]
+    pub names: Vec<String>,
     /// Unidentifiable parameters.
     pub unidentifiable: Vec<String>,
     /// Rank of the bodies' regressor at random states, by

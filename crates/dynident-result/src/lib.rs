@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod check;
+mod comparison;
 mod design;
 mod error;
 mod error_terms;
@@ -22,6 +23,8 @@ mod problems;
 mod provenance;
 mod read;
 mod seal;
+mod servo;
+mod servo_design;
 mod simulation;
 mod sound;
 mod stored;
@@ -29,6 +32,10 @@ mod test_samples;
 mod validation;
 
 pub use check::{CHECK_SCHEMA, CheckFile, CheckFinding, HypothesisResult, StudyChange, StudyCheck};
+pub use comparison::{
+    COMPARISON_SCHEMA, ChangeExplanation, ChangedPart, ChangesFrom, ComparedBody, ComparedFriction, ComparedParameter,
+    ComparedResult, ComparisonFile, DescriptionComparison,
+};
 pub use design::{
     DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast, StrokeFile, StrokeLimitFile, WindowedFile,
 };
@@ -55,6 +62,8 @@ pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};
 pub use problems::ProblemSettings;
 pub use provenance::{InputFile, Provenance};
 pub use read::{MAX_RESULT_BYTES, read_result};
+pub use servo::{SERVO_SCHEMA, ServoBody, ServoDrive, ServoFile, ServoLog, ServoMotion, ServoNumber, ServoScale};
+pub use servo_design::{SERVO_DESIGN_SCHEMA, ServoDesignFile, ServoForecast, ServoForecastValue};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 pub use test_samples::{TEST_SAMPLES_SCHEMA, TestSamplesFile, TestedLog};
 // Types of lower crates in these files.

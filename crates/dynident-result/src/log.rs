@@ -1,5 +1,6 @@
 //! Output of `log` as JSON.
 
+use dynident_recording::FileFormat;
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`LogContents`].
@@ -30,6 +31,31 @@ pub struct LogContents {
 }
 
 impl LogContents {
+    /// Whether its groups are episodes, separate recordings that `part` of a study selects, not topics with one clock.
+    pub fn has_episodes(&self) -> bool {
+        self.format == FileFormat::Hdf5.name() && self.groups.iter().any(|group| group.name.is_some())
+    }
+
+    /// Each episode with its name, as the contents of a separate file; itself for a single recording.
+    pub fn episodes(self) -> Vec<(Option<String>, Self)> {
+        if !self.has_episodes() {
+            return vec![(None, self)];
+        }
+        let episode = |(index, group): (usize, &LogGroupContents)| {
+            let part = group.name.clone().unwrap_or_default();
+            let own = |name: &str| name.strip_prefix(&part).and_then(|name| name.strip_prefix('.')).map(str::to_owned);
+            let channel = |channel: &LogChannel| {
+                let name = own(&channel.name).unwrap_or_else(|| channel.name.clone());
+                LogChannel { name, group: 0, ..channel.clone() }
+            };
+            let channels = self.channels.iter().filter(|channel| channel.group == index).map(channel).collect();
+            let time = group.time.as_deref().and_then(own);
+            let groups = vec![LogGroupContents { name: None, time, ..group.clone() }];
+            (Some(part), Self { groups, channels, ..self.clone() })
+        };
+        self.groups.iter().enumerate().map(episode).collect()
+    }
+
     /// Unit of the channel with this name in a group.
     pub fn unit(&self, group: usize, name: &str) -> Option<&str> {
         let found = self.channels.iter().find(|channel| channel.group == group && channel.name == name);

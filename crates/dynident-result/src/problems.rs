@@ -11,15 +11,16 @@ use dynident_study::{Expected, StudyError};
 /// Thresholds of [`ResultFile::problems_of_the_model_with`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProblemSettings {
-    /// Largest ratio of the torque errors of the consistent set and the estimate on the same rows, all joints. Default
-    /// 1.5: real test logs have 0.8 to 1.14, dead torque channels 1.6.
+    /// Torque error of the physically consistent model divided by that of the unconstrained estimate, same rows and all
+    /// joints, above which this is a problem. Default 1.5: real test logs have 0.8 to 1.14, dead torque channels 1.6.
     pub max_error_ratio: f64,
     /// The same for a single joint. Default 2.5: real test logs have 0.6 to 1.7, dead torque channels 5.2.
     pub max_joint_error_ratio: f64,
-    /// Largest unexplained torque of training or held-out logs, percent. Default 60.
+    /// Unexplained torque of training or held-out logs, in percent of the torque, above which this is a problem.
+    /// Default 60.
     pub max_unexplained_percent: f64,
-    /// Largest ratio of held-out and training residuals (root mean square over the joints). Default 4: ten real data
-    /// sets have 0.9 to 2.4, a fit of 58 parameters to 3 s has 6.
+    /// Residual of a held-out log divided by that of the training logs (root mean square over the joints), above which
+    /// this is a problem. Default 4: ten real data sets have 0.9 to 2.4, a fit of 58 parameters to 3 s has 6.
     pub max_held_out_ratio: f64,
     /// The same if `check` found an inconsistent joint torque. Default 2.
     pub max_held_out_ratio_if_inconsistent: f64,

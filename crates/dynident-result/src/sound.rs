@@ -18,11 +18,16 @@ impl ResultFile {
     /// The problem, with its place and the fix.
     pub(super) fn require_sound_numbers(&self) -> Result<(), String> {
         let count = self.base_parameters.len();
-        let rows = &self.base_parameter_covariance;
-        if !rows.is_empty() && (rows.len() != count || rows.iter().any(|row| row.len() != count)) {
-            return Err(format!(
-                "base_parameter_covariance does not have {count} rows of {count} numbers, one per base parameter: {FIX}"
-            ));
+        let matrices = [
+            ("base_parameter_covariance", &self.base_parameter_covariance),
+            ("base_parameter_joint_covariance", &self.base_parameter_joint_covariance),
+        ];
+        for (key, rows) in matrices {
+            if !rows.is_empty() && (rows.len() != count || rows.iter().any(|row| row.len() != count)) {
+                return Err(format!(
+                    "{key} does not have {count} rows of {count} numbers, one per base parameter: {FIX}"
+                ));
+            }
         }
         for (place, parameter) in self.base_parameters.iter().enumerate() {
             for (key, value) in [("value", Some(parameter.value)), ("physical", parameter.physical)] {

@@ -2,6 +2,7 @@
 
 use super::identification::{RESULT_SCHEMA, ResultFile};
 use super::seal::{HASH_KEY, content_sha256, stated_sha256};
+use super::servo::SERVO_SCHEMA;
 use crate::error::ResultFileError;
 use crate::read::read_result;
 use dynident_dynamics::ParametricModel;
@@ -42,6 +43,11 @@ fn part_of<T: DeserializeOwned>(bytes: &[u8], path: &Path, edits: Edits) -> Resu
         wrong(format!("line {line}, column {column}: not a result of `identify`: {error}"))
     };
     let Schema { schema } = serde_json::from_slice(bytes).map_err(not_a_result)?;
+    if schema == SERVO_SCHEMA {
+        let message = "a result of commands and positions holds no torque model: use its report, its JSON or the robot \
+                       description next to it (page \"Arms without torque\")";
+        return Err(wrong(message.to_owned()));
+    }
     if schema != RESULT_SCHEMA {
         return Err(wrong(format!("schema `{schema}`, not `{RESULT_SCHEMA}`: identify again with this version")));
     }
@@ -144,8 +150,9 @@ impl ResultFile {
             )));
         }
         let mut values = Vec::with_capacity(expressions.len());
-        for (stored, expression) in self.base_parameters.iter().zip(&expressions) {
-            if stored.expression != *expression {
+        let complete = model.base().complete_expressions();
+        for ((stored, expression), complete) in self.base_parameters.iter().zip(&expressions).zip(&complete) {
+            if stored.expression != *expression && stored.expression != *complete {
                 return Err(wrong(format!(
                     "base parameter `{}`, but the study's robot has `{expression}`: use the study that the result was made with",
                     stored.expression
@@ -225,7 +232,7 @@ impl ResultFile {
         }
         if self.drive_gains.is_some() {
             return Err(wrong(
-                "the arm was identified with unknown gains: write them as torque.scale of the format and identify it again",
+                "the arm was identified with unknown gains: write the gains as scale under [format.torque] and identify the arm again",
             ));
         }
         let covariance = DMatrix::from_fn(n, n, |row, column| rows[row][column]);

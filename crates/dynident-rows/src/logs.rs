@@ -138,6 +138,16 @@ impl<'a> Logs<'a> {
         }
     }
 
+    /// The same filters for other recordings, for example with fewer rows.
+    #[must_use]
+    pub fn with_recordings<'b>(&self, recordings: &'b [Recording]) -> Logs<'b>
+    where
+        'a: 'b,
+    {
+        let kept = unread(recordings);
+        Logs { recordings, kept, excerpts: Arc::default(), ..self.clone() }
+    }
+
     /// Shares the motions that `other` has stored, if recordings and motion settings are the same.
     #[must_use]
     pub fn with_motion_of(mut self, other: &Self) -> Self {

@@ -42,7 +42,7 @@ pub struct RunLimits {
     /// Maximum torque, Nm (N), to which the loop limits the controller's torque; saturated samples are counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque: Option<PerJoint>,
-    /// Minimum position, rad (m).
+    /// Minimum position, rad (m); a lower one ends the run, as do violations of the following limits.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lower: Option<PerJoint>,
     /// Maximum position, rad (m).

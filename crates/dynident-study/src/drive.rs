@@ -2,6 +2,7 @@
 
 use super::arrays::two;
 use super::friction::{ExportableForm, FrictionChoice, FrictionTerm};
+use super::servo::ServoSection;
 use crate::error::{Expected, StudyError};
 use dynident_identification::{GainChoice, OffsetChoice};
 use dynident_model::terms::{Coupling, TorqueTerm};
@@ -65,6 +66,8 @@ pub struct DriveSection {
     /// inertia unless their keys state them. Bodies are then fitted together with these terms. No restriction by
     /// default: the terms of each exported form are then fitted with the bodies of the complete model.
     pub exportable: Option<ExportableForm>,
+    /// Drives with a position controller, for logs with commands in place of torque. By default from the logs alone.
+    pub servo: Option<ServoSection>,
     /// Exceptions, by joint name.
     pub joints: BTreeMap<String, JointDrive>,
 }
@@ -86,6 +89,7 @@ impl Default for DriveSection {
             most_inflation: None,
             candidates: None,
             exportable: None,
+            servo: None,
             joints: BTreeMap::new(),
         }
     }
@@ -180,6 +184,9 @@ impl DriveSection {
             Expected::Positive.check("drive.most_inflation", most)?;
         }
         self.validate_candidates()?;
+        if let Some(servo) = &self.servo {
+            servo.validate()?;
+        }
         if let Some(percent) = self.gain_std_percent {
             Expected::Range(0.0, 100.0).check("drive.gain_std_percent", percent)?;
         }

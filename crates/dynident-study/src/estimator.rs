@@ -5,10 +5,10 @@ use super::physical::PhysicalChoice;
 use super::simulated::SimulatedSection;
 use crate::error::{Expected, StudyError, StudyFileError};
 use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings, SplineMotionSettings};
-use dynident_identification::EstimationSettings;
 use dynident_identification::estimators::{
     Estimator, EstimatorFunction, EstimatorRule, InstrumentSettings, NoiseLevels, PeriodSettings, SimulatedLoopSettings,
 };
+use dynident_identification::{EstimationSettings, EventChoice};
 use serde::{Deserialize, Serialize};
 
 /// Estimation method for the base parameters.
@@ -120,6 +120,11 @@ pub struct EstimatorSection {
     pub segments: SegmentSettings,
     /// Fixes poorly determined parameters at zero; off by default.
     pub essential: Option<EssentialSettings>,
+    /// Search for intervals of the logs that no single model explains: contact, closed brakes, a joint on its stop, a
+    /// change of load. `"auto"` (default) reports them and leaves out of the fit what no normal operation has: drives
+    /// off, a joint on its stop, filled holes. `"set-aside"` leaves out every clear event, `"warn"` only
+    /// reports, `"off"` does not search.
+    pub events: EventChoice,
     /// Instruments for `method = "auto"` and `"instrumental"`. With other methods they only test whether noise in the
     /// regressor biases least squares; `"weighted"` and `"ordinary"` run this test by default.
     pub instruments: Option<InstrumentSettings>,

@@ -40,7 +40,8 @@ impl Folders {
     }
 }
 
-/// Whether `path` is the folder of a rosbag2 recording or of a `LeRobot` data set.
+/// Whether `path` is the folder of a rosbag2 recording, of a `LeRobot` data set or of a SAGE recording.
 fn is_recording(path: &Path) -> bool {
-    ["metadata.yaml", "meta/info.json"].iter().any(|file| path.join(file).is_file())
+    let has = |file: &str| path.join(file).is_file();
+    has("metadata.yaml") || has("meta/info.json") || has("control.csv") && has("state_motor.csv")
 }

@@ -21,6 +21,7 @@ mod physical;
 mod robot;
 mod robot_file;
 mod robot_model;
+mod servo;
 mod simulated;
 mod simulation;
 mod study_file;
@@ -49,6 +50,7 @@ pub use physical::PhysicalChoice;
 pub use robot::{FollowSection, LoopSection, RobotSection};
 pub use robot_file::{LoadSettings, XacroSettings, load_robot};
 pub use robot_model::StudyRobot;
+pub use servo::{FloorPointSection, FloorSection, PerJoint, ServoSection, moving_link};
 pub use simulated::SimulatedSection;
 pub use simulation::{SimulatedTruth, SimulationSection};
 pub use study_file::{StudyFile, relative_path};
@@ -171,6 +173,29 @@ fn drop_nulls(value: &mut serde_json::Value) {
     }
 }
 
+/// Kind of a file that is obviously not a study, and the command for it.
+fn other_kind(text: &str, path: &Path) -> Option<(&'static str, String)> {
+    let file = path.display();
+    let first = text.trim_start();
+    let is_table = || {
+        let line = first.lines().find(|line| !line.starts_with('#')).unwrap_or_default();
+        [',', ';', '\t'].iter().any(|delimiter| line.matches(*delimiter).count() >= 2)
+            && !line.contains(['=', '[', '"'])
+    };
+    if first.starts_with('<') {
+        let fix = format!("write a study for it: dynident new --robot {file} --log LOG");
+        Some(("this is a robot description, not a study", fix))
+    } else if first.starts_with('{') {
+        let fix = "give the study file; for the result of an identification, `validate`, `export` and `design` take it as RESULT";
+        Some(("this is a JSON file, not a study", fix.to_owned()))
+    } else if is_table() {
+        let fix = format!("write a study for it: dynident new --robot ROBOT --log {file}");
+        Some(("this is a table, not a study", fix))
+    } else {
+        None
+    }
+}
+
 /// Largest study file, bytes.
 const MAX_STUDY_BYTES: u64 = 4 << 20;
 
@@ -206,6 +231,9 @@ impl Study {
         if text.trim().is_empty() {
             let fix = "a study needs at least [robot] and, to identify, one [[log]]";
             return Err(StudyFileError::study(path)(StudyError::missing("the file is empty", fix)));
+        }
+        if let Some((what, fix)) = other_kind(text, path) {
+            return Err(StudyFileError::study(path)(StudyError::conflict(what, fix)));
         }
         let study: Self = toml::from_str(text).map_err(|error| {
             let (line, column) = error.span().map_or((1, 1), |span| line_and_column(text, span.start));
@@ -274,7 +302,10 @@ impl Study {
         self.require_log(path)?;
         if !self.log.iter().any(|log| log.role == Role::Identify) {
             let what = "no log has the role \"identify\"";
-            return Err(StudyFileError::study(path)(StudyError::missing(what, "there is nothing to fit to")));
+            return Err(StudyFileError::study(path)(StudyError::missing(
+                what,
+                "there are no data for the fit; remove role = \"validate\" from one [[log]]",
+            )));
         }
         Ok(())
     }
@@ -311,6 +342,11 @@ impl Study {
                 return Err(at()(missing));
             }
             log.validate().map_err(at())?;
+            let format = self.format_of(index);
+            if format.torque.is_none() && format.command.is_none() {
+                let fix = "add torque = { columns = [...] } to [format], or command = { columns = [...] } for a robot that reports no torque";
+                return Err(at()(StudyError::missing("neither torque nor command", fix)));
+            }
         }
         self.drive.validate()?;
         self.check_temperature()?;
@@ -361,6 +397,16 @@ impl Study {
         Ok(())
     }
 
+    /// Whether `identify` fits the motion to commands: `[drive.servo]` is stated, or all logs have commands and no
+    /// torque.
+    pub fn fits_commands(&self) -> bool {
+        let without_torque = |index: usize| {
+            let format = self.format_of(index);
+            format.command.is_some() && format.torque.is_none()
+        };
+        !self.log.is_empty() && (self.drive.servo.is_some() || (0..self.log.len()).all(without_torque))
+    }
+
     /// Format of log number `index`, with the log's own range.
     ///
     /// # Panics
@@ -370,6 +416,9 @@ impl Study {
         let mut format = log.format.clone().or_else(|| self.format.clone()).expect("checked when the study was read");
         if log.rows.is_some() || log.fraction.is_some() || log.time_range_s.is_some() {
             (format.rows, format.fraction, format.time_range_s) = (log.rows, log.fraction, log.time_range_s);
+        }
+        if log.part.is_some() {
+            format.part.clone_from(&log.part);
         }
         format.drop_rows.extend_from_slice(&log.drop_rows);
         format.drop_time_s.extend_from_slice(&log.drop_time_s);
@@ -388,6 +437,7 @@ impl Study {
         }
         let file =
             log.file.file_stem().map_or_else(|| log.file.display().to_string(), |s| s.to_string_lossy().into_owned());
+        let file = log.part.iter().fold(file, |file, part| format!("{file} {part}"));
         if let Some([from, to]) = log.fraction {
             format!("{file} [{:.0} % .. {:.0} %]", 100.0 * from, 100.0 * to)
         } else if let Some([from, to]) = log.rows {

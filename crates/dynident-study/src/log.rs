@@ -17,6 +17,9 @@ pub struct LogSection {
     /// The samples, in place of a file: a table whose columns `format` describes. Not serialised.
     #[serde(skip)]
     pub samples: Option<MemoryLog>,
+    /// Overrides `part` of the format: the recording in a file with several.
+    #[serde(default)]
+    pub part: Option<String>,
     /// Name in reports; the file name by default.
     #[serde(default)]
     pub name: Option<String>,

@@ -32,8 +32,9 @@ impl StudyLogSource {
         }
     }
 
-    /// Whether both contain the same samples: one file or copies of it, one table or equal ones. False if a file cannot
-    /// be read, which its reader reports.
+    /// Whether both sources contain the same samples: the same file or files of equal content, the same table in memory
+    /// or tables of equal numbers. A file and a table are never equal. False if a file cannot be read: the error is
+    /// reported when the log is read.
     pub(crate) fn has_content_of(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::File(a), Self::File(b)) => same_file_content(a, b),

@@ -78,6 +78,9 @@ fn samples_of(recording: &Recording) -> Option<LogSamples> {
 /// Whether two parts of one file have, or may have, common rows: ranges by rows, fraction and time cannot be compared
 /// before the file is read.
 fn may_share_rows(a: &LogFormat, b: &LogFormat) -> bool {
+    if a.part.is_some() && b.part.is_some() && a.part != b.part {
+        return false;
+    }
     let common = |a: [f64; 2], b: [f64; 2]| a[0] < b[1] && b[0] < a[1];
     let rows = |rows: [u64; 2]| rows.map(|row| row as f64);
     match (a.rows, b.rows, a.fraction, b.fraction, a.time_range_s, b.time_range_s) {

@@ -78,15 +78,52 @@ impl PayloadSection {
             }
         }
         let Some(known) = self.known() else { return Ok(()) };
-        let pseudo_inertia = known.pseudo_inertia();
-        if known.mass_kg() <= 0.0
-            || pseudo_inertia.symmetric_eigenvalues().min() < -MAX_RELATIVE_ROUNDING * pseudo_inertia.amax()
-        {
-            return Err(StudyError::conflict(
-                "mass and inertia are not physically consistent",
-                "the mass must be positive and no moment about the centre of mass larger than the sum of the other two",
-            ));
+        if !is_consistent(&known) {
+            return Err(StudyError::conflict("mass and inertia are not physically consistent", self.fix()));
         }
         Ok(())
+    }
+
+    /// Fix for an inconsistent payload. If the moments are consistent in the order of MuJoCo's `fullinertia` (xx, yy,
+    /// zz, xy, xz, yz), the line to write.
+    fn fix(&self) -> String {
+        let general = "the mass must be positive and no moment about the centre of mass larger than the sum of the other two; \
+                       inertia_at_com_kgm2 has the order xx, xy, xz, yy, yz, zz";
+        let reordered = self.inertia_at_com_kgm2.map(|[xx, yy, zz, xy, xz, yz]| [xx, xy, xz, yy, yz, zz]);
+        let other = Self { inertia_at_com_kgm2: reordered, ..self.clone() };
+        match (reordered, other.known().is_some_and(|known| is_consistent(&known))) {
+            (Some(moments), true) => format!(
+                "{general}. The six numbers are consistent in MuJoCo's order (xx, yy, zz, xy, xz, yz); if they are in that order, write \
+                 inertia_at_com_kgm2 = {moments:?}"
+            ),
+            _ => general.to_owned(),
+        }
+    }
+}
+
+fn is_consistent(payload: &InertialParameters) -> bool {
+    let pseudo_inertia = payload.pseudo_inertia();
+    payload.mass_kg() > 0.0
+        && pseudo_inertia.symmetric_eigenvalues().min() >= -MAX_RELATIVE_ROUNDING * pseudo_inertia.amax()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PayloadSection;
+
+    fn message(numbers: &str) -> Option<String> {
+        let text = format!(
+            "name = \"p\"\nlink = \"l\"\nmass_kg = 1.0\ncom_m = [0.0, 0.0, 0.1]\ninertia_at_com_kgm2 = {numbers}"
+        );
+        toml::from_str::<PayloadSection>(&text).unwrap().validate().err().map(|error| error.to_string())
+    }
+
+    #[test]
+    fn inertia_in_the_order_of_mujoco_is_recognised() {
+        assert_eq!(message("[0.02, 0.0, 0.001, 0.03, 0.0, 0.04]"), None);
+        let found = message("[0.02, 0.03, 0.04, 0.0, 0.001, 0.0]").unwrap();
+        assert!(found.ends_with("write inertia_at_com_kgm2 = [0.02, 0.0, 0.001, 0.03, 0.0, 0.04]"), "{found}");
+        let neither = message("[0.02, 0.0, 0.0, 0.03, 0.0, 0.9]").unwrap();
+        assert!(neither.ends_with("the order xx, xy, xz, yy, yz, zz"), "{neither}");
     }
 }

@@ -1,7 +1,7 @@
 //! Robot files; the program `xacro` expands macros if permitted.
 
 use crate::error::{StudyFileError, XacroError};
-use dynident_model::{MAX_DESCRIPTION_BYTES, Robot, load_robot_with};
+use dynident_model::{MAX_DESCRIPTION_BYTES, Robot, load_robot_with, required_xacro_arguments};
 use dynident_system::{ProgramPermission, ProgramPurpose, ProgramRequest, RunLimits, run_to_end};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,10 +25,6 @@ impl XacroSettings {
     /// # Errors
     /// An invalid argument name, or a time limit that is not positive.
     pub fn validate(&self) -> Result<(), XacroError> {
-        let is_name = |name: &str| {
-            name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
-                && name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '/'))
-        };
         if let Some((name, value)) = self.arguments.iter().find(|(name, value)| !is_name(name) || value.contains('\0'))
         {
             return Err(XacroError::Argument { name: name.clone(), value: value.clone() });
@@ -81,12 +77,22 @@ pub fn load_robot(path: &Path, settings: &LoadSettings<'_>) -> Result<Robot, Stu
     if has_macros || settings.xacro.arguments.is_empty() { Ok(robot) } else { Err(wrong(XacroError::NoMacros)) }
 }
 
+/// Whether a text can be the name of an argument.
+fn is_name(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '/'))
+}
+
 fn expanded(path: &Path, settings: &LoadSettings<'_>) -> Result<String, XacroError> {
     let file = path.to_str().ok_or(XacroError::Path)?;
     let request = settings.xacro.request(file);
     let by_hand = || {
         let target = ProgramRequest::new(ProgramPurpose::Xacro, [expanded_name(file)]);
-        format!("{} > {}", request.command_line(), target.command_line())
+        let text = dynident_files::read_text(path, MAX_DESCRIPTION_BYTES).unwrap_or_default();
+        let needed = required_xacro_arguments(&text);
+        let missing = needed.iter().filter(|name| is_name(name) && !settings.xacro.arguments.contains_key(*name));
+        let missing = missing.fold(String::new(), |all, name| all + " " + name + ":=VALUE");
+        format!("{}{missing} > {}", request.command_line(), target.command_line())
     };
     let program =
         settings.programs.permit(request.clone()).map_err(|_| XacroError::NotPermitted { by_hand: by_hand() })?;
@@ -124,6 +130,20 @@ mod tests {
         ] {
             assert_eq!(expanded_name(file), expanded);
         }
+    }
+
+    #[test]
+    fn the_command_names_arguments_that_are_missing() {
+        let folder = std::env::temp_dir().join(format!("dynident-xacro-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("arm.urdf.xacro");
+        let arguments = r#"<xacro:arg name="ur_type"/><xacro:arg name="name"/><xacro:arg name="prefix" default=""/>"#;
+        std::fs::write(&path, format!(r#"<robot xmlns:xacro="x" name="r">{arguments}</robot>"#)).unwrap();
+        let mut settings = LoadSettings::default();
+        settings.xacro.arguments.insert("name".to_owned(), "arm".to_owned());
+        let error = load_robot(&path, &settings).unwrap_err().to_string();
+        std::fs::remove_dir_all(folder).unwrap();
+        assert!(error.ends_with("arm.urdf.xacro name:=arm ur_type:=VALUE > arm.expanded.urdf"), "{error}");
     }
 
     #[test]

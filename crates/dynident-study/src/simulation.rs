@@ -156,7 +156,7 @@ impl SimulationSection {
         self.validate(described.dof())?;
         let unknown = described.bodies_without_prior();
         if !unknown.is_empty() {
-            let fix = "a simulation needs inertials: add them to the robot description";
+            let fix = "a simulation needs the inertial parameters of all bodies: add them to the robot description";
             return Err(StudyError::NoInertials { bodies: unknown.into_iter().map(str::to_owned).collect(), fix });
         }
         let bodies = self.bodies(described);

@@ -1,8 +1,9 @@
 //! Helpers for the tests of several crates: paths of files, number of repetitions of an experiment, and comparison with
-//! a JSON schema. It depends on no other crate.
+//! a JSON schema, and simulated logs with events.
 
 #![forbid(unsafe_code)]
 
+pub mod event_logs;
 pub mod schema;
 
 use std::path::{Path, PathBuf};

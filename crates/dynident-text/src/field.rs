@@ -43,6 +43,49 @@ pub fn markdown(text: &str) -> String {
     out
 }
 
+/// `text` as a cell of a LaTeX table or a part of its text: special characters are escaped, and signs that the default
+/// fonts lack are commands.
+///
+/// ```
+/// assert_eq!(dynident_text::latex("m_1 ± 5 %"), "m\\_1 \\ensuremath{\\pm} 5 \\%");
+/// ```
+pub fn latex(text: &str) -> String {
+    let text = one_line(text);
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        let command = match c {
+            '\\' => "\\textbackslash{}",
+            '~' => "\\textasciitilde{}",
+            '^' => "\\textasciicircum{}",
+            '<' => "\\textless{}",
+            '>' => "\\textgreater{}",
+            '|' => "\\textbar{}",
+            '±' => "\\ensuremath{\\pm}",
+            '−' => "\\ensuremath{-}",
+            '·' => "\\ensuremath{\\cdot}",
+            '²' => "\\ensuremath{^2}",
+            '³' => "\\ensuremath{^3}",
+            '°' => "\\ensuremath{^\\circ}",
+            '–' => "--",
+            '\u{a0}' => "~",
+            '&' | '%' | '$' | '#' | '_' | '{' | '}' => {
+                out.push('\\');
+                out.push(c);
+                continue;
+            }
+            // After the end of a row, these would be an argument of `\\`.
+            '[' => "{[}",
+            '*' => "{*}",
+            c => {
+                out.push(c);
+                continue;
+            }
+        };
+        out.push_str(command);
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -59,6 +102,13 @@ mod tests {
         ] {
             assert_eq!(csv_field(text), field);
         }
+        assert_eq!(
+            latex("\\x{a}\n%$#_^~&[*"),
+            concat!(
+                "\\textbackslash{}x\\{a\\}\\textbackslash{}u000a\\%\\$\\#\\_",
+                "\\textasciicircum{}\\textasciitilde{}\\&{[}{*}"
+            )
+        );
         assert_eq!(markdown("a\\|`x`[y](z)\u{202e}"), "a\\\\\\|\\`x\\`\\[y\\](z)\\\\u202e");
     }
 }

@@ -8,7 +8,7 @@
 //! | a name in code | [`identifier`] |
 //! | XML: attributes and text, comments, a whole document | [`xml::escaped`], [`xml::comment`], [`xml::document`] |
 //! | a whole document of TOML | [`toml_document`] |
-//! | a cell of CSV, of Markdown | [`csv_field`], [`markdown`] |
+//! | a cell of CSV, of Markdown, of LaTeX | [`csv_field`], [`markdown`], [`latex`] |
 //! | JSON | `json::to_string` (feature `json`) |
 //! | a page, a picture, a terminal | [`visible`] |
 //!
@@ -28,7 +28,7 @@ mod toml_document;
 pub mod xml;
 
 pub use comment::comment;
-pub use field::{csv_field, markdown};
+pub use field::{csv_field, latex, markdown};
 pub use identifier::{IDENTIFIER_LENGTH, identifier};
 pub use invisible::{is_invisible, one_line, visible};
 pub use quoted::quoted;

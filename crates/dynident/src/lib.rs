@@ -6,6 +6,7 @@
 //! | logs to a model | [`identify()`]; result: [`ResultFile`], page: [`IdentificationOutcome::report`] |
 //! | validate a model on other logs | [`validate()`] |
 //! | logs to factors, and factors to one model | [`reduce()`], [`Factors`], [`identify_factors()`], [`factors_errors()`] |
+//! | figures and tables for papers | [`Figure`] |
 //! | predict torque along a motion, with its error band | [`TorquePredictor`] |
 //! | inspect a robot description | [`inspect()`]; correct it: [`mended()`] |
 //! | export a model as C, C++, Rust, Python, MATLAB, CasADi, JAX, Pinocchio, MJCF, URDF, SDF, ROS 2 parameters, JSON; drives for a simulator; a payload for a controller | [`export_model()`], [`export_simulator()`], [`export_payload()`] |
@@ -71,12 +72,14 @@ pub use dynident_system as system;
 pub use dynident_text as text;
 
 pub use dynident_identification::{Progress, Role, Silent};
+pub use dynident_report::{PrintStyle, ReportError};
 pub use dynident_system::{ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
 pub use dynident_text::shortened_message;
-pub use error::{Error, FactorsError, NewStudyError, error_code};
+pub use error::{Error, FactorsError, NewStudyError, RecognisedFile, error_code};
 pub use factors::{FactorLog, Factors, seconds_of};
 pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::{CheckSettings, check, check_with};
+pub use jobs::compare::compare;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::export::{
@@ -88,18 +91,25 @@ pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instrume
 pub use jobs::inspect::{
     CorrectedDescription, InspectSettings, inspect, inspect_robot, inspect_with, mended, mended_robot,
 };
-pub use jobs::iterate::{IterationWatch, RobotMaker, iterate_study, iterate_with_robot};
+pub use jobs::iterate::{IterationWatch, MotionObserver, RobotMaker, iterate_study, iterate_with_robot};
 pub use jobs::log::log_contents;
 pub use jobs::new_study::{NewStudy, NewStudySettings, new_study, new_study_with};
 pub use jobs::options::RunOptions;
 pub use jobs::predict::{PredictedTorque, TorquePredictor};
 pub use jobs::reduce::{ReduceSettings, factors_errors, identify_factors, reduce};
+pub use jobs::servo::{ServoDesignOutcome, ServoOutcome, design_servos, identify_servos};
 pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::test_samples::test_samples;
-pub use jobs::validate::{validate, validate_result};
+pub use jobs::validate::{validate, validate_result, validation_traces};
+pub use jobs::view::{view_result, view_robot, view_study};
 pub use output::{check_writable, write_atomically};
 pub use output_set::OutputSet;
+pub use pages::comparison::{comparison_page, explanation_words};
+pub use pages::differences::difference_words;
+pub use pages::figures::Figure;
 pub use pages::identification::identification_report;
+pub use pages::robot::RobotAppearance;
+pub use pages::servo::verdict_words;
 pub use result::{
     CheckFile, DesignFile, Inspection, IterationsFile, LogContents, MAX_RESULT_BYTES, ResultFile, ResultFileError,
     SimulationFile, ValidationFile, read_result,

@@ -3,6 +3,7 @@
 mod formats;
 mod jobs;
 mod parsers;
+mod sage;
 
 use std::io;
 
@@ -23,7 +24,7 @@ pub(crate) struct Target {
 }
 
 /// All targets.
-pub(crate) const TARGETS: [Target; 22] = [
+pub(crate) const TARGETS: [Target; 23] = [
     Target { name: "urdf", repetitions: 10, new: parsers::urdf },
     Target { name: "mjcf", repetitions: 10, new: parsers::mjcf },
     Target { name: "sdf", repetitions: 20, new: parsers::sdf },
@@ -39,6 +40,7 @@ pub(crate) const TARGETS: [Target; 22] = [
     Target { name: "arrow", repetitions: 4, new: formats::any },
     Target { name: "diadem", repetitions: 4, new: formats::any },
     Target { name: "matlab", repetitions: 10, new: formats::any },
+    Target { name: "sage", repetitions: 10, new: sage::sage },
     Target { name: "states", repetitions: 20, new: parsers::states },
     Target { name: "result", repetitions: 10, new: parsers::result },
     Target { name: "design", repetitions: 20, new: parsers::design },

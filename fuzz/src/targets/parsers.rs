@@ -3,7 +3,7 @@
 use super::Run;
 use dynident::iteration::IterationStore;
 use dynident::iteration::robot::{ToHost, read_log_table};
-use dynident::model::collision::read_mesh;
+use dynident::model::collision::{MeshInertiaMode, mesh_inertia, read_mesh};
 use dynident::model::terms::{Expression, JointNames};
 use dynident::model::{
     AuditFinding, Joint, JointChange, Model, audit, link_changes, read_dh, read_mjcf_with, read_sdf, read_urdf,
@@ -59,6 +59,14 @@ pub(crate) fn mesh() -> io::Result<Box<dyn Run>> {
         Ok(mesh) => {
             assert!(mesh.vertices.iter().flat_map(|vertex| vertex.0).all(f64::is_finite), "not finite");
             assert!(mesh.triangles.iter().flatten().all(|place| (*place as usize) < mesh.vertices.len()), "no vertex");
+            for mode in
+                [MeshInertiaMode::Legacy, MeshInertiaMode::Exact, MeshInertiaMode::Convex, MeshInertiaMode::Shell]
+            {
+                if let Ok(found) = mesh_inertia(&mesh, mode) {
+                    let numbers = found.inertia_at_centre.0.iter().flatten().chain(&found.centre_m.0);
+                    assert!(found.size > 0.0 && numbers.copied().all(f64::is_finite), "inertia that is not finite");
+                }
+            }
             true
         }
         Err(error) => said(&error),

@@ -4,8 +4,7 @@ mod markdown;
 
 pub(crate) use markdown::{inline, rendered};
 
-use flate2::read::DeflateDecoder;
-use std::io::Read;
+use crate::packed;
 
 /// Name of the page with the codes of messages.
 const MESSAGES: &str = "messages";
@@ -44,13 +43,8 @@ pub(crate) const SMALL_NOTE: &str = if cfg!(feature = "book") {
 
 /// All pages, in the order of the book.
 pub(crate) fn pages() -> Result<Vec<Page>, String> {
-    let packed: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/book.deflate"));
-    let mut text = String::new();
-    DeflateDecoder::new(packed)
-        .read_to_string(&mut text)
-        .map_err(|error| format!("the pages in this program are corrupt: {error}; install it again"))?;
-    let pages = text.split_terminator('\u{c}').filter_map(|page| page.split_once('\n'));
-    Ok(pages.map(|(name, text)| Page { name: name.to_owned(), text: text.to_owned() }).collect())
+    let files = packed::files(include_bytes!(concat!(env!("OUT_DIR"), "/book.deflate")))?;
+    Ok(files.into_iter().map(|file| Page { name: file.name, text: file.text }).collect())
 }
 
 impl Page {

@@ -1,3 +1,4 @@
+use super::design_commands::design_commands;
 use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, interruption, json, known_in, message_of, pretty_json, refuse_overwriting};
@@ -16,8 +17,9 @@ use std::path::PathBuf;
 
 /// The motion; not written if it was given.
 const TRAJECTORY: &str = "trajectory.csv";
-const FILES: [&str; 9] = [
+const FILES: [&str; 10] = [
     "design.json",
+    "report.html",
     TRAJECTORY,
     "preview.svg",
     "path.svg",
@@ -35,7 +37,8 @@ const OPTIONAL_FILES: [&str; 6] =
 pub(crate) struct Options {
     /// The study file; its [design] states the objective.
     study: PathBuf,
-    /// Folder for design.json, trajectory.csv, preview.svg and path.svg.
+    /// Folder for design.json, report.html, trajectory.csv, preview.svg and path.svg; for a study with [drive.servo]
+    /// design.json and commands.csv.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Do not search: check this trajectory (t_s, q1.., dq1.., ddq1.. or only positions) against the study's limits,
@@ -62,6 +65,19 @@ pub(crate) struct Options {
     programs: ProgramOptions,
 }
 
+impl Options {
+    /// The first given option that a design of commands does not have.
+    fn only_for_torque(&self) -> Option<&'static str> {
+        let given = [
+            ("--check", self.check.is_some()),
+            ("--check-log", self.check_log.is_some()),
+            ("--to", !self.to.is_empty()),
+            ("--rate-hz", self.rate_hz.is_some()),
+        ];
+        given.into_iter().find_map(|(name, is_given)| is_given.then_some(name))
+    }
+}
+
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Format {
     /// ROS 2 JointTrajectory, YAML.
@@ -79,6 +95,17 @@ fn rate(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let mut study = options.programs.load_study(&options.study, options.data.as_deref())?;
+    if study.drive.servo.is_some() {
+        if let Some(option) = options.only_for_torque() {
+            return Err(format!("{option} needs a study with torque, and this one has [drive.servo]: remove it"));
+        }
+        return design_commands(
+            &mut study,
+            (&options.study, &options.out),
+            (options.data.as_deref(), options.seed),
+            context,
+        );
+    }
     if let Some(seed) = options.seed {
         study.design.get_or_insert_default().search.seed = seed;
     }
@@ -161,6 +188,7 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
         at(rate_hz, &|sampled| write(sampled).map_err(|error| error.to_string()))
     };
     let mut files = vec![
+        ("report.html", outcome.report().map_err(message_of)?.into_bytes()),
         ("preview.svg", outcome.preview_svg().map_err(message_of)?.into_bytes()),
         ("path.svg", outcome.path_svg().map_err(message_of)?.into_bytes()),
     ];

@@ -1,5 +1,5 @@
 use super::permission::ProgramOptions;
-use super::{Context, json, known_in, message_of, pretty_json};
+use super::{Context, json, known_in, message_of, pretty_json, result_file};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::export::{CodeOptions, ControllerBrand, Exported, Target};
@@ -134,7 +134,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let data = options.data.as_deref();
     let study = options.study.as_deref().map(|path| options.programs.load_study(path, data).map(|study| (study, path)));
     let study = study.transpose()?;
-    let result = if options.result.is_dir() { options.result.join("result.json") } else { options.result.clone() };
+    let result = result_file(&options.result);
     if let Some(out) = &options.out {
         let named = study.as_ref().map(|(study, path)| study_inputs(study, path, data, &["robot", "torque", "log"]));
         let mut inputs = named.unwrap_or_default();

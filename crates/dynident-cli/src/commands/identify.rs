@@ -1,12 +1,12 @@
-//! `dynident identify STUDY.toml --out DIR`, or with factors instead of a study and its logs.
+//! `dynident identify STUDY.toml [--out DIR]`, or with factors instead of a study and its logs.
 
 use super::permission::ProgramOptions;
 use super::{Context, factors, json, judged, known_in, message_of, pretty_json, refuse_overwriting, show_problems};
 use crate::{Verdict, summary, terminal};
 use dynident::export::Target;
 use dynident::{
-    EXPORT_VALIDATION_SUFFIX, Factors, IdentificationOutcome, OutputSet, RunOptions, check_writable, export_validation,
-    identify, identify_factors, table_validation,
+    EXPORT_VALIDATION_SUFFIX, Factors, IdentificationOutcome, OutputSet, RunOptions, Study, check_writable,
+    export_validation, identify, identify_factors, identify_servos, table_validation,
 };
 use std::path::{Path, PathBuf};
 
@@ -31,9 +31,11 @@ pub(crate) struct Options {
     #[arg(long, value_name = "NAME", requires = "factors")]
     arm: Option<String>,
     /// Folder for result.json, report.html and identified.urdf (for a D-H table also identified.toml, for an MJCF
-    /// identified.xml, for an SDF identified.sdf), each model with its held-out error in NAME.validation.json.
+    /// identified.xml, for an SDF identified.sdf), each model with its held-out error in NAME.validation.json. By
+    /// default STUDY-result in the current folder, for a study STUDY.toml, and factors-result for factors. An earlier
+    /// result in the folder is replaced; its other files stay.
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    out: Option<PathBuf>,
     /// Folder of the recordings, if it differs from the study's.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -59,17 +61,24 @@ const FILES: [&str; 10] = [
 ];
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    let out = out_folder(options);
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
+    if let Some(path) = &options.study {
+        let study = options.programs.load_study(path, options.data.as_deref())?;
+        if study.fits_commands() {
+            return servos(&study, path, &out, options, (context, &run));
+        }
+    }
     let mut identification = match &options.study {
-        Some(study) => of_study(study, options, &run)?,
-        None => of_factors(options, &run)?,
+        Some(study) => of_study(study, &out, options, &run)?,
+        None => of_factors(&out, options, &run)?,
     };
     if let Some(provenance) = &mut identification.result.provenance {
         provenance.command = Some(command(options));
     }
     let result = &identification.result;
-    let mut set = OutputSet::new(&options.out)
+    let mut set = OutputSet::new(&out)
         .file("result.json", pretty_json(result)?)
         .file("report.html", identification.report().map_err(message_of)?);
     let mut models = Vec::new();
@@ -97,30 +106,82 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if context.json {
         terminal::print_document(&json(result)?)?;
     } else if !context.quiet {
-        terminal::print(&summary::identification(result, &options.out, &models))?;
+        terminal::print(&summary::identification(result, &out, &models))?;
     }
     show_problems(&result.problems, ", listed in result.json");
     let within = judged(&result.validation, options.max_validation_error);
     Ok(if result.problems.is_empty() { within } else { Verdict::Negative })
 }
 
-fn of_study(path: &Path, options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
+/// The folder of the result: stated, or named after the study.
+fn out_folder(options: &Options) -> PathBuf {
+    let default = || {
+        let stem = options.study.as_deref().and_then(Path::file_stem).unwrap_or("factors".as_ref());
+        let mut name = stem.to_owned();
+        name.push("-result");
+        name.into()
+    };
+    options.out.clone().unwrap_or_else(default)
+}
+
+/// Drives and bodies from commands and positions.
+fn servos(
+    study: &Study,
+    path: &Path,
+    out: &Path,
+    options: &Options,
+    (context, run): (&Context, &RunOptions<'_>),
+) -> Result<Verdict, String> {
+    if options.max_validation_error.is_some() {
+        return Err("--max-validation-error judges torque, and this study has commands: remove it".to_owned());
+    }
+    let named = (study, path, options.data.as_deref());
+    refuse_overwriting((out, &FILES), named, &["robot", "log", "format"], &[])?;
+    check_writable(out).map_err(message_of)?;
+    let mut found = identify_servos(study, path, run).map_err(known_in(path))?;
+    if let Some(provenance) = &mut found.result.provenance {
+        provenance.command = Some(command(options));
+    }
+    let mut set = OutputSet::new(out)
+        .file("result.json", pretty_json(&found.result)?)
+        .file("report.html", found.report().map_err(message_of)?);
+    let mut models = Vec::new();
+    for (name, text) in [(URDF, &found.urdf), (MJCF, &found.mjcf)] {
+        set = match text {
+            Some(text) => {
+                models.push(name);
+                set.file(name, text.as_str())
+            }
+            None => set.absent(name),
+        };
+    }
+    set.write().map_err(message_of)?;
+    if context.json {
+        terminal::print_document(&json(&found.result)?)?;
+    } else if !context.quiet {
+        terminal::print(&summary::servo(&found.result, out, &models))?;
+    }
+    show_problems(&found.result.problems, ", listed in result.json");
+    Ok(if found.result.problems.is_empty() { Verdict::Good } else { Verdict::Negative })
+}
+
+fn of_study(path: &Path, out: &Path, options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
     let study = options.programs.load_study(path, options.data.as_deref())?;
     let named = (&study, path, options.data.as_deref());
     let sections = ["robot", "torque", "log", "arm", "format", "motion", "estimator"];
-    refuse_overwriting((&options.out, &FILES), named, &sections, &[])?;
-    check_writable(&options.out).map_err(message_of)?;
+    refuse_overwriting((out, &FILES), named, &sections, &[])?;
+    check_writable(out).map_err(message_of)?;
     identify(&study, path, run).map_err(known_in(path))
 }
 
-fn of_factors(options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
-    let outputs = FILES.map(|name| options.out.join(name));
+fn of_factors(out: &Path, options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
+    let outputs = FILES.map(|name| out.join(name));
     dynident::refuse_overwriting(&outputs, &options.factors).map_err(message_of)?;
     let mut all = factors::read_all(&options.factors)?;
     if let Some(arm) = &options.arm {
         all = of_arm(&all, arm)?;
     }
-    check_writable(&options.out).map_err(message_of)?;
+    check_writable(out).map_err(message_of)?;
     identify_factors(&all, run).map_err(message_of)
 }
 

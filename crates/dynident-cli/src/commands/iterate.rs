@@ -1,16 +1,19 @@
 use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, interruption, json, known_in, message_of, permission, refuse_overwriting};
+use crate::live::{LiveServer, LiveState};
 use crate::{Verdict, summary, terminal};
 use dynident::excitation::DesignProgress;
 use dynident::iteration::{NextMotion, RobotRun, RunRecord, StopSignal};
 use dynident::result::INTERRUPTED;
 use dynident::study::{LegOrder, Study};
 use dynident::{
-    Error, IterationWatch, IterationsFile, ProgramPermission, ProgramRequest, Progress, RunOptions, Silent,
-    check_writable, iterate_study,
+    Error, IterationWatch, IterationsFile, MotionObserver, ProgramPermission, ProgramRequest, Progress, RunOptions,
+    Silent, StudyFile, check_writable, iterate_study,
 };
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 const WRITTEN: [&str; 11] = [
     "iterations.json",
@@ -25,6 +28,20 @@ const WRITTEN: [&str; 11] = [
     "identification.html",
     "controller.json",
 ];
+
+/// This computer only, any free port.
+const LOCAL: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
+
+#[derive(clap::Args)]
+struct LivePage {
+    /// Show the runs live on a page for the browser, with a stop button. The page is served on this computer only; the
+    /// link is printed.
+    #[arg(long)]
+    live: bool,
+    /// Address and port of the live page, if other computers are to open it: anyone with the link can stop the robot.
+    #[arg(long, value_name = "IP:PORT", default_value_t = LOCAL, requires = "live")]
+    live_address: SocketAddr,
+}
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
@@ -48,6 +65,8 @@ pub(crate) struct Options {
     /// Ask on the terminal before each run.
     #[arg(long)]
     confirm: bool,
+    #[command(flatten)]
+    page: LivePage,
     /// Folder of the robot description, if it differs from the study's.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -77,11 +96,14 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     // A progress bar would overwrite the questions.
     let progress: Box<dyn Progress> = if options.confirm { Box::new(Silent) } else { context.progress() };
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
+    let live = options.page.live.then(|| started(options, &study, &stop)).transpose()?;
+    let state = live.as_ref().map(|(_, state)| &**state);
     let search = Search::new(context, OnInterrupt::EndsCommand);
     progress.begin("runs", Some(most_runs(&study)));
     let mut notes = Vec::new();
     let mut hear = |record: &RunRecord, runs: &[RobotRun]| {
         progress.advance(1);
+        state.inspect(|state| state.made(record));
         notes.extend(runs.iter().filter_map(|run| Some(format!("run {}: {}", record.run, run.note.as_ref()?))));
     };
     let mut allow = |motion: &NextMotion| permission::for_motion(motion);
@@ -92,9 +114,11 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if options.confirm {
         watch.allow = Some(&mut allow);
     }
+    watch.observer = state.map(|state| state as &dyn MotionObserver);
     let file = iterate_study(&study, &options.study, &options.out, !options.fresh, &run, &mut watch);
     progress.end();
     search.end();
+    state.inspect(|state| state.end(last_words(&file)));
     for note in &notes {
         terminal::remark(note);
     }
@@ -104,6 +128,31 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
             Ok(Verdict::Interrupted)
         }
         other => ended(&other.map_err(known_in(&options.study))?, options, context),
+    }
+}
+
+/// Starts the live page and prints its link.
+fn started(options: &Options, study: &Study, stop: &StopSignal) -> Result<(LiveServer, Arc<LiveState>), String> {
+    let state = Arc::new(LiveState::new(StudyFile::new(study, &options.study).title(), stop.clone()));
+    let address = options.page.live_address;
+    let server = LiveServer::start(address, Arc::clone(&state));
+    let server = server.map_err(|error| {
+        format!("--live-address {address}: {error}; give an address of this computer and a free port (127.0.0.1:0)")
+    })?;
+    terminal::remark(&format!("live page: {}", server.url()));
+    if !address.ip().is_loopback() {
+        terminal::remark(
+            "the live page is open to the network without encryption: anyone with the link can stop the robot",
+        );
+    }
+    Ok((server, state))
+}
+
+/// The end of the iteration for the live page.
+fn last_words(file: &Result<IterationsFile, Error>) -> String {
+    match file {
+        Ok(file) => format!("the iteration has ended: {}", file.reason),
+        Err(error) => format!("the iteration has ended: {error}"),
     }
 }
 

@@ -3,13 +3,16 @@
 mod answer;
 pub(crate) mod benchmark;
 pub(crate) mod check;
+pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod design;
+mod design_commands;
 pub(crate) mod docs;
 pub(crate) mod evaluate;
 pub(crate) mod export;
 mod factors;
 pub(crate) mod identify;
+pub(crate) mod init;
 pub(crate) mod inspect;
 pub(crate) mod interruption;
 pub(crate) mod iterate;
@@ -18,13 +21,17 @@ pub(crate) mod manual;
 pub(crate) mod merge;
 pub(crate) mod new;
 mod permission;
+pub(crate) mod plot;
 pub(crate) mod reduce;
 pub(crate) mod reproduce;
+pub(crate) mod schema;
 mod search;
 pub(crate) mod simulate;
 pub(crate) mod validate;
+pub(crate) mod version;
+pub(crate) mod view;
 
-use crate::progress::Bar;
+use crate::progress::{Bar, Lines};
 use crate::{Verdict, terminal};
 use dynident::identification::examination::LogValidation;
 use dynident::{Progress, Silent, Study, study_inputs};
@@ -42,7 +49,11 @@ pub(crate) struct Context {
 
 impl Context {
     pub(crate) fn progress(&self) -> Box<dyn Progress> {
-        if self.quiet || !terminal::watched() { Box::new(Silent) } else { Box::new(Bar::default()) }
+        match (self.quiet, terminal::watched()) {
+            (true, _) => Box::new(Silent),
+            (false, true) => Box::new(Bar::default()),
+            (false, false) => Box::new(Lines::new(terminal::progress)),
+        }
     }
 }
 
@@ -76,6 +87,11 @@ fn explained(message: String, error: &dynident::Error) -> String {
         Some(code) => format!("{message}\nhelp: dynident docs {code}"),
         None => message,
     }
+}
+
+/// A result.json that is named itself or by its folder.
+pub(crate) fn result_file(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join("result.json") } else { path.to_owned() }
 }
 
 /// A limit for the relative error, in percent.

@@ -23,7 +23,7 @@ pub(crate) struct ProgramOptions {
 #[derive(clap::Args)]
 pub(crate) struct XacroOptions {
     #[command(flatten)]
-    programs: ProgramOptions,
+    pub(crate) programs: ProgramOptions,
     /// An argument of xacro, for a robot file with macros; may be given several times.
     #[arg(long = "xacro", value_name = "KEY=VALUE", value_parser = argument)]
     arguments: Vec<(String, String)>,

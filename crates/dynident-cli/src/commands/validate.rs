@@ -1,5 +1,5 @@
 use super::permission::ProgramOptions;
-use super::{Context, json, judged, known_in, message_of, pretty_json, show_problems};
+use super::{Context, json, judged, known_in, message_of, pretty_json, result_file, show_problems};
 use crate::{Verdict, summary, terminal};
 use dynident::{OutputSet, ResultFile, RunOptions, Study, study_inputs, test_samples, validate_result};
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ const SAMPLES: &str = "samples.json";
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The result.json of an identification.
+    /// The result.json of an identification, or its folder.
     result: PathBuf,
     /// Use the result although it was edited after it was written. Its numbers are still checked.
     #[arg(long)]
@@ -36,11 +36,12 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let read = if options.accept_edited { ResultFile::read_edited } else { ResultFile::read };
-    let stored = read(&options.result).map_err(message_of)?;
+    let result = result_file(&options.result);
+    let stored = read(&result).map_err(message_of)?;
     if let Some(folder) = &options.samples {
-        write_samples(folder, options, (&study, &stored), &run)?;
+        write_samples(folder, options, (&study, &result, &stored), &run)?;
     }
-    let file = validate_result(&stored, &options.result, &study, &options.study, &run);
+    let file = validate_result(&stored, &result, &study, &options.study, &run);
     let file = file.map_err(known_in(&options.study))?;
     if context.json {
         terminal::print_document(&json(&file)?)?;
@@ -55,15 +56,15 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
 fn write_samples(
     folder: &Path,
     options: &Options,
-    (study, stored): (&Study, &ResultFile),
+    (study, result, stored): (&Study, &Path, &ResultFile),
     run: &RunOptions<'_>,
 ) -> Result<(), String> {
     let (description, tables) =
-        test_samples(stored, &options.result, study, &options.study, run).map_err(known_in(&options.study))?;
+        test_samples(stored, result, study, &options.study, run).map_err(known_in(&options.study))?;
     let mut outputs = vec![folder.join(SAMPLES)];
     outputs.extend(tables.iter().map(|(name, _)| folder.join(name)));
     let mut inputs = study_inputs(study, &options.study, options.data.as_deref(), &["robot", "torque", "log"]);
-    inputs.push(options.result.clone());
+    inputs.push(result.to_owned());
     dynident::refuse_overwriting(&outputs, &inputs).map_err(message_of)?;
     let set = OutputSet::new(folder).file(SAMPLES, pretty_json(&description)?);
     let set = tables.into_iter().fold(set, |set, (name, table)| set.file(&name, table));

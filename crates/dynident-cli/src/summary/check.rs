@@ -42,6 +42,12 @@ pub(crate) fn check(file: &CheckFile) -> String {
 
 /// The result of a check without problems: whether the study fits, and how much torque is unexplained.
 fn verdict(check: &StudyCheck) -> String {
+    if check.commanded_logs > 0 {
+        return format!(
+            "commands and positions fit together in {} logs; torques were not compared",
+            check.commanded_logs
+        );
+    }
     let tried = format!("none of {} tested mistakes fits better", check.tried);
     let Some(unexplained) = check.unexplained_percent else {
         return "study, robot and logs were not compared".to_owned();

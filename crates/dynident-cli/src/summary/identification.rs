@@ -38,6 +38,7 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
     if !found.is_empty() {
         let _ = writeln!(text, "{found}");
     }
+    text += &differences(r);
     text += &noise(r);
     text += &joints(r);
     for log in &r.validation {
@@ -76,6 +77,12 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
     text
 }
 
+/// Bodies that differ from the robot description.
+fn differences(r: &ResultFile) -> String {
+    let words = dynident::difference_words(r);
+    if words.is_empty() { String::new() } else { wrapped(&format!("{}.", words.join(". ")), 2) }
+}
+
 fn estimator(name: &str) -> String {
     match name {
         "instrumental" => "instrumental variables".to_owned(),
@@ -103,14 +110,31 @@ fn headline(r: &ResultFile) -> String {
         let prior =
             prior_of(log, None).map_or(String::new(), |p| format!("; robot description {}\u{a0}%", percent(Some(p))));
         let error = percent(written(log).relative_error_percent);
+        let without = without_events(log);
         text += &wrapped(
-            &format!("held-out torque error {error}\u{a0}% on [{}] {} (fit {fit}\u{a0}%{prior})", number + 1, log.log),
+            &format!(
+                "held-out torque error {error}\u{a0}%{without} on [{}] {} (fit {fit}\u{a0}%{prior})",
+                number + 1,
+                log.log
+            ),
             2,
         );
     }
     text += &bands(r);
     text += &beside(r);
     text + &super::forms::forms(r)
+}
+
+/// The error without the intervals of clear events, if there are any.
+fn without_events(log: &LogValidation) -> String {
+    let Some(rest) = &log.without_events else { return String::new() };
+    let error = percent(rest.physical.as_ref().unwrap_or(&rest.model).relative_error_percent);
+    let places: Vec<String> = rest.left_out_s.iter().map(|[from, to]| format!("{from:.2} to {to:.2}\u{a0}s")).collect();
+    format!(
+        " ({error}\u{a0}% without the events at {}, {:.1}\u{a0}% of the rows)",
+        places.join(", "),
+        100.0 * rest.left_out_share
+    )
 }
 
 /// The frequency bands of fit and validation, if they differ.

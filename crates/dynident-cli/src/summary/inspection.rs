@@ -1,4 +1,4 @@
-use super::text::{name, rounded, table, wrapped};
+use super::text::{name, table, wrapped};
 use core::fmt::Write;
 use dynident::Inspection;
 use dynident::result::SlipEntry;
@@ -36,8 +36,8 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     text += &table(&header, 2..7, rows.collect());
     let base = &i.base_parameters;
     let _ = writeln!(text, "\n{} base parameters (combinations that motion and torque determine):", base.count);
-    for expression in &base.expressions {
-        text += &wrapped(&format!("  {}", rounded(expression)), 6);
+    for expression in &base.names {
+        text += &wrapped(&format!("  {expression}"), 6);
     }
     if base.numerical_rank != base.count {
         let doubt = format!(

@@ -24,6 +24,10 @@ pub(crate) fn log(found: &LogContents) -> String {
         }
         text.push('\n');
         text += &wrapped(&line, 2);
+        // All episodes have the channels of the first.
+        if index > 0 && found.has_episodes() {
+            continue;
+        }
         let channels: Vec<&LogChannel> = found.channels.iter().filter(|channel| channel.group == index).collect();
         // The topic is in the line above.
         let topic = group.name.as_ref().map_or_else(String::new, |name| format!("{name}."));

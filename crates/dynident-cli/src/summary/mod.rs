@@ -2,6 +2,7 @@
 
 mod benchmark;
 mod check;
+mod comparison;
 mod design;
 mod factors;
 mod findings;
@@ -13,11 +14,14 @@ mod load;
 mod log;
 mod noise;
 mod reproduction;
+mod servo;
+mod servo_design;
 mod text;
 mod validation;
 
 pub(crate) use benchmark::benchmark;
 pub(crate) use check::check;
+pub(crate) use comparison::comparison;
 pub(crate) use design::design;
 pub(crate) use factors::factors;
 pub(crate) use identification::identification;
@@ -25,4 +29,6 @@ pub(crate) use inspection::{inspection, mended};
 pub(crate) use iteration::{iteration, simulation};
 pub(crate) use log::log;
 pub(crate) use reproduction::reproduction;
+pub(crate) use servo::servo;
+pub(crate) use servo_design::servo_design;
 pub(crate) use validation::validation;

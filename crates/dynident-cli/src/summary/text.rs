@@ -105,15 +105,6 @@ pub(super) fn shortened(expression: &str, longest: usize) -> String {
     format!("{}{tail}", &expression[..cut])
 }
 
-/// A sum with six significant digits per factor.
-pub(super) fn rounded(expression: &str) -> String {
-    let digits = |word: &str| match word.parse::<f64>() {
-        Ok(factor) => format!("{factor:.5e}").parse::<f64>().unwrap_or(factor).to_string(),
-        Err(_) => word.to_owned(),
-    };
-    expression.split(' ').map(digits).collect::<Vec<_>>().join(" ")
-}
-
 /// `a, b, c and 4 more`.
 pub(super) fn listed(names: &[&str], most: usize) -> String {
     let shown = names[..names.len().min(most)].join(", ");
@@ -137,12 +128,6 @@ mod tests {
         assert_eq!(with_deviation(1234.5, 120.0), ["1234", "120"]);
         assert_eq!(with_deviation(1.0, 0.0), ["1.00000", "-"]);
         assert_eq!(with_deviation(1.5e-9, 2e-10), ["1.500e-9", "2.0e-10"]);
-    }
-
-    #[test]
-    fn factors_are_read_with_six_digits() {
-        assert_eq!(rounded("Izz1 + 0.48999999999999994 m2 - 12 mx3"), "Izz1 + 0.49 m2 - 12 mx3");
-        assert_eq!(rounded("my1 - 0.0922123456789 mz2"), "my1 - 0.0922123 mz2");
     }
 
     #[test]

@@ -82,6 +82,7 @@ fn a_design_is_feasible_complete_and_the_same_on_any_number_of_threads() {
     assert!([&rows[0], &rows[1000]].iter().all(|row| row[7..].iter().all(|rate| rate.abs() < 1e-11)));
     for (file, holds) in [
         ("preview.svg", "</svg>"),
+        ("report.html", "data-scene"),
         ("trajectory.ros2.yaml", "\"wrist_3_joint\""),
         ("trajectory.script", "servoj(["),
         ("waypoints.csv", "t_s,shoulder_pan_joint,"),

@@ -581,7 +581,7 @@ fn names_are_no_markup_of_pages() {
         for trace in &mut traces {
             trace.log = trace.log.replace("QQlog", name);
         }
-        identification_report(&file, &traces).unwrap()
+        identification_report(&file, &traces, Some(&outcome.robot)).unwrap()
     };
     let plain = page(PLAIN);
     let (known, scripts) = markup(&plain);

@@ -7,6 +7,43 @@ use core::fmt::Write;
 /// Coefficients below this are rounding noise of the split, not geometry (lengths have at best micrometre precision).
 pub(super) const NEGLIGIBLE: f64 = 1e-9;
 
+/// Direction cosines, and lengths relative to the robot's length, below which a coefficient is omitted in names.
+/// Rounded angles of robot descriptions (`1.5708` for π/2, an error of 4e-6) cause such coefficients.
+const NAME_SHARE: f64 = 1e-5;
+
+/// The same for products of two lengths: 1.4 mm squared on a robot of one metre.
+const NAME_SHARE_OF_SQUARES: f64 = 2e-6;
+
+/// Coefficients that are omitted.
+#[derive(Clone, Copy)]
+pub(super) enum Omitted {
+    /// Rounding noise.
+    Noise,
+    /// Also the effect of rounded angles on a robot of this length, m.
+    RoundedAngles(f64),
+}
+
+impl Omitted {
+    /// Smallest coefficient of the column `added` that a sum shows whose first parameter is the column `first`.
+    fn least(self, first: &Column, added: &Column) -> f64 {
+        let (Self::RoundedAngles(length), Some(to), Some(from)) = (self, power(first), power(added)) else {
+            return NEGLIGIBLE;
+        };
+        let share = if to - from == 2 { NAME_SHARE_OF_SQUARES } else { NAME_SHARE };
+        NEGLIGIBLE.max(share * length.powi(to - from))
+    }
+}
+
+/// Power of the length in the unit of a parameter of a body: 0 of a mass, 2 of an inertia.
+fn power(column: &Column) -> Option<i32> {
+    match column {
+        Column::Body { parameter: 0, .. } => Some(0),
+        Column::Body { parameter: 1..=3, .. } => Some(1),
+        Column::Body { .. } => Some(2),
+        Column::Term(_) => None,
+    }
+}
+
 #[derive(Clone, Copy)]
 pub(super) enum Digits {
     /// Six, without trailing zeros, for names.
@@ -15,11 +52,19 @@ pub(super) enum Digits {
     All,
 }
 
-pub(super) fn expressions(columns: &[Column], split: &IndependentColumns, digits: Digits) -> Vec<String> {
+pub(super) fn expressions(
+    columns: &[Column],
+    split: &IndependentColumns,
+    digits: Digits,
+    omitted: Omitted,
+) -> Vec<String> {
     let mut sums: Vec<String> = split.independent.iter().map(|&column| columns[column].symbol()).collect();
     for (&dependent, factors) in split.dependent.iter().zip(split.regrouping.column_iter()) {
         let symbol = columns[dependent].symbol();
-        for (sum, factor) in sums.iter_mut().zip(factors.iter()).filter(|(_, factor)| factor.abs() >= NEGLIGIBLE) {
+        for ((sum, factor), &first) in sums.iter_mut().zip(factors.iter()).zip(&split.independent) {
+            if factor.abs() < omitted.least(&columns[first], &columns[dependent]) {
+                continue;
+            }
             let sign = if *factor < 0.0 { '-' } else { '+' };
             // Writing to a string cannot fail.
             let _ = match coefficient(factor.abs(), digits) {

@@ -20,7 +20,7 @@ pub use determination::Determination;
 pub use numerical::{NumericalRank, numerical_rank};
 pub use one_joint_motions::numerical_rank_by_body;
 
-use self::expression::Digits;
+use self::expression::{Digits, Omitted};
 use crate::independent_columns::IndependentColumns;
 use crate::regressor_panels::{Column, all_columns};
 use dynident_model::Model;
@@ -47,6 +47,8 @@ impl Default for BaseParameterSettings {
 pub struct BaseParameters {
     columns: Vec<Column>,
     split: IndependentColumns,
+    /// Length of the robot, m.
+    length_m: f64,
 }
 
 impl BaseParameters {
@@ -60,7 +62,8 @@ impl BaseParameters {
             structural::identifiable_directions(model, terms, settings.tolerance).split(settings.tolerance)
         };
         let split = declared::regrouped(model, &columns, split, settings.tolerance);
-        Self { columns, split }
+        let arm_m = model.arm_m();
+        Self { columns, split, length_m: if arm_m > 0.0 { arm_m } else { 1.0 } }
     }
 
     /// Number of base parameters.
@@ -132,15 +135,22 @@ impl BaseParameters {
     }
 
     /// Readable sums, one per base parameter: `Izz1 + 0.49 m2`. Factors have six digits, so that the sums can serve as
-    /// names: they are the same on every processor.
+    /// names: they are the same on every processor. Factors below 1e-5 (if the unit is m times the robot's length
+    /// [`arm_m`](Model::arm_m)), and below 2e-6 of the squared length if it is m², are omitted: rounded angles such as
+    /// `1.5708` cause them. [`regrouping`](Self::regrouping) and all numbers contain them.
     pub fn expressions(&self) -> Vec<String> {
-        expression::expressions(&self.columns, &self.split, Digits::Six)
+        expression::expressions(&self.columns, &self.split, Digits::Six, Omitted::RoundedAngles(self.length_m))
+    }
+
+    /// As [`expressions`](Self::expressions) with the small factors, as in results of earlier versions.
+    pub fn complete_expressions(&self) -> Vec<String> {
+        expression::expressions(&self.columns, &self.split, Digits::Six, Omitted::Noise)
     }
 
     /// As [`expressions`](Self::expressions) for calculation, with every factor in the shortest form that reads back
     /// to the same `f64`. Factors below 1e-9 (rounding) are omitted.
     pub fn exact_expressions(&self) -> Vec<String> {
-        expression::expressions(&self.columns, &self.split, Digits::All)
+        expression::expressions(&self.columns, &self.split, Digits::All, Omitted::Noise)
     }
 
     /// Gap of the split: smallest independent and largest dependent share. With a wide gap the choice does not depend

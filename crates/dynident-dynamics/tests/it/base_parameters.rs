@@ -4,9 +4,9 @@ use dynident_dynamics::{
     BaseParameterSettings, BaseParameters, Workspace, inverse_dynamics, numerical_rank, numerical_rank_by_body,
     torque_regressor,
 };
-use dynident_model::Model;
 use dynident_model::sample::{Random, planar_2r, random_tree};
 use dynident_model::terms::{CoulombShape, Coupling, CouplingEffect, DriveChoice, TorqueTerm, terms_per_joint};
+use dynident_model::{Model, read_urdf};
 
 fn all_terms(model: &Model) -> Vec<TorqueTerm> {
     terms_per_joint(model, |_| DriveChoice {
@@ -29,6 +29,51 @@ fn planar_arm_has_the_base_parameters_of_table_2() {
     let mut expected = ["Izz1 + 0.49 m2", "mx1 + 0.7 m2", "my1", "Izz2", "mx2", "my2"].map(str::to_owned);
     expected.sort();
     assert_eq!(expressions, expected);
+}
+
+#[allow(clippy::approx_constant, clippy::format_push_string, reason = "rounded angles as people write them")]
+#[test]
+fn rounded_angles_change_numbers_but_not_names() {
+    // An arm with shoulder and elbow offsets; every right angle is written with `digits`.
+    let arm = |right: f64, half: f64, size: f64| {
+        let mut text = r#"<robot name="r"><link name="l0"/>"#.to_owned();
+        let joints = [
+            ([0.0, 0.0, 0.3], [0.0, 0.0, 0.0]),
+            ([0.05, 0.0, 0.2], [right, 0.0, 0.0]),
+            ([0.4, 0.0, 0.03], [0.0, 0.0, right]),
+            ([0.02, 0.35, 0.0], [-right, half, 0.0]),
+            ([0.0, 0.04, 0.1], [right, 0.0, half]),
+            ([0.0, 0.08, 0.0], [-right, 0.0, 0.0]),
+        ];
+        for (k, (xyz, rpy)) in joints.iter().enumerate() {
+            let [x, y, z] = xyz.map(|length| length * size);
+            let [roll, pitch, yaw] = rpy;
+            text += &format!(
+                r#"<link name="l{child}"/><joint name="j{child}" type="continuous"><parent link="l{k}"/><child link="l{child}"/>
+                <origin xyz="{x} {y} {z}" rpy="{roll} {pitch} {yaw}"/><axis xyz="0 0 1"/></joint>"#,
+                child = k + 1
+            );
+        }
+        BaseParameters::new(&read_urdf(&(text + "</robot>")).unwrap().model, &[], &BaseParameterSettings::default())
+    };
+    let (right, half) = (core::f64::consts::FRAC_PI_2, core::f64::consts::PI);
+    for size in [0.2, 1.0, 5.0] {
+        let exact = arm(right, half, size);
+        let rounded = arm(1.5708, 3.1416, size);
+        let symbols = |base: &BaseParameters| -> Vec<String> {
+            let words = |sum: String| -> Vec<String> {
+                sum.split(' ').filter(|word| word.parse::<f64>().is_err()).map(str::to_owned).collect()
+            };
+            base.expressions().into_iter().map(|sum| words(sum).join(" ")).collect()
+        };
+        assert_eq!(symbols(&rounded), symbols(&exact), "size {size}");
+        // The numbers keep the effect of the angles, and complete names show it.
+        let difference = (rounded.regrouping() - exact.regrouping()).amax();
+        assert!((1e-8..1e-3).contains(&difference), "{difference:e}");
+        let long = |base: &BaseParameters| base.complete_expressions().concat().len();
+        assert!(long(&rounded) > long(&exact) + 100, "size {size}");
+        assert_eq!(exact.complete_expressions(), exact.expressions(), "size {size}");
+    }
 }
 
 #[test]

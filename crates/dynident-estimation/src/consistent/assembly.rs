@@ -54,15 +54,8 @@ impl AssembledProgram {
             program.blocks.push(Block { map: BlockMap::Own(first), offset, entropy: 0.0, label });
             let prior = PriorBody { reference: &body.reference, whitening, label };
             constant += settings.prior.add_to(&mut program, first, &prior, settings.prior_weight);
-            if let Some(Some([mass, sigma])) = problem.mass_beliefs.get(index).filter(|belief| belief.is_some()) {
-                let functional =
-                    whitening.functional(&core::array::from_fn(|k| if k == 0 { sigma.recip() } else { 0.0 }));
-                program.local.push(LocalSquares {
-                    first,
-                    matrix: DMatrix::from_row_slice(1, 10, functional.as_slice()),
-                    target: DVector::from_element(1, mass / sigma),
-                });
-            }
+            let rows = problem.prior_rows(index).into_iter();
+            program.local.extend(rows.map(|(matrix, target)| LocalSquares { first, matrix, target }));
         }
         for (index, scalar) in problem.scalars.iter().enumerate() {
             let column = all.column(10 * problem.bodies.len() + index) * scalar.scale;

@@ -1,7 +1,7 @@
 //! Input of a physical fit: bodies, scalars, the map to base parameters, and the data.
 
 use super::cone::least_eigenvalue;
-use super::coordinates::{Whitening, pseudo_inertia};
+use super::coordinates::{Whitening, pseudo_inertia, vector_of};
 use super::error::PhysicalError;
 use crate::factor::TriangularFactor;
 use nalgebra::{DMatrix, DVector};
@@ -123,6 +123,17 @@ pub struct PhysicalProblem {
     pub(super) total_mass_kg: Option<Limits>,
     /// Prior of each body's mass: value and standard deviation, kg.
     pub(super) mass_beliefs: Vec<Option<[f64; 2]>>,
+    /// Prior of all values of each body.
+    pub(super) body_priors: Vec<Option<BodyPrior>>,
+}
+
+/// Gaussian prior of all ten values of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyPrior {
+    /// The expected values.
+    pub parameters: [f64; 10],
+    /// Standard deviation relative to the body: of its mass, of its inertia, and of its extent for the centre of mass.
+    pub share: f64,
 }
 
 /// Minimum relative width of an interval; a narrower one has no interior in double precision.
@@ -149,7 +160,17 @@ impl PhysicalProblem {
         let (triangle, rotated) = (factor.regressor_triangle(), factor.rotated_torque());
         finite("an entry of the factor", triangle.as_slice())?;
         finite("an entry of the factor", rotated.as_slice())?;
-        Ok(Self { base, bodies, whitenings, scalars, triangle, rotated, total_mass_kg: None, mass_beliefs: Vec::new() })
+        Ok(Self {
+            base,
+            bodies,
+            whitenings,
+            scalars,
+            triangle,
+            rotated,
+            total_mass_kg: None,
+            mass_beliefs: Vec::new(),
+            body_priors: Vec::new(),
+        })
     }
 
     /// Adds prior masses for the bodies: value and standard deviation, kg. Each is one more measurement, `½((m −
@@ -163,6 +184,43 @@ impl PhysicalProblem {
         finite("a belief of a mass", &beliefs.iter().flatten().flatten().copied().collect::<Vec<_>>())?;
         self.mass_beliefs = beliefs;
         Ok(self)
+    }
+
+    /// Adds Gaussian priors of all values of a body, `½‖(Q − Q₀)/ρ‖²` in coordinates whitened by its reference, with
+    /// the relative standard deviation ρ. They are added to the data's half squares.
+    ///
+    /// # Errors
+    /// [`PhysicalError::Mismatch`] for a wrong number of priors, [`PhysicalError::NotFinite`],
+    /// [`PhysicalError::EmptyInterval`] for a standard deviation that is not positive.
+    pub fn with_body_priors(mut self, priors: Vec<Option<BodyPrior>>) -> Result<Self, PhysicalError> {
+        expect("priors of bodies", self.bodies.len(), priors.len())?;
+        for (prior, body) in priors.iter().zip(&self.bodies) {
+            let Some(prior) = prior else { continue };
+            let name = &body.name;
+            finite(&format!("body {name}: a prior value"), &prior.parameters)?;
+            interval(&format!("body {name}: standard deviation of the prior"), [0.0, prior.share])?;
+        }
+        self.body_priors = priors;
+        Ok(self)
+    }
+
+    /// Rows over the whitened coordinates of a body, in units of their standard deviation, from the priors of its mass
+    /// and of all its values.
+    pub(super) fn prior_rows(&self, body: usize) -> Vec<(DMatrix<f64>, DVector<f64>)> {
+        let whitening = &self.whitenings[body];
+        let mut rows = Vec::new();
+        if let Some([mass, sigma]) = self.mass_beliefs.get(body).copied().flatten() {
+            let functional = whitening.functional(&core::array::from_fn(|k| if k == 0 { sigma.recip() } else { 0.0 }));
+            rows.push((DMatrix::from_row_slice(1, 10, functional.as_slice()), DVector::from_element(1, mass / sigma)));
+        }
+        if let Some(prior) = self.body_priors.get(body).and_then(Option::as_ref) {
+            let target = vector_of(&whitening.whitened(&prior.parameters)) / prior.share;
+            rows.push((
+                DMatrix::from_diagonal_element(10, 10, prior.share.recip()),
+                DVector::from_column_slice(target.as_slice()),
+            ));
+        }
+        rows
     }
 
     /// Sets limits of the sum of all bodies' masses, including known ones.

@@ -35,7 +35,7 @@ pub enum PhysicalError {
     },
     /// A body's reference is not a consistent body.
     #[error(
-        "body {body}: its prior is no consistent body (least eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); fix its mass and inertia or use a rough body of its size"
+        "body {body}: its prior is not physically consistent (smallest eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); correct its mass and inertia in the robot description, or give an approximate body of its size"
     )]
     InfeasiblePrior {
         /// The body.
@@ -45,7 +45,7 @@ pub enum PhysicalError {
     },
     /// A known body is neither physically consistent nor massless.
     #[error(
-        "body {body}: the known values are not physically consistent (smallest eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); fix them or estimate the body"
+        "body {body}: the known values are not physically consistent (smallest eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); correct these values, or remove them so that the body is estimated"
     )]
     InfeasibleKnown {
         /// The body.
@@ -54,7 +54,7 @@ pub enum PhysicalError {
         least_eigenvalue: f64,
     },
     /// The interval of a quantity is empty.
-    #[error("{what}: the interval from {lower} to {upper} is empty; swap or widen the limits")]
+    #[error("{what}: the interval from {lower} to {upper} is empty; the lower limit must be below the upper limit")]
     EmptyInterval {
         /// The quantity and its body.
         what: String,
@@ -78,7 +78,7 @@ pub enum PhysicalError {
         greatest: f64,
     },
     /// The constraints contradict each other.
-    #[error("contradicting constraints (violated by {shortfall:.3e} of the reference): {}", constraints.join("; "))]
+    #[error("contradicting constraints (violated by {shortfall:.3e} of the reference), widen or remove one: {}", constraints.join("; "))]
     Contradictory {
         /// The contradicting constraints.
         constraints: Vec<String>,

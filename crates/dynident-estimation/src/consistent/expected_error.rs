@@ -64,10 +64,12 @@ pub fn expected_error(
             }
             prior_rows.push(row);
         }
-        if let Some([_, std_kg]) = problem.mass_beliefs.get(body).copied().flatten() {
-            let mut row = DVector::zeros(unknowns);
-            row.rows_mut(10 * place, 10).copy_from(&(own.row(0).transpose() / std_kg));
-            prior_rows.push(row);
+        for (own, _) in problem.prior_rows(body) {
+            for k in 0..own.nrows() {
+                let mut row = DVector::zeros(unknowns);
+                row.rows_mut(10 * place, 10).copy_from(&(own.row(k).transpose() * belief.body_share));
+                prior_rows.push(row);
+            }
         }
     }
     let first = 10 * problem.bodies.len();

@@ -26,7 +26,9 @@ mod products;
 mod settings;
 mod stacked;
 
-pub use description::{BaseMap, Ellipsoid, Limits, PhysicalBody, PhysicalProblem, PhysicalScalar, rough_body};
+pub use description::{
+    BaseMap, BodyPrior, Ellipsoid, Limits, PhysicalBody, PhysicalProblem, PhysicalScalar, rough_body,
+};
 pub use difference::ConsistencyTest;
 pub use error::PhysicalError;
 pub use expected_error::{MassPrior, expected_error};

@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct EssentialSettings {
-    /// Dropping ends when the largest relative standard deviation is below this multiple of the smallest. Default 30,
-    /// as in published fits of the TX40; 10 is strict.
+    /// Parameters are dropped until the largest relative standard deviation is below this multiple of the smallest.
+    /// Default 30, as in published fits of the TX40; 10 is strict.
     pub ratio: f64,
-    /// Dropping ends when the F-test rejects: its probability falls below this level, so that noise does not explain
-    /// the growth of the residual. Default 0.05.
+    /// Dropping also ends if the probability of the F-test falls below this level, so that noise does not explain the
+    /// growth of the residual. Default 0.05.
     pub significance: f64,
 }
 

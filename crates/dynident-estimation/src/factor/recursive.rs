@@ -164,8 +164,9 @@ impl RecursiveFactor {
         Ok(())
     }
 
-    /// Writes the solution θ of `R_W θ = r` to `out`; returns false if a diagonal of R is below 1e-12 of the largest,
-    /// i.e. the rows do not determine θ. Does not allocate.
+    /// Writes the solution θ of `R_W θ = r` to `out`, with the triangle R_W of the regressor columns and the
+    /// transformed torques r. Returns false if a diagonal entry of R_W is below 1e-12 of the largest, i.e. the rows do
+    /// not determine θ; `out` is then incomplete. Does not allocate.
     ///
     /// # Panics
     /// If `out` does not have one entry per column.

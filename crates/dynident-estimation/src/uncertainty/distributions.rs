@@ -9,9 +9,14 @@ use statrs::function::{beta::checked_beta_reg, gamma::checked_gamma_ur};
 /// Half-width of the 95 % interval of a normal variable, in standard deviations.
 pub const HALF_WIDTH_95: f64 = 1.959_963_984_540_054;
 
+/// Probability that a standard normal variable is below `value`.
+pub fn normal_below(value: f64) -> f64 {
+    Normal::standard().cdf(value)
+}
+
 /// Probability that a chi-squared variable with `degrees_of_freedom` degrees of freedom exceeds `value`; NaN for a NaN
 /// or degrees of freedom that are not positive.
-pub(crate) fn chi_squared_tail(value: f64, degrees_of_freedom: f64) -> f64 {
+pub fn chi_squared_tail(value: f64, degrees_of_freedom: f64) -> f64 {
     if value.is_nan() || degrees_of_freedom.is_nan() || degrees_of_freedom <= 0.0 {
         return f64::NAN;
     }

@@ -12,7 +12,8 @@ mod newey_west;
 mod scores;
 
 pub use covariance::{CovarianceMethod, correlation};
-pub use distributions::{HALF_WIDTH_95, student_half_width};
-pub(crate) use distributions::{chi_squared_tail, f_tail};
+pub use distributions::chi_squared_tail;
+pub(crate) use distributions::f_tail;
+pub use distributions::{HALF_WIDTH_95, normal_below, student_half_width};
 pub use estimate::{Estimate, EstimateStatus};
 pub(crate) use estimate::{PointEstimate, covariance_of_all, joint_degrees_of_freedom};

@@ -58,7 +58,7 @@ impl FrictionLadderSettings {
             NAME,
             "ramp_s",
             self.ramp_s,
-            "the ramps (four per rung) take the whole duration: shorten them, use fewer rungs or a longer duration",
+            "the ramps (four per rung) take the whole duration: use shorter ramps (ramp_s), fewer rungs or a longer duration",
         )
     }
 

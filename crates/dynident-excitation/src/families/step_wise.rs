@@ -39,7 +39,8 @@ struct Turn {
 }
 
 impl StepWiseLogistic {
-    /// Creates the family for joints with the offsets h (rad, m), with ωT and the repetitions of `settings`.
+    /// Creates the family of motions that move one joint after another, one of `steps` each. `offsets` is the position
+    /// h (rad, m) of each joint from which its motion is counted; ωT and the repetitions are those of `settings`.
     ///
     /// # Errors
     /// Errors of [`SplicedLogistic::new`] for each step.

@@ -2,6 +2,7 @@
 
 use super::known_torque::KnownTorque;
 use super::link_points::LinkPoint;
+use super::scale::LimitScale;
 use super::self_collision_shapes::{LinkShape, SelfCollision};
 use dynident_model::Model;
 use serde::{Deserialize, Serialize};
@@ -28,6 +29,10 @@ use std::collections::BTreeMap;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
+    /// Factors on the limits of all joints, for a slower or weaker motion: one number for velocity, acceleration and
+    /// torque, or a table with one for each. Limits that `joints` states are not scaled. 1 by default.
+    #[serde(skip_serializing_if = "LimitScale::is_one")]
+    pub scale: LimitScale,
     /// Limits of single joints, at most one entry per joint.
     pub joints: Vec<JointLimit>,
     /// Boxes that points of the arm must not leave (workspace S of the paper).
@@ -132,6 +137,20 @@ pub struct ColumnLimit {
 }
 
 impl Limits {
+    /// Multiplies the limits of all joints.
+    pub(super) fn scale_joints(&mut self, factors: LimitScale) {
+        for joint in &mut self.joints {
+            let pairs = [
+                (&mut joint.speed, factors.speed),
+                (&mut joint.acceleration, factors.acceleration),
+                (&mut joint.torque, factors.torque),
+            ];
+            for (limit, factor) in pairs {
+                *limit = limit.map(|limit| limit * factor);
+            }
+        }
+    }
+
     /// Limits of the robot description: position if both ends are given, velocity, and torque from `effort`, which
     /// includes the description's friction, drive inertia and springs. Acceleration, jerk, power and space are
     /// unlimited.

@@ -55,6 +55,14 @@ pub enum LimitError {
         /// The value.
         value: f64,
     },
+    /// A factor that would raise limits.
+    #[error("{what} is {value}: it must be at most 1 (state higher limits in `joints`)")]
+    AboveOne {
+        /// The factor.
+        what: String,
+        /// The value.
+        value: f64,
+    },
     /// A value outside its range.
     #[error("{what} is {value}: it must be at least {at_least} and below {below}")]
     OutOfRange {
@@ -105,7 +113,7 @@ pub enum LimitError {
     },
     /// A torque or power limit without the inertial parameters to compute torque.
     #[error(
-        "joint `{joint}` has a {kind} limit, but the inertial parameters of {} are unknown: give them (rough values with a torque margin are sufficient) or omit the limit",
+        "joint `{joint}` has a {kind} limit, but the inertial parameters of {} are unknown: add them to the robot description (rough values with a torque margin are sufficient), or remove the limit",
         bodies.join(", ")
     )]
     MissingPrior {

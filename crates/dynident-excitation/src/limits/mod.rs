@@ -27,6 +27,7 @@ mod pieces;
 mod place;
 mod power;
 mod relaxation;
+mod scale;
 mod segments;
 mod self_collision;
 mod self_collision_shapes;
@@ -39,7 +40,9 @@ mod torque_range;
 mod validate;
 mod wrench;
 
-pub use assumed::{AssumedLimits, AssumptionThresholds, LimitsInForce, ShapesOfLinks, StartPositions};
+pub use assumed::{
+    AssumedLimits, AssumptionThresholds, CAPSULE_RADIUS_SHARE, LimitsInForce, ShapesOfLinks, StartPositions,
+};
 pub use description::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits};
 pub use diagnose::{Diagnosis, diagnose, diagnose_until};
 pub(crate) use diagnose::{Widened, relaxation};
@@ -47,7 +50,9 @@ pub use error::LimitError;
 pub use kind::{Constraint, LimitKind};
 pub use known_torque::KnownTorque;
 pub use link_points::LinkPoint;
+pub use pairs::{arm_length_m, neutral_posture};
 pub use peaks::{Peak, PeakSettings, peaks};
 pub use relaxation::{BrokenLimit, LimitChange, Relaxation};
-pub use self_collision_shapes::{LinkCapsule, LinkShape, SelfCollision};
+pub use scale::LimitScale;
+pub use self_collision_shapes::{LinkCapsule, LinkShape, SelfCollision, body_capsules};
 pub use set::{LimitSet, LimitWorkspace};

@@ -35,7 +35,7 @@ const POSTURES: usize = 256;
 const MIN_RELATIVE_SIZE: f64 = 0.05;
 
 /// Length of the longest chain of joints from the base, m; the characteristic length of a machine.
-pub(crate) fn arm_length_m(model: &Model) -> f64 {
+pub fn arm_length_m(model: &Model) -> f64 {
     let mut lengths: Vec<f64> = Vec::with_capacity(model.body_count());
     for joint in model.tree_joints() {
         let stroke = if joint.is_rotary() {
@@ -53,7 +53,7 @@ pub(crate) fn arm_length_m(model: &Model) -> f64 {
 }
 
 /// Every joint at zero, or as close to zero as the limits of the robot description allow.
-pub(crate) fn neutral_posture(model: &Model) -> Vec<f64> {
+pub fn neutral_posture(model: &Model) -> Vec<f64> {
     let nearest = |joint: &dynident_model::Joint| {
         let (lower, upper) = (joint.limits.lower.unwrap_or(0.0), joint.limits.upper.unwrap_or(0.0));
         if lower <= upper { 0.0_f64.max(lower).min(upper.max(lower)) } else { 0.0 }

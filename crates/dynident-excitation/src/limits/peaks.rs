@@ -19,7 +19,8 @@ pub struct Peak {
 /// Settings of [`peaks()`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeakSettings {
-    /// Largest difference to the row's largest sample of sampled maxima that are refined.
+    /// Sampled maxima of a row are refined if they are at most this far below the largest sample of the row. Rows are
+    /// relative to their limits. 0.1 by default.
     pub band: f64,
     /// Golden-section steps; each reduces the bracket by 0.618.
     pub steps: usize,

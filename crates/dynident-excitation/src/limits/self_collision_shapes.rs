@@ -139,7 +139,9 @@ pub(crate) fn fitted_capsules(model: &Model, radius_m: f64) -> Vec<LinkShape> {
     (0..=model.body_count()).flat_map(|index| body_capsules(model, index.checked_sub(1), radius_m)).collect()
 }
 
-pub(crate) fn body_capsules(model: &Model, body: Option<usize>, radius_m: f64) -> Vec<LinkShape> {
+/// Capsules of `radius_m` from the origin of a body to the origins of the joints that it carries; at a tip to the
+/// farthest fixed link. `None` is the base. They are in the frame of the body's first link, m.
+pub fn body_capsules(model: &Model, body: Option<usize>, radius_m: f64) -> Vec<LinkShape> {
     let links = &body.map_or(model.base(), |body| &model.bodies()[body]).links;
     let Some(link) = links.first() else { return Vec::new() };
     let carried = model.tree_joints().iter().filter(|joint| joint.parent == body);

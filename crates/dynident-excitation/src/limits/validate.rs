@@ -16,6 +16,7 @@ impl Limits {
     /// positive, an empty or inverted range, a torque or power limit over bodies without inertial parameters, a box
     /// that is too small.
     pub fn validate(&self, model: &Model) -> Result<(), LimitError> {
+        self.scale.validate()?;
         for (index, limit) in self.joints.iter().enumerate() {
             let joint = model.joint_index(&limit.joint).ok_or_else(|| LimitError::UnknownJoint {
                 joint: limit.joint.clone(),

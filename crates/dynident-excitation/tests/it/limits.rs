@@ -4,11 +4,59 @@ use crate::common::{Harmonics, all_limits, grid, palletizer, ur10};
 use dynident_excitation::Motion;
 use dynident_excitation::check::check_limits;
 use dynident_excitation::limits::{
-    ColumnLimit, LimitKind, LimitSet, LimitWorkspace, Limits, LinkPoint, PeakSettings, peaks,
+    AssumedLimits, ColumnLimit, LimitKind, LimitSet, LimitWorkspace, Limits, LimitsInForce, LinkPoint, PeakSettings,
+    ShapesOfLinks, StartPositions, peaks,
 };
 use dynident_model::Model;
 use dynident_model::sample::{Random, random_tree};
 use std::collections::BTreeMap;
+
+#[test]
+fn one_factor_scales_the_limits_of_all_joints_but_not_stated_ones() {
+    let model = ur10();
+    let of = |text: &str| -> Result<LimitsInForce, String> {
+        let given: Limits = toml::from_str(text).map_err(|error| error.to_string())?;
+        let assumed = AssumedLimits { floor: false, self_collision: false, ..AssumedLimits::default() };
+        LimitsInForce::new(&model, &ShapesOfLinks::default(), &assumed, &given, &StartPositions::default())
+            .map_err(|error| error.to_string())
+    };
+    let plain = of("").unwrap();
+    assert!(!plain.assumed.iter().any(|words| words.contains("limits.scale")));
+    for (text, [speed, acceleration, torque]) in [
+        ("scale = 0.8", [0.8; 3]),
+        ("scale = { speed = 0.5 }", [0.5, 1.0, 1.0]),
+        ("scale = { acceleration = 0.25, torque = 0.9 }", [1.0, 0.25, 0.9]),
+    ] {
+        let scaled = of(text).unwrap();
+        assert!(scaled.assumed.iter().any(|words| words.contains("limits.scale")), "{text}");
+        for (joint, whole) in scaled.limits.joints.iter().zip(&plain.limits.joints) {
+            assert_eq!(joint.position, whole.position, "{text}");
+            assert_eq!(joint.speed, whole.speed.map(|limit| limit * speed), "{text}");
+            assert_eq!(joint.acceleration, whole.acceleration.map(|limit| limit * acceleration), "{text}");
+            assert_eq!(joint.torque, whole.torque.map(|limit| limit * torque), "{text}");
+            assert!(joint.speed.is_some() && joint.acceleration.is_some() && joint.torque.is_some(), "{text}");
+        }
+    }
+    // The limit of one joint stays as stated, and the factors are applied once.
+    let name = &model.joints()[1].name;
+    let stated = of(&format!("scale = 0.5\njoints = [{{ joint = \"{name}\", speed = 0.3 }}]")).unwrap().limits;
+    assert_eq!(stated.joints[1].speed, Some(0.3));
+    assert_eq!(stated.joints[1].torque, plain.limits.joints[1].torque.map(|limit| 0.5 * limit));
+    assert!(stated.scale.is_one());
+    for (text, words) in [
+        ("scale = 0.0", "must be above 0"),
+        ("scale = 1.5", "must be at most 1"),
+        ("scale = { torque = nan }", "give a finite number"),
+        ("scale = { velocity = 0.5 }", "scale"),
+    ] {
+        let error = of(text).unwrap_err();
+        assert!(error.contains(words), "{text}: {error}");
+    }
+    // A study that states nothing is written without the key.
+    assert!(!toml::to_string(&Limits::default()).unwrap().contains("scale"));
+    let half: Limits = toml::from_str("scale = 0.5").unwrap();
+    assert_eq!(toml::from_str::<Limits>(&toml::to_string(&half).unwrap()).unwrap(), half);
+}
 
 /// Σ w c of a motion.
 fn cost(set: &LimitSet, motion: &Motion, weights: &[f64], swept: bool) -> f64 {

@@ -165,7 +165,7 @@ impl ArrowTable {
             return Err(broken(&self.path, place, "it is not a schema"));
         };
         if schema.i16(0).unwrap_or(0) != 0 {
-            let fix = "write it on a little-endian machine";
+            let fix = "write the file on a little-endian machine";
             let problem = "its numbers are big-endian";
             return Err(FileError::broken(&self.path, FileFormat::Arrow, place, problem, fix));
         }

@@ -1,6 +1,7 @@
 //! Reads MCAP sequentially: <https://mcap.dev/spec>.
 
 use super::part::{Channel, Encoding, Part};
+use super::unpacked;
 use crate::bytes::Bytes;
 use crate::error::FileError;
 use crate::kind::FileFormat;
@@ -38,7 +39,7 @@ impl core::fmt::Debug for McapFile {
 
 impl McapFile {
     pub(super) fn open(path: &Path) -> Result<Self, FileError> {
-        let file = dynident_files::open(path).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
+        let file = unpacked::open(path)?;
         // Decompress chunks here, because the lengths inside may be wrong.
         let options = LinearReaderOptions::default()
             .with_record_length_limit(MAX_RECORD_BYTES)
@@ -133,7 +134,9 @@ impl McapFile {
         let (kind, schema_encoding, text) = self.schemas.get(&channel.schema_id).cloned().unwrap_or(none);
         let encoding = match (channel.message_encoding.as_str(), schema_encoding.as_str()) {
             ("cdr", "ros2msg") => Encoding::Cdr(vec![text]),
+            ("ros1", "ros1msg") => Encoding::Ros1(text),
             ("json", _) => Encoding::Json,
+            ("cbor", _) => Encoding::Cbor,
             (encoding, schema) => Encoding::Other(format!("{encoding} with a schema in {schema}")),
         };
         self.channels.insert(channel.id, Channel { topic: channel.topic.clone(), kind, encoding });

@@ -1,7 +1,7 @@
 //! Messages of all parts of a recording in sequence.
 
 use super::part::{Channel, Part};
-use super::{database, mcap_file};
+use super::{database, mcap_file, ros1_bag, ulog};
 use crate::error::FileError;
 use crate::kind::FileFormat;
 use std::path::{Path, PathBuf};
@@ -58,6 +58,8 @@ impl Messages {
 fn begin(path: &Path, format: FileFormat) -> Result<Box<dyn Part>, FileError> {
     match format {
         FileFormat::Mcap => Ok(Box::new(mcap_file::McapFile::open(path)?)),
+        FileFormat::Ros1Bag => Ok(Box::new(ros1_bag::Ros1Bag::open(path)?)),
+        FileFormat::Ulog => Ok(Box::new(ulog::Ulog::open(path)?)),
         _ => Ok(Box::new(database::Database::open(path)?)),
     }
 }

@@ -1,4 +1,4 @@
-//! Recordings of messages: MCAP and rosbag2. Every topic is a group of columns with a separate clock.
+//! Recordings of messages: MCAP, rosbag2, ROS 1 bags and ULog. Every topic is a group of columns with a separate clock.
 
 use crate::error::FileError;
 use crate::kind::FileFormat;
@@ -15,6 +15,8 @@ mod messages;
 #[cfg(feature = "bags")]
 mod part;
 #[cfg(feature = "bags")]
+mod ros1_bag;
+#[cfg(feature = "bags")]
 mod sqlite;
 #[cfg(feature = "bags")]
 mod table;
@@ -22,7 +24,12 @@ mod table;
 mod topic;
 
 #[cfg(feature = "bags")]
-pub(crate) use table::{open_database, open_folder, open_mcap};
+mod ulog;
+#[cfg(feature = "bags")]
+mod unpacked;
+
+#[cfg(feature = "bags")]
+pub(crate) use table::{open_file, open_folder};
 
 pub(crate) const METADATA: &str = "metadata.yaml";
 const MAX_METADATA_BYTES: u64 = 1 << 24;
@@ -35,7 +42,7 @@ pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
         .and_then(|file| file.take(MAX_METADATA_BYTES).read_to_string(&mut text))
         .map_err(|source| FileError::Io { file: path.clone(), source })?;
     let broken = |problem: String| {
-        let fix = "recreate it by `ros2 bag reindex`, or specify the part";
+        let fix = "recreate the metadata by `ros2 bag reindex`, or specify the part";
         FileError::broken(&path, FileFormat::Rosbag2, "relative_file_paths", problem, fix)
     };
     let mut lines = text.lines().skip_while(|line| !line.trim_start().starts_with("relative_file_paths:")).skip(1);
@@ -55,16 +62,18 @@ pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
 
 #[cfg(not(feature = "bags"))]
 mod left_out {
-    use crate::{Contents, FileError};
+    use crate::{Contents, FileError, FileFormat};
     use std::path::Path;
 
     pub(crate) fn not_built(path: &Path) -> Result<Contents, FileError> {
         Err(FileError::NotBuilt { file: path.to_owned(), format: "a recording of messages", feature: "bags" })
     }
 
-    pub(crate) use not_built as open_mcap;
-    pub(crate) use not_built as open_database;
     pub(crate) use not_built as open_folder;
+
+    pub(crate) fn open_file(path: &Path, _: FileFormat) -> Result<Contents, FileError> {
+        not_built(path)
+    }
 }
 #[cfg(not(feature = "bags"))]
-pub(crate) use left_out::{open_database, open_folder, open_mcap};
+pub(crate) use left_out::{open_file, open_folder};

@@ -7,7 +7,10 @@ use core::fmt;
 pub(super) enum Encoding {
     /// CDR, with the texts of possible message definitions.
     Cdr(Vec<String>),
+    /// The serialisation of ROS 1: little-endian, without alignment; with the text of the message definition.
+    Ros1(String),
     Json,
+    Cbor,
     Other(String),
 }
 

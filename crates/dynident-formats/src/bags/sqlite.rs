@@ -1,5 +1,6 @@
 //! Reads the rows of tables in an SQLite file sequentially. Format: <https://www.sqlite.org/fileformat2.html>.
 
+use super::unpacked;
 use crate::error::FileError;
 use crate::kind::FileFormat;
 use std::fs::File;
@@ -60,7 +61,7 @@ fn varint(bytes: &[u8], at: usize) -> Option<(u64, usize)> {
 impl Sqlite {
     pub(super) fn open(path: &Path) -> Result<Self, FileError> {
         let io = |source| FileError::Io { file: path.to_owned(), source };
-        let mut file = dynident_files::open(path).map_err(io)?;
+        let mut file = unpacked::open(path)?;
         let mut head = Vec::new();
         file.by_ref().take(100).read_to_end(&mut head).map_err(io)?;
         let size = file.seek(SeekFrom::End(0)).map_err(io)?;

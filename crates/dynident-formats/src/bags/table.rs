@@ -4,13 +4,12 @@ use super::joined::Joined;
 use super::messages::{Header, Messages};
 use super::parts;
 use super::topic::{Sample, Topic};
+use super::unpacked::inner_format;
 use crate::Contents;
 use crate::error::FileError;
 use crate::kind::FileFormat;
-use crate::recognition;
 use crate::table::{ColumnGroup, Table};
 use std::collections::HashMap;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// Maximum number of messages, and of their bytes, that are searched for topics and columns.
@@ -19,29 +18,16 @@ const MAX_SEARCHED_BYTES: usize = 1 << 26;
 /// Number of messages per topic that are searched for columns; several publishers may alternate.
 const MAX_SEARCHED_PER_TOPIC: u64 = 64;
 
-pub(crate) fn open_mcap(path: &Path) -> Result<Contents, FileError> {
-    BagTable::open(path, &[(path.to_owned(), FileFormat::Mcap)])
-}
-
-pub(crate) fn open_database(path: &Path) -> Result<Contents, FileError> {
-    BagTable::open(path, &[(path.to_owned(), FileFormat::Rosbag2)])
+/// Opens one file, possibly compressed as a whole.
+pub(crate) fn open_file(path: &Path, format: FileFormat) -> Result<Contents, FileError> {
+    BagTable::open(path, &[(path.to_owned(), format)])
 }
 
 pub(crate) fn open_folder(path: &Path) -> Result<Contents, FileError> {
     let mut found = Vec::new();
     for part in parts(path)? {
-        let file = dynident_files::open(&part).map_err(|source| FileError::Io { file: part.clone(), source })?;
-        let head = recognition::head(&mut BufReader::new(file));
-        let head = head.map_err(|source| FileError::Io { file: part.clone(), source })?;
-        match recognition::recognised(&part, &head)? {
+        match inner_format(&part)? {
             format @ (FileFormat::Mcap | FileFormat::Rosbag2) => found.push((part, format)),
-            FileFormat::ZstdText => {
-                return Err(FileError::OtherFormat {
-                    file: part,
-                    format: "a packed part of a rosbag2 recording",
-                    fix: "unpack it (`zstd -d`), and write its name without .zstd into metadata.yaml",
-                });
-            }
             other => {
                 let problem = format!("it is {}, not a part of a recording", other.name());
                 return Err(FileError::broken(&part, FileFormat::Rosbag2, "its beginning", problem, "copy it again"));

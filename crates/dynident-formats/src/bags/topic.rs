@@ -2,8 +2,10 @@
 
 use super::part::{Channel, Encoding};
 use crate::arrays::MAX_COLUMNS;
-use crate::json_numbers::flattened;
-use crate::ros::{Decoder, Definition, Leaves};
+use crate::cbor;
+use crate::json_numbers::flattened_message;
+use crate::ros::{Decoder, Definition, Layout, Leaves};
+use serde_json::Value;
 use std::collections::HashMap;
 
 const STAMP: &str = "header.stamp";
@@ -11,8 +13,13 @@ const STAMP: &str = "header.stamp";
 #[derive(Debug)]
 enum Reader {
     /// Possible definitions of the messages; the first one that fits is kept.
-    Cdr(Vec<Decoder>),
-    Json,
+    Binary(Vec<Decoder>),
+    /// Messages that name their numbers.
+    Named(fn(&[u8]) -> Result<Value, String>),
+}
+
+fn json(message: &[u8]) -> Result<Value, String> {
+    serde_json::from_slice(message).map_err(|error| format!("it is not JSON ({error})"))
 }
 
 #[derive(Debug)]
@@ -49,11 +56,15 @@ impl Topic {
     /// The reason why its messages cannot be read.
     pub(super) fn new(channel: &Channel) -> Result<Self, String> {
         let reader = match &channel.encoding {
-            Encoding::Json => Reader::Json,
+            Encoding::Json => Reader::Named(json),
+            Encoding::Cbor => Reader::Named(cbor::value),
+            Encoding::Ros1(text) => {
+                Reader::Binary(vec![Decoder::new(Definition::parse(&channel.kind, text)?, Layout::Ros1)])
+            }
             Encoding::Other(what) => return Err(format!("its messages are {what}")),
             Encoding::Cdr(texts) => {
-                let decoders = texts.iter().map(|text| Definition::parse(&channel.kind, text).map(Decoder::new));
-                Reader::Cdr(decoders.collect::<Result<_, _>>()?)
+                let decoder = |text: &String| Ok(Decoder::new(Definition::parse(&channel.kind, text)?, Layout::Cdr));
+                Reader::Binary(texts.iter().map(decoder).collect::<Result<_, String>>()?)
             }
         };
         let log_time = "log_time".to_owned();
@@ -84,11 +95,10 @@ impl Topic {
         self.origins_ns.entry(0).or_insert(log_ns);
         let mut names = Vec::new();
         match &mut self.reader {
-            Reader::Json => {
-                let value = serde_json::from_slice(message).map_err(|error| format!("it is not JSON ({error})"))?;
-                flattened(&value, &mut String::new(), &mut |name, _| names.push(name.to_owned()));
+            Reader::Named(value) => {
+                flattened_message(&value(message)?, &mut |name, _| names.push(name.to_owned()));
             }
-            Reader::Cdr(decoders) => {
+            Reader::Binary(decoders) => {
                 let mut outcome = Err("its definition is missing".to_owned());
                 let fits = decoders.iter().position(|decoder| {
                     outcome = decoder.read(message, true, &mut self.leaves);
@@ -106,7 +116,7 @@ impl Topic {
                 self.columns.push(name);
             }
         }
-        if let Reader::Cdr(_) = self.reader {
+        if let Reader::Binary(_) = self.reader {
             for (leaf, stamp) in &self.leaves.stamps_ns {
                 if let Some(column) = self.column_of.get(&self.leaves.paths[*leaf]) {
                     self.origins_ns.entry(*column).or_insert(*stamp);
@@ -133,15 +143,14 @@ impl Topic {
         sample.values.resize(self.columns.len(), f64::NAN);
         sample.values[0] = seconds(log_ns, self.origins_ns.get(&0));
         match &mut self.reader {
-            Reader::Json => {
-                let value = serde_json::from_slice(message).map_err(|error| format!("it is not JSON ({error})"))?;
-                flattened(&value, &mut String::new(), &mut |name, number| {
+            Reader::Named(value) => {
+                flattened_message(&value(message)?, &mut |name, number| {
                     if let Some(column) = self.column_of.get(name) {
                         sample.values[*column] = number;
                     }
                 });
             }
-            Reader::Cdr(decoders) => {
+            Reader::Binary(decoders) => {
                 let decoder = decoders.first().ok_or("its definition is missing")?;
                 decoder.read(message, false, &mut self.leaves)?;
                 if self.leaves.shape != self.shape || self.column_of_leaf.len() != self.leaves.values.len() {

@@ -1,7 +1,8 @@
 //! Decodes the numbers of a message in CDR, the serialisation of ROS 2 (OMG DDS-XTypes 1.3, section 7.4; plain
-//! encodings).
+//! encodings), or in that of ROS 1.
 
 use super::definition::{Count, Definition, Field, Kind};
+use super::names_entries;
 use crate::bytes::Bytes;
 
 /// Maximum length of an array that becomes columns; longer ones are images, point clouds or maps.
@@ -19,23 +20,33 @@ pub(crate) struct Leaves {
     pub(crate) paths: Vec<String>,
 }
 
+/// Serialisation of messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Layout {
+    /// After a header of four bytes; numbers are aligned to their length.
+    Cdr,
+    /// Little-endian, without alignment.
+    Ros1,
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Decoder {
     definition: Definition,
+    layout: Layout,
 }
 
 struct Pass<'a, 'l> {
     messages: &'a [Vec<Field>],
     bytes: Bytes<'a>,
-    /// Maximum alignment: 8, or 4 in version 2 of the encoding.
+    /// Maximum alignment: 8, 4 in version 2 of the encoding, 1 without alignment.
     widest: usize,
     leaves: &'l mut Leaves,
     path: Option<String>,
 }
 
 impl Decoder {
-    pub(crate) fn new(definition: Definition) -> Self {
-        Self { definition }
+    pub(crate) fn new(definition: Definition, layout: Layout) -> Self {
+        Self { definition, layout }
     }
 
     /// Reads the numbers of `message` into `leaves`, with their paths if `named`.
@@ -47,13 +58,18 @@ impl Decoder {
         leaves.stamps_ns.clear();
         leaves.shape.clear();
         leaves.paths.clear();
-        let (header, body) = message.split_at_checked(4).ok_or("it is truncated")?;
-        let (big_endian, widest) = match header[..2] {
-            [0, 0] => (true, 8),
-            [0, 1] => (false, 8),
-            [0, 6] => (true, 4),
-            [0, 7] => (false, 4),
-            _ => return Err(format!("its encoding {:#04x}{:02x} is not plain CDR", header[0], header[1])),
+        let (body, big_endian, widest) = match self.layout {
+            Layout::Ros1 => (message, false, 1),
+            Layout::Cdr => {
+                let (header, body) = message.split_at_checked(4).ok_or("it is truncated")?;
+                match header[..2] {
+                    [0, 0] => (body, true, 8),
+                    [0, 1] => (body, false, 8),
+                    [0, 6] => (body, true, 4),
+                    [0, 7] => (body, false, 4),
+                    _ => return Err(format!("its encoding {:#04x}{:02x} is not plain CDR", header[0], header[1])),
+                }
+            }
         };
         let bytes = Bytes::new(body, big_endian);
         let path = named.then(String::new);
@@ -62,11 +78,6 @@ impl Decoder {
         // The middleware may pad the last word.
         if pass.bytes.left() >= 8 { Err("it is longer than defined".to_owned()) } else { Ok(()) }
     }
-}
-
-/// Whether a text field contains the names of the entries of other arrays.
-fn names_entries(field: &str) -> bool {
-    field == "name" || field == "names" || field.ends_with("_names")
 }
 
 impl<'a> Pass<'a, '_> {
@@ -101,6 +112,9 @@ impl<'a> Pass<'a, '_> {
     fn message(&mut self, index: usize, labels: &[&'a [u8]]) -> Result<(), String> {
         let messages = self.messages;
         let fields = &messages[index];
+        if fields.is_empty() && self.widest == 1 {
+            return Ok(());
+        }
         if fields.is_empty() {
             // rosidl adds one byte to an empty message.
             return self.bytes.u8().map(|_| ()).ok_or_else(cut);
@@ -188,7 +202,8 @@ impl<'a> Pass<'a, '_> {
         }
         let value = match kind {
             Kind::Bool | Kind::U8 => self.bytes.u8().map(f64::from),
-            Kind::I8 => self.bytes.u8().map(|value| f64::from(value as i8)),
+            Kind::Byte if self.widest > 1 => self.bytes.u8().map(f64::from),
+            Kind::I8 | Kind::Byte => self.bytes.u8().map(|value| f64::from(value as i8)),
             Kind::U16 => self.bytes.u16().map(f64::from),
             Kind::I16 => self.bytes.u16().map(|value| f64::from(value as i16)),
             Kind::U32 => self.bytes.u32().map(f64::from),
@@ -198,6 +213,7 @@ impl<'a> Pass<'a, '_> {
             Kind::F32 => self.bytes.u32().map(|value| f64::from(f32::from_bits(value))),
             Kind::F64 => self.bytes.u64().map(f64::from_bits),
             Kind::Text => return self.text().map(|_| ()),
+            Kind::Skipped => return self.bytes.u8().map(|_| ()).ok_or_else(cut),
             Kind::WideText => {
                 let length = self.length()?;
                 return self.bytes.take(length.saturating_mul(2)).map(|_| ()).ok_or_else(cut);
@@ -221,7 +237,7 @@ impl<'a> Pass<'a, '_> {
 /// Bytes of a number; zero for other types.
 fn size(kind: Kind) -> usize {
     match kind {
-        Kind::Bool | Kind::U8 | Kind::I8 => 1,
+        Kind::Bool | Kind::Byte | Kind::U8 | Kind::I8 | Kind::Skipped => 1,
         Kind::U16 | Kind::I16 => 2,
         Kind::U32 | Kind::I32 | Kind::F32 => 4,
         Kind::U64 | Kind::I64 | Kind::F64 => 8,

@@ -9,6 +9,8 @@ const MAX_NESTING: usize = 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Bool,
+    /// `byte`: an unsigned number in ROS 2, a signed one in ROS 1.
+    Byte,
     U8,
     I8,
     U16,
@@ -21,6 +23,8 @@ pub(crate) enum Kind {
     F64,
     Text,
     WideText,
+    /// A byte that is not a number: a character, padding.
+    Skipped,
     /// `builtin_interfaces/Time`: one number, s.
     Time,
     /// `builtin_interfaces/Duration`: one number, s.
@@ -105,7 +109,13 @@ impl Definition {
             let kind = if let Some(kind) = primitive(kind) {
                 kind
             } else {
-                let full = if kind.contains('/') { short(kind) } else { format!("{package}/{kind}") };
+                // ROS 1 defines the header without its package.
+                let own = format!("{package}/{kind}");
+                let full = match kind {
+                    "Header" if !texts.contains_key(&own) => "std_msgs/Header".to_owned(),
+                    _ if kind.contains('/') => short(kind),
+                    _ => own,
+                };
                 match full.as_str() {
                     "builtin_interfaces/Time" => Kind::Time,
                     "builtin_interfaces/Duration" => Kind::Duration,
@@ -173,7 +183,11 @@ fn declaration(line: &str) -> Result<Option<(&str, Count, &str)>, String> {
 fn primitive(name: &str) -> Option<Kind> {
     Some(match name {
         "bool" => Kind::Bool,
-        "byte" | "uint8" | "char" => Kind::U8,
+        "byte" => Kind::Byte,
+        "uint8" | "char" => Kind::U8,
+        "time" => Kind::Time,
+        "duration" => Kind::Duration,
+        "skipped" => Kind::Skipped,
         "int8" => Kind::I8,
         "uint16" => Kind::U16,
         "int16" => Kind::I16,

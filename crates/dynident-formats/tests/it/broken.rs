@@ -88,16 +88,18 @@ fn files_with_altered_bytes_are_read_or_refused() {
 #[test]
 fn truncated_recordings_are_read_up_to_the_end() {
     let scratch = tempfile::tempdir().unwrap();
-    let path = scratch.path().join("crash.mcap");
-    let whole = std::fs::read(folder().join("zstd.mcap")).unwrap();
-    std::fs::write(&path, &whole[..whole.len() / 3]).unwrap();
-    let Contents::Table(mut table) = open(&path).unwrap().contents else { panic!() };
-    let mut rows = 0;
-    let mut row = vec![0.0; table.width()];
-    while table.next_row(&mut row).unwrap() {
-        rows += 1;
+    let path = scratch.path().join("crash.log");
+    for file in ["zstd.mcap", "plain.bag", "flight.ulg"] {
+        let whole = std::fs::read(folder().join(file)).unwrap();
+        std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+        let Contents::Table(mut table) = open(&path).unwrap().contents else { panic!() };
+        let mut rows = 0;
+        let mut row = vec![0.0; table.width()];
+        while table.next_row(&mut row).unwrap() {
+            rows += 1;
+        }
+        assert!(rows > 5 && rows < 40 && table.truncated(), "{file}: {rows}");
     }
-    assert!(rows > 5 && rows < 40 && table.truncated(), "{rows}");
     let path = scratch.path().join("crash.jsonl");
     std::fs::write(&path, "{\"t\": 1}\n{\"t\": 2}\n{\"t\": 3").unwrap();
     let Contents::Table(mut table) = open(&path).unwrap().contents else { panic!() };
@@ -150,16 +152,47 @@ fn claims_that_the_file_cannot_fill_take_no_memory() {
     }
 }
 
+/// A short subscription must not cause a long definition each.
+#[test]
+fn subscriptions_of_a_ulog_are_limited() {
+    let scratch = tempfile::tempdir().unwrap();
+    let path = scratch.path().join("many.ulg");
+    let mut bytes = b"ULog\x01\x12\x35\x01\0\0\0\0\0\0\0\0".to_vec();
+    let mut add = |kind: u8, body: &[u8]| {
+        bytes.extend_from_slice(&(body.len() as u16).to_le_bytes());
+        bytes.push(kind);
+        bytes.extend_from_slice(body);
+    };
+    add(b'F', format!("a:uint64_t timestamp;{}", "double x;".repeat(6000)).as_bytes());
+    for id in 0..3000_u16 {
+        add(b'A', &[&[0], &id.to_le_bytes()[..], b"a"].concat());
+    }
+    std::fs::write(&path, bytes).unwrap();
+    let message = drain(&path).unwrap_err().to_string();
+    assert!(message.contains("more than 2000 subscriptions"), "{message}");
+}
+
 #[test]
 fn unsupported_formats_are_named() {
     let scratch = tempfile::tempdir().unwrap();
     let path = scratch.path().join("log.csv");
     for (bytes, words) in [
-        (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag, which is not read; convert it to MCAP"),
-        (b"FEA1\0\0", "write it as Parquet"),
+        (&b"#ROSBAG V2.0\n"[..], "without a column of numbers"),
+        (b"#ROSBAG V1.2\n", "`rosbag fix`"),
+        (b"FEA1\0\0", "pandas.read_feather"),
+        (b"TDSm\x0E\0\0\0", "a TDMS file of LabVIEW, which is not read; convert it in Python: `nptdms.TdmsFile"),
+        (b"MDF     4.10    ", "asammdf.MDF"),
+        (b"UnFinMF 4.10    ", "asammdf.MDF"),
+        (b"\x0E\x03\x13\x01", "h4toh5"),
+        (b"\x80\x04\x95\x20\0\0\0", "a pickle can run any program, so it is never loaded"),
+        (b"\x80\x02}q\0", "pandas.read_pickle"),
+        (b"\x78\x9C\xED\x9D", "joblib.load"),
+        (b"PK\x03\x04\x14\0\0\0\x08\0....[Content_Types].xml....PK\x03\x04..xl/workbook.xml", "pandas.read_excel"),
+        (b"PK\x03\x04....mimetypeapplication/vnd.oasis.opendocument.spreadsheet", "a workbook (ods)"),
+        (b"PK\x03\x04....simulink/blockdiagram.xml", "a Simulink model (slx)"),
+        (b"\xD0\xCF\x11\xE0\xA1\xB1\x1A\xE1", "an old workbook (xls)"),
         (b"ARROW1\0\0", "its end: it is truncated"),
         (b"BZh91AY&SY", "unpack it first"),
-        (b"\xFF\xFEa\0", "save it as UTF-8"),
         (b"PK\x03\x04nothing", "the list of members is missing"),
         (b"\x1F\x8B\x08\0garbage beyond", "cannot be read"),
     ] {
@@ -171,7 +204,10 @@ fn unsupported_formats_are_named() {
     assert!(message.contains("cannot be read"), "{message}");
     std::fs::write(scratch.path().join("metadata.yaml"), "relative_file_paths:\n  - gone.mcap\n").unwrap();
     let message = open(scratch.path()).unwrap_err().to_string();
-    assert!(message.contains("`gone.mcap` is not in the folder; recreate it by `ros2 bag reindex`"), "{message}");
+    assert!(
+        message.contains("`gone.mcap` is not in the folder; recreate the metadata by `ros2 bag reindex`"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -24,7 +24,8 @@ use simulated_copies::SimulatedCopies;
 /// Ratio of neighbouring candidates.
 const CANDIDATE_RATIO: f64 = core::f64::consts::SQRT_2;
 /// Range of candidates: the lowest relative to the lowest cut-off of a joint's spectrum, the highest relative to the
-/// highest one.
+/// highest one. Noise can raise the cut-offs of the spectra, so the lowest candidate is not above the velocity band of
+/// any joint.
 const CANDIDATE_RANGE: [f64; 2] = [0.7, 6.0];
 /// Maximum ratio of candidate to sample rate.
 const MAX_SAMPLE_RATE_RATIO: f64 = 0.4;
@@ -91,7 +92,8 @@ pub fn choose_cutoff(
         return Ok(None);
     }
     let suggested = || logs.spectra().iter().flat_map(|log| log.choice.joints_hz.iter().flatten().copied());
-    let lowest = CANDIDATE_RANGE[0] * suggested().fold(f64::INFINITY, f64::min);
+    let velocities = logs.spectra().iter().flat_map(|log| log.choice.velocity_hz.iter().flatten().copied());
+    let lowest = velocities.fold(CANDIDATE_RANGE[0] * suggested().fold(f64::INFINITY, f64::min), f64::min);
     let highest = CANDIDATE_RANGE[1] * suggested().fold(0.0, f64::max);
     if !(lowest > 0.0 && lowest < highest) {
         return Ok(None);

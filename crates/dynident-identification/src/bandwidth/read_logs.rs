@@ -74,7 +74,7 @@ impl ReadLogs {
         let LogSpectrum { index, rate_hz, choice: spectrum, position_noise } = log;
         let (recording, rate_hz, highest_hz) = (&logs.recordings[*index], *rate_hz, self.highest_hz);
         let Samples::Log(log) = &recording.samples else { return Ok(()) };
-        let places = recording.places(model.model())?;
+        let places = recording.joint_indices(model.model())?;
         if self.log_rate_hz == 0.0 {
             self.log_rate_hz = rate_hz;
             self.thinning = (rate_hz / (RATE_RATIO * highest_hz)).floor().clamp(1.0, 1000.0) as usize;

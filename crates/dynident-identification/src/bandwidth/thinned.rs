@@ -45,7 +45,7 @@ impl Thinned {
         }
         for (left_out, (&place, q)) in self.left_out.iter_mut().zip(places.iter().zip(&self.columns[0])) {
             left_out.resize(q.len(), false);
-            left_out.extend_from_slice(set_aside(block, place, 0, rows));
+            left_out.extend_from_slice(&set_aside(block, place, 0, rows));
         }
         for (joint, &place) in places.iter().enumerate() {
             for (column, source) in self.columns.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {

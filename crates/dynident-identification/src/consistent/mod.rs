@@ -16,9 +16,11 @@ mod settings;
 pub use error::ConsistencyError;
 pub use intervals::{ParameterInterval, consistent_intervals};
 pub use nearest_to_nominal::{inertials, nearest_to_nominal};
+pub(crate) use nominal_spread::body_spread;
 pub use nominal_spread::{nominal_covariance, usual_errors_of_bodies};
 pub use of_estimate::consistent_with_estimate;
 pub use parameter_std::parameter_std;
+pub(crate) use problem::consistent_body;
 pub use problem::{
     consistency_problem, consistent_parameters, inconsistent_nominal_bodies, nearest_consistent_parameters,
     typical_length_m,

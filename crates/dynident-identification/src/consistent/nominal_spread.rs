@@ -1,10 +1,10 @@
 //! Assumed uncertainty of the values of a robot description.
 
-use super::problem::{MASS_STD_RATIO, reference_bodies, term_sizes};
+use super::problem::{MASS_STD_RATIO, consistent_body, reference_bodies, term_sizes};
 use super::settings::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::LinearProblem;
-use dynident_model::{INERTIAL_NAMES, InertialParameters};
+use dynident_model::{Body, INERTIAL_NAMES, InertialParameters};
 use nalgebra::{DMatrix, Matrix4};
 
 /// Standard deviation of a term, relative to the value for which the term alone explains the torque of its joint.
@@ -50,6 +50,27 @@ pub fn usual_errors_of_bodies(robot: &ParametricModel, settings: &ConsistencySet
         }
     }
     directions
+}
+
+/// Change of all parameters of the bodies for independent errors of one relative standard deviation of 1, ten for each
+/// body (the directions of [`nominal_covariance`] divided by its 30 %). `None` if a body has no consistent description.
+pub(crate) fn body_spread(robot: &ParametricModel, settings: &ConsistencySettings) -> Option<DMatrix<f64>> {
+    let bodies = robot.model().bodies();
+    let is_described = |(index, body): (usize, &Body)| {
+        body.prior().is_some() && consistent_body(&robot.nominal()[10 * index..10 * index + 10]).0
+    };
+    if !bodies.iter().enumerate().all(is_described) {
+        return None;
+    }
+    let mut spread = DMatrix::zeros(10 * bodies.len(), 10 * bodies.len());
+    for (index, body) in reference_bodies(robot, settings).iter().enumerate() {
+        for (k, direction) in body_directions(body, 0.0).iter().enumerate() {
+            for (row, value) in direction.iter().enumerate() {
+                spread[(10 * index + row, 10 * index + k)] = value / MASS_STD_RATIO;
+            }
+        }
+    }
+    Some(spread)
 }
 
 /// The base parameters for a unit value of one parameter.

@@ -1,10 +1,10 @@
 //! The physically consistent fit of all bodies and terms to the factors of an estimate.
 
 use super::error::ConsistencyError;
-use super::settings::{ConsistencySettings, EllipsoidSettings};
+use super::settings::{BodyKnowledge, ConsistencySettings, EllipsoidSettings};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::consistent::{
-    BaseMap, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
+    BaseMap, BodyPrior, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
 };
 use dynident_estimation::{LinearProblem, RankSettings};
 use dynident_model::terms::TorqueTerm;
@@ -46,7 +46,7 @@ pub(super) fn described_problem(
     settings: &ConsistencySettings,
 ) -> Result<PhysicalProblem, ConsistencyError> {
     let problem = consistency_problem(robot, problem, joint_sigma, settings)?;
-    Ok(problem.with_mass_beliefs(mass_beliefs(robot, settings))?)
+    Ok(problem.with_mass_beliefs(mass_beliefs(robot, settings))?.with_body_priors(body_priors(robot, settings))?)
 }
 
 /// The consistent parameters whose base parameters are nearest to `theta` in the metric of the factors, for estimates
@@ -69,10 +69,22 @@ pub fn nearest_consistent_parameters(
 fn mass_beliefs(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<Option<[f64; 2]>> {
     let belief = |(index, body): (usize, &Body)| {
         let own = &robot.nominal()[10 * index..10 * index + 10];
-        let is_stated = settings.bodies.get(body.name()).is_some_and(|own| own.prior.is_some() || own.known.is_some());
+        let is_stated = |own: &BodyKnowledge| own.prior.is_some() || own.known.is_some() || own.prior_std.is_some();
+        let is_stated = settings.bodies.get(body.name()).is_some_and(is_stated);
         (body.prior().is_some() && !is_stated && consistent_body(own).0).then(|| [own[0], MASS_STD_RATIO * own[0]])
     };
     robot.model().bodies().iter().enumerate().map(belief).collect()
+}
+
+/// The bodies whose settings state the standard deviation of their prior.
+fn body_priors(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<Option<BodyPrior>> {
+    let prior = |(index, body): (usize, &Body)| {
+        let own = settings.bodies.get(body.name())?;
+        let nominal = core::array::from_fn(|k| robot.nominal()[10 * index + k]);
+        let parameters = own.prior.or_else(|| consistent_body(&nominal).0.then_some(nominal))?;
+        own.prior_std.map(|share| BodyPrior { parameters, share })
+    };
+    robot.model().bodies().iter().enumerate().map(prior).collect()
 }
 
 /// Bodies whose nominal inertia is not physically consistent, unless the settings define them: names with the smallest
@@ -93,7 +105,7 @@ pub fn inconsistent_nominal_bodies(robot: &ParametricModel, settings: &Consisten
 
 /// Whether ten parameters are physically consistent (thin plates are allowed), and the smallest eigenvalue of their
 /// pseudo-inertia.
-pub(super) fn consistent_body(own: &[f64]) -> (bool, f64) {
+pub(crate) fn consistent_body(own: &[f64]) -> (bool, f64) {
     let stated = InertialParameters(core::array::from_fn(|k| own[k]));
     let least = stated.pseudo_inertia().symmetric_eigenvalues().min();
     let moments = stated.inertia_at_origin();

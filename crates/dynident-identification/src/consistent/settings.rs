@@ -37,6 +37,10 @@ pub struct BodyKnowledge {
     /// the link frame.
     #[serde(deserialize_with = "optional")]
     pub prior: Option<[f64; 10]>,
+    /// Standard deviation of the prior body relative to itself: of its mass, its inertia, and its extent for the centre
+    /// of mass. 0.02 keeps a body that was weighed and measured near its values. Without it, masses have 30 % and
+    /// shapes are hardly restricted.
+    pub prior_std: Option<f64>,
     /// The same ten parameters if they are known; they are not fitted.
     #[serde(deserialize_with = "optional")]
     pub known: Option<[f64; 10]>,

@@ -95,8 +95,9 @@ impl Candidate {
     }
 }
 
-/// Searches one mistake in recording number `log`, whose instants are `rows`, that explains its larger residual.
-/// `lag_search` gives its torque at other moments, if the log is long enough.
+/// Searches one mistake in recording number `log` that explains why its residual is larger than that of the training
+/// logs. `rows` are motion and torque of this log at some instants; `lag_search` gives them with the torque shifted in
+/// time, if the log is long enough.
 pub(super) fn held_out_hypothesis(
     known: KnownRobot<'_>,
     rows: &MotionRows,

@@ -32,17 +32,18 @@ impl InconsistentTorque {
 
     /// Whether it is so inconsistent that it does not belong to this robot.
     pub fn is_foreign(&self) -> bool {
-        self.times() > self.settings.min_foreign_ratio
+        self.unexplained_ratio() > self.settings.min_foreign_ratio
     }
 
-    /// Ratio of its unexplained share by one robot to that by separate parameters and the noise of the positions.
-    /// Separate parameters fit such noise, parameters of all joints do not.
-    pub fn times(&self) -> f64 {
+    /// Ratio of the joint's unexplained torque with one robot for all joints to that with separate parameters of the
+    /// joint. The second share includes the noise of the positions, which separate parameters fit, but one robot does
+    /// not.
+    pub fn unexplained_ratio(&self) -> f64 {
         self.left / self.alone.hypot(self.noise).max(f64::MIN_POSITIVE)
     }
 
     fn is_inconsistent(&self) -> bool {
-        self.left > self.settings.min_doubted_unexplained && self.times() > self.settings.min_doubted_ratio
+        self.left > self.settings.min_doubted_unexplained && self.unexplained_ratio() > self.settings.min_doubted_ratio
     }
 }
 
@@ -82,7 +83,7 @@ pub(super) fn inconsistent_torques(
     Ok(all
         .into_iter()
         .filter(InconsistentTorque::is_inconsistent)
-        .max_by(|a, b| a.times().total_cmp(&b.times()))
+        .max_by(|a, b| a.unexplained_ratio().total_cmp(&b.unexplained_ratio()))
         .into_iter()
         .collect())
 }

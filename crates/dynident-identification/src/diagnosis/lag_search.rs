@@ -7,7 +7,7 @@ use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
 use super::joint_fits::{JointFits, SharedMotion};
 use super::mistakes::lag::Lag;
 use super::mistakes::{Mistake, ternary_search};
-use super::motion_rows::{MotionRows, MotionSamples, share_of_log};
+use super::motion_rows::{MotionRows, MotionSamples, instants_of_log};
 use crate::consistent::ConsistencySettings;
 use crate::diagnosis_settings::DiagnosisSettings;
 use crate::lag::LONGEST_DELAY_S;
@@ -76,7 +76,7 @@ impl<'a> LagSearch<'a> {
         let lags: Vec<f64> = (0..dof).map(|joint| if joints.contains(&joint) { lag_s } else { 0.0 }).collect();
         let mut rows = MotionRows::empty(lags.len());
         for (place, samples) in self.samples.iter().enumerate() {
-            let share = share_of_log(most, place, self.samples.len());
+            let share = instants_of_log(most, place, self.samples.len());
             rows.append(&samples.shifted(channels, &lags, self.reach_s, share));
         }
         rows

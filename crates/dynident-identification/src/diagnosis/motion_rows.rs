@@ -13,10 +13,10 @@ const NORMAL_DEVIATION_OF_MEDIAN: f64 = 1.4826;
 /// Variance of the third difference of white noise of variance 1.
 const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
 
-/// Number of the `most` instants that are taken from log number `place` of `logs`: equal for all logs, or one from
-/// evenly chosen logs if there are more logs than instants.
-pub(super) fn share_of_log(most: usize, place: usize, logs: usize) -> usize {
-    if logs <= most { most / logs.max(1) } else { (place + 1) * most / logs - place * most / logs }
+/// Number of instants to take from log number `log` (from 0) of `logs`, so that all logs together give at most `total`:
+/// the same number from each log. With more logs than `total`, one from each of `total` evenly chosen logs.
+pub(super) fn instants_of_log(total: usize, log: usize, logs: usize) -> usize {
+    if logs <= total { total / logs.max(1) } else { (log + 1) * total / logs - log * total / logs }
 }
 
 /// Instants of a motion with its torques, in SI units and in the model's order of joints.
@@ -63,7 +63,7 @@ impl MotionSamples {
     ) -> Result<Self, LogError> {
         let pass = logs.pass_for_instants(model, index);
         let recording = pass.recording;
-        let places = recording.places(model.model())?;
+        let places = recording.joint_indices(model.model())?;
         let joints = places.len();
         let mut rows = MotionRows::empty(joints);
         let (mut pieces, mut spacing_s, mut interpolated) = (vec![0], 0.0, Vec::new());
@@ -289,10 +289,10 @@ mod tests {
     #[test]
     fn instants_are_shared_by_any_number_of_logs() {
         for logs in [1, 2, 7, 299, 300] {
-            assert!((0..logs).all(|place| share_of_log(300, place, logs) == 300 / logs));
+            assert!((0..logs).all(|place| instants_of_log(300, place, logs) == 300 / logs));
         }
         for logs in [301, 450, 1000, 12_345] {
-            let shares: Vec<usize> = (0..logs).map(|place| share_of_log(300, place, logs)).collect();
+            let shares: Vec<usize> = (0..logs).map(|place| instants_of_log(300, place, logs)).collect();
             assert_eq!(shares.iter().sum::<usize>(), 300, "{logs}");
             assert!(shares.iter().all(|&share| share <= 1));
         }

@@ -5,7 +5,7 @@ use super::description_fit::description_fit;
 use super::error::DiagnosisError;
 use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
 use super::lag_search::LagSearch;
-use super::motion_rows::{INSTANTS, MotionRows, MotionSamples, share_of_log};
+use super::motion_rows::{INSTANTS, MotionRows, MotionSamples, instants_of_log};
 use super::search::{Search, searches};
 use crate::consistent::ConsistencySettings;
 use crate::left_to_the_logs::with_drives_left_to_the_logs;
@@ -49,7 +49,7 @@ pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, Dia
     let samples: Vec<MotionSamples> = training.iter().map(of_recording).collect::<Result<_, _>>()?;
     let mut rows = MotionRows::empty(robot.dof());
     for (place, one) in samples.iter().enumerate() {
-        rows.append(&one.instants(share_of_log(INSTANTS, place, samples.len())));
+        rows.append(&one.instants(instants_of_log(INSTANTS, place, samples.len())));
     }
     let torque_noise = torque_noise(&samples, robot.dof());
     // Identification estimates unstated drive inertia; without it a mistake would have to explain this torque.

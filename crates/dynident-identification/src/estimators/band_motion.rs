@@ -3,7 +3,7 @@
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
 use dynident_recording::derivative::ButterworthZeroPhase;
-use dynident_recording::{Derivatives, Differentiator, FilterError, MotionBlock, Place, cutoff};
+use dynident_recording::{Derivatives, Differentiator, FilterError, MotionBlock, Place, cutoff, unsettled_samples};
 use dynident_rows::{LogError, LogPass};
 
 /// Order of the low-pass, equal to the default of the differentiator.
@@ -73,6 +73,10 @@ impl InstrumentSource for BandMotion<'_, '_> {
                 values.extend_from_slice(&joint[order][from..to]);
             }
         }
+        let whole = joints.first().map_or(0, |[q, ..]| q.len());
+        let ends = unsettled_samples(measured.rate_hz, self.cutoff_hz).min(whole / 4);
+        instruments.unsettled =
+            [ends.saturating_sub(from), (to + ends).saturating_sub(whole)].map(|end| end.min(to - from));
         self.next = (piece, to);
         Ok(())
     }

@@ -10,6 +10,7 @@ use dynident_rows::{
     JointFilters, LogError, LogPass, PANEL_SAMPLES, RegressorModel, Samples, in_model_order, motion_band_hz,
     predicted_torque, set_aside,
 };
+use std::borrow::Cow;
 
 /// Factors of `[Z | W | τ]` of one log, one for each joint.
 pub(super) fn instrumented_factors(
@@ -63,6 +64,23 @@ fn made_rows<'r, 'a>(
         Ok(())
     })?;
     refused.map_or(Ok(builder), Err)
+}
+
+/// Marks of samples that are invalid in the measured motion or at the ends of the instruments' motion.
+fn left_out<'m>(
+    measured: &'m MotionBlock,
+    instruments: &MotionBlock,
+    place: usize,
+    from: usize,
+    samples: usize,
+) -> Cow<'m, [bool]> {
+    let of_measured = set_aside(measured, place, from, samples);
+    let ends = MotionBlock { rows: instruments.rows, unsettled: instruments.unsettled, ..MotionBlock::default() };
+    let of_instruments = set_aside(&ends, 0, from, samples);
+    if of_instruments.is_empty() || of_measured.is_empty() {
+        return if of_measured.is_empty() { Cow::Owned(of_instruments.into_owned()) } else { of_measured };
+    }
+    of_measured.iter().zip(of_instruments.iter()).map(|(own, other)| *own || *other).collect()
 }
 
 struct InstrumentedRows<'r, 'a> {
@@ -130,7 +148,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             rows,
             log: recording.name.clone(),
             label,
-            places: recording.places(model)?,
+            places: recording.joint_indices(model)?,
             theta,
             squares: vec![0.0; widths.len()],
             widths,
@@ -211,8 +229,8 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                     self.panel.extend(torque.iter().map(|torque| gain * torque));
                 }
                 // Mask invalid samples in both motions and the torque, as in the rows of a fit.
-                let left_out = set_aside(measured, place, from, samples);
-                let rows = filters.push(joint, &self.panel, samples, left_out).counted(&mut self.counted);
+                let left_out = left_out(measured, &self.other, place, from, samples);
+                let rows = filters.push(joint, &self.panel, samples, &left_out).counted(&mut self.counted);
                 if rows.rows > 0 {
                     self.squares[joint] += rows.panel[..rows.rows].iter().map(|value| value * value).sum::<f64>();
                     self.factors[joint]

@@ -15,12 +15,11 @@ pub trait InstrumentSource: Send {
     fn begin(&mut self, log: usize) -> Result<(), EstimatorError>;
 
     /// Writes `q`, `dq` and `ddq` (joint-major, `joint * rows + row`, joints in the order of the log, SI units) for the
-    /// samples of `measured`, which arrive in order of time. Rows and segment are those of `measured`. Other fields of
-    /// `instruments` are ignored.
+    /// samples of `measured`, which arrive in order of time. Rows and segment are those of `measured`. Samples at the
+    /// ends that a filter extrapolated can be excluded by `unsettled`. Other fields of `instruments` are ignored.
     ///
     /// # Errors
     /// The motion does not cover these samples.
-    /// If the motion does not cover these samples.
     fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), EstimatorError>;
 }
 
@@ -76,7 +75,7 @@ impl InstrumentSource for SmoothedMotion<'_> {
 
     fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), EstimatorError> {
         let (rows, joints) = (measured.rows, measured.joints);
-        (instruments.rows, instruments.joints) = (rows, joints);
+        (instruments.rows, instruments.joints, instruments.unsettled) = (rows, joints, [0; 2]);
         for values in [&mut instruments.q, &mut instruments.dq, &mut instruments.ddq] {
             values.clear();
             values.resize(rows * joints, 0.0);
@@ -109,6 +108,10 @@ impl InstrumentSource for SmoothedMotion<'_> {
                     to[joint * rows + done..joint * rows + done + count].copy_from_slice(source);
                 }
             }
+            let [begin, end] = self.block.unsettled;
+            let behind = self.block.rows - (self.used + count);
+            instruments.unsettled[0] += begin.saturating_sub(self.used).min(count);
+            instruments.unsettled[1] += end.saturating_sub(behind).min(count);
             self.used += count;
             done += count;
         }

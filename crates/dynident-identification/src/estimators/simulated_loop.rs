@@ -93,7 +93,7 @@ impl LoopLog {
         let Some(mut stream) = recording.open(model.model(), motion)? else {
             return Err(wrong(format!("log `{name}`: a prepared motion has no sampling instants; give raw samples")));
         };
-        let places = recording.places(model.model())?;
+        let places = recording.joint_indices(model.model())?;
         let filter = logs.filter.decimation(stream.rate_hz(), motion_band_hz(motion));
         let in_filter = |source| LogError::Filter { log: name.clone(), source };
         let dof = model.dof();

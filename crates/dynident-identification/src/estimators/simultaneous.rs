@@ -180,7 +180,7 @@ fn read(
     let Some(mut stream) = recording.open(model.model(), &motion)? else {
         return Err(wrong(format!("log `{name}`: the positions of a prepared motion are smoothed; give raw samples")));
     };
-    let (rate_hz, places) = (stream.rate_hz(), recording.places(model.model())?);
+    let (rate_hz, places) = (stream.rate_hz(), recording.joint_indices(model.model())?);
     let mut channels = vec![Vec::new(); 2 * places.len()];
     let (mut block, mut segment) = (MotionBlock::default(), None);
     while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {

@@ -124,7 +124,7 @@ fn read(
     let Some(mut stream) = whole.open(model.model(), &motion)? else {
         return Err(wrong(format!("log `{name}`: {raw}")));
     };
-    let (rate_hz, places) = (stream.rate_hz(), recording.places(model.model())?);
+    let (rate_hz, places) = (stream.rate_hz(), recording.joint_indices(model.model())?);
     let mut pieces: Vec<Vec<Vec<f64>>> = Vec::new();
     let (mut block, mut segment) = (MotionBlock::default(), None);
     while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {

@@ -36,6 +36,23 @@ pub struct LogValidation {
     pub prior: Option<ValidationReport>,
     /// Residual diagnostics of each joint.
     pub residuals: Vec<JointResiduals>,
+    /// Errors without the intervals of clear events; missing without such events.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub without_events: Option<WithoutEvents>,
+}
+
+/// Errors on a held-out recording without the intervals of clear events.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct WithoutEvents {
+    /// Intervals that are left out, s after the first data row of the file.
+    pub left_out_s: Vec<[f64; 2]>,
+    /// Share of the log's rows that are left out, from 0 to 1.
+    pub left_out_share: f64,
+    /// For the same torque as the errors of the complete log.
+    pub model: ValidationReport,
+    /// The physically consistent set for the same torque.
+    pub physical: Option<ValidationReport>,
 }
 
 /// A recording that a model was tested on.
@@ -242,6 +259,7 @@ pub(crate) fn tested_on(
             physical: tested_physical,
             prior: tested_prior,
             residuals,
+            without_events: None,
         },
         nominal_agreement: test.agreement.map(|rows| PriorAgreement::of_rows(model, &rows, limits)),
         delays: lags_after_pass(test.delay, (logs, settings), index)?,

@@ -4,6 +4,7 @@ mod finer_motion;
 mod friction_sign;
 mod held_out;
 mod motion_band;
+mod motion_trace;
 mod nominal_agreement;
 mod residuals;
 mod stiction;
@@ -17,12 +18,13 @@ pub use crate::lag::{
     pooled_delay,
 };
 pub use friction_sign::{FrictionSign, friction_sign_findings, friction_signs};
-pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, examine_held_out};
+pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, WithoutEvents, examine_held_out};
+pub use motion_trace::MotionTrace;
 pub use nominal_agreement::{PriorAgreement, agreement_findings};
 pub use residuals::{JointResiduals, TorqueBand, Uncertainty};
 pub use stiction::Stiction;
 pub use torque_sign::{TorqueSignCheck, sign_evidence, sign_findings};
-pub use torque_trace::{JointTrace, LogTrace};
+pub use torque_trace::{EventTrace, JointTrace, LogTrace};
 pub use training::examine_training;
 
 pub(crate) use held_out::tested_on;

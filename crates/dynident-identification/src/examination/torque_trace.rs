@@ -1,5 +1,7 @@
 //! Measured and predicted torque over time, for the report.
 
+use super::motion_trace::MotionTrace;
+use dynident_events::LogEvent;
 use dynident_rows::{JointRows, RawSamples, RegressorModel, Role, predicted_torque};
 
 /// Largest number of rows of one joint: enough for a plot, and bounds the memory.
@@ -11,6 +13,21 @@ pub struct JointTrace {
     /// Measured torque with the filter of the fit, Nm (N); NaN in gaps and for unused rows.
     pub measured_nm: Vec<f64>,
     /// Predicted torque of the base parameters, Nm (N); NaN in gaps and for unused rows.
+    pub predicted_nm: Vec<f64>,
+}
+
+/// Torque of one joint around an event.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EventTrace {
+    /// The event.
+    pub event: LogEvent,
+    /// Name of the joint with the largest residual in the interval, relative to its usual residual.
+    pub joint: String,
+    /// Time, s after the first data row of the file.
+    pub time_s: Vec<f64>,
+    /// Measured torque, Nm or N, as means over bins.
+    pub measured_nm: Vec<f64>,
+    /// Torque of the model of the rest of the log, Nm or N.
     pub predicted_nm: Vec<f64>,
 }
 
@@ -27,6 +44,10 @@ pub struct LogTrace {
     pub cut: bool,
     /// Torque of each joint, in the model's order.
     pub joints: Vec<JointTrace>,
+    /// Motion of the first minute.
+    pub motion: MotionTrace,
+    /// Torque around the events of the log.
+    pub events: Vec<EventTrace>,
 }
 
 /// Collects a [`LogTrace`].
@@ -41,11 +62,14 @@ pub(crate) struct TraceConsumer<'a> {
 
 impl<'a> TraceConsumer<'a> {
     pub(crate) fn new(model: &'a RegressorModel, theta: &'a [f64]) -> Self {
-        let joints = vec![JointTrace::default(); model.model().dof()];
-        Self { model, theta, trace: LogTrace { joints, ..LogTrace::default() }, segment: None, buffer: Vec::new() }
+        let dof = model.model().dof();
+        let (joints, motion) = (vec![JointTrace::default(); dof], MotionTrace::new(dof));
+        let trace = LogTrace { joints, motion, ..LogTrace::default() };
+        Self { model, theta, trace, segment: None, buffer: Vec::new() }
     }
 
     pub(crate) fn raw(&mut self, samples: &RawSamples<'_>) {
+        self.trace.motion.add(self.model, self.theta, samples, &mut self.buffer);
         if *self.segment.get_or_insert(samples.segment) != samples.segment {
             self.segment = Some(samples.segment);
             for JointTrace { measured_nm, predicted_nm } in &mut self.trace.joints {

@@ -72,8 +72,9 @@ pub(super) fn further_columns(
     (0..further).filter(move |place| !fixed.contains(&(base + place))).map(move |place| wide_base + place)
 }
 
-/// Selects friction for joints whose `candidates` are columns of `wide_problem`. `plain` is the fit with the stated
-/// terms, in which joints have equal weights if `equal_weights`. `limits` are those of each of `candidates`.
+/// Selects the friction of the joints in `candidates`: pairs of a joint and its candidate columns, all of them
+/// columns of `wide_problem`. `plain` is the fit with the stated terms, with equal weights of the joints if
+/// `equal_weights`. `limits` has the thresholds of the search for each entry of `candidates`.
 pub(crate) fn choose_friction(
     model: &RegressorModel,
     wide: &RegressorModel,

@@ -7,7 +7,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum PayloadError {
     /// A recording has an unknown payload.
-    #[error("a [[log]] carries payload `{name}`, but the [[payload]]s are: {}; name one of them or describe it",
+    #[error("payload = \"{name}\" of a [[log]] is no name of a [[payload]] (names: {}); use one of these names, or add a [[payload]] with this name",
         if known.is_empty() { "none".to_owned() } else { known.join(", ") })]
     UnknownPayload {
         /// Name of the payload.
@@ -16,7 +16,7 @@ pub enum PayloadError {
         known: Vec<String>,
     },
     /// The link does not exist.
-    #[error("payload at link `{link}`: no moving link has this name; the moving links are {}", known.join(", "))]
+    #[error("[[payload]] link = \"{link}\": no moving link has this name; use one of {}", known.join(", "))]
     UnknownLink {
         /// Name of the link.
         link: String,
@@ -25,7 +25,7 @@ pub enum PayloadError {
     },
     /// Only test recordings have the payload to estimate.
     #[error(
-        "payload `{name}` is unknown, and no log to fit to carries it: give its mass_kg and com_m, or a [[log]] with the role \"identify\""
+        "payload `{name}` is unknown, and no training log contains it: add mass_kg and com_m to its [[payload]], or payload = \"{name}\" to a [[log]] that is not for validation"
     )]
     NotTrained {
         /// Name of the payload.
@@ -33,12 +33,12 @@ pub enum PayloadError {
     },
     /// A known arm without anything to estimate.
     #[error(
-        "[arm]: the arm is held and there is nothing to estimate: describe a [[payload]] without mass_kg and name it in a [[log]], or set `refit`"
+        "[arm]: the arm is known, and the study has no other unknown: add a [[payload]] without mass_kg and payload = \"NAME\" to its [[log]], or refit = \"offset\" or \"friction\" to [arm]"
     )]
     NothingToEstimate,
     /// A known arm with unknown gains.
     #[error(
-        "[arm] and drive.gains = \"unknown\": with a known arm the gains are known; state them as torque.scale of the format"
+        "[arm] and drive.gains = \"unknown\": with a known arm the gains are known; remove this key and write the gains as scale under [format.torque]"
     )]
     GainsOfKnownArm,
     /// The estimator does not support additional columns.
@@ -53,16 +53,18 @@ pub enum PayloadError {
     )]
     FrictionOfKnownArm,
     /// Test of drive inertia for a known arm.
-    #[error("[arm]: a known arm has the drive inertia of its result; do not test it")]
+    #[error(
+        "[arm]: a known arm has the drive inertia of its result; remove the test of drive inertia (drive.drive_inertia)"
+    )]
     DrivesOfKnownArm,
     /// Friction that depends on the load of the bare arm.
     #[error(
-        "load-dependent friction is not possible with payloads, because its load is that of the bare arm: leave out the law `load`"
+        "load-dependent friction is not possible with payloads, because its load is that of the bare arm: remove the law `load` from [drive]"
     )]
     LoadFriction,
     /// No recording determines the gains.
     #[error(
-        "drive.gains = \"unknown\" needs training logs both without and with a payload that is known: give a [[payload]] with mass_kg and com_m, and a [[log]] that carries it"
+        "drive.gains = \"unknown\" needs training logs both without and with a payload that is known: add a [[payload]] with mass_kg and com_m, and payload = \"NAME\" to the [[log]] of each loaded recording"
     )]
     GainsNeedPayload,
     /// The covariance of the known arm has the wrong size.

@@ -74,10 +74,10 @@ pub(crate) fn drive_gains(
 fn drive_gain(gain: JointGain, max_half_width: f64) -> DriveGain {
     let wide = gain.half_width_95 > max_half_width * gain.gain.abs();
     let reason = if !gain.identified {
-        Some("joint does not feel the payload, so any gain fits equally well; move it so that the payload's weight or inertia loads it".to_owned())
+        Some("the payload does not change the torque of this joint, so any gain fits equally well; record a motion in which the weight or the inertia of the payload loads the joint".to_owned())
     } else if wide {
         Some(format!(
-            "joint hardly feels the payload: the half width of its interval exceeds {:.0} % of its value; use a heavier payload, a larger distance, or a motion that loads the joint more",
+            "the payload hardly changes the torque of this joint: the half width of the gain's 95 % interval exceeds {:.0} % of the gain; use a heavier payload, a larger distance, or a motion that loads the joint more",
             100.0 * max_half_width
         ))
     } else {

@@ -1,4 +1,5 @@
 //! Integration tests of the crate.
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
+mod events;
 mod pauses;

@@ -1,6 +1,7 @@
 //! Tests of a run: noise, clipping, prediction, tracking floor, held-out motion.
 
 pub(crate) mod clipping;
+pub(crate) mod expected_torque;
 pub(crate) mod held_out_motion;
 pub(crate) mod prediction;
 pub(crate) mod run_evidence;

@@ -4,7 +4,7 @@ use dynident_identification::{LogError, Logs, RegressorModel};
 use nalgebra::DMatrix;
 
 /// Half width of a 95 % interval in standard deviations; runs have far more rows than parameters.
-const HALF_WIDTH_95_SIGMAS: f64 = 1.96;
+pub(crate) const HALF_WIDTH_95_SIGMAS: f64 = 1.96;
 
 /// L with `Lᵀ L` the covariance of some columns, by eigenvalues, because covariances from few segments are singular.
 pub(crate) fn covariance_root(covariance: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {

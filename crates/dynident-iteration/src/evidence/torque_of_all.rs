@@ -68,7 +68,7 @@ pub(crate) fn largest_torque(
     largest
 }
 
-fn samples_of(whole: &Motion, some: &[usize]) -> Motion {
+pub(crate) fn samples_of(whole: &Motion, some: &[usize]) -> Motion {
     let mut part = Motion::default();
     part.reset(whole.joints, some.len());
     for joint in 0..whole.joints {

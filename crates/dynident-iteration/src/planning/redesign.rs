@@ -78,13 +78,14 @@ enum NotRedesigned {
     Limits(#[from] LimitError),
     #[error("the search found no motion: {0}")]
     Search(#[from] OptimiserError),
-    #[error("the best motion breaks a limit of {what} by {percent:.2} %")]
+    /// The iteration keeps its motion: the best new one exceeds a limit.
+    #[error("the best motion that was found exceeds the limit of {what} by {percent:.2} %")]
     Broken { what: String, percent: f64 },
     #[error(
-        "joint {joint} may need {torque:.3} Nm along every motion found (models within the uncertainty), its limit is {limit:.3} Nm"
+        "every motion that was found needs up to {torque:.3} Nm at joint {joint} for some model within the uncertainty, and the limit is {limit:.3} Nm"
     )]
     Torque { joint: String, torque: f64, limit: f64 },
-    #[error("the family does not return joint {joint} to where it began")]
+    #[error("the motion does not end at its start position at joint {joint}: use a family that returns")]
     Ends { joint: String },
     #[error("the search was interrupted")]
     Interrupted,

@@ -1,6 +1,7 @@
 use crate::policy::record::RunRecord;
-use crate::robot::{RobotRun, RunPurpose, StopSignal};
+use crate::robot::{ExpectedTorque, RobotRun, RunPurpose, SampleObserver, StopSignal};
 use crate::setup::rehearsal::Rehearsal;
+use dynident_simulation::Reference;
 
 /// A motion that is about to be commanded.
 #[derive(Clone, Debug)]
@@ -40,6 +41,17 @@ pub struct NextWays {
     pub over_postures: [usize; 2],
 }
 
+/// A motion that is commanded now, for an observer.
+#[derive(Clone, Copy, Debug)]
+pub struct BegunMotion<'a> {
+    /// The motion.
+    pub motion: &'a NextMotion,
+    /// The trajectory, without the paths from and to home.
+    pub reference: &'a Reference,
+    /// Torque that the newest estimate predicts along it; `None` without an estimate.
+    pub expected: Option<&'a ExpectedTorque>,
+}
+
 /// Supervises an iteration.
 pub trait Supervisor {
     /// The signal that stops the iteration.
@@ -56,6 +68,17 @@ pub trait Supervisor {
     fn allows(&mut self, _motion: &NextMotion) -> bool {
         true
     }
+
+    /// Receives the samples of a motion while the robot moves; `None` if nobody observes.
+    fn observer(&self) -> Option<&dyn SampleObserver> {
+        None
+    }
+
+    /// Called before a motion is commanded, if there is an [`observer`](Self::observer).
+    fn begins(&mut self, _motion: &BegunMotion<'_>) {}
+
+    /// Called after each motion with its record, if there is an [`observer`](Self::observer).
+    fn ended(&mut self, _run: &RobotRun) {}
 
     /// Called after every new run.
     fn made(&mut self, _record: &RunRecord, _runs: &[RobotRun]) {}

@@ -11,6 +11,7 @@ mod handover;
 mod held_torque;
 mod log_mistakes;
 mod log_table;
+mod observer;
 mod oscillation_watch;
 mod process;
 mod process_settings;
@@ -33,6 +34,7 @@ pub use function::{ControlledRun, FunctionRobot};
 pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
 pub use log_mistakes::{ExaminedLog, LogMistake, LogMistakeSettings, examine_log};
 pub use log_table::{LogTableError, read_log_table};
+pub use observer::{ExpectedTorque, ObservedSample, SampleObserver};
 pub(crate) use oscillation_watch::RunOscillations;
 pub use process::ProcessRobot;
 pub use process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
@@ -85,6 +87,8 @@ pub struct RunRequest<'a> {
     pub oscillation: Option<OscillationLimits>,
     /// Signal that stops the run.
     pub stop: Option<&'a StopSignal>,
+    /// Receives every sample when it arrives, if the robot streams samples.
+    pub observer: Option<&'a dyn SampleObserver>,
     /// Speed of the reference as a share of the trajectory's speed; below 1 only in slow runs before the first run.
     pub speed: f64,
     /// Purpose of the motion.
@@ -104,6 +108,7 @@ impl<'a> RunRequest<'a> {
             envelope: None,
             oscillation: None,
             stop: None,
+            observer: None,
             speed: 1.0,
             purpose: RunPurpose::Run,
             ways: None,
@@ -325,7 +330,9 @@ pub enum RobotFault {
         said: String,
     },
     /// No message within the time limit.
-    #[error("the robot program sent no {waiting_for} within {limit_s} s")]
+    #[error(
+        "the robot program sent no {waiting_for} within {limit_s} s: check the program, or raise this limit in limits of [iteration.robot]"
+    )]
     Hung {
         /// The expected message.
         waiting_for: String,

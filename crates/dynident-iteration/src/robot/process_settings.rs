@@ -20,22 +20,24 @@ pub enum ProcessMode {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ProcessLimits {
-    /// From its start to its hello, s. Default 30.
+    /// Longest time from the start of the program to its `hello`, s; then the program is killed. Default 30.
     pub hello_s: f64,
-    /// From one message to the next, s. In mode `run` the remaining time of the motion is added, because a program may
-    /// send its samples afterwards; moving to the start and back is limited to this time, too. Default 60.
+    /// Longest time from one message of the program to the next, s; then the program is killed. In mode `run` the
+    /// remaining time of the motion is added, because a program may send its samples afterwards; moving to the start
+    /// and back is limited to this time, too. Default 60.
     pub message_s: f64,
-    /// From one sample to the next in mode `run` while samples arrive in real time, s; a program that is silent for
-    /// longer during a motion is stopped. Default ten sample periods, at least 0.2 s. Not used for programs that send
-    /// samples afterwards, in batches, or faster or slower than real time.
+    /// Longest time from one sample to the next in mode `run` while samples arrive in real time, s; a program that is
+    /// silent for longer during a motion is stopped. Default ten sample periods, at least 0.2 s. Not used for programs
+    /// that send samples afterwards, in batches, or faster or slower than real time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub silence_s: Option<f64>,
-    /// A whole run, s. Default none.
+    /// Longest duration of a run, s; then the program is killed. Default none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run_s: Option<f64>,
-    /// From a stop message to the program's `end`, s; then it is killed. Default 5.
+    /// Longest time from a stop message to the program's `end`, s; then the program is killed. Default 5.
     pub stop_s: f64,
-    /// From the host's bye to its end, s; then it is terminated, and killed after the same time again. Default 2.
+    /// Longest time from Dynident's `bye` to the end of the program, s; then the program is terminated, and killed
+    /// after the same time again. Default 2.
     pub bye_s: f64,
 }
 
@@ -52,10 +54,10 @@ impl Default for ProcessLimits {
 pub struct ProcessSettings {
     /// Program and arguments.
     pub command: Vec<String>,
-    /// Which side runs the control loop; default the client.
+    /// Which side runs the control loop; by default the program.
     #[serde(default)]
     pub mode: ProcessMode,
-    /// Its time limits.
+    /// Time limits of the program.
     #[serde(default)]
     pub limits: ProcessLimits,
     /// Folder for the input files `run_k/trajectory.csv` and `run_k/controller.json`. Default a temporary folder,

@@ -1,4 +1,5 @@
 use super::envelope::EnvelopeWatch;
+use super::observer::{ObservedSample, SampleObserver};
 use super::oscillation_watch::RunOscillations;
 use super::stop_reason::{Breach, JointOscillation};
 use super::ways::{RunPart, WayRecords};
@@ -36,6 +37,7 @@ pub(super) struct Recorder<'a> {
     /// Time of the sample at which the current part begins, by the robot's clock, s.
     zero_s: f64,
     joints: Vec<String>,
+    observer: Option<&'a dyn SampleObserver>,
 }
 
 impl<'a> Recorder<'a> {
@@ -53,7 +55,7 @@ impl<'a> Recorder<'a> {
             parts.insert(0, part(RunPart::Approach, &ways.approach));
             parts.push(part(RunPart::Return, &ways.back));
         }
-        Self { parts, at: 0, zero_s: 0.0, joints: joints.to_vec() }
+        Self { parts, at: 0, zero_s: 0.0, joints: joints.to_vec(), observer: request.observer }
     }
 
     pub(super) fn record(&mut self) -> &mut Record {
@@ -130,9 +132,15 @@ impl<'a> Recorder<'a> {
         if self.at == 0 { time_s } else { time_s - self.zero_s }
     }
 
-    /// Returns the breach of the envelope at the newest sample, if any; `dq` are measured velocities, if available.
+    /// Passes the newest sample to the observer, and returns the breach of the envelope there, if any; `dq` are the
+    /// measured velocities, if available.
     pub(super) fn look(&mut self, dq: Option<&[f64]>) -> Option<Breach> {
         let Part { which, record, watch, .. } = &mut self.parts[self.at];
+        if let (Some(observer), Some(last)) = (self.observer, record.samples.checked_sub(1)) {
+            let from = last * record.joints.len();
+            let (q, tau) = (&record.q[from..], &record.tau[from..]);
+            observer.sample(&ObservedSample { part: *which, time_s: record.times_s[last], q, tau });
+        }
         watch.look(record, dq).map(|breach| Breach { part: *which, ..breach })
     }
 

@@ -1,6 +1,8 @@
+use crate::estimation::estimate::RunEstimate;
+use crate::evidence::expected_torque::expected_torque;
 use crate::policy::next_step::RunPlan;
 use crate::policy::record::RunRecord;
-use crate::policy::supervision::Supervisor;
+use crate::policy::supervision::{BegunMotion, Supervisor};
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
 use crate::runs::before_motion::{Commanded, next_motion, rehearsed, ways_of};
 use crate::runs::iteration::Iteration;
@@ -10,6 +12,7 @@ use crate::setup::leg::IterationTask;
 use crate::setup::rehearsal::{Rehearsal, RehearsalFailure};
 use crate::setup::status::IterationStatus;
 use crate::storage::cut_short::CutShort;
+use dynident_dynamics::ParametricModel;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use std::time::Instant;
 
@@ -19,6 +22,8 @@ pub(crate) struct Prepared {
     pub(crate) model: Option<ControllerModel>,
     pub(crate) ways: Vec<Option<FoundPaths>>,
     pub(crate) rehearsal: Option<Rehearsal>,
+    /// The newest estimate with its model, for an observer.
+    known: Option<(ParametricModel, RunEstimate)>,
 }
 
 pub(crate) enum MotionOutcome {
@@ -64,7 +69,11 @@ impl Iteration {
         };
         let with = (plan, &controller, model.as_ref());
         match rehearsed(task, settings, &robot, with, (&ways, &stopped), before)? {
-            Ok(rehearsal) => Ok(Ok(Prepared { controller, model, ways, rehearsal })),
+            Ok(rehearsal) => {
+                let known = before.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
+                let known = known.map(|known| (robot.into_owned(), known.clone()));
+                Ok(Ok(Prepared { controller, model, ways, rehearsal, known }))
+            }
             Err(RehearsalFailure::Interrupted) => interrupted(),
             Err(failure) => refused(&failure),
         }
@@ -79,7 +88,7 @@ impl Iteration {
         last_motion: &mut Option<Instant>,
     ) -> Result<MotionOutcome, IterationError> {
         let Commanded { place, speed, purpose, .. } = *motion;
-        let Prepared { controller, model, ways, rehearsal } = prepared;
+        let Prepared { controller, model, ways, rehearsal, known } = prepared;
         let run = folder_number(plan.run, place, task.legs.len());
         let reference = &*motion.reference()?;
         let found = ways[place].as_ref();
@@ -99,17 +108,26 @@ impl Iteration {
             let reason = format!("run {} was not allowed", plan.run);
             return Ok(MotionOutcome::Stopped(IterationStatus::Waiting { reason }));
         }
+        let observed = supervisor.observer().is_some();
+        if observed {
+            let expected = known.as_ref().map(|(model, known)| expected_torque(model, known, reference));
+            supervisor.begins(&BegunMotion { motion: &shown, reference, expected: expected.as_ref() });
+        }
         let robot_run = robot.run(&RunRequest {
             model: model.as_ref(),
             envelope: self.settings().safety.envelope.as_ref(),
             oscillation: self.settings().safety.oscillation.limits(self.task().robot.model()),
             stop: stop.as_ref(),
+            observer: supervisor.observer(),
             speed,
             purpose,
             ways: own.as_ref(),
             ..RunRequest::new(run, reference, controller)
         })?;
         *last_motion = Some(Instant::now());
+        if observed {
+            supervisor.ended(&robot_run);
+        }
         Ok(match &robot_run.status {
             RobotStatus::Waiting { .. } => {
                 MotionOutcome::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() })

@@ -39,8 +39,8 @@ pub struct RehearsalSettings {
     pub robots: usize,
     /// Delay of the robot's controller between its sensors and its drives, seconds: derived gains tolerate it, and the
     /// robots are simulated with it. Not used for a position loop in the drives. Default 8 ms for an arm of 1.2 m (some
-    /// control cycles over a network), scaled with the time constant of other arms. In a study the default is 0 if the
-    /// gains are stated or the robot waits for every torque.
+    /// control cycles over a network), multiplied by the characteristic time of other arms. In a study the default is 0
+    /// if the gains are stated or the robot waits for every torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
     /// Smallest inertia of a drive without described inertia, as a share of the typical one (which the effort limit

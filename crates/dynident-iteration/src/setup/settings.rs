@@ -120,11 +120,14 @@ pub enum StartWith {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ConvergenceSettings {
-    /// Largest change of a parameter, in error bars. Default 3.
+    /// Largest change of a parameter by the last run, in error bars of the parameter, for a converged iteration.
+    /// Default 3.
     pub parameter_sigmas: f64,
-    /// Largest change of a parameter as a share of the largest parameter (both by torque). Default 1e-6.
+    /// Change of a parameter that is accepted in addition, as a share of the largest parameter, both measured by their
+    /// torque. Default 1e-6.
     pub parameter_tolerance: f64,
-    /// Widest error bar (one standard deviation) as a share of the largest parameter, both by torque. Default 0.1.
+    /// Largest error bar (one standard deviation) of a parameter as a share of the largest parameter, both measured by
+    /// their torque, for a converged iteration. Default 0.1.
     pub most_uncertain: f64,
     /// Accepted tracking error, rad (m): the largest deviation of each joint from its trajectory. Default 1e-4.
     pub tracking_tolerance: f64,
@@ -137,9 +140,9 @@ pub struct ConvergenceSettings {
     /// Largest unexplained torque of a joint beyond the noise of the log, in percent of the joint torque (root mean
     /// squares). Default 5.
     pub most_unexplained_percent: f64,
-    /// Longest compensated lag between torque and motion that is accepted, seconds. With a longer lag the logged
-    /// position differs from the true position of the robot. Default 10 ms, for an arm longer than 1.2 m scaled with
-    /// its time constant; bus delay does not shrink with the arm.
+    /// Longest compensated lag between torque and motion for a converged iteration, seconds. With a longer lag the
+    /// logged position differs from the true position of the robot. Default 10 ms, for an arm longer than 1.2 m
+    /// multiplied by its characteristic time; bus delay does not shrink with the arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_lag_s: Option<f64>,
     /// Thresholds of the verdict on a run. Not part of study files.

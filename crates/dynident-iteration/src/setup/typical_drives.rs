@@ -10,10 +10,13 @@ pub(crate) const FRICTION: f64 = 0.05;
 /// Velocity of a joint without velocity limit, rad/s (m/s) for an arm of 1.2 m.
 const SPEED: f64 = 2.0;
 
-/// Returns the nominal parameters with typical values for drive terms that the robot description leaves at zero:
-/// inertia that the effort limit accelerates by 300 rad/s² (geared arms have 100 to 500; a UR10's wrist has 0.2 kg m²
-/// at 56 Nm; scaled with the time constant of other robots), dry friction of 5 % of the effort limit, and as much
-/// viscous friction at the velocity limit. `None` if no value was filled in.
+/// Returns the nominal parameters with typical values for the drive terms that are zero in the robot description;
+/// `None` if no value was replaced.
+/// * Drive inertia: the effort limit accelerates it by 300 rad/s² (m/s²) on an arm of 1.2 m; on other robots by this
+///   value in [characteristic units](dynident_model::CharacteristicScale). Geared arms have 100 to 500 rad/s²; a UR10's
+///   wrist has 0.2 kg m² at 56 Nm.
+/// * Dry friction: 5 % of the effort limit.
+/// * Viscous friction: 5 % of the effort limit at the velocity limit.
 pub fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
     filled_in(robot, |_| true, 1.0)
 }

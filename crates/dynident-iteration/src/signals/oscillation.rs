@@ -41,8 +41,8 @@ const MIN_PEAK_GROWTH: f64 = 0.9;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct OscillationSettings {
-    /// Lowest frequency of an oscillation, Hz. Default 8 Hz for an arm of 1.2 m, scaled with the time constant of other
-    /// arms.
+    /// Lowest frequency of an oscillation, Hz; slower ones are part of the motion. Default 8 Hz for an arm of 1.2 m,
+    /// divided by the characteristic time of other arms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lowest_hz: Option<f64>,
     /// Amplitude of the velocity error of a joint at which a run is stopped, in percent of the joint's highest velocity

@@ -10,6 +10,7 @@ mod identification;
 mod iteration;
 mod late_controllers;
 mod near_rest;
+mod observer;
 mod oscillations;
 mod policy;
 mod pooling;

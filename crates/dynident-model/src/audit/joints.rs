@@ -26,7 +26,7 @@ pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, 
             let rest = if follows {
                 ": it is not a degree of freedom, and its load acts on these joints"
             } else {
-                ", which is not a degree of freedom here, so that this joint is independent: lock it if the log does not contain it"
+                ", which is not a degree of freedom here, so that this joint is independent: lock the joint ([robot] lock) if the log does not contain its position"
             };
             findings.add(Info, "mimic", place(), format!("follows {}{rest}", mimic.source_names()));
         }
@@ -51,14 +51,15 @@ fn check_limits(joint: &Joint, follows: bool, settings: &AuditSettings, findings
                 add(Problem, "limit-order", has);
             }
             (Some(lower), Some(upper)) if lower == upper => {
-                let cannot = format!("cannot move: both limits are {lower} {unit}; give its range or lock it");
+                let cannot =
+                    format!("cannot move: both limits are {lower} {unit}; correct the limits, or lock the joint");
                 add(Warning, "limit-range", cannot);
             }
             (Some(_), Some(_)) => {}
             // The limits of a mimic joint follow from its sources.
             _ if follows => {}
             _ => {
-                let has = "has no position limits: give them before designing an excitation";
+                let has = "has no position limits: add them before `design`, to <limit> or to [design.limits]";
                 add(Warning, "limit-missing", has.to_owned());
             }
         }

@@ -6,6 +6,7 @@
 mod inertials;
 mod joints;
 mod settings;
+mod sizes;
 mod slips;
 
 pub use settings::AuditSettings;
@@ -53,7 +54,8 @@ pub struct AuditFinding {
 /// order of the tree; the first one is a summary of the model.
 ///
 /// Checks (`check` of the findings): `summary`, `mass-not-positive`, `mass-absurd`, `inertia-not-positive`,
-/// `triangle-inequality`, `centre-of-mass-outside`, `inertia-too-large`, `inertia-too-small`, `inertia-at-origin`,
+/// `triangle-inequality`, `centre-of-mass-outside`, `inertia-too-large`, `inertia-too-small`, `inertia-against-size`,
+/// `inertia-at-origin`, `base-fixed`,
 /// `placeholder`, `equal-inertials`, `inertial-unknown`, `massless-subtree`, `length-unit`, `limit-missing`,
 /// `limit-order`, `limit-range`, `limit-unit`, `velocity-limit`, `effort-limit`, `friction-negative`, `mimic`.
 pub fn audit(model: &Model) -> Vec<AuditFinding> {
@@ -81,6 +83,7 @@ fn findings(model: &Model, settings: &AuditSettings) -> Vec<AuditFinding> {
     findings.add(AuditLevel::Info, "summary", "model".to_owned(), summary);
     joints::check(model, &lengths, settings, &mut findings);
     inertials::check(model, &lengths, settings, &mut findings);
+    sizes::check(model, &lengths, settings, &mut findings);
     findings.0
 }
 
@@ -92,18 +95,21 @@ impl Findings {
     }
 }
 
+/// Smallest length of a body, m: the joints of a wrist often intersect in one point.
+const MIN_BODY_LENGTH_M: f64 = 0.1;
+
 struct Lengths {
     /// Largest sum of joint offsets from the base to a joint, m.
     reach: f64,
     /// Size of each body, m: the largest distance between its frame and a joint or link on it, or its parent joint; at
-    /// least 0.1 m, because the joints of a wrist often intersect in one point.
+    /// least [`MIN_BODY_LENGTH_M`].
     bodies: Vec<f64>,
 }
 
 impl Lengths {
     fn of(model: &Model) -> Self {
         let mut from_base: Vec<f64> = Vec::with_capacity(model.body_count());
-        let mut bodies = vec![0.1_f64; model.body_count()];
+        let mut bodies = vec![MIN_BODY_LENGTH_M; model.body_count()];
         for (index, joint) in model.tree_joints().iter().enumerate() {
             let offset = joint.placement.translation.norm();
             from_base.push(offset + joint.parent.map_or(0.0, |parent| from_base[parent]));

@@ -14,6 +14,14 @@ pub struct AuditSettings {
     pub max_distance_lengths: f64,
     /// The same distance above which it is a problem, usually a wrong unit. Default 50.
     pub problem_distance_lengths: f64,
+    /// Largest plausible radius of gyration of a body, in sizes: its length, or the diagonal of its collision shapes if
+    /// that is larger. Mass inside the size gives at most 0.5. Default 1.3, from 1,526 bodies of 95 published URDFs:
+    /// the fitted inertia of a Franka link 1 has 1.13, and 60 bodies are above 1.3. Those inspected by hand have
+    /// placeholders or the inertia of another link.
+    pub max_gyration_sizes: f64,
+    /// Least plausible inertia, as a share of that of a uniform box around the collision shapes. Default 1/12: two
+    /// bodies of the same URDFs are below, the next ones have 0.15.
+    pub min_box_inertia_share: f64,
     /// Share of the parallel-axis term in the inertia above which the moments may be about the link's origin. A uniform
     /// rod about its end has 0.75; correct inertials rarely exceed the default of 0.7.
     pub max_parallel_axis_share: f64,
@@ -35,6 +43,8 @@ impl Default for AuditSettings {
             moment_rounding: 1e-2,
             max_distance_lengths: 3.0,
             problem_distance_lengths: 50.0,
+            max_gyration_sizes: 1.3,
+            min_box_inertia_share: 1.0 / 12.0,
             max_parallel_axis_share: 0.7,
             max_joint_offset_m: 10.0,
             max_position_limit_rad: 30.0,
@@ -55,6 +65,8 @@ impl AuditSettings {
             ("moment_rounding", self.moment_rounding),
             ("max_distance_lengths", self.max_distance_lengths),
             ("problem_distance_lengths", self.problem_distance_lengths),
+            ("max_gyration_sizes", self.max_gyration_sizes),
+            ("min_box_inertia_share", self.min_box_inertia_share),
             ("max_parallel_axis_share", self.max_parallel_axis_share),
             ("max_joint_offset_m", self.max_joint_offset_m),
             ("max_position_limit_rad", self.max_position_limit_rad),

@@ -1,7 +1,7 @@
 //! Reads the mesh file that a robot description names.
 
 use super::mesh::TriangleMesh;
-use super::{collada, mesh_text, stl};
+use super::{collada, mesh_text, msh, stl};
 use crate::spatial::Vec3;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ pub enum MeshError {
 #[non_exhaustive]
 pub enum MeshFault {
     /// Unknown format.
-    #[error("unknown format; STL (binary or text), OBJ and COLLADA (.dae) are read")]
+    #[error("unknown format; STL (binary or text), OBJ, MSH (.msh) and COLLADA (.dae) are read")]
     Format,
     /// The file exceeds the size limit.
     #[error("larger than {} MiB", MAX_MESH_BYTES >> 20)]
@@ -94,20 +94,39 @@ pub fn find_mesh(folder: &Path, name: &str) -> Option<PathBuf> {
 /// converted to metres.
 ///
 /// # Errors
-/// File not found or not readable, or not an STL, OBJ or COLLADA file with at least one vertex.
+/// File not found or not readable, or not an STL, OBJ, MSH or COLLADA file with at least one vertex.
 pub fn read_mesh(folder: &Path, name: &str) -> Result<TriangleMesh, MeshError> {
+    read_from(folder, name, mesh_text::Shapes::All)
+}
+
+/// As [`read_mesh`], as MuJoCo reads a mesh: coordinates in single precision, and of an OBJ the faces of the first
+/// object or group only.
+pub(crate) fn read_mujoco_mesh(folder: &Path, name: &str) -> Result<TriangleMesh, MeshError> {
+    let mut mesh = read_from(folder, name, mesh_text::Shapes::First)?;
+    for vertex in &mut mesh.vertices {
+        *vertex = Vec3(vertex.0.map(|coordinate| f64::from(coordinate as f32)));
+    }
+    Ok(mesh)
+}
+
+fn read_from(folder: &Path, name: &str, shapes: mesh_text::Shapes) -> Result<TriangleMesh, MeshError> {
     let missing = || MeshError::Missing { name: name.to_owned(), folder: folder.to_owned() };
     let path = find_mesh(folder, name).ok_or_else(missing)?;
     let mut bytes = Vec::new();
     dynident_files::open(&path)
         .and_then(|file| file.take(MAX_MESH_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|source| MeshError::File { path: path.clone(), source })?;
-    let parsed = if bytes.len() as u64 > MAX_MESH_BYTES { Err(MeshFault::TooLarge) } else { parse(&bytes) };
+    let parsed =
+        if bytes.len() as u64 > MAX_MESH_BYTES { Err(MeshFault::TooLarge) } else { parse(&path, &bytes, shapes) };
     parsed.map_err(|fault| MeshError::Content { path, fault })
 }
 
-fn parse(bytes: &[u8]) -> Result<TriangleMesh, MeshFault> {
-    let mesh = if stl::is_binary(bytes) {
+fn parse(path: &Path, bytes: &[u8], shapes: mesh_text::Shapes) -> Result<TriangleMesh, MeshFault> {
+    // The format has no signature.
+    let is_msh = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("msh"));
+    let mesh = if is_msh {
+        msh::read(bytes)?
+    } else if stl::is_binary(bytes) {
         TriangleMesh::of_corners(&stl::binary(bytes))
     } else {
         let text = core::str::from_utf8(bytes).map_err(|_| MeshFault::Format)?;
@@ -117,12 +136,16 @@ fn parse(bytes: &[u8]) -> Result<TriangleMesh, MeshFault> {
         } else if text.starts_with("solid") {
             mesh_text::stl(text)?
         } else {
-            mesh_text::obj(text)?.ok_or(MeshFault::Format)?
+            mesh_text::obj(text, shapes)?.ok_or(MeshFault::Format)?
         }
     };
     if mesh.vertices.is_empty() {
         return Err(MeshFault::Empty);
     }
+    let mesh = match shapes {
+        mesh_text::Shapes::All => TriangleMesh::merged(&mesh.vertices, &mesh.triangles),
+        mesh_text::Shapes::First => mesh,
+    };
     let finite = |v: &Vec3| v.0.iter().all(|x| x.abs() <= MAX_COORDINATE);
     if mesh.vertices.iter().all(finite) { Ok(mesh) } else { Err(MeshFault::NotFinite) }
 }

@@ -15,16 +15,35 @@ pub(super) fn stl(text: &str) -> Result<TriangleMesh, MeshFault> {
     Ok(TriangleMesh::of_corners(&corners))
 }
 
-/// Vertices and faces of an OBJ; a face with more than three corners becomes a fan. `None` if no line begins with `v`.
-pub(super) fn obj(text: &str) -> Result<Option<TriangleMesh>, MeshFault> {
-    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+/// Which objects and groups (`o`, `g`) of an OBJ give faces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shapes {
+    All,
+    /// The first one with faces, as in MuJoCo; vertices are always read.
+    First,
+}
+
+/// Vertices and faces of an OBJ as in the file. A quadrilateral is split at its shorter diagonal, a face with more
+/// corners becomes a fan. `None` if no line begins with `v`.
+pub(super) fn obj(text: &str, shapes: Shapes) -> Result<Option<TriangleMesh>, MeshFault> {
+    let (mut vertices, mut triangles, mut is_complete) = (Vec::new(), Vec::new(), false);
     for line in text.lines() {
         let mut words = line.split_ascii_whitespace();
         match words.next() {
             Some("v") => vertices.push(vertex(&mut words)?),
-            Some("f") => {
+            Some("o" | "g") => is_complete |= shapes == Shapes::First && !triangles.is_empty(),
+            Some("f") if !is_complete => {
                 let corners = words.map(|word| corner(word, vertices.len())).collect::<Option<Vec<u32>>>();
-                let corners = corners.ok_or(MeshFault::Face)?;
+                let mut corners = corners.ok_or(MeshFault::Face)?;
+                let square = |one: u32, other: u32| {
+                    let edge = vertices[other as usize] - vertices[one as usize];
+                    edge.dot(edge)
+                };
+                if let [a, b, c, d] = corners[..]
+                    && square(b, d) <= square(a, c)
+                {
+                    corners.rotate_left(1);
+                }
                 for pair in corners.windows(2).skip(1) {
                     triangles.push([corners[0], pair[0], pair[1]]);
                 }
@@ -32,7 +51,7 @@ pub(super) fn obj(text: &str) -> Result<Option<TriangleMesh>, MeshFault> {
             _ => {}
         }
     }
-    Ok((!vertices.is_empty()).then(|| TriangleMesh::merged(&vertices, &triangles)))
+    Ok((!vertices.is_empty()).then_some(TriangleMesh { vertices, triangles }))
 }
 
 fn vertex<'t>(words: &mut impl Iterator<Item = &'t str>) -> Result<Vec3, MeshFault> {

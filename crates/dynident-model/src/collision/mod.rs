@@ -13,14 +13,19 @@
 //! ```
 
 mod collada;
+mod hull;
 mod mesh;
 mod mesh_file;
+mod mesh_inertia;
 mod mesh_text;
+mod msh;
 mod solid;
 mod stl;
 
 pub use mesh::TriangleMesh;
+pub(crate) use mesh_file::read_mujoco_mesh;
 pub use mesh_file::{MeshError, MeshFault, find_mesh, read_mesh};
+pub use mesh_inertia::{MeshInertia, MeshInertiaFault, MeshInertiaMode, mesh_inertia};
 pub use solid::Solid;
 
 use crate::spatial::Transform;

@@ -91,7 +91,7 @@ pub enum DhFault {
     #[error("the table has more than {limit} joints: remove some")]
     TooManyJoints { limit: usize },
     #[error(
-        "the inertial is incomplete or redundant: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters alone; or no inertial (unknown)"
+        "the inertial is incomplete or redundant: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters (ten numbers) alone; or no inertial, if it is unknown"
     )]
     Inertial,
     #[error("{0}; fix the table")]

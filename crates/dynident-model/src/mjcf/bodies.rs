@@ -4,9 +4,11 @@ use super::classes::{ClassId, Classes, MAIN, Stated};
 use super::compiler::{Compiler, FromGeoms};
 use super::expanded::{Element, Expanded, Place};
 use super::fault::{MjcfError, MjcfFault};
-use super::geoms::{Geom, GeomMass, Meshes, geom};
+use super::floating::{ActuatedNames, Dropped, free_joint, is_free};
+use super::geoms::{Geom, GeomMass, geom};
 use super::inertials::{corrected, inertial};
-use super::joints::{JointElement, floating, joint};
+use super::joints::{JointElement, joint, nested_free_joint};
+use super::meshes::Meshes;
 use super::notices::{MjcfLoss, Notices};
 use super::orientation::place;
 use crate::collision::{CollisionGeometry, CollisionShape};
@@ -87,6 +89,29 @@ pub(super) struct Tree {
     pub(super) base: Body,
     pub(super) links: Vec<LinkPlace>,
     pub(super) unknown: HashSet<String>,
+    /// Objects of the scene that were left out.
+    pub(super) dropped: Dropped,
+}
+
+impl Tree {
+    fn new() -> Self {
+        let world =
+            Link { name: WORLD.to_owned(), placement: Transform::IDENTITY, inertial: None, collision: Vec::new() };
+        Self {
+            joints: Vec::new(),
+            joint_places: Vec::new(),
+            references: Vec::new(),
+            bodies: Vec::new(),
+            base: Body { links: vec![world] },
+            links: Vec::new(),
+            unknown: HashSet::new(),
+            dropped: Dropped::default(),
+        }
+    }
+
+    fn all_links(&mut self) -> impl Iterator<Item = &mut Link> {
+        self.bodies.iter_mut().chain([&mut self.base]).flat_map(|body| &mut body.links)
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -97,6 +122,8 @@ struct PendingBody<'t> {
     /// Pose of the surrounding `<body>` or `<frame>` in the carrier.
     carrier_from_parent: Transform,
     childclass: ClassId,
+    /// Whether the body is directly in `<worldbody>`.
+    is_top: bool,
 }
 
 #[derive(Default)]
@@ -108,44 +135,50 @@ struct Contents<'t> {
     bodies: Vec<(&'t Element, Transform, ClassId)>,
 }
 
-pub(super) struct Reader<'t> {
+pub(super) struct Reader<'t, 'f> {
     pub(super) document: &'t Expanded,
     pub(super) classes: &'t Classes<'t>,
     pub(super) compiler: &'t Compiler,
-    pub(super) meshes: &'t Meshes,
+    pub(super) meshes: &'t mut Meshes<'f>,
     pub(super) notices: &'t mut Notices,
     body_count: usize,
     body_names: HashSet<String>,
     joint_names: HashSet<String>,
-    unknown: HashMap<String, (&'static str, Place)>,
+    unknown: HashMap<String, (String, Place)>,
+    actuated: ActuatedNames<'t>,
+    /// Objects of the scene, which are read only if `settotalmass` includes their masses.
+    objects: Vec<PendingBody<'t>>,
+    keeps_objects: bool,
 }
 
-impl<'t> Reader<'t> {
+impl<'t, 'f> Reader<'t, 'f> {
     pub(super) fn new(
         document: &'t Expanded,
         classes: &'t Classes<'t>,
         compiler: &'t Compiler,
-        meshes: &'t Meshes,
+        meshes: &'t mut Meshes<'f>,
         notices: &'t mut Notices,
     ) -> Self {
         let body_names = HashSet::from([WORLD.to_owned()]);
-        let (joint_names, unknown) = (HashSet::new(), HashMap::new());
-        Self { document, classes, compiler, meshes, notices, body_count: 0, body_names, joint_names, unknown }
+        Self {
+            document,
+            classes,
+            compiler,
+            meshes,
+            notices,
+            body_count: 0,
+            body_names,
+            joint_names: HashSet::new(),
+            unknown: HashMap::new(),
+            actuated: ActuatedNames::new(document),
+            objects: Vec::new(),
+            keeps_objects: false,
+        }
     }
 
     /// Depth first, bodies in the order of the document.
     pub(super) fn tree(mut self) -> Result<Tree, MjcfError> {
-        let world =
-            Link { name: WORLD.to_owned(), placement: Transform::IDENTITY, inertial: None, collision: Vec::new() };
-        let mut tree = Tree {
-            joints: Vec::new(),
-            joint_places: Vec::new(),
-            references: Vec::new(),
-            bodies: Vec::new(),
-            base: Body { links: vec![world] },
-            links: Vec::new(),
-            unknown: HashSet::new(),
-        };
+        let mut tree = Tree::new();
         // A stack avoids recursion, because a chain may be as long as the file.
         let mut ahead: Vec<PendingBody<'t>> = Vec::new();
         for world in self.document.sections("worldbody") {
@@ -156,6 +189,7 @@ impl<'t> Reader<'t> {
                 carrier: None,
                 carrier_from_parent,
                 childclass,
+                is_top: true,
             }));
         }
         ahead.reverse();
@@ -173,14 +207,25 @@ impl<'t> Reader<'t> {
         tree: &mut Tree,
         ahead: &mut Vec<PendingBody<'t>>,
     ) -> Result<(), MjcfError> {
-        let PendingBody { element, carrier, carrier_from_parent, childclass } = next;
+        let PendingBody { element, carrier, carrier_from_parent, childclass, is_top } = next;
         let stated = Stated::own(self.document, element);
+        let class = self.classes.named(self.document, element, "childclass")?.unwrap_or(childclass);
+        let free = free_joint(self.document, self.classes, element, class)?;
+        if free.is_some() && is_top && !self.keeps_objects && self.actuated.is_object(self.document, element) {
+            let body = element.attribute("name").map_or("without a name", |name| &name.value);
+            self.notices.note(&stated, MjcfLoss::FreeObject { body: shortened(body) });
+            tree.dropped.add(self.document, element);
+            self.objects.push(next);
+            return Ok(());
+        }
         let name = self.body_name(element)?;
+        if let Some(free) = free {
+            self.floating_base(free, &name, &stated, is_top, tree)?;
+        }
         self.note_unread(&stated, &IN_BODY);
         if stated.number("gravcomp")?.is_some_and(|part| part != 0.0) {
             self.notices.note(&stated, MjcfLoss::GravityCompensation { body: name.clone() });
         }
-        let class = self.classes.named(self.document, element, "childclass")?.unwrap_or(childclass);
         let mut contents = self.contents(element, &name, class, false)?;
         let moves = carrier.is_some() || !contents.joints.is_empty();
         let inertial = self.mass(&name, element, &mut contents, moves)?;
@@ -232,7 +277,29 @@ impl<'t> Reader<'t> {
             carrier: at,
             carrier_from_parent: carrier_from_body.then(&body_from_frame),
             childclass,
+            is_top: false,
         }));
+        Ok(())
+    }
+
+    /// Reports a robot that floats; its base is read as fixed.
+    fn floating_base(
+        &mut self,
+        free: &Element,
+        body: &str,
+        stated: &Stated<'_>,
+        is_top: bool,
+        tree: &mut Tree,
+    ) -> Result<(), MjcfError> {
+        let name = free.attribute("name").map(|name| &name.value);
+        if !is_top {
+            let label = name.map_or_else(|| "without a name".to_owned(), |name| format!("`{}`", shortened(name)));
+            return Err(self.document.fault(free.place, nested_free_joint(&label)));
+        }
+        tree.dropped.joints.extend(name.cloned());
+        if !self.keeps_objects {
+            self.notices.note(stated, MjcfLoss::FloatingBase { body: shortened(body) });
+        }
         Ok(())
     }
 
@@ -326,15 +393,13 @@ impl<'t> Reader<'t> {
                 }
                 "joint" => {
                     let stated = self.classes.stated(self.document, element, class)?;
+                    if is_free(&stated) {
+                        continue;
+                    }
                     found.joints.push(joint(&stated, &frame, self.compiler, self.notices)?);
                     self.note_unread(&Stated::own(self.document, element), &IN_JOINT);
                 }
-                "freejoint" => {
-                    let label = element
-                        .attribute("name")
-                        .map_or("without a name".to_owned(), |name| format!("`{}`", shortened(&name.value)));
-                    return Err(self.document.fault(element.place, floating(&label)));
-                }
+                "freejoint" => {}
                 "composite" | "flexcomp" | "replicate" | "attach" => {
                     let what = format!("<{}>", element.tag);
                     return unsupported(&what, "save the model from MuJoCo (mj_saveLastXML), which writes it out");
@@ -367,16 +432,22 @@ impl<'t> Reader<'t> {
             if let Some(faulty) = contents.geoms.iter().position(Result::is_err) {
                 contents.geoms.swap_remove(faulty)?;
             }
-            for mass in contents.geoms.iter().flatten().map(|geom| geom.mass) {
-                match mass {
-                    GeomMass::Massless => {}
-                    GeomMass::Known(inertial) => sum = Some(sum.map_or(inertial, |sum| sum.plus(&inertial))),
-                    GeomMass::Unknown(why) => {
-                        self.unknown.insert(name.to_owned(), (why, element.place));
+            // Meshes of a body that does not move are not read: its mass is in no torque.
+            let is_needed = moves || self.compiler.total_mass.is_some();
+            for geom in contents.geoms.iter().flatten() {
+                let inertial = match geom.mass {
+                    GeomMass::Mesh { .. } if !is_needed => Err("is not needed".to_owned()),
+                    ref mass => mass.inertial(self.meshes),
+                };
+                match inertial {
+                    Ok(None) => {}
+                    Ok(Some(inertial)) => sum = Some(sum.map_or(inertial, |sum| sum.plus(&inertial))),
+                    Err(why) => {
                         if moves {
-                            let loss = MjcfLoss::UnknownMass { body: name.to_owned(), why };
+                            let loss = MjcfLoss::UnknownMass { body: name.to_owned(), why: why.clone() };
                             self.notices.note_at(self.document, element.place, loss);
                         }
+                        self.unknown.insert(name.to_owned(), (why, element.place));
                         return Ok(None);
                     }
                 }
@@ -385,17 +456,22 @@ impl<'t> Reader<'t> {
         Ok(corrected(sum.or(contents.inertial), self.compiler))
     }
 
-    /// Applies `settotalmass`: scales all masses and inertias by one factor.
-    fn set_total_mass(&self, tree: &mut Tree) -> Result<(), MjcfError> {
+    /// Applies `settotalmass`: scales all masses and inertias by one factor. The total includes objects of the scene.
+    fn set_total_mass(&mut self, tree: &mut Tree) -> Result<(), MjcfError> {
         let Some(total) = self.compiler.total_mass else { return Ok(()) };
-        if let Some((body, (why, place))) = self.unknown.iter().min_by_key(|(_, (_, place))| (place.source, place.at)) {
-            return Err(self.document.fault(*place, MjcfFault::TotalMass { body: body.clone(), why }));
+        let (mut scene, mut ahead) = (Tree::new(), std::mem::take(&mut self.objects));
+        self.keeps_objects = true;
+        while let Some(next) = ahead.pop() {
+            self.visit(next, &mut scene, &mut ahead)?;
         }
-        let all = || tree.bodies.iter().chain([&tree.base]).flat_map(|body| &body.links);
-        let sum: f64 = all().filter_map(|link| link.inertial).map(|inertial| inertial.mass_kg()).sum();
+        if let Some((body, (why, place))) = self.unknown.iter().min_by_key(|(_, (_, place))| (place.source, place.at)) {
+            return Err(self.document.fault(*place, MjcfFault::TotalMass { body: body.clone(), why: why.clone() }));
+        }
+        let all = tree.all_links().chain(scene.all_links());
+        let sum: f64 = all.filter_map(|link| link.inertial).map(|inertial| inertial.mass_kg()).sum();
         if sum > 0.0 {
             let factor = total / sum;
-            for link in tree.bodies.iter_mut().chain([&mut tree.base]).flat_map(|body| &mut body.links) {
+            for link in tree.all_links() {
                 link.inertial = link.inertial.map(|inertial| InertialParameters(inertial.0.map(|x| x * factor)));
             }
         }

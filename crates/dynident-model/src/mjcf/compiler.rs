@@ -14,6 +14,7 @@ pub(super) enum FromGeoms {
 
 /// Settings that affect the tree and its masses, with MuJoCo's defaults.
 #[derive(Clone, Debug)]
+#[allow(clippy::struct_excessive_bools, reason = "each is an attribute of the element")]
 pub(super) struct Compiler {
     pub(super) degrees: bool,
     /// Axes of `euler` in their order: lower case for rotating axes, upper case for fixed axes.
@@ -27,6 +28,10 @@ pub(super) struct Compiler {
     pub(super) balance: bool,
     pub(super) total_mass: Option<f64>,
     pub(super) meshdir: String,
+    /// Whether folders in the names of mesh files are ignored.
+    pub(super) strips_path: bool,
+    /// `exactmeshinertia` of MuJoCo before 3.2.5: the mode of meshes that do not state one.
+    pub(super) exact_mesh_inertia: bool,
 }
 
 impl Compiler {
@@ -43,6 +48,8 @@ impl Compiler {
             balance: false,
             total_mass: None,
             meshdir: String::new(),
+            strips_path: false,
+            exact_mesh_inertia: false,
         };
         for section in document.sections("compiler") {
             let stated = Stated::own(document, section);
@@ -57,6 +64,8 @@ impl Compiler {
                     .ok_or_else(|| stated.word_fault(sequence, "three of the letters x y z X Y Z"))?;
             }
             found.autolimits = stated.flag("autolimits")?.unwrap_or(found.autolimits);
+            found.strips_path = stated.flag("strippath")?.unwrap_or(found.strips_path);
+            found.exact_mesh_inertia = stated.flag("exactmeshinertia")?.unwrap_or(found.exact_mesh_inertia);
             found.balance = stated.flag("balanceinertia")?.unwrap_or(found.balance);
             if stated.get("inertiafromgeom").is_some() {
                 found.from_geoms = match stated.flag("inertiafromgeom")? {

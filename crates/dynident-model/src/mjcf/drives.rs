@@ -47,6 +47,9 @@ pub(super) fn efforts(
     for element in document.sections("actuator").flat_map(|section| document.children(section)) {
         let Some(name) = ["joint", "jointinparent"].iter().find_map(|key| element.attribute(key)) else { continue };
         let Some(&joint) = index.get(&name.value) else {
+            if tree.dropped.joints.contains(&name.value) {
+                continue;
+            }
             let fault = MjcfFault::UnknownJoint { element: shortened(&element.tag), joint: shortened(&name.value) };
             return Err(document.fault(name.place, fault));
         };
@@ -102,6 +105,15 @@ pub(super) fn couplings<'t>(
     for element in document.sections("equality").flat_map(|section| document.children(section)) {
         let stated = Stated::own(document, element);
         if stated.get("active").is_some_and(|active| active.value == "false") {
+            continue;
+        }
+        let is_dropped =
+            |key: &str, names: &HashSet<String>| element.attribute(key).is_some_and(|name| names.contains(&name.value));
+        let bodies = ["body1", "body2"].map(|key| is_dropped(key, &tree.dropped.bodies));
+        let joints = ["joint1", "joint2"].map(|key| is_dropped(key, &tree.dropped.joints));
+        // A constraint of an object with the robot stays: it loads the robot.
+        let has_second = element.attribute("body2").is_some_and(|name| name.value != WORLD);
+        if joints.contains(&true) || bodies == [true, true] || bodies[0] && !has_second {
             continue;
         }
         let named = |key: &str| element.attribute(key).map(|name| format!("`{}`", shortened(&name.value)));

@@ -58,15 +58,17 @@ pub enum MjcfFault {
     WorldInertial,
     #[error("{what} is not supported: {fix}")]
     Unsupported { what: String, fix: &'static str },
-    #[error("a geom of type `{kind}` needs {needed} positive numbers in `size`: write them")]
+    #[error("a geom of type `{kind}` needs {needed} positive numbers in `size`: write all of them")]
     Size { kind: &'static str, needed: usize },
     #[error("`{attribute}` of <{element}> is negative: write a value of zero or more")]
     Negative { element: String, attribute: &'static str },
     #[error("`settotalmass` needs all masses, and that of body `{body}` {why}: give the body an <inertial>")]
-    TotalMass { body: String, why: &'static str },
+    TotalMass { body: String, why: String },
     #[error("the model has no joint of type hinge or slide: give the MJCF of a robot that moves")]
     NoMovingJoint,
-    #[error("the model has more than {limit} joints: fix those that the log does not contain")]
+    #[error(
+        "the model has more than {limit} joints: delete <joint> elements that the log does not contain, which fixes their bodies"
+    )]
     TooManyJoints { limit: usize },
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),

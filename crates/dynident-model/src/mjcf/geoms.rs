@@ -1,36 +1,65 @@
 //! `<geom>`: the mass and inertia of its solid, and its shape for collision checking.
 
-use super::classes::{Classes, MAIN, Stated};
+use super::classes::Stated;
 use super::compiler::Compiler;
-use super::expanded::Expanded;
 use super::fault::{MjcfError, MjcfFault};
+use super::meshes::Meshes;
 use super::orientation::{from_z, place};
 use crate::collision::{CollisionGeometry, CollisionShape};
 use crate::inertial::InertialParameters;
 use crate::spatial::{Mat3, Transform, Vec3};
 use crate::xml::shortened;
 use core::f64::consts::PI;
-use std::collections::HashMap;
 
 /// MuJoCo's default density of a geom, kg/m³ (water).
 const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum GeomMass {
     /// No mass: a plane, a geom of mass zero, or a geom of a group that is not included.
     Massless,
     /// Known inertial in the body's frame.
     Known(InertialParameters),
+    /// Mass properties of a mesh, with its pose in the body's frame.
+    Mesh { name: String, placement: Transform, mass: MassOrDensity },
     /// Unknown, with the reason.
     Unknown(&'static str),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum MassOrDensity {
+    /// kg
+    Mass(f64),
+    /// kg/m³; of a shell kg/m².
+    Density(f64),
+}
+
+impl GeomMass {
+    /// Inertial in the body's frame, `None` without mass, or the reason why it is unknown.
+    pub(super) fn inertial(&self, meshes: &mut Meshes<'_>) -> Result<Option<InertialParameters>, String> {
+        match self {
+            Self::Massless => Ok(None),
+            Self::Known(inertial) => Ok(Some(*inertial)),
+            Self::Unknown(why) => Err(format!("{why}, which is not supported")),
+            Self::Mesh { name, placement, mass } => {
+                let mesh =
+                    meshes.inertia(name).map_err(|why| format!("follows from mesh `{}`: {why}", shortened(name)))?;
+                let density = match mass {
+                    MassOrDensity::Mass(mass) => mass / mesh.size,
+                    MassOrDensity::Density(density) => *density,
+                };
+                let at_com = mesh.inertia_at_centre.scale(density);
+                let own = InertialParameters::from_centre_of_mass(density * mesh.size, mesh.centre_m, &at_com);
+                Ok(Some(own.expressed_in(placement)))
+            }
+        }
+    }
 }
 
 pub(super) struct Geom {
     pub(super) mass: GeomMass,
     pub(super) shape: Option<CollisionShape>,
 }
-
-pub(super) type Meshes = HashMap<String, (String, [f64; 3])>;
 
 /// Solids, with half sizes, or radius and half length.
 #[derive(Clone, Copy)]
@@ -42,34 +71,12 @@ enum Solid {
     Ellipsoid,
 }
 
-pub(super) fn meshes<'t>(
-    document: &'t Expanded,
-    classes: &'t Classes<'t>,
-    compiler: &Compiler,
-) -> Result<Meshes, MjcfError> {
-    let mut found = Meshes::new();
-    for element in document.sections("asset").flat_map(|asset| document.children(asset)) {
-        let Some(file) = element.attribute("file").filter(|_| element.tag == "mesh") else { continue };
-        let stated = classes.stated(document, element, MAIN)?;
-        let stem = file.value.rsplit(['/', '\\']).next().unwrap_or(&file.value);
-        let stem = stem.rsplit_once('.').map_or(stem, |(stem, _)| stem);
-        let name = element.attribute("name").map_or(stem, |name| &name.value);
-        let folder = compiler.meshdir.trim_end_matches('/');
-        let path = if folder.is_empty() { file.value.clone() } else { format!("{folder}/{}", file.value) };
-        // A mesh that is moved in its own frame cannot be placed by its file alone.
-        if stated.get("refpos").is_none() && stated.get("refquat").is_none() {
-            found.insert(name.to_owned(), (path, stated.numbers("scale")?.unwrap_or([1.0; 3])));
-        }
-    }
-    Ok(found)
-}
-
 /// Reads a geom of a body; `body_from_frame` is the pose of the surrounding `<frame>`.
 pub(super) fn geom(
     stated: &Stated<'_>,
     body_from_frame: &Transform,
     compiler: &Compiler,
-    meshes: &Meshes,
+    meshes: &Meshes<'_>,
 ) -> Result<Geom, MjcfError> {
     let kind = stated.get("type").map_or("sphere", |kind| kind.value.trim());
     let group = stated.number("group")?.unwrap_or(0.0);
@@ -88,17 +95,27 @@ pub(super) fn geom(
         "plane" | "hfield" => return Ok(Geom { mass: GeomMass::Massless, shape: None }),
         "mesh" => {
             let name = stated.get("mesh").map_or("", |mesh| &mesh.value);
-            let shape = match meshes.get(name) {
-                Some((file, scale)) if collides => Some(CollisionShape {
-                    placement: body_from_frame.then(&place(stated, compiler)?),
-                    geometry: CollisionGeometry::Mesh { file: file.clone(), scale: *scale },
+            let placement = body_from_frame.then(&place(stated, compiler)?);
+            let file = meshes.get(name).and_then(|mesh| Some((mesh, mesh.file.clone()?)));
+            let shape = match file {
+                // A mesh that is moved in its own frame cannot be placed by its file alone.
+                Some((mesh, file)) if mesh.reference == Transform::IDENTITY => collides.then_some(CollisionShape {
+                    placement,
+                    geometry: CollisionGeometry::Mesh { file, scale: mesh.scale },
                 }),
                 _ => unsupported(&format!(
                     "mesh `{}` without a file, or moved in its own frame (`refpos`, `refquat`)",
                     shortened(name)
                 )),
             };
-            return Ok(unknown("follows from a mesh", shape));
+            if !weighs {
+                return Ok(Geom { mass: GeomMass::Massless, shape });
+            }
+            if stated.flag("shellinertia")? == Some(true) {
+                return Ok(unknown("follows from `shellinertia` of a mesh geom, which MuJoCo refuses", shape));
+            }
+            let mass = mass.map_or(MassOrDensity::Density(density), MassOrDensity::Mass);
+            return Ok(Geom { mass: GeomMass::Mesh { name: name.to_owned(), placement, mass }, shape });
         }
         "sdf" => {
             return Ok(unknown("follows from a signed distance field", unsupported("geom of the type `sdf`")));

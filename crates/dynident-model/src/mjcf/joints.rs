@@ -41,10 +41,10 @@ pub(super) fn joint(
         "slide" => false,
         "ball" => {
             let what = format!("joint {label} of type ball");
-            let fix = "write it as three hinges, or delete it so that the body is fixed";
+            let fix = "write three hinges instead, or delete the joint so that the body is fixed";
             return Err(stated.fault(MjcfFault::Unsupported { what, fix }));
         }
-        _ => return Err(stated.fault(floating(&label))),
+        _ => return Err(stated.fault(nested_free_joint(&label))),
     };
     let angle = |value: f64| if is_rotary { compiler.radians(value) } else { value };
     let axis = stated.direction("axis")?.unwrap_or(Vec3([0.0, 0.0, 1.0]));
@@ -95,10 +95,10 @@ pub(super) fn joint(
     })
 }
 
-pub(super) fn floating(label: &str) -> MjcfFault {
+pub(super) fn nested_free_joint(label: &str) -> MjcfFault {
     MjcfFault::Unsupported {
-        what: format!("a floating base (joint {label} of type free)"),
-        fix: "delete the joint, so that its body is fixed",
+        what: format!("joint {label} of type free in a body inside another body"),
+        fix: "delete the joint, so that its body is fixed, or put the body directly into <worldbody>",
     }
 }
 

@@ -1,9 +1,10 @@
 //! MJCF, MuJoCo's model format: reading and writing back.
 //!
-//! Supported are nested bodies with `<inertial>` or geoms of simple solids, and joints of type hinge and slide, on a
-//! fixed base, with `<compiler>`, `<default>` classes, `<frame>` and `<include>`, `armature`, `damping` and
+//! Supported are nested bodies with `<inertial>` or geoms (simple solids, meshes), and joints of type hinge and slide,
+//! on a fixed base, with `<compiler>`, `<default>` classes, `<frame>` and `<include>`, `armature`, `damping` and
 //! `frictionloss`, effort limits of joints and actuators, and gravity. A body without joint is merged into its parent.
-//! A body whose mass depends on a mesh is unknown, not massless.
+//! A body whose mass depends on a missing mesh is unknown, not massless. A robot with a free joint is read as fixed;
+//! other bodies with a free joint are objects of the scene and are left out. Both give a notice.
 //!
 //! A joint's anchor may differ from the origin of its body. The frame of a link that moves with a joint has the axes of
 //! its MJCF body, and its origin at the anchor of the body's last hinge. Several joints in one body become a chain with
@@ -30,13 +31,16 @@ mod drives;
 mod expanded;
 mod fault;
 mod files;
+mod floating;
 mod geoms;
 mod inertials;
 mod joints;
+mod meshes;
 mod notices;
 mod orientation;
 mod values;
 mod write;
+mod write_servos;
 
 pub use expanded::Include;
 pub(crate) use expanded::is_mjcf;
@@ -44,15 +48,19 @@ pub use fault::{MjcfError, MjcfFault};
 pub use files::included_from;
 pub use notices::{MjcfLoss, MjcfNotice};
 pub use write::{MjcfWriteError, rewrite_mjcf};
+pub use write_servos::{ServoChange, rewrite_servos};
 
+use crate::collision::read_mujoco_mesh;
 use crate::tree::Model;
 use bodies::{LinkPlace, Reader, Tree};
 use chains::ChainContext;
 use classes::Classes;
 use compiler::Compiler;
 use expanded::{Expanded, Place};
+use meshes::{Meshes, ReadMesh};
 use notices::Notices;
 use std::collections::HashSet;
+use std::path::Path;
 
 /// Result of reading an MJCF.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,7 +89,19 @@ pub fn read_mjcf_with(
     mut include: impl FnMut(&str) -> Result<String, String>,
 ) -> Result<MjcfRobot, MjcfError> {
     let document = Expanded::new(text, &mut include)?;
-    let found = read(&document)?;
+    let mut no_mesh = |_: &str| Err("meshes are read only where the MJCF is read from a file".to_owned());
+    let found = read(&document, &mut no_mesh)?;
+    Ok(MjcfRobot { model: found.model, notices: found.notices })
+}
+
+/// Reads an MJCF in `folder`, with its included files and with the meshes on which masses depend.
+///
+/// # Errors
+/// Those of [`read_mjcf`], and an included file that cannot be read. A mesh that cannot be read gives a notice.
+pub fn read_mjcf_in(text: &str, folder: &Path) -> Result<MjcfRobot, MjcfError> {
+    let document = Expanded::new(text, &mut included_from(folder))?;
+    let mut mesh = |file: &str| read_mujoco_mesh(folder, file).map_err(|error| error.to_string());
+    let found = read(&document, &mut mesh)?;
     Ok(MjcfRobot { model: found.model, notices: found.notices })
 }
 
@@ -94,12 +114,12 @@ struct Found {
     unknown: HashSet<String>,
 }
 
-fn read(document: &Expanded) -> Result<Found, MjcfError> {
+fn read(document: &Expanded, read_mesh: &mut ReadMesh<'_>) -> Result<Found, MjcfError> {
     let compiler = Compiler::new(document)?;
     let classes = Classes::new(document)?;
-    let meshes = geoms::meshes(document, &classes, &compiler)?;
+    let mut meshes = Meshes::new(document, &classes, &compiler, read_mesh)?;
     let mut notices = Notices::default();
-    let mut tree = Reader::new(document, &classes, &compiler, &meshes, &mut notices).tree()?;
+    let mut tree = Reader::new(document, &classes, &compiler, &mut meshes, &mut notices).tree()?;
     let driven = drives::efforts(document, &classes, &mut tree, &mut notices)?;
     let connects = drives::couplings(document, &mut tree, &mut notices)?;
     drives::tendons(document, &mut notices)?;
@@ -109,7 +129,7 @@ fn read(document: &Expanded) -> Result<Found, MjcfError> {
         return Err(document.fault(root.place, MjcfFault::NoMovingJoint));
     }
     let name = root.attribute("model").map_or("robot", |name| &name.value);
-    let Tree { joints, bodies, base, links, joint_places, unknown, references } = tree;
+    let Tree { joints, bodies, base, links, joint_places, unknown, references, .. } = tree;
     let model = Model::new(name, base, joints, bodies).and_then(|model| model.with_gravity(gravity));
     let model = model.map_err(|error| document.fault(root.place, MjcfFault::Model(error)))?;
     let around = ChainContext { document, links: &links, references: &references, driven: &driven };

@@ -2,6 +2,7 @@
 
 use super::classes::Stated;
 use super::expanded::{Expanded, Place};
+use crate::audit::AuditLevel;
 use thiserror::Error;
 
 /// A part of an MJCF that the model does not represent.
@@ -20,10 +21,15 @@ pub struct MjcfNotice {
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum MjcfLoss {
+    #[error("the mass of body `{body}` {why}: it is unknown; give the body an <inertial>")]
+    UnknownMass { body: String, why: String },
+    #[error("body `{body}` has a free joint and no actuated joint: it is an object of the scene and is left out")]
+    FreeObject { body: String },
     #[error(
-        "the mass of body `{body}` {why}, which is not supported, so that it is unknown: give the body an <inertial>"
+        "body `{body}` has a free joint: the robot floats, but is read as fixed to the world at `{body}` in its drawn pose; \
+         use only logs in which this body stands still and level as drawn"
     )]
-    UnknownMass { body: String, why: &'static str },
+    FloatingBase { body: String },
     #[error("joint {joint} has a nonlinear spring (`stiffness`): only its linear coefficient is used")]
     SpringPolynomial { joint: String },
     #[error("the damping of joint {joint} is a polynomial: only its linear coefficient is used")]
@@ -55,10 +61,17 @@ pub enum MjcfLoss {
 }
 
 impl MjcfLoss {
+    /// Severity: information if the torques of the robot do not depend on the part.
+    pub fn level(&self) -> AuditLevel {
+        if matches!(self, Self::FreeObject { .. }) { AuditLevel::Info } else { AuditLevel::Warning }
+    }
+
     /// Short name.
     pub fn name(&self) -> &'static str {
         match self {
             Self::UnknownMass { .. } => "unknown-mass",
+            Self::FreeObject { .. } => "free-object",
+            Self::FloatingBase { .. } => "floating-base",
             Self::SpringPolynomial { .. } => "spring-polynomial",
             Self::DampingPolynomial { .. } => "damping-polynomial",
             Self::OneSidedEffort { .. } => "one-sided-effort",

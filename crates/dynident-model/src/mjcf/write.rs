@@ -38,7 +38,7 @@ pub enum MjcfWriteError {
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
     NotFinite { kind: &'static str, name: String },
     #[error(
-        "the new values of body `{body}` are those of no body with mass, which MuJoCo refuses: use physically consistent parameters"
+        "the new values of body `{body}` are not physically consistent, and MuJoCo would refuse them: use physically consistent parameters"
     )]
     NotPhysical { body: String },
     #[error(
@@ -63,7 +63,8 @@ pub fn rewrite_mjcf(
     joints: &[JointChange],
 ) -> Result<String, MjcfWriteError> {
     let document = Expanded::new(original, include)?;
-    let found = read(&document)?;
+    // The masses of the original are replaced.
+    let found = read(&document, &mut |_: &str| Err(String::new()))?;
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     // Cannot fail: the same text has just been parsed.
     let Ok(parsed) = Document::parse_with_options(original, options) else { return Ok(original.to_owned()) };
@@ -135,7 +136,8 @@ fn all_changes<'c>(found: &'c Found, links: &'c [LinkChange]) -> Vec<(&'c str, C
                 all.push((link, Some((*inertial, note.as_deref()))));
                 let body = found.model.bodies().iter().find(|body| body.name() == link);
                 let fixed = body.into_iter().flat_map(|body| &body.links[1..]);
-                let weighs = fixed.filter(|fixed| found.unknown.contains(&fixed.name));
+                let is_given = |name: &str| links.iter().any(|change| change.link() == name);
+                let weighs = fixed.filter(|fixed| found.unknown.contains(&fixed.name) && !is_given(&fixed.name));
                 all.extend(weighs.map(|fixed| (&*fixed.name, None)));
             }
             LinkChange::Remove { link } => all.push((link, None)),

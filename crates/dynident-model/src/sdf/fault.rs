@@ -44,13 +44,17 @@ pub enum SdfFault {
     Word { element: String, text: String, expected: &'static str },
     #[error("`{name}` is defined a second time: rename or delete one")]
     DuplicateName { name: String },
-    #[error("{of} refers to `{name}`, which is no link, joint, frame or nested model here: add it or fix the name")]
+    #[error(
+        "{of} refers to `{name}`, but there is no link, joint, frame or nested model of this name: add it or fix the name"
+    )]
     UnknownFrame { name: String, of: String },
     #[error("the pose of `{name}` refers back to itself: give one of these frames another `relative_to`")]
     FrameLoop { name: String },
     #[error("link `{link}` is the child of joints `{first}` and `{second}`: delete one, closed chains are not read")]
     TwoParents { link: String, first: String, second: String },
-    #[error("links `{first}` and `{second}` both have no parent joint: fix one of them to the other, or to `world`")]
+    #[error(
+        "links `{first}` and `{second}` both have no parent joint: connect one of them to the other, or to `world`, by a fixed joint"
+    )]
     SeveralRoots { first: String, second: String },
     #[error("link `{link}` is its own ancestor through its joints: delete one joint of the loop")]
     Loop { link: String },
@@ -64,7 +68,7 @@ pub enum SdfFault {
     NegativeMass { link: String },
     #[error("the model has no joint of type revolute, continuous or prismatic: give the SDF of a robot that moves")]
     NoMovingJoint,
-    #[error("the model has more than {limit} joints: fix those that the log does not contain")]
+    #[error("the model has more than {limit} joints: write type=\"fixed\" for joints that the log does not contain")]
     TooManyJoints { limit: usize },
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),

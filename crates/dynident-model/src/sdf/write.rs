@@ -37,7 +37,7 @@ pub enum SdfWriteError {
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
     NotFinite { kind: &'static str, name: String },
     #[error(
-        "the new values of link `{link}` are those of no body with mass, which simulators refuse: use physically consistent parameters"
+        "the new values of link `{link}` are not physically consistent, and simulators would refuse them: use physically consistent parameters"
     )]
     NotPhysical { link: String },
 }

@@ -29,8 +29,9 @@ impl TermClass {
     /// width, so that equal joints have equal steps and no code switches at a velocity of zero.
     pub const CODE_STEP_WIDTH: f64 = 0.002;
 
-    /// The terms of joint `joint`, without its spring, in a form of this class, for a robot with the terms `terms`.
-    /// Several lists are alternatives: the one with the smallest residual should be taken.
+    /// Terms of joint `joint` that a format of this class can contain, chosen to replace its terms in `terms` (all
+    /// terms of the robot) except its spring. If the class contains all of them, there is one list. Otherwise each list
+    /// is an alternative, and the caller should fit all and take the one with the smallest residual.
     pub fn terms_of_joint(self, model: &Model, terms: &[TorqueTerm], joint: usize) -> Vec<Vec<TorqueTerm>> {
         let is_own = move |term: &&TorqueTerm| {
             term.own_joint() == Some(joint) && term.property() != Some(JointProperty::Stiffness)

@@ -159,7 +159,9 @@ pub enum UrdfFault {
     Loop { link: String },
     #[error("links `{first}` and `{second}` both have no parent: join them, a robot has one base")]
     SeveralRoots { first: String, second: String },
-    #[error("the robot has more than {limit} moving joints: fix those that the log does not contain")]
+    #[error(
+        "the robot has more than {limit} moving joints: write type=\"fixed\" for joints that the log does not contain"
+    )]
     TooManyJoints { limit: usize },
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),

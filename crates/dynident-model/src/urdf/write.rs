@@ -37,7 +37,7 @@ pub enum LinkChange {
 }
 
 impl LinkChange {
-    fn link(&self) -> &str {
+    pub(crate) fn link(&self) -> &str {
         match self {
             Self::Set { link, .. } | Self::Remove { link } => link,
         }

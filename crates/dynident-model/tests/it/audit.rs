@@ -49,6 +49,81 @@ fn known_defects_of_published_descriptions_are_found() {
     }
 }
 
+/// An arm of two links; `upper` has its elbow at 0.42 m.
+fn upper_arm(inertia: [f64; 3], collision: &str) -> Vec<AuditFinding> {
+    let [x, y, z] = inertia;
+    let text = format!(
+        r#"<robot name="r"><link name="base"/>
+        <link name="upper"><inertial><origin xyz="0.02 0 0.14"/><mass value="6.8"/>
+          <inertia ixx="{x}" iyy="{y}" izz="{z}" ixy="0" ixz="0" iyz="0"/></inertial>{collision}</link>
+        <link name="fore"><inertial><origin xyz="0 0 0.1"/><mass value="2"/>
+          <inertia ixx="0.02" iyy="0.02" izz="0.003" ixy="0" ixz="0" iyz="0"/></inertial></link>
+        <joint name="a" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+        <joint name="b" type="continuous"><parent link="upper"/><child link="fore"/><origin xyz="0 -0.12 0.42"/></joint>
+        </robot>"#
+    );
+    findings(&text).into_iter().filter(|finding| finding.level > AuditLevel::Info).collect()
+}
+
+#[test]
+fn an_inertia_is_compared_with_the_link_length_and_the_collision_shapes() {
+    let of = |size: &str, at: &str| {
+        format!(r#"<collision><origin xyz="{at}"/><geometry><box size="{size}"/></geometry></collision>"#)
+    };
+    let around = of("0.1 0.1 0.42", "0 0 0.2");
+    let mesh = r#"<collision><geometry><mesh filename="absent.stl"/></geometry></collision>"#;
+    let correct = [0.12, 0.12, 0.02];
+    for collision in ["", &around, mesh] {
+        assert!(upper_arm(correct, collision).is_empty(), "{collision}");
+    }
+    // The radius of gyration is 0.62 m.
+    for collision in ["", &around, mesh] {
+        let found = upper_arm([0.013, 2.61, 2.62], collision);
+        assert_eq!(found.len(), 1, "{collision}: {found:?}");
+        assert_eq!((found[0].check, &*found[0].place), ("inertia-against-size", "link upper"));
+        assert!(found[0].message.starts_with("has a radius of gyration of 0.621 m"), "{}", found[0].message);
+    }
+    // A large shape explains the same inertia.
+    assert!(upper_arm([0.013, 2.61, 2.62], &of("1.2 0.1 0.1", "0.3 0 0")).is_empty());
+    // 14 times less than the box; the shapes of several elements count together.
+    let halves = of("0.1 0.1 0.21", "0 0 0.095") + &of("0.1 0.1 0.21", "0 0 0.305");
+    for collision in [&around, &halves] {
+        let found = upper_arm([0.00711, 0.00711, 0.0019], collision);
+        assert_eq!(found.len(), 1, "{collision}: {found:?}");
+        assert!(found[0].message.starts_with("has 13.8 times less inertia than a uniform box"), "{}", found[0].message);
+    }
+    // Nothing is known about the size of a single link with its joint at the base.
+    let fan = |collision: &str| {
+        let text = format!(
+            r#"<robot name="r"><link name="base"/><link name="fan"><inertial><mass value="1"/>
+            <inertia ixx="0.04" iyy="0.04" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial>{collision}</link>
+            <joint name="a" type="continuous"><parent link="base"/><child link="fan"/></joint></robot>"#
+        );
+        above_info(&findings(&text)).len()
+    };
+    assert_eq!((fan(""), fan(mesh), fan(&of("0.1 0.1 0.1", "0 0 0"))), (0, 0, 1));
+}
+
+#[test]
+fn a_base_with_several_limbs_is_reported_as_fixed() {
+    let leg = |name: &str| {
+        format!(
+            r#"<link name="{name}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+            <joint name="{name}_joint" type="continuous"><parent link="trunk"/><child link="{name}"/></joint>"#
+        )
+    };
+    let notes = |mass: &str, legs: &str| -> Vec<AuditFinding> {
+        let text = format!(r#"<robot name="r"><link name="trunk">{mass}</link>{legs}</robot>"#);
+        findings(&text).into_iter().filter(|finding| finding.check == "base-fixed").collect()
+    };
+    let mass = r#"<inertial><mass value="7"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>"#;
+    let both = leg("left") + &leg("right");
+    let found = notes(mass, &both);
+    assert_eq!((found.len(), found[0].level, &*found[0].place), (1, AuditLevel::Info, "link trunk"));
+    assert!(found[0].message.contains("7.000 kg and 2 chains of joints"), "{}", found[0].message);
+    assert!(notes(mass, &leg("left")).is_empty() && notes("", &both).is_empty());
+}
+
 #[test]
 fn every_seeded_defect_is_found() {
     use AuditLevel::{Info, Problem, Warning};

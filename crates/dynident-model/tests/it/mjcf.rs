@@ -22,9 +22,9 @@ fn faults_are_named_at_their_place() {
         ("<robot/>".into(), "1:1: the root element is <robot>, not <mujoco>"),
         ("<mujoco>\n<worldbody>".into(), "2:12: malformed XML: the document ends too early"),
         ("<!DOCTYPE a><mujoco/>".into(), "1:1: a document type declaration"),
-        (ball, "1:52: joint `k` of type ball is not supported: write it as three hinges"),
-        (with_body("<freejoint name=\"f\"/>"), "a floating base (joint `f` of type free) is not supported: delete"),
-        (with_body("<joint type=\"free\"/>"), "a floating base (joint without a name of type free)"),
+        (ball, "1:52: joint `k` of type ball is not supported: write three hinges"),
+        (with_body("<body><freejoint name=\"f\"/></body>"), "joint `f` of type free in a body inside another body is not"),
+        (with_body("<body><joint type=\"free\"/></body>"), "joint without a name of type free in a body inside another"),
         (with_body("<joint name=\"j\"/>"), "joint `j` is defined a second time"),
         (with_body("<body name=\"b\"/>"), "body `b` is defined a second time"),
         (with_body("<joint axis=\"0 0 0\"/>"), "`axis` of <joint> gives no direction"),
@@ -86,7 +86,7 @@ fn faults_are_named_at_their_place() {
             "<mujoco><compiler settotalmass=\"3\"/><worldbody><body name=\"b\"><joint/><geom type=\"mesh\" mesh=\"m\"/>\
              </body></worldbody></mujoco>"
                 .into(),
-            "`settotalmass` needs all masses, and that of body `b` follows from a mesh",
+            "`settotalmass` needs all masses, and that of body `b` follows from mesh `m`",
         ),
     ];
     for (text, fragment) in cases {
@@ -200,6 +200,121 @@ fn linear_equalities_are_mimics_and_others_give_notices() {
     let mut said: Vec<&str> = robot.notices.iter().map(|notice| notice.loss.name()).collect();
     said.sort_unstable();
     assert_eq!(said, ["constraint", "coupling-polynomial", "gravity-compensation", "medium", "tendon"]);
+}
+
+/// A humanoid of one leg, or an arm on the world, with objects that float.
+fn scene(base: &str, actuator: &str) -> String {
+    format!(
+        r#"<mujoco><compiler angle="radian"/><default><default class="floats"><joint type="free"/></default></default>
+        <worldbody>
+          <body name="cube"><freejoint name="cube_free"/><geom type="box" size="1 1 1"/></body>
+          <body name="trunk" pos="0 0 1" euler="0.5 0 0">{base}<geom size="0.1"/>
+            <body name="leg" pos="0 0 -0.2"><joint name="hip" axis="0 1 0"/><geom size="0.1" pos="0 0 -0.2"/></body></body>
+          <body name="scissors"><frame><joint class="floats" name="scissors_free"/></frame>
+            <geom type="mesh" mesh="absent"/>
+            <body name="blade"><joint name="hinge"/><joint name="ball" type="ball"/><geom size="1"/></body></body>
+        </worldbody>
+        <equality>
+          <joint joint1="hinge" polycoef="0 1"/> <weld body1="cube"/> <connect body1="cube" body2="blade" anchor="0 0 0"/>
+        </equality>
+        <actuator>{actuator}</actuator></mujoco>"#
+    )
+}
+
+#[test]
+fn floating_objects_are_left_out_and_floating_robots_are_fixed() {
+    let losses = |text: &str| -> (Vec<String>, Vec<String>) {
+        let robot = read_mjcf(text).unwrap();
+        let names = robot.model.joints().iter().map(|joint| joint.name.clone()).collect();
+        (names, robot.notices.iter().map(|notice| format!("{}: {}", notice.loss.name(), notice.loss)).collect())
+    };
+    let object =
+        |name: &str| format!("free-object: body `{name}` has a free joint and no actuated joint: it is an object");
+    let [cube, scissors] = ["cube", "scissors"].map(object);
+    let motor = r#"<motor joint="hip"/><adhesion body="cube"/>"#;
+    let (joints, notices) = losses(&scene("", motor));
+    assert_eq!(joints, ["hip"]);
+    assert!(notices.len() == 2 && notices[0].starts_with(&cube) && notices[1].starts_with(&scissors), "{notices:?}");
+    for base in ["<freejoint/>", "<joint type=\"free\" name=\"root\"/>", "<joint class=\"floats\"/>"] {
+        let (joints, notices) = losses(&scene(base, motor));
+        assert_eq!(joints, ["hip"], "{base}");
+        assert!(notices.len() == 3 && notices[1].contains("read as fixed to the world at `trunk`"), "{notices:?}");
+        let floating = read_mjcf(&scene(base, motor)).unwrap().model;
+        assert_eq!(floating, read_mjcf(&scene("", motor)).unwrap().model, "{base}");
+    }
+    // A tendon can move a joint, too.
+    let tendon = scene("<freejoint/>", "<motor tendon=\"t\"/>").replace(
+        "<equality>",
+        "<tendon><fixed name=\"t\"><joint joint=\"hip\" coef=\"1\"/></fixed></tendon><equality>",
+    );
+    assert_eq!(losses(&tendon).0, ["hip"]);
+    // Without actuators, every body with joints is a robot: the ball joint of the scissors is then refused.
+    let error = read_mjcf(&scene("<freejoint/>", "")).unwrap_err().to_string();
+    assert!(error.contains("`ball`"), "{error}");
+    // Nothing remains of a scene of objects.
+    let objects = "<mujoco><worldbody><body><freejoint/><geom size=\"1\"/></body></worldbody></mujoco>";
+    assert!(read_mjcf(objects).unwrap_err().to_string().contains("no joint of type hinge or slide"));
+}
+
+#[test]
+fn a_total_mass_includes_the_objects_of_the_scene() {
+    let text = |object: &str| {
+        format!(
+            r#"<mujoco><compiler settotalmass="10"/><worldbody>
+            <body name="b"><joint name="j"/><geom size="1" mass="3"/></body>
+            <body name="o">{object}<geom size="1" mass="1"/><body><geom size="1" mass="1"/></body></body>
+            </worldbody><actuator><motor joint="j"/></actuator></mujoco>"#
+        )
+    };
+    for object in ["<freejoint/>", ""] {
+        let model = read_mjcf(&text(object)).unwrap().model;
+        assert!((model.inertials()[0].mass_kg() - 6.0).abs() < 1e-14, "{object}");
+    }
+}
+
+#[test]
+fn mesh_files_are_read_only_if_a_mass_depends_on_them() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(repository("golden/mjcf/meshes/prism.stl"), folder.path().join("prism.stl")).unwrap();
+    let text = |contents: &str| {
+        with_body(contents).replace(
+            "<worldbody>",
+            r#"<compiler meshdir="at/../" strippath="true"/>
+            <asset><mesh file="x/prism.stl"/><mesh name="absent" file="absent.stl"/></asset><worldbody>"#,
+        )
+    };
+    std::fs::create_dir(folder.path().join("at")).unwrap();
+    let read = |contents: &str| {
+        let path = folder.path().join("robot.xml");
+        std::fs::write(&path, text(contents)).unwrap();
+        load_robot(&path).unwrap()
+    };
+    let known = read("<geom type=\"mesh\" mesh=\"prism\"/>");
+    assert!(known.notices.is_empty() && known.model.inertials()[0].mass_kg() > 1.0, "{:?}", known.notices);
+    for (contents, words) in [
+        (
+            "<geom type=\"mesh\" mesh=\"absent\"/>",
+            "follows from mesh `absent`: mesh `at/../absent.stl` is missing (searched",
+        ),
+        ("<geom type=\"mesh\" mesh=\"no\"/>", "follows from mesh `no`: no mesh `no` under <asset>"),
+    ] {
+        let unknown = read(contents);
+        let said: Vec<String> = unknown.notices.iter().map(|notice| notice.loss.to_string()).collect();
+        assert!(said.len() == 1 && said[0].contains(words), "{said:?}");
+        assert!(unknown.model.bodies()[0].links[0].inertial.is_none());
+        // Not needed: the body has an inertial.
+        let given = format!("{contents}<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>");
+        assert!(read(&given).notices.is_empty());
+    }
+    // The body that carries a fixed mesh gets the mass of both, also where the original is rewritten.
+    let robot =
+        read("<geom size=\"0.1\"/><body name=\"tip\" pos=\"1 0 0\"><geom type=\"mesh\" mesh=\"prism\"/></body>");
+    let changes = dynident_model::link_changes(&robot.model, robot.model.inertials()).unwrap();
+    let mut include = |_: &str| Err(String::new());
+    let written = rewrite_mjcf(&robot.text, &mut include, &changes, &[]).unwrap();
+    let again = read_mjcf(&written).unwrap();
+    let (one, other) = (&again.model.inertials()[0].0, &robot.model.inertials()[0].0);
+    assert!(again.notices.is_empty() && (0..10).all(|k| (one[k] - other[k]).abs() < 1e-12), "{written}");
 }
 
 #[test]

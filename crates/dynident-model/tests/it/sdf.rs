@@ -40,7 +40,7 @@ fn faults_name_the_place_and_the_fix() {
         ("<sdf version=\"1.9\"><model name=\"a\"><link name=\"l\"/></model></sdf>", "no joint of type"),
         (&changed("type=\"revolute\"", "type=\"ball\""), "4:1: joint `swing` of type ball is not supported: write it"),
         (&changed("type=\"revolute\"", "type=\"screw\""), "write it as revolute, continuous, prismatic or fixed"),
-        (&changed("<child>rod", "<child>rot"), "the pose of `swing` refers to `rot`, which is no link"),
+        (&changed("<child>rod", "<child>rot"), "the pose of `swing` refers to `rot`, but there is no link"),
         (&changed("<parent>base", "<parent>bas"), "<parent> of joint `swing` refers to `bas`"),
         (&changed("<parent>base", "<parent>rod"), "joint `swing` joins `rod` with itself"),
         (&changed("<parent>base</parent>", ""), "<joint> has no element `parent`"),

@@ -77,6 +77,8 @@ fn empty_like(block: &RawBlock) -> RawBlock {
         ddq: none(&block.ddq),
         tau: none(&block.tau),
         temperature_c: none(&block.temperature_c),
+        // The motion of a log with torque does not use its commands.
+        command: Vec::new(),
     }
 }
 

@@ -72,7 +72,7 @@ impl RejectedSamples {
         let share = 100.0 * self.share;
         match self.reason {
             Reason::Outlier => format!(
-                "{samples} samples ({share:.2} %) stand far off those before and behind them, e.g. {value:.4} for \
+                "{samples} samples ({share:.2} %) differ strongly from their neighbours, e.g. {value:.4} for \
                  about {expected:.4} at {time_s:.3} s (row {row}); they are left out of torque and regressor"
             ),
             Reason::Held => format!(

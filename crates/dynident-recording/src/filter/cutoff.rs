@@ -4,19 +4,22 @@ use crate::error::{FilterError, require};
 use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
 
+/// Share of the velocity's power that defines its band.
+const VELOCITY_SHARE: f64 = 0.99;
 pub(crate) const MAX_CUTOFF_SAMPLES: usize = 1 << 16;
 
 /// Limits of the choice of a cut-off. They are not part of a study file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CutoffSettings {
-    /// Share of the acceleration's power (noise subtracted) below the maximum frequency of the motion, 0.9999 by
-    /// default.
+    /// Share of the acceleration's power (noise subtracted) that defines the maximum frequency of the motion: this
+    /// share lies below it. 0.9999 by default.
     pub power_share: f64,
     /// Ratio of the cut-off to the maximum frequency of the motion, 2 by default. Two-way Butterworth filters of order
     /// 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it. Attenuation of positions but not of
     /// torque biases the fit; the default limits it to 0.4 %.
     pub margin: f64,
-    /// Minimum ratio of the spectrum to the noise floor for motion, 10 by default.
+    /// Smallest ratio of the spectrum to the noise floor for a joint that moves, 10 by default; other joints are
+    /// ignored.
     pub min_noise_ratio: f64,
     /// Maximum ratio of the cut-off to the sampling rate, 0.4 by default.
     pub max_rate_share: f64,
@@ -56,6 +59,10 @@ pub struct CutoffChoice {
     /// move.
     #[serde(default)]
     pub faded_hz: Vec<Option<f64>>,
+    /// Frequency below which each joint has 99 % of its velocity's power (noise subtracted), Hz; `None` for a joint
+    /// that does not move. It is not stored in files.
+    #[serde(skip)]
+    pub velocity_hz: Vec<Option<f64>>,
     /// The choice in one sentence.
     pub evidence: String,
 }
@@ -63,16 +70,17 @@ pub struct CutoffChoice {
 /// Chooses one cut-off for all joints from uniformly sampled positions `q` (one slice for each joint; at most the first
 /// 65 536 samples are used).
 ///
-/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, three pieces;
-/// independent of the unit of time):
-/// * Position noise makes the spectrum of the acceleration rise with frequency. Above the peak of the velocity's
-///   spectrum, the valley is the first frequency at which the acceleration's spectrum (smoothed over a quarter octave)
-///   falls below twice its minimum. There the motion disappears in the noise.
-/// * Data that were filtered before have their valley far above the motion. Hence the second frequency, below which
-///   99.99 % of the acceleration's power up to the valley lies.
+/// Per joint, from the Welch spectrum of the second difference of q, which is the acceleration up to a factor (Hann
+/// window, three segments with half overlap):
+/// * Position noise makes the spectrum of the acceleration rise with frequency. The valley is the first frequency above
+///   the peak of the velocity's spectrum at which the acceleration's spectrum (smoothed over a quarter octave) falls
+///   below twice its minimum above this peak. There the motion disappears in the noise.
+/// * Data that were filtered before have their valley far above the motion. The joint therefore needs twice the
+///   frequency below which 99.99 % of the acceleration's power up to the valley lies.
 ///
-/// The joint needs twice the lower of the two; the cut-off of the log is the maximum over the joints, at most 0.4 of
-/// the rate. A joint is ignored if its spectrum never exceeds ten times its median over the upper half of the band.
+/// The cut-off of the log is the maximum over the joints, at most 0.4 of the sample rate. A joint is ignored if its
+/// spectrum never exceeds ten times the median over the upper half of the frequencies. If all joints are ignored, the
+/// cut-off is a tenth of the rate.
 pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
     cutoff_within(q, rate_hz, &CutoffSettings::default())
 }
@@ -91,17 +99,20 @@ pub fn cutoff_within<S: AsRef<[f64]>>(q: &[S], rate_hz: f64, limits: &CutoffSett
     let leading = leading.max_by(|a, b| a.1.power_hz.total_cmp(&b.1.power_hz));
     let joints_hz = joints.iter().map(|content| content.as_ref().map(joint_cutoff_hz)).collect();
     let faded_hz = joints.iter().map(|content| content.as_ref().map(|content| content.valley_hz)).collect();
+    let velocity_hz = joints.iter().map(|content| content.as_ref().map(|content| content.velocity_hz)).collect();
     match leading {
         None => CutoffChoice {
             cutoff_hz: 0.1 * rate_hz,
             joints_hz,
             faded_hz,
+            velocity_hz,
             evidence: "no joint moves above its noise: the cut-off is a tenth of the sampling rate".to_owned(),
         },
         Some((joint, content)) => CutoffChoice {
             cutoff_hz: joint_cutoff_hz(content),
             joints_hz,
             faded_hz,
+            velocity_hz,
             evidence: format!(
                 "joint {} (0-based) needs the highest cut-off: its acceleration falls below the noise ({:.1e} per \
                  sample of position) at {:.3} Hz, and 99.99 % of its power below that lies below {:.3} Hz; times \
@@ -114,6 +125,7 @@ pub fn cutoff_within<S: AsRef<[f64]>>(q: &[S], rate_hz: f64, limits: &CutoffSett
 
 struct Content {
     power_hz: f64,
+    velocity_hz: f64,
     valley_hz: f64,
     /// Standard deviation of the position noise of one sample.
     noise: f64,
@@ -160,13 +172,25 @@ fn content(spectrum: &Spectrum, rate_hz: f64, limits: &CutoffSettings) -> Option
     if position[0] <= limits.min_noise_ratio * floor || total <= 0.0 {
         return None;
     }
-    let mut sum = 0.0;
-    let last = power.iter().position(|power| {
-        sum += power;
-        sum >= limits.power_share * total
-    });
+    let velocity: Vec<f64> = power.iter().enumerate().map(|(k, power)| power / ((k + 1) * (k + 1)) as f64).collect();
     let hertz = |k: usize| (k + 1) as f64 * rate_hz / *length as f64;
-    Some(Content { power_hz: hertz(last.unwrap_or(end)), valley_hz: hertz(valley), noise: floor.sqrt() })
+    Some(Content {
+        power_hz: hertz(bin_below(&power, limits.power_share)),
+        velocity_hz: hertz(bin_below(&velocity, VELOCITY_SHARE)),
+        valley_hz: hertz(valley),
+        noise: floor.sqrt(),
+    })
+}
+
+/// First bin below which this share of the power lies.
+fn bin_below(power: &[f64], share: f64) -> usize {
+    let total: f64 = power.iter().sum();
+    let mut sum = 0.0;
+    let is_reached = |power: &f64| {
+        sum += power;
+        sum >= share * total
+    };
+    power.iter().position(is_reached).unwrap_or(power.len() - 1)
 }
 
 /// Index (bin minus one) at which the acceleration's spectrum has fallen to twice its minimum above the main motion.

@@ -69,7 +69,7 @@ impl DecimationSettings {
             0.5842 * (attenuation - 21.0).powf(0.4) + 0.07886 * (attenuation - 21.0)
         };
         let length = (attenuation - 7.95) / (2.285 * 2.0 * PI * transition / rate_hz) + 1.0;
-        let fix = "widen it: the filter would have more than 20001 coefficients";
+        let fix = "give a wider transition: the filter would have more than 20001 coefficients";
         require(length <= MAX_TAPS as f64, "transition_hz", transition, fix)?;
         let half = ((length.ceil() as usize) / 2).max(1);
         let middle = half as f64;

@@ -26,7 +26,7 @@ pub(crate) fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -
     if cutoff_hz.partial_cmp(&(0.5 * rate_hz)) != Some(core::cmp::Ordering::Less) {
         return Err(FilterError::AboveNyquist { cutoff_hz, rate_hz });
     }
-    let fix = "raise it: below 1e-5 of the sampling rate the recursion loses all precision";
+    let fix = "give a higher cut-off: below 1e-5 of the sampling rate the recursion loses all precision";
     require(cutoff_hz >= MIN_CUTOFF_RATIO * rate_hz, "cutoff_hz", cutoff_hz, fix)?;
     let warped = (PI * cutoff_hz / rate_hz).tan();
     let mut sections: Vec<Section> = (0..order / 2)

@@ -1,6 +1,6 @@
 //! The columns of one quantity of all joints, with unit, sign, scale and matrix.
 
-use super::column_pattern::expand_pattern;
+use super::column_pattern::expand_for_joints;
 use super::units::{Quantity, si_factor, unit_names};
 use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
@@ -13,11 +13,12 @@ use std::path::PathBuf;
 pub enum ColumnRef {
     /// 0-based index.
     Index(usize),
-    /// Name in the header; may contain a range such as `q{1..7}_rad`.
+    /// Name in the header; may contain a range such as `q{1..7}_rad`, or `{joint}` for the name of each joint.
     Name(String),
 }
 
-/// Columns in joint order: a list, or one text with a range such as `"q{1..7}_rad"`.
+/// Columns in joint order: a list, or one text with a range such as `"q{1..7}_rad"`, or with the joint names of the
+/// study such as `"effort[{joint}]"`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(
@@ -88,7 +89,8 @@ impl<T: Clone> OneOrMany<T> {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ChannelGroup {
-    /// Another file of the same log, relative to the main file's folder, with the same rows.
+    /// Another file of the same log, relative to the main file's folder, with the same rows. A range or `{joint}` gives
+    /// one file for each column: `"axis{1..6}.csv"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// One column for each joint of the study, in the study's joint order (any number with a matrix).
@@ -128,32 +130,57 @@ impl ChannelGroup {
         }
     }
 
-    /// The columns with ranges expand_pattern.
+    /// The columns with expanded ranges; a pattern with `{joint}` is one column.
     ///
     /// # Errors
     /// If a range is malformed or too long.
     pub fn column_list(&self, key: &str) -> Result<Vec<ColumnRef>, FormatError> {
+        self.columns_of(key, &[])
+    }
+
+    /// The columns of a study with these joints: one column for each file if there are several files.
+    ///
+    /// # Errors
+    /// If a range is malformed or too long.
+    pub(super) fn columns_of(&self, key: &str, joints: &[String]) -> Result<Vec<ColumnRef>, FormatError> {
         let key = format!("{key}.columns");
         let mut list = Vec::new();
+        let expanded =
+            |name: &str| expand_for_joints(&key, name, joints).map(|names| names.into_iter().map(ColumnRef::Name));
         match &self.columns {
-            Columns::Pattern(pattern) => list.extend(expand_pattern(&key, pattern)?.into_iter().map(ColumnRef::Name)),
+            Columns::Pattern(pattern) => list.extend(expanded(pattern)?),
             Columns::List(columns) => {
                 for column in columns {
                     match column {
                         ColumnRef::Index(index) => list.push(ColumnRef::Index(*index)),
-                        ColumnRef::Name(name) => {
-                            list.extend(expand_pattern(&key, name)?.into_iter().map(ColumnRef::Name));
-                        }
+                        ColumnRef::Name(name) => list.extend(expanded(name)?),
                     }
                 }
             }
         }
+        // The same column of several files.
+        let files = self.files(&key, joints)?.len();
+        if let ([column], true) = (&list[..], files > 1) {
+            list = vec![column.clone(); files];
+        }
         Ok(list)
+    }
+
+    /// The file of each column; one for all columns, or none for the main file.
+    ///
+    /// # Errors
+    /// If a range is malformed or too long.
+    pub(super) fn files(&self, key: &str, joints: &[String]) -> Result<Vec<PathBuf>, FormatError> {
+        let Some(file) = &self.file else { return Ok(Vec::new()) };
+        match file.to_str() {
+            Some(name) => Ok(expand_for_joints(key, name, joints)?.into_iter().map(PathBuf::from).collect()),
+            None => Ok(vec![file.clone()]),
+        }
     }
 
     pub(super) fn validate(&self, quantity: Quantity, joints: &[String]) -> Result<(), FormatError> {
         let key = quantity.key();
-        let columns = self.column_list(key)?.len();
+        let columns = self.columns_of(key, joints)?.len();
         let at = |name: &str| format!("{key}.{name}");
         let wrong = |name: &str, found: usize, expected: usize, what: &str| {
             FormatError::new(
@@ -172,6 +199,10 @@ impl ChannelGroup {
                 format!("{columns} columns for {} joints", joints.len()),
                 format!("give one column for each of: {}", joints.join(", ")),
             ));
+        }
+        let files = self.files(&at("file"), joints)?.len();
+        if files > 1 && files != columns {
+            return Err(wrong("file", files, columns, "columns"));
         }
         if let Some(unit) = &self.unit {
             if !unit.fits(columns) {

@@ -1,9 +1,20 @@
-//! Expands ranges in column names: `"q{1..7}_rad"`.
+//! Expands ranges and joint names in the names of columns and files: `"q{1..7}_rad"`, `"effort[{joint}]"`.
 
 use crate::error::FormatError;
 
 /// Maximum number of columns in a range; protects the memory.
 const MAX_COLUMNS: u64 = 4096;
+
+/// Placeholder of the name of each joint of the study.
+const JOINT: &str = "{joint}";
+
+/// As [`expand_pattern`]; `effort[{joint}]` gives one name for each of `joints`, in their order.
+pub(crate) fn expand_for_joints(key: &str, pattern: &str, joints: &[String]) -> Result<Vec<String>, FormatError> {
+    if pattern.contains(JOINT) && !joints.is_empty() {
+        return Ok(joints.iter().map(|joint| pattern.replace(JOINT, joint)).collect());
+    }
+    expand_pattern(key, pattern)
+}
 
 /// Expands `pattern`: `q{1..3}` gives `q1 q2 q3`, `{01..12}` keeps leading zeros, a text without a range is unchanged.
 pub(crate) fn expand_pattern(key: &str, pattern: &str) -> Result<Vec<String>, FormatError> {
@@ -40,6 +51,13 @@ mod tests {
         assert_eq!(expand_pattern("k", "{09..10}").unwrap(), ["09", "10"]);
         assert_eq!(expand_pattern("k", "plain {x}").unwrap(), ["plain {x}"]);
         assert_eq!(expand_pattern("k", "a{b").unwrap(), ["a{b"]);
+    }
+
+    #[test]
+    fn joints_are_named() {
+        let joints = ["pan", "lift"].map(str::to_owned);
+        assert_eq!(expand_for_joints("k", "x[{joint}]", &joints).unwrap(), ["x[pan]", "x[lift]"]);
+        assert_eq!(expand_for_joints("k", "x{1..2}", &joints).unwrap(), ["x1", "x2"]);
     }
 
     #[test]

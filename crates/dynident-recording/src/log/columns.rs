@@ -64,6 +64,10 @@ impl ColumnSelection {
             }
             ColumnRef::Name(name) => {
                 let Some(names) = self.table.names() else {
+                    // `"{1..7}"` for columns without names.
+                    if let Some(index) = name.parse().ok().filter(|index| *index < width) {
+                        return Ok(index);
+                    }
                     let hint = match self.table.place() {
                         LogPlace::Line { .. } => {
                             "the file has no header line: give 0-based indices, or set header = true"
@@ -129,13 +133,18 @@ pub(super) fn column_label(names: Option<&[String]>, field: usize) -> String {
 }
 
 fn existing_names(requested: &str, names: &[String]) -> String {
-    const MAX_SHOWN: usize = 40;
+    const MAX_SHOWN: usize = 20;
     // Bounded, because a line of a megabyte may contain half a million names.
     const MAX_COMPARED: usize = 1000;
-    let nearest =
-        names.iter().take(MAX_COMPARED).min_by_key(|name| edit_distance(requested, name)).map_or("", String::as_str);
+    let mut likely: Vec<&String> = names.iter().take(MAX_COMPARED).collect();
+    // Of many names, the similar ones are of interest.
+    let by_distance = |name: &&String| edit_distance(requested, name);
+    let nearest = likely.iter().copied().min_by_key(by_distance).map_or("", String::as_str);
+    if names.len() > MAX_SHOWN {
+        likely.sort_by_key(by_distance);
+    }
     let cut = |name: &str| name.chars().take(60).flat_map(char::escape_debug).collect::<String>();
-    let list = names.iter().take(MAX_SHOWN).map(|name| cut(name)).collect::<Vec<_>>().join(", ");
+    let list = likely.iter().take(MAX_SHOWN).map(|name| cut(name)).collect::<Vec<_>>().join(", ");
     let more = if names.len() > MAX_SHOWN { format!(", and {} more", names.len() - MAX_SHOWN) } else { String::new() };
     let delimiter = if names.len() == 1 { " (only one column: is `delimiter` right?)" } else { "" };
     format!("did you mean `{}`? There are: {list}{more}{delimiter}", cut(nearest))

@@ -1,17 +1,19 @@
 //! A file of any format as a source of rows.
 
 use super::format::{Header, LogFormat};
+use super::part::PartTable;
+use super::sage::SageTable;
 use super::source::{LogGroup, LogSource, LogTable};
 use super::text::TextTable;
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 use dynident_files::SeenFiles;
-use dynident_formats::{Contents, FileError, FileFormat, Table};
+use dynident_formats::{Contents, FileError, FileFormat, SAGE_FILES, Table};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A file with rows of numbers in any supported format (`docs/src/logs.md`), detected from its content. The folder of a
-/// rosbag2 recording is treated as a file.
+/// rosbag2, LeRobot or SAGE recording is treated as a file.
 ///
 /// A log is read several times. Every pass and every clone compares the file's length, modification time and inode with
 /// those of the first pass; a replaced file is an error.
@@ -20,18 +22,26 @@ pub struct FileLog {
     path: PathBuf,
     header: Header,
     delimiter: Option<char>,
+    part: Option<String>,
     seen: Arc<SeenFiles>,
 }
 
 impl FileLog {
-    /// The file at `path`; `header` and `delimiter` of `format` apply to text. Does not read the file.
+    /// The file at `path`; `header` and `delimiter` of `format` apply to text, `part` to a file with several
+    /// recordings. Does not read the file.
     pub fn new(path: &Path, format: &LogFormat) -> Self {
-        Self { path: path.to_owned(), header: format.header, delimiter: format.delimiter, seen: Arc::default() }
+        Self {
+            path: path.to_owned(),
+            header: format.header,
+            delimiter: format.delimiter,
+            part: format.part.clone(),
+            seen: Arc::default(),
+        }
     }
 
     /// The file at `path`; header and delimiter of a text file are detected.
     pub fn described_by_itself(path: &Path) -> Self {
-        Self { path: path.to_owned(), header: Header::Auto, delimiter: None, seen: Arc::default() }
+        Self { path: path.to_owned(), header: Header::Auto, delimiter: None, part: None, seen: Arc::default() }
     }
 
     /// Opens the file for one pass over its rows; also returns its format.
@@ -47,10 +57,14 @@ impl FileLog {
         }
         let opened = dynident_formats::open(&self.path)?;
         let table: Box<dyn LogTable> = match opened.contents {
+            Contents::Text(_) if opened.format == FileFormat::Sage => Box::new(SageTable::open(&self.path)?),
             Contents::Text(text) => Box::new(TextTable::open(&self.path, text, self.header, self.delimiter)?),
             Contents::Table(table) => Box::new(FileTable { label: self.label(), table, rows: 0 }),
         };
-        Ok((opened.format, table))
+        match &self.part {
+            Some(part) => Ok((opened.format, Box::new(PartTable::new(table, part)?))),
+            None => Ok((opened.format, table)),
+        }
     }
 }
 
@@ -73,7 +87,10 @@ impl LogSource for FileLog {
         match dynident_formats::open(&self.path).ok()?.contents {
             Contents::Table(table) => table.estimated_rows(),
             Contents::Text(mut text) => {
-                let size = std::fs::metadata(&self.path).ok()?.len();
+                // Of a SAGE recording, the measurements are the last text.
+                let files = dynident_formats::files(&self.path).ok()?;
+                let file = files.iter().find(|file| file.ends_with(SAGE_FILES[1])).unwrap_or(&self.path);
+                let size = std::fs::metadata(file).ok()?.len();
                 let mut head = Vec::new();
                 text.by_ref().take(1 << 16).read_to_end(&mut head).ok()?;
                 let lines = head.split(|byte| *byte == b'\n').count().max(2) - 1;

@@ -6,6 +6,7 @@ use super::row_rules::{RowRule, checked_ranges};
 use super::units::Quantity;
 use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// Whether the first row contains the column names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -95,24 +96,41 @@ impl TimeUnit {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TimeColumn {
-    /// Name or 0-based index, in the main file.
+    /// Name or 0-based index, in the main file or in `file`.
     pub column: ColumnRef,
+    /// Another file of the same log, relative to the main file's folder, with the same rows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
     /// Unit of the stamps; seconds by default.
     #[serde(default)]
     pub unit: TimeUnit,
     /// Further factor on the stamps (tick length); 1 by default.
     #[serde(default = "one")]
     pub scale: f64,
+    /// Largest difference of the stamps of one row, s, if other files of the log have a column of this name too. A
+    /// larger one shows that the files do not belong together. Default 0.1, five samples of a servo bus; the files of
+    /// published SAGE recordings have equal stamps.
+    #[serde(default = "max_difference_s", skip_serializing_if = "is_default_difference")]
+    pub max_difference_s: f64,
 }
 
 fn one() -> f64 {
     1.0
 }
 
+fn max_difference_s() -> f64 {
+    0.1
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the shape that serde wants")]
+fn is_default_difference(value: &f64) -> bool {
+    *value == max_difference_s()
+}
+
 impl TimeColumn {
     /// Stamps in seconds.
     pub fn seconds(column: ColumnRef) -> Self {
-        Self { column, unit: TimeUnit::Seconds, scale: one() }
+        Self { column, file: None, unit: TimeUnit::Seconds, scale: one(), max_difference_s: max_difference_s() }
     }
 }
 
@@ -171,6 +189,10 @@ pub struct LogFormat {
     /// `","`, `";"`, `"\t"` or `" "` (any number of spaces); detected from the first line by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delimiter: Option<char>,
+    /// The recording in a file with several: an episode, `"data.demo_3"`. Names of columns follow this name. The whole
+    /// file by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<String>,
     /// The time column; otherwise `rate_hz` is required.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<TimeColumn>,
@@ -185,8 +207,13 @@ pub struct LogFormat {
     /// Logged accelerations, for comparison only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub acceleration: Option<ChannelGroup>,
-    /// Joint torques or motor currents.
-    pub torque: ChannelGroup,
+    /// Joint torques or motor currents. A log without them needs `command`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque: Option<ChannelGroup>,
+    /// Commanded positions, for robots behind position loops: the target that was sent to each servo, in rad (m) after
+    /// unit, scale and offset. In addition to `torque` or in place of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command: Option<ChannelGroup>,
     /// Joint temperatures, °C, for temperature-dependent friction. Convert other units by `scale` and `offset`; several
     /// joints may use the same column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -200,6 +227,10 @@ pub struct LogFormat {
     /// Seconds `[from, to)` after the first data row of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_range_s: Option<[f64; 2]>,
+    /// Keep one row in n, for a recorder that repeats values: `3` keeps rows 0, 3, 6 and so on. All other keys apply to
+    /// the kept rows; `rate_hz` remains the rate of the file. Default 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub keep_every: Option<u64>,
     /// Ranges of data rows `[first, end)`, 0-based, that are left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drop_rows: Vec<[u64; 2]>,
@@ -241,15 +272,18 @@ impl LogFormat {
         Self {
             header: Header::default(),
             delimiter: None,
+            part: None,
             time: Some(time),
             rate_hz: None,
             position,
             velocity: None,
             acceleration: None,
-            torque,
+            torque: Some(torque),
+            command: None,
             temperature: None,
             rows: None,
             fraction: None,
+            keep_every: None,
             time_range_s: None,
             drop_rows: Vec::new(),
             drop_time_s: Vec::new(),
@@ -287,6 +321,10 @@ impl LogFormat {
                 let fix = "give samples per second, above 0 and at most 1e7";
                 return wrong("rate_hz", &format!("{rate} is not a valid rate"), fix);
             }
+            (Some(time), None) if time.max_difference_s.is_nan() || time.max_difference_s <= 0.0 => {
+                let problem = format!("{:?} is not positive", time.max_difference_s);
+                return wrong("time.max_difference_s", &problem, "give a number of seconds, such as 0.1");
+            }
             (Some(time), None) if !(1e-15..=1e6).contains(&time.scale) => {
                 let problem = format!("{:?} is no length of a tick", time.scale);
                 return wrong("time.scale", &problem, "give 1e-15 to 1e6 units per tick, or leave it out");
@@ -319,6 +357,9 @@ impl LogFormat {
             let fix = "write [from, to] in seconds with from < to";
             return wrong("time_range_s", &format!("[{from}, {to}] is empty"), fix);
         }
+        if self.keep_every == Some(0) {
+            return wrong("keep_every", "0 keeps no row", "give 1 for all rows, 2 for every second row, ..");
+        }
         checked_ranges(&self.drop_rows, &self.drop_time_s)?;
         self.keep_where.iter().try_for_each(|rule| rule.validate("keep_where"))?;
         self.drop_where.iter().try_for_each(|rule| rule.validate("drop_where"))?;
@@ -326,11 +367,33 @@ impl LogFormat {
             let problem = format!("{} is out of range", self.max_gap_steps);
             return wrong("max_gap_steps", &problem, "give 1.5 to 1000 median steps");
         }
+        if self.torque.is_none() && self.command.is_none() {
+            let fix =
+                "add torque = { columns = [...] }, or command = { columns = [...] } for a robot that reports no torque";
+            return wrong("torque", "neither torque nor command is given", fix);
+        }
         for (quantity, group) in self.groups() {
             group.validate(quantity, joints)?;
-            Mapping::new(group, quantity, joints.len())?;
+            Mapping::new(group, quantity, joints)?;
         }
         Ok(())
+    }
+
+    /// Checks that the format has torque columns.
+    ///
+    /// # Errors
+    /// A [`FormatError`] that names the key and the fix.
+    pub fn require_torque(&self) -> Result<(), FormatError> {
+        if self.torque.is_some() {
+            return Ok(());
+        }
+        let fix = match self.command {
+            Some(_) => {
+                "add torque = { columns = [...] }; for a robot that reports no torque, describe its servos in [drive.servo]"
+            }
+            None => "add torque = { columns = [...] }",
+        };
+        Err(FormatError::new("torque", "this method needs measured torques or currents", fix))
     }
 
     /// The channel groups that are present, in the order of [`Quantity::ALL`].
@@ -339,8 +402,9 @@ impl LogFormat {
             Quantity::Position => Some(&self.position),
             Quantity::Velocity => self.velocity.as_ref(),
             Quantity::Acceleration => self.acceleration.as_ref(),
-            Quantity::Torque => Some(&self.torque),
+            Quantity::Torque => self.torque.as_ref(),
             Quantity::Temperature => self.temperature.as_ref(),
+            Quantity::Command => self.command.as_ref(),
         };
         Quantity::ALL.into_iter().filter_map(|quantity| Some((quantity, group(quantity)?))).collect()
     }

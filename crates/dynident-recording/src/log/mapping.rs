@@ -13,9 +13,10 @@ pub(crate) struct Mapping {
 }
 
 impl Mapping {
-    pub(crate) fn new(group: &ChannelGroup, quantity: Quantity, joints: usize) -> Result<Self, FormatError> {
+    pub(crate) fn new(group: &ChannelGroup, quantity: Quantity, names: &[String]) -> Result<Self, FormatError> {
         let key = quantity.key();
-        let columns = group.column_list(key)?.len();
+        let joints = names.len();
+        let columns = group.columns_of(key, names)?.len();
         let factor = |column: usize| {
             let unit = group.unit.as_ref().and_then(|unit| unit.at(column));
             let unit = unit.map_or(Some(1.0), |unit| si_factor(&unit, quantity)).unwrap_or(1.0);
@@ -110,10 +111,14 @@ mod tests {
         toml::from_str(toml).unwrap()
     }
 
+    fn joints(count: usize) -> Vec<String> {
+        (0..count).map(|joint| joint.to_string()).collect()
+    }
+
     #[test]
     fn inverse_matrix_undoes_the_joint_to_motor_matrix() {
         let group = group("columns = [0, 1]\ninverse_matrix = [[45.0, 0.0], [32.0, 32.0]]\noffset = [0.0, 0.5]");
-        let mapping = Mapping::new(&group, Quantity::Position, 2).unwrap();
+        let mapping = Mapping::new(&group, Quantity::Position, &joints(2)).unwrap();
         // Joints (0.1, 0.2) turn the motors by (4.5, 9.6).
         let mut out = vec![Vec::new(), Vec::new()];
         mapping.apply(&[vec![4.5], vec![9.6]], &mut out);
@@ -123,7 +128,7 @@ mod tests {
     #[test]
     fn unit_sign_and_scale_multiply_before_the_offset() {
         let group = group("columns = [0]\nunit = \"deg\"\nsign = -1\nscale = 2.0\noffset = 1.0");
-        let mapping = Mapping::new(&group, Quantity::Position, 1).unwrap();
+        let mapping = Mapping::new(&group, Quantity::Position, &joints(1)).unwrap();
         let mut out = vec![Vec::new()];
         mapping.apply(&[vec![90.0]], &mut out);
         assert!((out[0][0] - (1.0 - core::f64::consts::PI)).abs() < 1e-15);
@@ -132,6 +137,6 @@ mod tests {
     #[test]
     fn a_singular_matrix_is_refused() {
         let group = group("columns = [0, 1]\ninverse_matrix = [[1.0, 2.0], [2.0, 4.0]]");
-        assert!(Mapping::new(&group, Quantity::Position, 2).is_err());
+        assert!(Mapping::new(&group, Quantity::Position, &joints(2)).is_err());
     }
 }

@@ -38,7 +38,7 @@ impl Log {
     ) -> Result<Arc<T>, E> {
         let file = self.source.path().and_then(|path| path.metadata().ok());
         let about = About {
-            format: LogFormat { velocity: None, acceleration: None, ..self.format.clone() },
+            format: LogFormat { velocity: None, acceleration: None, command: None, ..self.format.clone() },
             joints: self.joints.clone(),
             file: file.map(|data| (data.len(), data.modified().ok())),
         };

@@ -31,7 +31,7 @@ pub struct JointSamples {
     pub clock: SampleClock,
     /// Positions (rad, m).
     pub q: Vec<Vec<f64>>,
-    /// Torques (N m, N).
+    /// Torques (N m, N); may be empty if there are commands.
     pub tau: Vec<Vec<f64>>,
     /// Measured velocities (rad/s, m/s), for comparison only; may be empty.
     pub dq: Vec<Vec<f64>>,
@@ -39,6 +39,8 @@ pub struct JointSamples {
     pub ddq: Vec<Vec<f64>>,
     /// Temperatures (°C); may be empty.
     pub temperature_c: Vec<Vec<f64>>,
+    /// Commanded positions (rad, m); may be empty.
+    pub command: Vec<Vec<f64>>,
 }
 
 /// Rate or times of samples in memory.
@@ -88,17 +90,19 @@ impl JointSamples {
             Ok(ChannelGroup::new(Columns::List(list)))
         };
         let position = group("q", self.q)?;
-        let torque = group("tau", self.tau)?;
+        let torque = if self.tau.is_empty() && !self.command.is_empty() { None } else { Some(group("tau", self.tau)?) };
         let mut optional = |name: &str, values: Vec<Vec<f64>>| {
             if values.is_empty() { Ok(None) } else { group(name, values).map(Some) }
         };
         let (velocity, acceleration) = (optional("dq", self.dq)?, optional("ddq", self.ddq)?);
         let temperature = optional("temperature_c", self.temperature_c)?;
+        let command = optional("command", self.command)?;
+        // Replaced by the torque of the samples, if any.
         let format = match rate_hz {
-            Some(rate_hz) => LogFormat::at_rate(rate_hz, position, torque),
-            None => LogFormat::with_time(TimeColumn::seconds(ColumnRef::Index(0)), position, torque),
+            Some(rate_hz) => LogFormat::at_rate(rate_hz, position.clone(), position),
+            None => LogFormat::with_time(TimeColumn::seconds(ColumnRef::Index(0)), position.clone(), position),
         };
-        let format = LogFormat { velocity, acceleration, temperature, ..format };
+        let format = LogFormat { velocity, acceleration, torque, command, temperature, ..format };
         Ok(Log::new(MemoryLog::columns(label, None, columns)?, format, joints))
     }
 }

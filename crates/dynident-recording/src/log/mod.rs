@@ -15,14 +15,17 @@ mod field;
 mod file;
 mod format;
 mod found_rules;
+mod ignored_torque;
 mod lines;
 mod mapping;
 mod memo;
 mod memory;
+mod part;
 mod plain_row;
 mod reader;
 mod row_count;
 mod row_rules;
+mod sage;
 mod shared_samples;
 mod source;
 mod text;
@@ -33,6 +36,7 @@ pub(crate) use blocks::RawBlocks;
 pub use channels::{ChannelGroup, ColumnRef, Columns, OneOrMany};
 pub use file::FileLog;
 pub use format::{ClockRule, Header, LogFormat, Missing, TimeColumn, TimeUnit};
+pub use ignored_torque::IgnoredTorque;
 pub use memory::{JointSamples, MemoryLog, SampleClock};
 pub use reader::{LinesDropped, LogReader, RawBlock};
 pub use row_rules::RowRule;
@@ -66,6 +70,8 @@ pub struct Log {
     pub format: LogFormat,
     /// Names of the joints, in the order of the format's columns.
     pub joints: Vec<String>,
+    /// Intervals whose torque is ignored; motion and clock use all rows.
+    pub ignored_torque: Vec<IgnoredTorque>,
 }
 
 impl Log {
@@ -76,7 +82,14 @@ impl Log {
 
     /// As [`new`](Self::new), for a shared source.
     pub fn shared(source: Arc<dyn LogSource>, format: LogFormat, joints: &[String]) -> Self {
-        Self { source, row_count: Arc::default(), memo: Arc::default(), format, joints: joints.to_vec() }
+        Self {
+            source,
+            row_count: Arc::default(),
+            memo: Arc::default(),
+            format,
+            joints: joints.to_vec(),
+            ignored_torque: Vec::new(),
+        }
     }
 
     /// The log with its main file at `path`; the `file` keys of channel groups are relative to its folder.

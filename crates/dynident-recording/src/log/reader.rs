@@ -1,5 +1,6 @@
 //! Logs as a stream of blocks: paired files, ranges, mapping to joints. Memory does not grow with the log.
 
+use super::channels::ColumnRef;
 use super::columns::ColumnSelection;
 use super::format::{LogFormat, Missing};
 use super::found_rules::FoundRules;
@@ -8,7 +9,7 @@ use super::source::LogSource;
 use super::units::Quantity;
 use super::{FileLog, Log};
 use crate::error::RecordingError;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Maximum position or torque: its squares and its second differences per second squared are finite.
 const MAX_VALUE: f64 = 1e60;
@@ -28,10 +29,12 @@ pub struct RawBlock {
     pub dq: Vec<Vec<f64>>,
     /// Logged accelerations; empty without an `acceleration` group.
     pub ddq: Vec<Vec<f64>>,
-    /// Torques (N m, N).
+    /// Torques (N m, N); empty without a `torque` group.
     pub tau: Vec<Vec<f64>>,
     /// Temperatures (°C); empty without a `temperature` group.
     pub temperature_c: Vec<Vec<f64>>,
+    /// Commanded positions (rad, m); empty without a `command` group.
+    pub command: Vec<Vec<f64>>,
 }
 
 impl RawBlock {
@@ -57,8 +60,8 @@ pub struct LinesDropped {
 #[derive(Debug)]
 struct Group {
     quantity: Quantity,
-    table: usize,
-    slots: Vec<usize>,
+    /// Table and slot of each column.
+    slots: Vec<(usize, usize)>,
     mapping: Mapping,
     columns: Vec<Vec<f64>>,
 }
@@ -70,11 +73,15 @@ pub struct LogReader {
     joints: Vec<String>,
     tables: Vec<ColumnSelection>,
     groups: Vec<Group>,
-    /// Slot of the time column in the main table, and its factor to seconds.
-    time: Option<(usize, f64)>,
+    /// Table and slot of the time column, and its factor to seconds.
+    time: Option<(usize, usize, f64)>,
+    /// Table and slot of columns of the same name in other files, and the largest difference to the time column, s.
+    other_stamps: Vec<(usize, usize)>,
+    max_difference_s: f64,
     period_s: f64,
     first_stamp_s: Option<f64>,
     rows: [u64; 2],
+    keep_every: u64,
     time_range_s: [f64; 2],
     rules: FoundRules,
     selection: String,
@@ -95,17 +102,24 @@ impl LogReader {
         format.validate(&log.joints)?;
         let main = log.source();
         let mut tables = vec![ColumnSelection::new(main.label(), main.open()?)];
+        let mut paths = vec![main.path().map(Path::to_owned)];
         let time = match &format.time {
-            Some(time) => Some((tables[0].request("time.column", &time.column)?, time.unit.seconds() * time.scale)),
+            Some(time) => {
+                let table = table_of(log, "time", time.file.as_deref(), &mut tables, &mut paths)?;
+                let slot = tables[table].request("time.column", &time.column)?;
+                Some((table, slot, time.unit.seconds() * time.scale))
+            }
             None => None,
         };
         let rules = FoundRules::new(format, |key, column| tables[0].request(key, column))?;
-        let groups = channel_groups(log, &mut tables)?;
+        let groups = channel_groups(log, &mut tables, &mut paths)?;
+        let other_stamps = other_stamps(format, time.map(|time| time.0), &mut tables);
         tables.iter_mut().for_each(ColumnSelection::finish_selection);
+        let keep_every = format.keep_every.unwrap_or(1);
         let rows = match (format.rows, format.fraction) {
             (Some(rows), _) => rows,
             (None, Some([from, to])) => {
-                let count = tables[0].count_rows(main, &log.row_count)? as f64;
+                let count = tables[0].count_rows(main, &log.row_count)?.div_ceil(keep_every) as f64;
                 [(from * count).round() as u64, (to * count).round() as u64]
             }
             (None, None) => [0, u64::MAX],
@@ -116,9 +130,12 @@ impl LogReader {
             tables,
             groups,
             time,
-            period_s: format.rate_hz.map_or(0.0, f64::recip),
+            other_stamps,
+            max_difference_s: format.time.as_ref().map_or(f64::INFINITY, |time| time.max_difference_s),
+            period_s: format.rate_hz.map_or(0.0, |rate_hz| keep_every as f64 / rate_hz),
             first_stamp_s: None,
             rows,
+            keep_every,
             time_range_s: format.time_range_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
             rules,
             selection: describe_selection(format),
@@ -142,7 +159,7 @@ impl LogReader {
 
     /// Name or index of the time column, for messages.
     pub fn time_label(&self) -> String {
-        self.time.map_or_else(|| "none".to_owned(), |(slot, _)| self.tables[0].label_of_slot(slot))
+        self.time.map_or_else(|| "none".to_owned(), |(table, slot, _)| self.tables[table].label_of_slot(slot))
     }
 
     /// Reads up to 4096 rows into `block`; false at the end of the log (with an empty `block`).
@@ -165,6 +182,7 @@ impl LogReader {
                 Quantity::Acceleration => &mut block.ddq,
                 Quantity::Torque => &mut block.tau,
                 Quantity::Temperature => &mut block.temperature_c,
+                Quantity::Command => &mut block.command,
             };
             let Some(group) = self.groups.iter().find(|group| group.quantity == quantity) else {
                 out.clear();
@@ -211,8 +229,9 @@ impl LogReader {
         if self.next_row > 0 && self.next_row < self.rows[0] {
             return self.skip_row();
         }
-        let (mut ended, mut missing) = (None, None);
-        for (index, table) in self.tables.iter_mut().enumerate() {
+        let (mut ended, mut missing) = (self.skip_thinned()?, None);
+        let read = if ended.is_some() { &mut [][..] } else { &mut self.tables[..] };
+        for (index, table) in read.iter_mut().enumerate() {
             if !table.next_row()? {
                 ended = Some(index);
             } else if table.missing() {
@@ -229,13 +248,14 @@ impl LogReader {
             return self.leave_out_missing(row, index);
         }
         let time_s = match self.time {
-            Some((slot, seconds)) => {
-                let stamp = self.tables[0].values[slot];
+            Some((table, slot, seconds)) => {
+                let stamp = self.tables[table].values[slot];
                 // Subtract stamps before scaling: nanoseconds since 1970 lose precision in the multiplication.
                 (stamp - *self.first_stamp_s.get_or_insert(stamp)) * seconds
             }
             None => row as f64 * self.period_s,
         };
+        self.check_stamps(row)?;
         if row < self.rows[0] || time_s < self.time_range_s[0] || time_s >= self.time_range_s[1] {
             return Ok(());
         }
@@ -246,18 +266,53 @@ impl LogReader {
         block.row.push(row);
         block.time_s.push(time_s);
         for group in &mut self.groups {
-            let values = &self.tables[group.table].values;
-            for (column, slot) in group.columns.iter_mut().zip(&group.slots) {
-                column.push(values[*slot]);
+            for (column, (table, slot)) in group.columns.iter_mut().zip(&group.slots) {
+                column.push(self.tables[*table].values[*slot]);
             }
         }
         Ok(())
     }
 
+    /// Checks that the files of one log have the same time in a row.
+    fn check_stamps(&self, row: u64) -> Result<(), RecordingError> {
+        let Some((table, slot, seconds)) = self.time else { return Ok(()) };
+        let stamp = self.tables[table].values[slot];
+        for &(other, own) in &self.other_stamps {
+            let difference_s = (self.tables[other].values[own] - stamp) * seconds;
+            if difference_s.abs() > self.max_difference_s {
+                return Err(RecordingError::ForeignFile {
+                    log: self.tables[table].label.clone(),
+                    other: self.tables[other].label.clone(),
+                    column: self.time_label(),
+                    row,
+                    difference_s,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Skips the rows of the tables between two that `keep_every` keeps; returns a table that ended.
+    fn skip_thinned(&mut self) -> Result<Option<usize>, RecordingError> {
+        let mut ended = None;
+        for _ in 1..if self.next_row > 0 { self.keep_every } else { 1 } {
+            for (index, table) in self.tables.iter_mut().enumerate() {
+                if !table.skip_row()? {
+                    ended = Some(index);
+                }
+            }
+            if ended.is_some() {
+                break;
+            }
+        }
+        Ok(ended)
+    }
+
     /// Skips a row before the first requested one.
     fn skip_row(&mut self) -> Result<(), RecordingError> {
-        let mut ended = None;
-        for (index, table) in self.tables.iter_mut().enumerate() {
+        let mut ended = self.skip_thinned()?;
+        let skipped = if ended.is_some() { &mut [][..] } else { &mut self.tables[..] };
+        for (index, table) in skipped.iter_mut().enumerate() {
             if !table.skip_row()? {
                 ended = Some(index);
             }
@@ -270,8 +325,9 @@ impl LogReader {
     /// Leaves out a row with a missing value in table `index`, if a rule or the settings allow it.
     fn leave_out_missing(&mut self, row: u64, index: usize) -> Result<(), RecordingError> {
         let values = &self.tables[0].values;
-        let since = |stamp: f64| (stamp - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.1);
-        let time_s = self.time.map_or(row as f64 * self.period_s, |(slot, _)| since(values[slot]));
+        let since = |stamp: f64| (stamp - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.2);
+        let stamp = |(table, slot, _): (usize, usize, f64)| since(self.tables[table].values[slot]);
+        let time_s = self.time.map_or(row as f64 * self.period_s, stamp);
         // Rows that a rule leaves out may contain invalid values.
         if self.rules.drops(row, time_s, values) {
             self.dropped.by_rule += u64::from(row >= self.rows[0]);
@@ -303,33 +359,58 @@ impl LogReader {
     }
 }
 
+/// Table and slot of the columns in other files that have the name of the time column.
+fn other_stamps(format: &LogFormat, own: Option<usize>, tables: &mut [ColumnSelection]) -> Vec<(usize, usize)> {
+    let (Some(time), Some(own)) = (&format.time, own) else { return Vec::new() };
+    let ColumnRef::Name(name) = &time.column else { return Vec::new() };
+    let others = tables.iter_mut().enumerate().filter(|(table, other)| {
+        let names = other.table.names().unwrap_or_default();
+        *table != own && names.iter().filter(|known| *known == name).count() == 1
+    });
+    others.filter_map(|(table, other)| Some((table, other.request("time.column", &time.column).ok()?))).collect()
+}
+
 /// The channel groups of a log. Opens each separate file of a group once.
-fn channel_groups(log: &Log, tables: &mut Vec<ColumnSelection>) -> Result<Vec<Group>, RecordingError> {
-    let (format, main) = (&log.format, log.source());
-    let mut paths = vec![main.path().map(Path::to_owned)];
+fn channel_groups(
+    log: &Log,
+    tables: &mut Vec<ColumnSelection>,
+    paths: &mut Vec<Option<PathBuf>>,
+) -> Result<Vec<Group>, RecordingError> {
     let mut groups = Vec::new();
-    for (quantity, group) in format.groups() {
+    for (quantity, group) in log.format.groups() {
         let key = quantity.key();
-        let path = match &group.file {
-            None => main.path().map(Path::to_owned),
-            Some(name) => {
-                let beside = main.path().ok_or_else(|| RecordingError::NoFolder { log: main.label(), key })?;
-                Some(beside.parent().unwrap_or(Path::new("")).join(name))
-            }
-        };
-        let table = paths.iter().position(|known| *known == path).unwrap_or(paths.len());
-        if let (Some(path), true) = (&path, table == paths.len()) {
-            let source = FileLog::new(path, format);
-            tables.push(ColumnSelection::new(source.label(), source.open()?));
-            paths.push(Some(path.clone()));
+        let files = group.files(key, &log.joints)?;
+        let mut slots = Vec::new();
+        for (at, column) in group.columns_of(key, &log.joints)?.iter().enumerate() {
+            let file = files.get(at).or(files.first()).map(PathBuf::as_path);
+            let table = table_of(log, key, file, tables, paths)?;
+            slots.push((table, tables[table].request(&format!("{key}.columns"), column)?));
         }
-        let list = group.column_list(key)?;
-        let slots = list.iter().map(|column| tables[table].request(&format!("{key}.columns"), column));
-        let slots = slots.collect::<Result<Vec<_>, _>>()?;
-        let mapping = Mapping::new(group, quantity, log.joints.len())?;
-        groups.push(Group { quantity, table, columns: vec![Vec::new(); slots.len()], slots, mapping });
+        let mapping = Mapping::new(group, quantity, &log.joints)?;
+        groups.push(Group { quantity, columns: vec![Vec::new(); slots.len()], slots, mapping });
     }
     Ok(groups)
+}
+
+/// Index of the table of `file`, relative to the folder of the main file; opens it if it is new.
+fn table_of(
+    log: &Log,
+    key: &'static str,
+    file: Option<&Path>,
+    tables: &mut Vec<ColumnSelection>,
+    paths: &mut Vec<Option<PathBuf>>,
+) -> Result<usize, RecordingError> {
+    let main = log.source();
+    let Some(name) = file else { return Ok(0) };
+    let beside = main.path().ok_or_else(|| RecordingError::NoFolder { log: main.label(), key })?;
+    let path = Some(beside.parent().unwrap_or(Path::new("")).join(name));
+    let table = paths.iter().position(|known| *known == path).unwrap_or(paths.len());
+    if let (Some(path), true) = (&path, table == paths.len()) {
+        let source = FileLog::new(path, &log.format);
+        tables.push(ColumnSelection::new(source.label(), source.open()?));
+        paths.push(Some(path.clone()));
+    }
+    Ok(table)
 }
 
 fn describe_selection(format: &LogFormat) -> String {
@@ -338,6 +419,9 @@ fn describe_selection(format: &LogFormat) -> String {
         (Some(rows), _) => selection.push(format!("rows = {rows:?}")),
         (None, Some([from, to])) => selection.push(format!("fraction = [{from}, {to}]")),
         (None, None) => {}
+    }
+    if let Some(every) = format.keep_every.filter(|every| *every > 1) {
+        selection.push(format!("keep_every = {every}"));
     }
     let rules_in_force = [
         (!format.drop_rows.is_empty()).then_some("drop_rows"),

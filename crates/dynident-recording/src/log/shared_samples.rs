@@ -29,11 +29,11 @@ pub struct SharedSamples {
     pub other_row: u64,
 }
 
-/// Positions and torques of all rows of a log, for the comparison with another log.
+/// Positions, torques and commands of all rows of a log, for the comparison with another log.
 #[derive(Clone, Debug)]
 pub struct LogSamples {
     row: Vec<u64>,
-    /// Positions, then torques, of all joints.
+    /// Positions, then torques and commands as far as the log has them, of all joints.
     values: Vec<Vec<f64>>,
     joints: Vec<String>,
 }
@@ -47,12 +47,13 @@ impl LogSamples {
         if log.source().estimated_rows().is_some_and(|rows| rows > 2 * MAX_ROWS as u64) {
             return Ok(None);
         }
-        let values = vec![Vec::new(); 2 * log.joints.len()];
+        let groups = 1 + usize::from(log.format.torque.is_some()) + usize::from(log.format.command.is_some());
+        let values = vec![Vec::new(); groups * log.joints.len()];
         let mut all = Self { row: Vec::new(), values, joints: log.joints.clone() };
         let (mut reader, mut block) = (LogReader::open(log)?, RawBlock::default());
         while reader.next_block(&mut block)? {
             all.row.extend_from_slice(&block.row);
-            for (to, from) in all.values.iter_mut().zip(block.q.iter().chain(&block.tau)) {
+            for (to, from) in all.values.iter_mut().zip(block.q.iter().chain(&block.tau).chain(&block.command)) {
                 to.extend_from_slice(from);
             }
             if all.row.len() > MAX_ROWS {
@@ -70,7 +71,7 @@ impl LogSamples {
     /// First shared samples of both logs; `None` if there are none or the joints differ. Joints at rest are ignored,
     /// because a constant position repeats.
     pub fn shared_with(&self, other: &Self) -> Option<SharedSamples> {
-        if self.joints != other.joints {
+        if self.joints != other.joints || self.values.len() != other.values.len() {
             return None;
         }
         // Places of the shorter log are searched in the longer one.

@@ -109,6 +109,11 @@ impl TextTable {
         Ok(table)
     }
 
+    /// Number of rows read so far.
+    pub(super) fn rows_read(&self) -> u64 {
+        self.rows
+    }
+
     fn place_of_line(&self, line: u64) -> LogPlace {
         LogPlace::Line { log: self.label.clone(), line }
     }

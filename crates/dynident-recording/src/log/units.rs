@@ -18,12 +18,14 @@ pub enum Quantity {
     Torque,
     /// Temperature, °C.
     Temperature,
+    /// Commanded position of a joint or its servo (rad, m).
+    Command,
 }
 
 impl Quantity {
     /// All quantities, in the order of a log's channel groups.
-    pub(crate) const ALL: [Self; 5] =
-        [Self::Position, Self::Velocity, Self::Acceleration, Self::Torque, Self::Temperature];
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Position, Self::Velocity, Self::Acceleration, Self::Torque, Self::Temperature, Self::Command];
 
     /// Key of its channel group in a [`LogFormat`](crate::LogFormat), also used in reports.
     pub fn key(self) -> &'static str {
@@ -33,8 +35,14 @@ impl Quantity {
             Self::Acceleration => "acceleration",
             Self::Torque => "torque",
             Self::Temperature => "temperature",
+            Self::Command => "command",
         }
     }
+}
+
+/// The quantity with the same units: a commanded position has those of a position.
+fn dimension(quantity: Quantity) -> Quantity {
+    if quantity == Quantity::Command { Quantity::Position } else { quantity }
 }
 
 /// Name, quantity, factor to SI.
@@ -69,12 +77,12 @@ const UNITS: &[(&str, Quantity, f64)] = &[
 /// Factor from `unit` to SI: rad, m, their rates, N m, N, °C, and A (times `scale` in N m/A). `None` if `unit` is not a
 /// unit of `quantity`.
 pub fn si_factor(unit: &str, quantity: Quantity) -> Option<f64> {
-    UNITS.iter().find(|(name, of, _)| *name == unit && *of == quantity).map(|(_, _, factor)| *factor)
+    UNITS.iter().find(|(name, of, _)| *name == unit && *of == dimension(quantity)).map(|(_, _, factor)| *factor)
 }
 
 /// The units of `quantity`, for messages.
 pub fn unit_names(quantity: Quantity) -> Vec<&'static str> {
-    UNITS.iter().filter(|(_, of, _)| *of == quantity).map(|(name, _, _)| *name).collect()
+    UNITS.iter().filter(|(_, of, _)| *of == dimension(quantity)).map(|(name, _, _)| *name).collect()
 }
 
 #[cfg(test)]
@@ -86,6 +94,7 @@ mod tests {
         assert_eq!(si_factor("deg", Quantity::Position).map(|f| f * 180.0), Some(core::f64::consts::PI));
         assert_eq!(si_factor("rpm", Quantity::Velocity).map(|f| f * 60.0), Some(core::f64::consts::TAU));
         assert_eq!(si_factor("deg", Quantity::Torque), None);
+        assert_eq!(si_factor("deg", Quantity::Command), si_factor("deg", Quantity::Position));
         assert!(unit_names(Quantity::Torque).contains(&"A"));
     }
 }

@@ -85,6 +85,16 @@ impl MotionSettings {
     }
 }
 
+/// Length of the ends of a piece that depend on extrapolated samples, in periods of the cut-off: there the transients
+/// of a Butterworth filter of order 4 have decayed to 3 %.
+const UNSETTLED_PERIODS: f64 = 1.5;
+
+/// Number of samples at each end of a long piece whose motion a low-pass at `cutoff_hz` takes from extrapolated
+/// samples.
+pub fn unsettled_samples(rate_hz: f64, cutoff_hz: f64) -> usize {
+    (UNSETTLED_PERIODS * rate_hz / cutoff_hz) as usize
+}
+
 /// Successive samples of a motion on a uniform clock, joint-major: entry `joint * rows + row`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionBlock {

@@ -9,5 +9,5 @@ mod opening;
 mod stream;
 mod torque_lag;
 
-pub use block::{ImportLimits, MotionBlock, MotionSettings};
+pub use block::{ImportLimits, MotionBlock, MotionSettings, unsettled_samples};
 pub use stream::MotionStream;

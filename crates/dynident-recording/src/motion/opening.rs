@@ -29,8 +29,9 @@ impl Opening {
     /// Estimates for `log`; its first rows are read once for all passes.
     ///
     /// # Errors
-    /// If the rows cannot be read, or do not determine a rate.
+    /// If the log has no torque, the rows cannot be read, or they do not determine a rate.
     pub(super) fn of(log: &Log, settings: &MotionSettings) -> Result<Arc<Self>, RecordingError> {
+        log.format.require_torque()?;
         let MotionSettings { keep_outliers, limits, .. } = settings;
         log.found_once(&(*keep_outliers, limits.clone()), || Self::read(log, *keep_outliers, limits))
     }

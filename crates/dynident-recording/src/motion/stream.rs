@@ -2,7 +2,7 @@
 
 mod giving;
 
-use super::block::{MotionBlock, MotionSettings};
+use super::block::{MotionBlock, MotionSettings, unsettled_samples};
 use super::opening::Opening;
 use super::torque_lag::TorqueShift;
 use crate::cleaning::{CleanBlock, CleanRows};
@@ -12,7 +12,7 @@ use crate::clock::timeline::Timeline;
 use crate::derivative::Differentiator;
 use crate::error::{FilterError, RecordingError};
 use crate::filter::CutoffChoice;
-use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
+use crate::log::{IgnoredTorque, Log, LogFormat, LogReader, Quantity, RawBlock};
 use crate::reference::Reference;
 use crate::report::channels::ChannelCheck;
 use crate::report::comparison::Comparison;
@@ -22,9 +22,6 @@ use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Length of the ends of a piece that depend on extrapolated samples, in periods of the cut-off: there the transients
-/// of a Butterworth filter of order 4 have decayed to 3 %.
-const UNSETTLED_PERIODS: f64 = 1.5;
 /// Minimum number of rows of a [`MotionBlock`], except the last of a segment.
 const MIN_CHUNK_ROWS: usize = 8192;
 /// Number of rows per backward step below which a log without an uninterrupted piece is reported as not ordered by
@@ -63,6 +60,8 @@ pub struct MotionStream {
     passed: u64,
     /// Samples of the segment whose torque is ignored: index in the segment and joint, ascending.
     set_aside: VecDeque<(u64, usize)>,
+    /// Intervals whose torque is ignored.
+    ignored_torque: Vec<IgnoredTorque>,
     ended: bool,
     segments: usize,
     short_segments: [u64; 2],
@@ -169,7 +168,7 @@ impl MotionStream {
         let temperature = if format.temperature.is_some() { joints.len() } else { 0 };
         let torque_shift = TorqueShift::new(settings.torque_lags_s(joints.len())?.into_iter(), clock.rate_hz);
         let context = differentiator.context_samples(clock.rate_hz);
-        let unsettled = ((UNSETTLED_PERIODS * clock.rate_hz / cutoff_in_use_hz) as usize).min(context.unwrap_or(0));
+        let unsettled = unsettled_samples(clock.rate_hz, cutoff_in_use_hz).min(context.unwrap_or(0));
         let channels = 2 * joints.len() + velocity.len() + acceleration.len() + temperature;
         Ok(Self {
             rows_in: CleanRows::new(
@@ -199,6 +198,7 @@ impl MotionStream {
             done: 0,
             passed: 0,
             set_aside: VecDeque::new(),
+            ignored_torque: log.ignored_torque.clone(),
             ended: false,
             segments: 0,
             short_segments: [0; 2],
@@ -429,13 +429,14 @@ impl MotionStream {
 
 fn channel_checks(log: &Log, opening: &Opening, limits: ReportSettings) -> Vec<ChannelCheck> {
     let mut checks = Vec::new();
-    for (quantity, _) in log.format.groups() {
+    // Commands are not part of the motion.
+    for (quantity, _) in log.format.groups().into_iter().filter(|(quantity, _)| *quantity != Quantity::Command) {
         for (index, joint) in log.joints.iter().enumerate() {
             let mut check = ChannelCheck::new(quantity, joint, limits);
             check.quantisation_step = match quantity {
                 Quantity::Position => opening.position_steps[index],
                 Quantity::Torque => opening.torque_steps[index],
-                Quantity::Velocity | Quantity::Acceleration | Quantity::Temperature => None,
+                Quantity::Velocity | Quantity::Acceleration | Quantity::Temperature | Quantity::Command => None,
             };
             checks.push(check);
         }

@@ -25,10 +25,15 @@ impl TorqueShift {
         if longest > 0.0 { longest.ceil() as usize + NODES / 2 } else { 0 }
     }
 
+    /// Delay of a joint in samples.
+    pub(crate) fn of(&self, joint: usize) -> f64 {
+        self.samples.get(joint).copied().unwrap_or(0.0)
+    }
+
     /// The rows affected by a mark on the torque at `place` of a piece: the two adjacent rows, or the row at this
     /// place.
     pub(crate) fn rows_of_mark(&self, joint: usize, place: f64) -> impl Iterator<Item = u64> + use<> {
-        let place = place - self.samples.get(joint).copied().unwrap_or(0.0);
+        let place = place - self.of(joint);
         // A sample on the grid is copied, one between grid points contributes to both.
         let on_grid = (place - place.round()).abs() <= 1e-6;
         let rows = if on_grid { [place.round(), place.round()] } else { [place.floor(), place.ceil()] };
@@ -38,7 +43,7 @@ impl TorqueShift {
     /// Appends the shifted torques of `rows` of a joint's `signal`. Returns the indices of rows outside the signal;
     /// they get its first or last value.
     pub(crate) fn append(&self, joint: usize, signal: &[f64], rows: Range<usize>, out: &mut Vec<f64>) -> Vec<usize> {
-        let shift = self.samples.get(joint).copied().unwrap_or(0.0);
+        let shift = self.of(joint);
         if shift == 0.0 {
             out.extend_from_slice(&signal[rows]);
             return Vec::new();

@@ -151,7 +151,7 @@ impl ImportReport {
             let Some(every) = every else { continue };
             let message = format!(
                 "values change only at every {} row ({:.4} Hz); the repeated rows cause steps in the motion and a lag: \
-                 log at the robot's sample rate, or keep one row in {every}",
+                 log at the robot's sample rate, or keep one row in {every} by the key `keep_every = {every}` of [format]",
                 ordinal(every),
                 self.rate_hz / every as f64
             );

@@ -16,15 +16,16 @@ pub struct ReportSettings {
     pub jump_step_ratio: f64,
     /// Minimum size of a position jump as a share of the channel's range, 0.01 by default: encoders flicker at rest.
     pub jump_range_share: f64,
-    /// Minimum correlation of a logged velocity that is proportional to the derivative of the position, 0.98 by
-    /// default.
+    /// Correlation of a logged velocity with the derivative of the position, above which the two are treated as
+    /// proportional, 0.98 by default.
     pub proportional_correlation: f64,
-    /// Minimum logarithm of the factor from the derivative to such a velocity for another unit or another sample rate,
-    /// 0.05 by default.
+    /// Smallest logarithm of the ratio of a logged velocity to the derivative of the position that is reported as
+    /// another unit or sample rate, 0.05 by default.
     pub min_log_factor: f64,
     /// Maximum relative difference of this factor from that of a unit, 0.02 by default.
     pub unit_tolerance: f64,
-    /// Maximum correlation of a logged derivative with the opposite sign, -0.5 by default.
+    /// Correlation of a logged derivative with that of the position, below which the signs are reported as opposite,
+    /// -0.5 by default.
     pub opposite_correlation: f64,
     /// Minimum RMS difference of a logged derivative from that of the position, %, for a warning, 20 by default.
     pub min_difference_percent: f64,

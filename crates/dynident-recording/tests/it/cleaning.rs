@@ -1,6 +1,7 @@
 //! Detection and treatment of invalid samples in a log.
 
-use dynident_recording::{JointSamples, Level, Log, MotionBlock, MotionSettings, MotionStream, Reason};
+use dynident_recording::log::OneOrMany;
+use dynident_recording::{IgnoredTorque, JointSamples, Level, Log, MotionBlock, MotionSettings, MotionStream, Reason};
 
 struct Random(u64);
 
@@ -242,4 +243,37 @@ fn rows_are_left_out_by_number_time_and_status() {
         let refused = read(keys).unwrap_err().to_string();
         assert!(refused.contains(words), "{keys}: {refused}");
     }
+}
+
+/// The motion of the other rows is the same to the last bit, and only the marked torques of one joint are ignored.
+#[test]
+fn an_ignored_torque_costs_only_its_samples() {
+    let times: Vec<f64> = (0..2000).map(|k| 0.005 * f64::from(k)).collect();
+    let (log, _) = log(&times, &times, [1e-6, 0.01]);
+    let mut partly = log.clone();
+    partly.ignored_torque.push(IgnoredTorque { time_s: [4.0, 5.0], joints: vec![1] });
+    let settings = MotionSettings::default();
+    let [(all, _), (some, _)] = [blocks(&log, &settings), blocks(&partly, &settings)];
+    assert_eq!(all.len(), some.len());
+    let mut ignored = [0; 2];
+    for (all, some) in all.iter().zip(&some) {
+        assert_eq!(
+            (&all.q, &all.dq, &all.ddq, &all.tau, all.segment),
+            (&some.q, &some.dq, &some.ddq, &some.tau, some.segment)
+        );
+        for (place, _) in some.set_aside.iter().enumerate().filter(|(_, marked)| **marked) {
+            let time_s = some.first_time_s + (place % some.rows) as f64 / some.rate_hz;
+            assert!((4.0 - 1e-6..5.0 + 1e-6).contains(&time_s), "{time_s}");
+            ignored[place / some.rows] += 1;
+        }
+    }
+    assert_eq!(ignored, [0, 201]);
+    // With a lag, the torque of a row is that of a later time.
+    let late = MotionSettings { torque_lag_s: Some(OneOrMany::One(0.1)), ..settings };
+    let first = |block: &MotionBlock| {
+        let row = block.set_aside.iter().skip(block.rows).position(|marked| *marked);
+        row.map(|row| block.first_time_s + row as f64 / block.rate_hz)
+    };
+    let found = blocks(&partly, &late).0.iter().find_map(first).unwrap();
+    assert!((found - 3.9).abs() < 0.006, "{found}");
 }

@@ -5,7 +5,9 @@ mod broken_files;
 mod cleaning;
 mod memory;
 mod real_logs;
+mod sage;
 mod scipy;
+mod selection;
 mod streaming;
 
 /// A temporary file with these bytes.

@@ -63,6 +63,24 @@
     pen.restore();
   };
 
+  addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((fold) => { fold.open = true; }));
+  // Shaded intervals, below the curves.
+  const shades = (intervals) => (plot) => {
+    const pen = plot.ctx;
+    const { left, top, width, height } = plot.bbox;
+    pen.save();
+    pen.beginPath();
+    pen.rect(left, top, width, height);
+    pen.clip();
+    pen.globalAlpha = 0.15;
+    pen.fillStyle = style("--warning");
+    intervals.forEach((ends) => {
+      const [from, to] = ends.map((x) => plot.valToPos(x, "x", true));
+      pen.fillRect(from, top, to - from, height);
+    });
+    pen.restore();
+  };
+
   const plots = [];
   const width = (holder) => Math.max(holder.clientWidth, 280);
   // The curves and the strip with their difference; both zoom together.
@@ -103,7 +121,7 @@
         axes: [axis(data.x_label, whole), axis(data.y_label, { size: 64, values: numbers })],
         series: [x, ...series],
         cursor,
-        hooks: { draw: [whiskers(data.curves)] },
+        hooks: { drawClear: [shades(data.shaded || [])], draw: [whiskers(data.curves)] },
       },
       [data.x, ...data.curves.map((curve) => curve.y)],
       holder,
@@ -176,6 +194,24 @@
     }
   }, { rootMargin: "400px" });
   plots.forEach((entry) => seen.observe(entry.holder));
+
+  // A joint that is chosen in the picture of the robot hides the plots of the others.
+  const filter = document.createElement("p");
+  filter.className = "filter note";
+  filter.setAttribute("role", "status");
+  const ofJoints = [...document.querySelectorAll("section[data-joint]")];
+  document.addEventListener("joint", ({ detail: joint }) => {
+    const own = ofJoints.some((section) => section.dataset.joint === joint) ? joint : null;
+    ofJoints.forEach((section) => { section.hidden = own !== null && section.dataset.joint !== own; });
+    filter.replaceChildren();
+    if (own === null) return filter.remove();
+    const all = document.createElement("button");
+    all.type = "button";
+    all.textContent = "Show all joints";
+    all.addEventListener("click", () => document.dispatchEvent(new CustomEvent("joint", { detail: null })));
+    filter.append(`Plots of joint ${own} only. `, all);
+    ofJoints[0].before(filter);
+  });
 
   let waiting;
   addEventListener("resize", () => {

@@ -1,6 +1,7 @@
 //! The complete page: no content becomes markup or script, and there is no network access.
 use dynident_report::{
-    BarPlot, Cell, ConvergencePlot, Diagram, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone,
+    BarPlot, Cell, Colouring, ConvergencePlot, Diagram, Gauge, Heading, HeatMap, KeyFigures, LinePlot, Report, Scene,
+    SceneBody, SceneMotion, Surface, Table, Text, Tone,
 };
 
 /// Ends every context of a page: element, attribute, script, comment.
@@ -17,8 +18,39 @@ fn page_of(text: &str) -> String {
     report.add(BarPlot::new(text, text).note(text).reference_label(text).bar(text, 1.0, Some(0.5), Some(2.0)));
     report.add(HeatMap::new(text, [text], [text], vec![vec![1.0]]).note(text));
     report.add(Diagram::new(text, text, [300.0, 100.0]).note(text).boxed([150.0, 50.0], [9.0, 9.0], &[text]));
+    report.add(scene_of(text));
     report.add(Table::new("links", [text]).row([Cell::link(text, text)]));
     report.html().unwrap()
+}
+
+fn scene_of(text: &str) -> Scene {
+    let texts = || vec![text.to_owned()];
+    let body = SceneBody {
+        name: text.to_owned(),
+        drivers: vec![(0, 1.0)],
+        surface: Surface::cuboid([1.0; 3]),
+        ..SceneBody::default()
+    };
+    let gauge = Gauge { name: text.to_owned(), values: vec![vec![0.0, 1.0]], limits: vec![None] };
+    let motion = SceneMotion {
+        name: text.to_owned(),
+        times_s: vec![0.0, 1.0],
+        q: vec![vec![0.0, 1.0]],
+        gauges: vec![gauge],
+        ..SceneMotion::default()
+    };
+    let classes = vec![(text.to_owned(), 0)];
+    Scene {
+        title: text.to_owned(),
+        note: text.to_owned(),
+        words: text.to_owned(),
+        joints: texts(),
+        bodies: vec![body],
+        posture: vec![0.0],
+        colourings: vec![Colouring { name: text.to_owned(), classes, of: vec![Some(0)], words: texts(), gauge: None }],
+        motions: vec![motion],
+        ..Scene::default()
+    }
 }
 
 #[test]
@@ -35,6 +67,26 @@ fn names_never_become_markup_or_script() {
         assert_eq!(plot["y_label"], HOSTILE);
         assert_eq!(plot["curves"][0]["name"], HOSTILE);
     }
+    let data = hostile.split_once("data-scene=\"").unwrap().1.split_once('>').unwrap().1;
+    let scene: serde_json::Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
+    assert_eq!(scene["bodies"][0]["name"], HOSTILE);
+    assert_eq!(scene["motions"][0]["gauges"][0]["name"], HOSTILE);
+}
+
+#[test]
+fn a_scene_that_does_not_fit_is_named() {
+    let message = |spoil: &dyn Fn(&mut Scene)| {
+        let mut scene = scene_of("Arm");
+        spoil(&mut scene);
+        let mut report = Report::new("t");
+        report.add(scene);
+        report.html().unwrap_err().to_string()
+    };
+    assert!(message(&|scene| scene.posture.clear()).contains("posture"));
+    assert!(message(&|scene| scene.bodies[0].parent = Some(0)).contains("parents"));
+    assert!(message(&|scene| scene.bodies[0].drivers[0].0 = 1).contains("unknown joints"));
+    assert!(message(&|scene| scene.motions[0].q[0].push(2.0)).contains("samples"));
+    assert!(message(&|scene| scene.colourings[0].of.clear()).contains("classes"));
 }
 
 #[test]
@@ -42,12 +94,13 @@ fn the_page_needs_nothing_else() {
     let page = page_of("name");
     assert!(page.contains("default-src 'none'"));
     assert!(page.contains("Leon Sorokin") && page.contains("Permission is hereby granted"));
+    assert!(page.contains("OGL 1.0.11") && page.contains("released into the public domain"));
     for outside in ["src=\"http", "href=\"http", "@import", "url(http", "fetch(", "XMLHttpRequest"] {
         assert!(!page.contains(outside), "{outside}");
     }
     // Without plots the plot library is not included.
     let plain = Report::new("plain").html().unwrap();
-    assert!(!plain.contains("uPlot 1.6") && plain.len() < 20_000);
+    assert!(!plain.contains("uPlot 1.6") && !plain.contains("OGL 1.0") && plain.len() < 20_000);
 }
 
 #[test]
@@ -56,6 +109,17 @@ fn a_section_that_does_not_fit_is_named() {
     report.add(LinePlot::new("Elbow", "", "", vec![0.0, 1.0]).line("measured", vec![1.0]));
     let message = report.html().unwrap_err().to_string();
     assert!(message.contains("Elbow") && message.contains("measured"), "{message}");
+}
+
+#[test]
+fn a_long_table_is_folded() {
+    let page = |rows: usize| {
+        let mut report = Report::new("t");
+        report.add(Table::new("numbers", ["k"]).rows((0..rows).map(|k| vec![k.to_string().into()])));
+        report.html().unwrap()
+    };
+    assert!(!page(15).contains("<details>"));
+    assert!(page(16).contains("<summary>16 rows</summary>"));
 }
 
 #[test]
@@ -137,7 +201,7 @@ fn text_and_curves_stand_out_from_the_paper() {
 fn every_plot_is_a_picture_with_words_before_any_script_runs() {
     let page = page_of("name");
     let pictures = page.matches("<svg").count();
-    assert_eq!(pictures, 5, "two plots, bars, a map, a diagram");
+    assert_eq!(pictures, 6, "two plots, bars, a map, a diagram, a robot");
     assert_eq!(page.matches("role=\"img\" aria-label=\"name: ").count(), pictures);
     for plot in page.split("class=\"chart\"").skip(1) {
         let before = plot.split_once("<script").unwrap().0;

@@ -17,7 +17,7 @@ pub enum LogError {
         source: Box<RecordingError>,
     },
     /// A joint of the model is missing in the log.
-    #[error("log `{log}`: joint `{joint}` is missing; the columns belong to {}", known.join(", "))]
+    #[error("log `{log}`: joint `{joint}` is missing; the columns belong to {}; add columns of this joint, or lock it under [robot]", known.join(", "))]
     NoSuchJoint {
         /// Log.
         log: String,

@@ -145,7 +145,7 @@ impl Recording {
     ///
     /// # Errors
     /// The recording lacks a joint.
-    pub fn places(&self, model: &Model) -> Result<Vec<usize>, LogError> {
+    pub fn joint_indices(&self, model: &Model) -> Result<Vec<usize>, LogError> {
         match &self.samples {
             Samples::Log(log) => {
                 let place = |name: &String| log.joints.iter().position(|joint| joint == name);
@@ -172,7 +172,7 @@ impl Recording {
         motion: &'m MotionSettings,
     ) -> Result<Cow<'m, MotionSettings>, LogError> {
         let Some(OneOrMany::Many(lags)) = &motion.torque_lag_s else { return Ok(Cow::Borrowed(motion)) };
-        let places = self.places(model)?;
+        let places = self.joint_indices(model)?;
         if places.iter().enumerate().all(|(joint, place)| joint == *place) || lags.len() != places.len() {
             return Ok(Cow::Borrowed(motion));
         }
@@ -199,7 +199,7 @@ impl Recording {
         let reference = match &self.commanded {
             Some(commanded) if motion.differentiator.reference().is_some() => {
                 let mut order = vec![0; model.dof()];
-                for (joint, &place) in self.places(model)?.iter().enumerate() {
+                for (joint, &place) in self.joint_indices(model)?.iter().enumerate() {
                     order[place] = joint;
                 }
                 commanded.reordered(&order).map(Arc::new)

@@ -1,7 +1,7 @@
 //! Masking of invalid samples before the filter.
 
 use super::JointRows;
-use dynident_recording::{DecimationSettings, FilterError, MotionBlock};
+use dynident_recording::{DecimationSettings, FilterError};
 
 /// Minimum share of a filter's weight on valid samples for a valid row.
 const MIN_COVERAGE: f64 = 0.5;
@@ -98,14 +98,6 @@ impl Coverage {
 pub fn divide_by_coverage(column: &mut [f64], coverage: &[f64]) {
     for (value, coverage) in column.iter_mut().zip(coverage) {
         *value /= coverage.max(MIN_COVERAGE);
-    }
-}
-
-/// Marks of invalid torque for the samples `from .. from + samples` of the joint at `place`; empty if all are valid.
-pub fn set_aside(block: &MotionBlock, place: usize, from: usize, samples: usize) -> &[bool] {
-    match block.set_aside.get(place * block.rows + from..place * block.rows + from + samples) {
-        Some(set_aside) => set_aside,
-        None => &[],
     }
 }
 

@@ -53,7 +53,7 @@ pub fn noise_factors(
     }
     let (rate_hz, in_filter) = (report.rate_hz, |source| LogError::Filter { log: name.clone(), source });
     let filter = pass.filter.decimation(rate_hz, pass.torque_hz.or_else(|| motion_band_hz(pass.motion)));
-    let places = pass.recording.places(model.model())?;
+    let places = pass.recording.joint_indices(model.model())?;
     let builder = || RowBuilder::new(model, &places, rate_hz, filter.as_ref()).map_err(in_filter);
     let (pieces, read) = pass.some_pieces(NOISE_SAMPLES, (NOISE_SAMPLES / 4).max(4 * builder()?.needed()))?;
     let samples: usize = pieces.iter().map(|piece| piece.rows).sum();

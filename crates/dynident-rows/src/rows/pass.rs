@@ -93,7 +93,7 @@ impl LogPass<'_> {
             let joint = self.model.model().joints()[joint].name.clone();
             return Err(LogError::NoTemperature { log: name.clone(), joint });
         }
-        let places = self.recording.places(self.model.model())?;
+        let places = self.recording.joint_indices(self.model.model())?;
         let set;
         let mut motion = match (samples, self.kept.and_then(OnceLock::get)) {
             (Samples::Motion(record), _) => {

@@ -1,6 +1,6 @@
 //! Panels of regressor and torque before any filter.
 
-use super::coverage::set_aside;
+use super::mask_of_block::{set_aside, settled};
 use super::velocities::VelocityHistogram;
 use super::{PANEL_SAMPLES, RawSamples};
 use crate::regressor_model::RegressorModel;
@@ -163,20 +163,12 @@ impl<'a> PanelMaker<'a> {
         }
         out.motion.clone_from(&self.motion);
         out.set_aside.clear();
-        if !block.set_aside.is_empty() {
-            let of_joints = self.places.iter().map(|&place| set_aside(block, place, from, samples).to_vec());
+        if !block.set_aside.is_empty() || settled.len() < samples {
+            let of_joints = self.places.iter().map(|&place| set_aside(block, place, from, samples).into_owned());
             out.set_aside.extend(of_joints);
         }
         (out.segment, out.rate_hz, out.settled) = (block.segment, block.rate_hz, settled);
         self.samples += samples as u64;
         from + samples
     }
-}
-
-/// Samples of a panel without the end effects of the differentiator.
-fn settled(block: &MotionBlock, from: usize, samples: usize) -> Range<usize> {
-    let [begin, end] = block.unsettled;
-    let inside = begin..block.rows.saturating_sub(end);
-    let clamped = |row: usize| row.clamp(from, from + samples) - from;
-    clamped(inside.start)..clamped(inside.end).max(clamped(inside.start))
 }

@@ -57,7 +57,7 @@ impl JoinedChoice {
             return Err(setting(
                 "move_s",
                 self.move_s,
-                "the transitions take the whole duration_s: shorten them, or increase duration_s",
+                "the transitions take the whole duration_s: give a shorter move_s, or a longer duration_s",
             ));
         }
         let all: f64 = shares.iter().sum();

@@ -46,6 +46,9 @@ pub enum StudyError {
         /// Maximum size, bytes.
         most_bytes: u64,
     },
+    /// Invalid settings of a fit to commands.
+    #[error("{0}")]
+    Servo(#[from] dynident_servo::ServoError),
     /// A number outside its range.
     #[error("{key} = {value}: give {expected}")]
     Number {
@@ -99,7 +102,7 @@ pub enum StudyError {
         known: Vec<String>,
     },
     /// A duplicate name in a list.
-    #[error("{what} `{name}` stands twice: {fix}")]
+    #[error("{what} `{name}` is given twice: {fix}")]
     Twice {
         /// The kind of list.
         what: String,
@@ -122,7 +125,7 @@ pub enum StudyError {
     },
     /// A held-out log that contains training samples.
     #[error(
-        "log `{held_out}` is to test what `{training}` is fitted to, and has samples of it: give parts of the file that do not overlap (both by rows, by fraction, or by time_range_s), or another file"
+        "validation log `{held_out}` contains samples of the training log `{training}`: select parts that do not overlap in both [[log]] entries (both by rows, by fraction, or by time_range_s), or use another file"
     )]
     Overlap {
         /// The training log.
@@ -132,7 +135,7 @@ pub enum StudyError {
     },
     /// A held-out log in another file that contains the same samples as a training log.
     #[error(
-        "validation log `{held_out}` contains the same samples as the training log `{training}`: its row {held_out_row} and the following equal those of `{training}` from row {training_row} (two runs never have identical positions and torques): give a log of another run, or parts that do not overlap"
+        "validation log `{held_out}` contains the same samples as the training log `{training}`: its row {held_out_row} and the following equal those of `{training}` from row {training_row} (two runs never have identical positions and torques): name the file of another run in this [[log]], or select parts that do not overlap"
     )]
     SameSamples {
         /// The training log.
@@ -178,7 +181,7 @@ pub enum StudyError {
         /// The key.
         key: String,
         /// The conflict and the fix.
-        fix: &'static str,
+        fix: String,
     },
     /// Bodies without the inertial parameters that a job needs.
     #[error("the inertial parameters of {} are unknown: {fix}", bodies.join(", "))]
@@ -193,14 +196,14 @@ pub enum StudyError {
     Xacro(#[source] Box<XacroError>),
     /// A joint without a limit on its speed.
     #[error(
-        "joint `{joint}` has no limit of speed, acceleration, jerk, torque or power, so its motion could be infinitely fast; give one: joints = [{{ joint = \"{joint}\", acceleration = ... }}]"
+        "joint `{joint}` has no limit of speed, acceleration, jerk, torque or power, so its motion could be infinitely fast; add one under [design.limits]: joints = [{{ joint = \"{joint}\", acceleration = ... }}]"
     )]
     Unbounded {
         /// The joint.
         joint: String,
     },
     /// A joint without a limit that its stroke needs.
-    #[error("joint `{joint}` has no {limit} limit, which a stroke needs: add it in limits.joints")]
+    #[error("joint `{joint}` has no {limit} limit, which a stroke needs: add it to joints under [design.limits]")]
     NoStrokeLimit {
         /// The joint.
         joint: String,
@@ -209,7 +212,7 @@ pub enum StudyError {
     },
     /// A stroke that starts outside of the position limits.
     #[error(
-        "family.offsets: joint `{joint}` starts its stroke at {offset_rad} rad, but its limits are {} to {} rad; a stroke moves in the positive direction",
+        "family.offsets: joint `{joint}` starts its stroke at {offset_rad} rad, but its limits are {} to {} rad: give a start within them, from which the stroke can move in the positive direction",
         limits_rad[0], limits_rad[1]
     )]
     StrokeStart {
@@ -297,8 +300,8 @@ impl StudyError {
     }
 
     /// Error of a key that conflicts with the rest of the study.
-    pub fn conflict(key: impl Into<String>, fix: &'static str) -> Self {
-        Self::Conflict { key: key.into(), fix }
+    pub fn conflict(key: impl Into<String>, fix: impl Into<String>) -> Self {
+        Self::Conflict { key: key.into(), fix: fix.into() }
     }
 }
 

@@ -47,7 +47,7 @@ impl IterationSection {
             if unknown.is_empty() {
                 return Ok(());
             }
-            let fix = "bandwidth_hz computes gains from the inertials of the robot description: add them there, or state the gains";
+            let fix = "bandwidth_hz computes gains from the inertial parameters in the robot description: add these parameters, or state the gains";
             return Err(StudyError::NoInertials { bodies: unknown.into_iter().map(str::to_owned).collect(), fix });
         }
         let missing = match (&self.model_free, &study.controller) {

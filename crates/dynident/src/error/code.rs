@@ -15,9 +15,9 @@ use dynident_identification::diagnosis::{DiagnosisError, InvalidLimit};
 use dynident_identification::estimators::{EstimatorError, PeriodError};
 use dynident_identification::payload::PayloadError;
 use dynident_identification::rows::{LogError, ParallelFilterError};
-use dynident_identification::{IdentificationError, ReduceError, ThresholdError};
+use dynident_identification::{EventSettingsError, IdentificationError, ReduceError, ThresholdError};
 use dynident_iteration::{HomeError, IterationError, RehearsalFailure, RobotFault};
-use dynident_model::collision::{MeshError, MeshFault};
+use dynident_model::collision::{MeshError, MeshFault, MeshInertiaFault};
 use dynident_model::terms::{ExpressionError, ExpressionProblem, TorqueTableError};
 use dynident_model::{
     DhFault, DhWriteError, LoopError, MjcfFault, MjcfWriteError, ModelError, ReadError, SdfFault, SdfWriteError,
@@ -26,6 +26,7 @@ use dynident_model::{
 use dynident_online::OnlineError;
 use dynident_recording::{FileError, FilterError, FormatError, RecordingError};
 use dynident_report::ReportError;
+use dynident_servo::{RunFault, ServoError};
 use dynident_simulation::{PlantFault, SimulationError};
 use dynident_study::XacroError;
 use dynident_system::{ProgramRefused, RunError};
@@ -59,6 +60,7 @@ const CODES: &[CodeOf] = &[
     of::<LoopError>,
     of::<MeshError>,
     of::<MeshFault>,
+    of::<MeshInertiaFault>,
     of::<MjcfFault>,
     of::<MjcfWriteError>,
     of::<ModelError>,
@@ -80,13 +82,16 @@ const CODES: &[CodeOf] = &[
     of::<ResultFileError>,
     of::<RobotFault>,
     of::<RunError>,
+    of::<RunFault>,
     of::<SdfFault>,
     of::<SdfWriteError>,
+    of::<ServoError>,
     of::<SimulationError>,
     of::<StepWiseError>,
     of::<StudyError>,
     of::<StudyFileError>,
     of::<ThresholdError>,
+    of::<EventSettingsError>,
     of::<TorqueTableError>,
     of::<UrdfFault>,
     of::<UrdfWriteError>,

@@ -6,7 +6,7 @@ mod new_study;
 
 pub use code::error_code;
 pub use factors::FactorsError;
-pub use new_study::NewStudyError;
+pub use new_study::{NewStudyError, RecognisedFile};
 
 use dynident_export::ExportError;
 use dynident_identification::IdentificationError;

@@ -1,21 +1,19 @@
 //! Errors of `new`.
 
+use core::fmt;
 use thiserror::Error;
-
-/// Maximum number of column names in a message.
-const MAX_SHOWN: usize = 12;
 
 /// Reason why a study cannot be written from these recordings.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum NewStudyError {
     /// No columns for a quantity, or not for the joints of the positions.
-    #[error("no columns of {quantity} recognised among {}; write the study by hand (page \"Your robot in 15 minutes\": `dynident docs your-robot`); `dynident log` shows the contents of a recording", shown(.columns))]
+    #[error("no columns of {quantity} recognised: {}; write the study by hand (page \"Your robot in 15 minutes\": `dynident docs your-robot`); `dynident log` shows the contents of a recording", listed(.found))]
     NotRecognised {
         /// `positions`, or `torques or currents`.
         quantity: &'static str,
-        /// All columns.
-        columns: Vec<String>,
+        /// The columns of each recording.
+        found: Vec<RecognisedFile>,
     },
     /// More position columns than joints.
     #[error(
@@ -29,9 +27,40 @@ pub enum NewStudyError {
     },
 }
 
-fn shown(columns: &[String]) -> String {
-    let first: Vec<&str> = columns.iter().take(MAX_SHOWN).map(String::as_str).collect();
+/// The columns of one recording by their names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecognisedFile {
+    /// Name of the file.
+    pub file: String,
+    /// Number of columns.
+    pub columns: usize,
+    /// Columns with a known quantity of joints; empty without such columns.
+    pub known: String,
+    /// All other columns.
+    pub unknown: String,
+}
+
+impl fmt::Display for RecognisedFile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, columns, known, unknown } = self;
+        write!(f, "{file} ({columns} columns)")?;
+        if !unknown.is_empty() {
+            write!(f, " has unknown columns {unknown}")?;
+        }
+        if !known.is_empty() {
+            let and = if unknown.is_empty() { " has" } else { ", and" };
+            write!(f, "{and} other columns of joints {known}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Maximum number of files in a message.
+const MAX_FILES: usize = 4;
+
+fn listed(found: &[RecognisedFile]) -> String {
+    let first: Vec<String> = found.iter().take(MAX_FILES).map(ToString::to_string).collect();
     let more =
-        if columns.len() > MAX_SHOWN { format!(" and {} more", columns.len() - MAX_SHOWN) } else { String::new() };
-    format!("{}{more}", first.join(", "))
+        if found.len() > MAX_FILES { format!("; {} more files", found.len() - MAX_FILES) } else { String::new() };
+    format!("{}{more}", first.join("; "))
 }

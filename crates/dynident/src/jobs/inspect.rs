@@ -135,6 +135,7 @@ fn base_summary(model: &Model) -> BaseSummary {
     BaseSummary {
         count: base.count(),
         expressions: base.exact_expressions(),
+        names: base.expressions(),
         unidentifiable: base.unidentifiable().iter().map(|&column| base.all_columns()[column].symbol()).collect(),
         numerical_rank: numerical_rank_by_body(model, 1, settings.tolerance).independent.len(),
         gap: [weakest, strongest],
@@ -159,7 +160,7 @@ fn audit_entries(robot: &Robot) -> Vec<AuditEntry> {
     }));
     entries.extend(robot.irregularities.iter().map(irregularity));
     entries.extend(robot.notices.iter().map(|notice| AuditEntry {
-        level: "warning".to_owned(),
+        level: notice.loss.level().name().to_owned(),
         check: notice.loss.name().to_owned(),
         place: match &notice.file {
             Some(file) => format!("{file}, line {}", notice.line),

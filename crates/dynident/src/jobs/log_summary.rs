@@ -49,5 +49,6 @@ fn summary(
         torque_lag_half_width_95_s: of_joints(&|lag| lag.half_width_95_s),
         velocities: statistics.velocities.clone(),
         model_findings,
+        events: Vec::new(),
     }
 }

@@ -2,7 +2,9 @@
 
 pub(crate) mod check;
 mod columns;
+pub(crate) mod compare;
 pub(crate) mod design;
+mod differences;
 pub(crate) mod evaluate;
 pub(crate) mod export;
 pub(crate) mod identify;
@@ -16,7 +18,9 @@ pub(crate) mod predict;
 mod provenance;
 mod recorded_velocities;
 pub(crate) mod reduce;
+pub(crate) mod servo;
 pub(crate) mod simulate;
 pub(crate) mod test_samples;
 pub(crate) mod validate;
+pub(crate) mod view;
 mod violations;

@@ -7,7 +7,7 @@ use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::read_input;
 use crate::result::{InputFile, LogSummary, ResultFile, VALIDATION_SCHEMA, ValidationFile};
 use crate::study::{Folders, Study, StudyFile, StudyInput};
-use dynident_identification::examination::{HeldOutExamination, ModelUnderTest, examine_held_out};
+use dynident_identification::examination::{HeldOutExamination, LogTrace, ModelUnderTest, examine_held_out};
 use dynident_identification::{Logs, Role};
 use std::path::Path;
 
@@ -36,6 +36,30 @@ pub fn validate_result(
     study_path: &Path,
     options: &RunOptions<'_>,
 ) -> Result<ValidationFile, Error> {
+    Ok(validated(stored, result_path, (study, study_path), options, false)?.0)
+}
+
+/// Torque over time of the logs that [`validate_result()`] uses: measured, and predicted by the exported model.
+///
+/// # Errors
+/// As [`validate()`].
+pub fn validation_traces(
+    stored: &ResultFile,
+    result_path: &Path,
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+) -> Result<Vec<LogTrace>, Error> {
+    Ok(validated(stored, result_path, (study, study_path), options, true)?.1)
+}
+
+fn validated(
+    stored: &ResultFile,
+    result_path: &Path,
+    (study, study_path): (&Study, &Path),
+    options: &RunOptions<'_>,
+    traced: bool,
+) -> Result<(ValidationFile, Vec<LogTrace>), Error> {
     let study = StudyFile::new(study, study_path);
     study.require_log(study.path)?;
     let files = InputFiles::of(study, options.data.as_deref());
@@ -62,8 +86,7 @@ pub fn validate_result(
             let carried = recordings[index].payload.as_ref();
             let theta = payloads.base_values(carried, &theta);
             let physical = consistent.as_ref().map(|values| payloads.base_values(carried, values));
-            let tested =
-                ModelUnderTest { theta: &theta, physical: physical.as_deref(), uncertainty: None, traced: false };
+            let tested = ModelUnderTest { theta: &theta, physical: physical.as_deref(), uncertainty: None, traced };
             examine_held_out(&logs, &settings.estimation, &model, index, &tested)
         };
         chosen.iter().map(one).collect::<Result<Vec<_>, _>>()
@@ -79,13 +102,9 @@ pub fn validate_result(
     let mut problems = training_logs(stored, study, &folders, &chosen)?;
     problems.extend(logs.iter().flat_map(LogSummary::problems));
     files.unchanged()?;
-    Ok(ValidationFile {
-        schema: VALIDATION_SCHEMA.to_owned(),
-        name: study.title(),
-        logs,
-        problems,
-        validation: tested.into_iter().map(|log| log.validation).collect(),
-    })
+    let (validation, traces): (Vec<_>, Vec<_>) = tested.into_iter().map(|log| (log.validation, log.trace)).unzip();
+    let file = ValidationFile { schema: VALIDATION_SCHEMA.to_owned(), name: study.title(), logs, problems, validation };
+    Ok((file, traces.into_iter().flatten().collect()))
 }
 
 fn training_logs(

@@ -1,28 +1,34 @@
 //! `report.html` of an identification.
 
+use super::robot::RobotAppearance;
 use super::unit;
+use super::verdict::{exported_report, key_figures, model_description, percent, verdict};
 use crate::error::Error;
 use crate::result::{
     BaseParameterResult, BodyResult, ErrorTermResult, JointFrictionResult, LogSummary, ResultFile, TermResult,
     ValueSource,
 };
+use dynident_estimation::HALF_WIDTH_95;
 use dynident_estimation::consistent::IntervalEnd;
-use dynident_estimation::{HALF_WIDTH_95, ValidationReport};
 use dynident_identification::consistent::ParameterInterval;
 use dynident_identification::examination::{LogTrace, LogValidation};
 use dynident_identification::friction::FrictionConstant;
 use dynident_identification::{DriveInertiaEstimate, Role};
 use dynident_recording::Level;
-use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone, short};
+use dynident_report::{BarPlot, Cell, Heading, HeatMap, LinePlot, Report, Table, Text, Tone, short};
 
 const MAX_CORRELATED_PARAMETERS: usize = 80;
 
-/// The page of a stored result with torque over time, as
+/// The page of a stored result with torque over time and a picture of the robot, as
 /// [`IdentificationOutcome::report`](crate::IdentificationOutcome) returns it.
 ///
 /// # Errors
 /// [`Error::Report`], which indicates a bug.
-pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<String, Error> {
+pub fn identification_report(
+    r: &ResultFile,
+    traces: &[LogTrace],
+    robot: Option<&RobotAppearance>,
+) -> Result<String, Error> {
     let mut page = Report::new(&r.name).subtitle(format!(
         "{}: {} joints, {} base parameters; estimator {}, error bars {}",
         r.robot.name,
@@ -31,15 +37,17 @@ pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<Stri
         r.method.estimator,
         r.method.covariance
     ));
-    if !r.problems.is_empty() {
-        let mut problems = Text::new("What speaks against loading this model into a robot:");
-        for problem in &r.problems {
-            problems = problems.point(Tone::Bad, problem);
-        }
-        page.add(problems);
-    }
+    page.add(verdict(r));
     page.add(key_figures(r));
     page.add(model_description(r));
+    let differences = super::differences::difference_words(r);
+    if !differences.is_empty() {
+        let points = differences.into_iter().map(|words| (Tone::Warning, words)).collect();
+        page.add(Text { paragraphs: vec!["Differences from the robot description:".to_owned()], points });
+    }
+    if let Some(robot) = robot {
+        page.add(super::robot_colours::scene(robot, r, traces));
+    }
     if let Some(check) = &r.check {
         super::check::examination(&mut page, check);
     }
@@ -50,6 +58,7 @@ pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<Stri
     }
     super::forms::forms(&mut page, r);
     torques(&mut page, &r.robot.joints, traces, r.validation.iter().any(|log| log.physical.is_some()));
+    super::events::events(&mut page, traces);
     page.add(Heading::new("Parameters"));
     parameters(&mut page, r);
     page.add(Heading::new("Friction and drives"));
@@ -78,86 +87,7 @@ pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<Stri
     Ok(page.html()?)
 }
 
-fn percent(value: Option<f64>) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| format!("{}\u{a0}%", short(value, 3)))
-}
-
-fn key_figures(r: &ResultFile) -> KeyFigures {
-    let mut figures = KeyFigures::new();
-    for log in r.validation.iter().take(3) {
-        let prior = log.prior.as_ref().and_then(|prior| prior.relative_error_percent);
-        let mut note = log.log.clone();
-        if log.physical.is_some() {
-            note = format!("{note}; unconstrained estimate {}", percent(log.model.relative_error_percent));
-        }
-        if prior.is_some() {
-            note = format!("{note}; robot description {}", percent(prior));
-        }
-        figures = figures.figure("held-out torque error", percent(exported_report(log).relative_error_percent), note);
-    }
-    if r.validation.is_empty() {
-        figures = figures.judged("held-out torque error", "–", "no held-out log", Tone::Warning);
-    }
-    // A green mark next to a problem would be misleading.
-    let good = if r.problems.is_empty() && r.method.is_settled() { Tone::Good } else { Tone::Plain };
-    let all = r.base_parameters.len();
-    let within = |percent: f64| {
-        let bar = |p: &&BaseParameterResult| p.relative_half_width_percent().is_some_and(|bar| bar <= percent);
-        r.base_parameters.iter().filter(bar).count()
-    };
-    let excited = r.base_parameters.iter().filter(|parameter| parameter.excited).count();
-    let vague = excited - within(100.0).min(excited);
-    let mut known = vec![format!("{} within 10 %", within(10.0))];
-    if vague > 0 {
-        known.push(format!("{vague} with error bars larger than the value"));
-    }
-    if excited < all {
-        known.push(format!("{} not excited", all - excited));
-    }
-    if !r.method.is_settled() {
-        known.push("NOT converged".to_owned());
-    }
-    let tone = if vague > 0 || excited < all || !r.method.is_settled() { Tone::Warning } else { good };
-    let physical = if r.physical.consistent { ("yes", good) } else { ("no", Tone::Bad) };
-    let fit = r.training.physical.as_ref().map_or(r.training.relative_error_percent, |own| own.relative_error_percent);
-    figures
-        .figure("error of the fit", percent(fit), format!("{} rows", r.training.samples))
-        .judged("parameters within 30 %", format!("{} of {all}", within(30.0)), known.join("; "), tone)
-        .figure("condition number", short(r.method.condition_number_scaled, 3), "columns of unit length")
-        .judged("physically consistent", physical.0, "", physical.1)
-        .figure("time", format!("{} s", short(r.timings_s.total, 3)), "")
-}
-
-/// Errors of the exported model: the physically consistent set, or the estimate without one.
-fn exported_report(log: &LogValidation) -> &ValidationReport {
-    log.physical.as_ref().unwrap_or(&log.model)
-}
-
-/// Describes the model in the figures, and whether it differs significantly from the unconstrained estimate.
-fn model_description(r: &ResultFile) -> Text {
-    let Some(fit) = &r.physical.fit else {
-        return Text::new("All figures use the unconstrained estimate, because there is no physically consistent set.");
-    };
-    let figures = "Figures and plots of held-out logs use the physically consistent model, which is the exported one; \
-                   the unconstrained estimate is listed for comparison.";
-    let Some(test) = fit.difference else { return Text::new(figures) };
-    let [parameters, rest] = test.degrees_of_freedom;
-    let numbers = format!(
-        "F({}, {}) = {}, p = {}",
-        short(parameters, 4),
-        short(rest, 4),
-        short(test.f, 3),
-        short(test.p_value, 2)
-    );
-    let (tone, verdict) = if test.is_significant {
-        (Tone::Warning, "The difference is significant: no physically consistent model explains these logs completely")
-    } else {
-        (Tone::Plain, "The difference is not significant")
-    };
-    Text::new(figures).point(tone, format!("{verdict} ({numbers})."))
-}
-
-fn error_table(r: &ResultFile) -> Table {
+pub(super) fn error_table(r: &ResultFile) -> Table {
     let mut columns = vec!["joint".to_owned(), "fit, Nm (N)".to_owned(), "fit, %".to_owned()];
     for log in &r.validation {
         columns.extend([format!("{}, Nm (N)", log.log), format!("{}, %", log.log)]);
@@ -179,9 +109,12 @@ fn error_table(r: &ResultFile) -> Table {
 }
 
 fn held_out_table(log: &LogValidation) -> Table {
+    let without_events = log.without_events.as_ref().map(|rest| rest.physical.as_ref().unwrap_or(&rest.model));
     let sets = [
         ("consistent set (exported)", log.physical.as_ref()),
+        ("the same without the intervals of events", without_events.filter(|_| log.physical.is_some())),
         ("unconstrained estimate", Some(&log.model)),
+        ("the same without the intervals of events", without_events.filter(|_| log.physical.is_none())),
         ("unconstrained estimate, unfiltered torque", Some(&log.raw)),
         ("robot description", log.prior.as_ref()),
     ];
@@ -213,6 +146,7 @@ fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace], is_consist
             page.add(
                 LinePlot::new(format!("{name}: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
                     .note(format!("filtered, {} Hz{part}; gaps of the log are removed", short(trace.rate_hz, 4)))
+                    .of_joint(name)
                     .broad(predicted_by, predicted)
                     .line("measured", measured)
                     .difference("measured minus predicted", 1, 0),
@@ -446,9 +380,12 @@ fn bodies(page: &mut Report, r: &ResultFile) {
         row.push(Cell::judged(short(least, 3), if least > 0.0 { Tone::Plain } else { Tone::Bad }));
         row
     });
-    let note = format!(
-        "± for 30 % uncertainty of the robot description; centre of mass in the body frame; smallest eigenvalue of the pseudo-inertia; {MARKS}"
-    );
+    let bars = if r.description_differences.is_some() {
+        "± averaged over the explanations of the difference from the robot description"
+    } else {
+        "± for 30 % uncertainty of the robot description"
+    };
+    let note = format!("{bars}; centre of mass in the body frame; smallest eigenvalue of the pseudo-inertia; {MARKS}");
     let columns = ["body", "mass, kg", "± (95 %), kg", "nominal, kg", "x, m", "y, m", "z, m", "smallest eigenvalue"];
     page.add(Table::new("Bodies", columns).note(note).rows(rows));
     let rows = r.bodies.iter().map(|body| {

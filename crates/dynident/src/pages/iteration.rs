@@ -2,65 +2,14 @@
 
 use super::iteration_parameters::{add_parameters, identified_parameters};
 use super::iteration_remarks::{log_remarks, motion_remarks, run_remarks, unmet_conditions};
+use super::iteration_scene::{by_posture, scene};
+use super::robot::RobotAppearance;
 use super::run_figures::{MAX_CURVES, error_in_bars, is_known, largest_error, last_good, run_name, worst};
+use super::run_trace::RunTrace;
 use super::torque_check::torque_section;
 use crate::error::Error;
 use crate::result::{IterationRun, IterationsFile};
-use dynident_iteration::IterationStore;
-use dynident_iteration::robot::read_log_table;
 use dynident_report::{Cell, ConvergencePlot, Heading, KeyFigures, LinePlot, Report, Table, Tone, short};
-use dynident_simulation::Reference;
-
-/// A trajectory of a run.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) struct RunName {
-    pub(crate) run: usize,
-    /// Leg number, if there are several legs.
-    pub(crate) leg: Option<usize>,
-    /// Index of the leg within the run.
-    pub(crate) place: usize,
-}
-
-/// Tracking error of a run.
-pub(crate) struct RunTrace {
-    name: RunName,
-    /// Sample times of the trajectory, s.
-    pub(crate) times_s: Vec<f64>,
-    /// Desired minus measured position of each joint, rad (m); NaN after the end of the run.
-    pub(crate) error: Vec<Vec<f64>>,
-}
-
-impl RunTrace {
-    /// Reads the log of the run. An unreadable log gives an empty plot, so that the page can still be written.
-    pub(crate) fn new(name: RunName, store: &IterationStore, reference: &Reference, joints: &[String]) -> Self {
-        let log = if name.place == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", name.place + 1) };
-        let (motion, rate_hz) = (reference.motion(), reference.rate_hz());
-        let times_s: Vec<f64> = (0..motion.samples).map(|sample| sample as f64 / rate_hz).collect();
-        let record = read_log_table(&store.run_folder(name.run).join(log), joints, rate_hz).ok();
-        let error = (0..joints.len()).map(|joint| {
-            let target = &motion.q[motion.of(joint)];
-            let Some(record) = &record else { return vec![f64::NAN; motion.samples] };
-            let own = &record.q[record.of(joint)];
-            let measured = times_s.iter().map(|time_s| between(&record.times_s, own, *time_s));
-            target.iter().zip(measured).map(|(target, measured)| target - measured).collect()
-        });
-        Self { name, error: error.collect(), times_s }
-    }
-}
-
-/// Linear interpolation; NaN after the last sample.
-fn between(times_s: &[f64], values: &[f64], time_s: f64) -> f64 {
-    let after = times_s.partition_point(|time| *time < time_s);
-    match (after, times_s.get(after)) {
-        // Tolerates rounding of the last sample time.
-        (_, None) => times_s.last().filter(|last| time_s - **last < 1e-9).map_or(f64::NAN, |_| values[after - 1]),
-        (0, Some(_)) => values[0],
-        (_, Some(next)) => {
-            let share = (time_s - times_s[after - 1]) / (next - times_s[after - 1]);
-            values[after - 1] + share * (values[after] - values[after - 1])
-        }
-    }
-}
 
 /// Computing times.
 pub(crate) struct TimeSpent {
@@ -72,10 +21,18 @@ pub(crate) struct TimeSpent {
     pub(crate) runs: usize,
 }
 
-pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time: &TimeSpent) -> Result<String, Error> {
+pub(crate) fn iteration_report(
+    file: &IterationsFile,
+    traces: &[RunTrace],
+    robot: &RobotAppearance,
+    time: &TimeSpent,
+) -> Result<String, Error> {
     let mut page = Report::new(&file.name).subtitle(format!("{} joints; {}", file.joints.len(), file.reason));
     page.add(figures(file));
     unmet_conditions(&mut page, file);
+    if let Some(scene) = scene(robot, traces) {
+        page.add(scene);
+    }
     page.add(Heading::new("Runs"));
     page.add(runs(file));
     run_remarks(&mut page, file);
@@ -142,7 +99,7 @@ fn model(run: &IterationRun) -> String {
     }
 }
 
-fn runs(file: &IterationsFile) -> Table {
+pub(super) fn runs(file: &IterationsFile) -> Table {
     let known = is_known(file);
     let mut columns = vec!["run", "controller", "model", "result", "tracking error, rad (m)", "largest error bar"];
     if known {
@@ -186,15 +143,19 @@ fn tracking(page: &mut Report, file: &IterationsFile, traces: &[RunTrace]) {
     for leg in legs {
         let own: Vec<&RunTrace> = traces.iter().filter(|trace| trace.name.leg == leg).collect();
         let Some(longest) = own.iter().max_by_key(|trace| trace.times_s.len()) else { continue };
+        let of_leg = leg.map_or_else(String::new, |leg| format!(", leg {leg}"));
+        if let Some(map) = by_posture(&own, format!("Tracking error along the motion{of_leg}")) {
+            page.add(map);
+        }
         for (joint, name) in file.joints.iter().enumerate() {
             // A locked joint has no tracking error.
             if own.iter().all(|trace| trace.error[joint].iter().all(|error| *error == 0.0)) {
                 continue;
             }
-            let of_leg = leg.map_or_else(String::new, |leg| format!(", leg {leg}"));
             let title = format!("{name}: tracking error{of_leg}");
             let mut plot = LinePlot::new(title, "t, s", "rad (m)", longest.times_s.clone())
-                .note("desired minus measured position");
+                .note("desired minus measured position")
+                .of_joint(name);
             // First and last runs; intermediate runs are similar.
             let shown = |place: usize| place + 2 < MAX_CURVES || place + 2 >= own.len();
             for trace in own.iter().enumerate().filter(|(place, _)| shown(*place)).map(|(_, trace)| trace) {

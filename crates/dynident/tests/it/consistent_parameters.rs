@@ -82,7 +82,7 @@ fn contradictions_name_link_and_constraint() {
     assert!(reason.contains("link2: mass") && reason.contains("3 to 2"), "{reason}");
     let reason =
         failure("[estimator.physical.bodies.link2]\nprior = [1.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1, 0.0, 0.9]");
-    assert!(reason.contains("body link2: its prior is no consistent body"), "{reason}");
+    assert!(reason.contains("body link2: its prior is not physically consistent"), "{reason}");
     let reason =
         failure("[estimator.physical.bodies.link1]\nknown = [1.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1, 0.0, 0.9]");
     assert!(reason.contains("body link1") && reason.contains("known"), "{reason}");

@@ -288,7 +288,7 @@ fn what_cannot_be_is_said_with_its_place() {
         ("expression = \"sqrt(q)\"", ["torque spring = sqrt(q1): no value at q1 = -", "inside the joints' limits"]),
         ("expression = \"0 * q\"", ["torque spring = 0.0 * q1", "remove it"]),
         ("table = [[0.0, 1.0], [0.0, 2.0]]", ["torque `spring`: table: point 2", "sort the points"]),
-        ("table_file = \"none.csv\"", ["none.csv is in none of", "fix its path"]),
+        ("table_file = \"none.csv\"", ["none.csv is in none of", "correct its path"]),
         ("table_file = \"log.csv\"", ["log.csv:2: `", "give two numbers, position and torque"]),
     ] {
         let message = refused(here, torque);
@@ -299,7 +299,7 @@ fn what_cannot_be_is_said_with_its_place() {
         ("expression = \"q\"\ntable = [[0.0, 1.0]]", "expression and table are both given: keep one"),
         ("expression = \"q\"\nnominal = nan", "torque `spring`: nominal: give a finite number"),
         ("expression = \"q\"\nstiffness = 2.0", "unknown field `stiffness`"),
-        ("expression = \"q\"\n[[torque]]\nname = \"spring\"\njoint = \"hinge\"\nexpression = \"q\"", "stands twice"),
+        ("expression = \"q\"\n[[torque]]\nname = \"spring\"\njoint = \"hinge\"\nexpression = \"q\"", "is given twice"),
     ] {
         let message = Job::new_error(here, &pendulum(here, torque));
         assert!(message.contains(fragment), "{message}");
@@ -309,7 +309,10 @@ fn what_cannot_be_is_said_with_its_place() {
     for taken in ["mx1", "fv1"] {
         let job = Job::new(here, &renamed(taken));
         let message = identify(&job.study, &job.path, &Job::options(1)).unwrap_err().to_string();
-        assert!(message.contains(&format!("torque {taken}: the name stands among")), "{message}");
+        assert!(
+            message.contains(&format!("torque {taken}: the name is invalid, or the symbol of another")),
+            "{message}"
+        );
     }
     let unknown = Job::new(here, &pendulum(here, "expression = \"q\"").replace("\"hinge\"", "\"knee\""));
     let message = identify(&unknown.study, &unknown.path, &Job::options(1)).unwrap_err().to_string();

@@ -1,6 +1,7 @@
 //! Generated studies compared with manually written ones.
 
 use crate::common::{recordings, repository};
+use dynident::recording::LogFormat;
 use dynident::recording::log::{ChannelGroup, ColumnRef};
 use dynident::result::{StudyChange, Unsure};
 use dynident::{Error, NewStudy, RunOptions, Silent, Study, XacroSettings, new_study};
@@ -15,7 +16,7 @@ struct Written {
 
 fn reading_keys(study: &Study) -> ([String; 3], [String; 3]) {
     let format = study.format.as_ref().unwrap();
-    (reading(&format.position).1, reading(&format.torque).1)
+    (reading(&format.position).1, reading(format.torque.as_ref().unwrap()).1)
 }
 
 fn request(folder: &Path, robot: &Path, logs: &[PathBuf], rate_hz: Option<f64>) -> NewStudy {
@@ -55,7 +56,8 @@ fn is_read_alike(example: &str, found: &Written) {
     let hand = by_hand(example);
     let (own, other) = (found.study.format.as_ref().unwrap(), hand.format.as_ref().unwrap());
     assert_eq!(reading(&own.position), reading(&other.position), "{example}\n{}", found.text);
-    assert_eq!(reading(&own.torque), reading(&other.torque), "{example}\n{}", found.text);
+    let torques = |format: &LogFormat| reading(format.torque.as_ref().unwrap());
+    assert_eq!(torques(own), torques(other), "{example}\n{}", found.text);
     assert_eq!(format!("{:?}", own.time), format!("{:?}", other.time), "{example}\n{}", found.text);
     assert_eq!(own.rate_hz, other.rate_hz, "{example}\n{}", found.text);
 }
@@ -116,7 +118,7 @@ fn what_no_name_and_no_number_tells_is_marked() {
     let files = |names: &[&str]| names.iter().map(|name| data.join(name)).collect::<Vec<_>>();
     let tx40 = files(&["staubli_tx40/pos_read_data.csv", "staubli_tx40/curr_data.csv"]);
     let found = written(&data.join("staubli_tx40/tx40_mdh_modified.urdf"), &tx40, None);
-    let torque = &found.study.format.as_ref().unwrap().torque;
+    let torque = &found.study.format.as_ref().unwrap().torque.as_ref().unwrap();
     assert_eq!(torque.file.as_deref(), Some(Path::new("curr_data.csv")), "{}", found.text);
     for key in ["scale", "rate_hz", "unit"] {
         assert!(found.unsure.iter().any(|line| line.contains(key)), "{key}: {:?}", found.unsure);

@@ -253,7 +253,7 @@ fn what_does_not_go_together_is_refused_with_the_fix() {
     };
     let carrying = "{ file = \"box.csv\", payload = \"box\" }";
     for (more, log, words) in [
-        ("", carrying, "describe it"),
+        ("", carrying, "add a [[payload]] with this name"),
         ("payload = [{ name = \"box\", link = \"hand\" }]", carrying, "wrist_3_link"),
         ("payload = [{ name = \"box\", link = \"tool0\", com_m = [0, 0, 0.1] }]", carrying, "mass_kg and com_m"),
         ("payload = [{ name = \"box\", link = \"tool0\", mass_kg = -2.0, com_m = [0, 0, 0] }]", carrying, "positive"),
@@ -263,7 +263,7 @@ fn what_does_not_go_together_is_refused_with_the_fix() {
         (
             BOX,
             "{ file = \"empty.csv\" }, { file = \"box.csv\", payload = \"box\", role = \"validate\" }",
-            "no log to fit to",
+            "no training log contains it",
         ),
     ] {
         let said = refused(more, log);

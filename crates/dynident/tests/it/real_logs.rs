@@ -42,12 +42,12 @@ fn held_out(name: &str, limit_percent: f64, readme_percent: f64) -> Option<Ident
 
 #[test]
 fn lwr4plus_fitted_to_two_runs() {
-    held_out("lwr4plus_23_to_1.toml", 2.34, 2.40);
+    held_out("lwr4plus_23_to_1.toml", 2.34, 2.41);
 }
 
 #[test]
 fn lwr4plus_fitted_to_one_run() {
-    held_out("lwr4plus_1_to_2.toml", 2.12, 2.24);
+    held_out("lwr4plus_1_to_2.toml", 2.12, 2.25);
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn ur10_has_54_base_parameters() {
 
 #[test]
 fn tx40_has_61_base_parameters() {
-    if let Some(found) = held_out("tx40.toml", 12.8, 10.69) {
+    if let Some(found) = held_out("tx40.toml", 12.8, 10.27) {
         // Joints with directional friction have a velocity too; half of the held-out rows are at rest.
         for joint in &found.result.validation[0].residuals {
             let regimes = joint.regimes.unwrap();
@@ -78,7 +78,7 @@ fn tx40_has_61_base_parameters() {
 
 #[test]
 fn panda_has_43_base_parameters_of_bodies() {
-    let Some(found) = held_out("panda.toml", 2.13, 1.80) else { return };
+    let Some(found) = held_out("panda.toml", 2.13, 1.79) else { return };
     // The number of friction parameters matches the selection.
     let of_bodies = found.result.base_parameters.iter().filter(|parameter| parameter.unit.starts_with("kg")).count();
     assert_eq!(of_bodies, 43);

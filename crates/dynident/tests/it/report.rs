@@ -36,7 +36,8 @@ fn every_joint_is_drawn_and_no_name_becomes_markup() {
     "#;
     let found = Job::new(folder.path(), text).identify();
     assert_eq!(found.traces.iter().map(|trace| trace.role.name()).collect::<Vec<_>>(), ["identify", "validate"]);
-    for (trace, gaps) in found.traces.iter().zip([0, 1]) {
+    // Differences of order 8 leave out 8 samples at either end of a piece.
+    for (trace, gaps) in found.traces.iter().zip([2 * 8, 4 * 8]) {
         assert_eq!((trace.joints.len(), trace.cut), (2, false));
         for joint in &trace.joints {
             assert_eq!(joint.measured_nm.len(), joint.predicted_nm.len());

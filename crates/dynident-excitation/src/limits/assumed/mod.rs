@@ -10,7 +10,7 @@ mod thresholds;
 mod turns;
 mod words;
 
-pub use shapes::ShapesOfLinks;
+pub use shapes::{CAPSULE_RADIUS_SHARE, ShapesOfLinks};
 pub use thresholds::AssumptionThresholds;
 pub use turns::StartPositions;
 
@@ -117,6 +117,15 @@ impl LimitsInForce {
                 "acceleration: full speed within {} rad from rest, or {}% of the stroke of a prismatic joint (defaults.acceleration)",
                 settings.thresholds.run_up_rad,
                 100.0 * settings.thresholds.run_up_stroke_share
+            ));
+        }
+        given.scale.validate()?;
+        if !given.scale.is_one() {
+            under.scale_joints(given.scale);
+            let scale = given.scale;
+            assumed.push(format!(
+                "limits of the robot description and assumed accelerations are multiplied by {} (speed), {} (acceleration), {} (torque) (limits.scale)",
+                scale.speed, scale.acceleration, scale.torque
             ));
         }
         let clearance_m = settings.thresholds.clearance_share * arm_length_m(model);

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Radius of a capsule that replaces the shapes of a link, as a share of the arm's length; that of the tubes of a UR10
 /// or an iiwa.
-const CAPSULE_RADIUS_SHARE: f64 = 0.04;
+pub const CAPSULE_RADIUS_SHARE: f64 = 0.04;
 
 /// Shapes of all links.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -5,6 +5,7 @@ use super::study_keys::{KeyChange, StudyKeys, list};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
 use dynident_dynamics::ParametricModel;
+use dynident_recording::log::ChannelGroup;
 
 /// The column of a joint also moves with another joint: it contains `q_joint + sign q_with`, as for the motor of a
 /// parallelogram or of a coupled wrist. For torques of the motor, `τ_with` lacks `sign τ_joint`.
@@ -58,7 +59,7 @@ impl MistakeKind for Coupled {
 
     fn sentence(&self, names: &[String]) -> String {
         format!(
-            "{channels} of joint `{joint}` {belong} to a motor that also turns with joint `{with}`: its column is `{joint}` {sign} `{with}`",
+            "{channels} of joint `{joint}` {belong} to a motor that also turns with joint `{with}`: the column contains `{joint}` {sign} `{with}`",
             channels = self.channels.text(),
             joint = names[self.joint],
             belong = if self.channels == Channels::Both { "belong" } else { "belongs" },
@@ -72,7 +73,8 @@ impl MistakeKind for Coupled {
         let [joint, with] = [self.joint, self.with].map(|joint| keys.places[joint]);
         let of = |channels: Channels| {
             let (group, table) = keys.group(channels);
-            if group.matrix.is_some() || group.inverse_matrix.is_some() {
+            let has = |matrix: fn(&ChannelGroup) -> bool| group.is_some_and(matrix);
+            if has(|group| group.matrix.is_some() || group.inverse_matrix.is_some()) {
                 let line = format!("# matrix: rows {} and {} are coupled", joint + 1, with + 1);
                 return KeyChange { table, line };
             }

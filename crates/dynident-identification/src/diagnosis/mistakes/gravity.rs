@@ -58,7 +58,9 @@ impl MistakeKind for Gravity {
             return "the torque is without gravity: the controller compensated gravity, or this robot has no gravity"
                 .to_owned();
         }
-        format!("the base is mounted in another orientation: gravity is [{x:.2}, {y:.2}, {z:.2}] m/s² in its frame")
+        format!(
+            "the base is mounted in another orientation: gravity is [{x:.2}, {y:.2}, {z:.2}] m/s² in the frame of the base"
+        )
     }
 
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {

@@ -55,7 +55,7 @@ impl MistakeKind for Length {
             _ => "too far from",
         };
         format!(
-            "the description has joint `{}` {place} the joint before it: multiply `xyz` of its origin by {:.3}",
+            "the robot description has joint `{}` {place} the joint before it: multiply `xyz` of the origin of this joint by {:.3}",
             names[self.joint], self.factor
         )
     }

@@ -54,7 +54,7 @@ impl MistakeKind for Offset {
 
     fn sentence(&self, names: &[String]) -> String {
         format!(
-            "the zero of joint `{}` differs by {:.1} degrees from the description's",
+            "the zero of joint `{}` differs by {:.1} degrees from that of the robot description",
             names[self.joint],
             self.offset_rad * 180.0 / PI
         )
@@ -63,7 +63,7 @@ impl MistakeKind for Offset {
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
         let (group, _) = keys.group(Channels::Position);
         let with = |place: usize| {
-            let own = at(group.offset.as_ref(), place, 0.0);
+            let own = at(group.and_then(|group| group.offset.as_ref()), place, 0.0);
             number(if place == keys.places[self.joint] { own + self.offset_rad } else { own }, 4)
         };
         vec![keys.per_column(Channels::Position, "offset", with)]

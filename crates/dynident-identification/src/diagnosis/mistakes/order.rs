@@ -72,7 +72,7 @@ impl MistakeKind for Order {
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
         let of = |channels: Channels| {
             let (group, table) = keys.group(channels);
-            let columns = group.column_list("columns").ok().filter(|columns| columns.len() == keys.columns)?;
+            let columns = group?.column_list("columns").ok().filter(|columns| columns.len() == keys.columns)?;
             let mut ordered = columns.clone();
             for (joint, &from) in self.order.iter().enumerate() {
                 ordered[keys.places[joint]] = columns[keys.places[from]].clone();

@@ -6,6 +6,7 @@ use super::study_keys::{KeyChange, StudyKeys, at, list};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
 use dynident_dynamics::ParametricModel;
+use dynident_recording::log::ChannelGroup;
 
 /// The signs of these joints are reversed. Position and torque together mean a reversed axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,13 +57,15 @@ impl MistakeKind for Sign {
         let places: Vec<usize> = self.joints.iter().map(|&joint| keys.places[joint]).collect();
         let of = |channels: Channels| {
             let (group, table) = keys.group(channels);
-            if group.matrix.is_some() || group.inverse_matrix.is_some() {
-                let (key, what) = if group.matrix.is_some() { ("matrix", "row") } else { ("inverse_matrix", "column") };
+            let has = |matrix: fn(&ChannelGroup) -> bool| group.is_some_and(matrix);
+            if has(|group| group.matrix.is_some() || group.inverse_matrix.is_some()) {
+                let (key, what) =
+                    if has(|group| group.matrix.is_some()) { ("matrix", "row") } else { ("inverse_matrix", "column") };
                 let numbers: Vec<String> = places.iter().map(|place| (place + 1).to_string()).collect();
                 return KeyChange { table, line: format!("# {key}: the negative of {what} {}", numbers.join(", ")) };
             }
             let flipped = |place: usize| {
-                let sign = at(group.sign.as_ref(), place, 1.0);
+                let sign = at(group.and_then(|group| group.sign.as_ref()), place, 1.0);
                 if places.contains(&place) { -sign } else { sign }
             };
             let signs: Vec<f64> = (0..keys.columns).map(flipped).collect();

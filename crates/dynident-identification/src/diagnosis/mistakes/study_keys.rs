@@ -32,11 +32,11 @@ pub struct StudyKeys {
 }
 
 impl StudyKeys {
-    /// The columns of positions or torques, and their table.
-    pub(super) fn group(&self, channels: Channels) -> (&ChannelGroup, String) {
+    /// The columns of positions or torques, if the format has them, and their table.
+    pub(super) fn group(&self, channels: Channels) -> (Option<&ChannelGroup>, String) {
         let (group, name) = match channels {
-            Channels::Torque => (&self.format.torque, "torque"),
-            Channels::Position | Channels::Both => (&self.format.position, "position"),
+            Channels::Torque => (self.format.torque.as_ref(), "torque"),
+            Channels::Position | Channels::Both => (Some(&self.format.position), "position"),
         };
         (group, format!("{}.{name}", self.table))
     }
@@ -57,7 +57,7 @@ impl StudyKeys {
         let (group, _) = self.group(channels);
         let places: Vec<usize> = joints.iter().map(|&joint| self.places[joint]).collect();
         self.per_column(channels, "scale", |place| {
-            let own = at(group.scale.as_ref(), place, 1.0);
+            let own = at(group.and_then(|group| group.scale.as_ref()), place, 1.0);
             if places.contains(&place) { significant(factor * own) } else { format!("{own:?}") }
         })
     }
@@ -71,7 +71,7 @@ impl StudyKeys {
             own.find_map(|(_, factor)| *factor)
         };
         let value = |place: usize| {
-            let scale = at(group.scale.as_ref(), place, 1.0);
+            let scale = at(group.and_then(|group| group.scale.as_ref()), place, 1.0);
             factor(place).map_or_else(|| format!("{scale:?}"), |factor| significant(factor * scale))
         };
         let unknown = (0..self.columns).filter(|&place| factor(place).is_none()).map(|place| (place + 1).to_string());
@@ -87,7 +87,8 @@ impl StudyKeys {
     /// study.
     pub fn torque_unit(&self, unit: f64) -> KeyChange {
         let (group, table) = self.group(Channels::Torque);
-        let own: Vec<f64> = (0..self.columns).map(|place| at(group.scale.as_ref(), place, 1.0)).collect();
+        let own = group.and_then(|group| group.scale.as_ref());
+        let own: Vec<f64> = (0..self.columns).map(|place| at(own, place, 1.0)).collect();
         // A unit is exact.
         let value = |own: &f64| if *own == 1.0 { format!("{unit:?}") } else { significant(unit * own) };
         let line = match own.first() {

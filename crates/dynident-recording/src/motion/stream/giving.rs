@@ -41,6 +41,7 @@ impl MotionStream {
         let mut marked = Vec::new();
         if rows > 0 {
             self.set_torques_aside(block, &span);
+            self.ignore_torques(block);
             for values in &mut self.window {
                 values.resize(span.window.len(), 0.0);
             }
@@ -95,6 +96,21 @@ impl MotionStream {
             block.set_aside.resize(joints * rows, false);
             block.set_aside[joint * rows + (sample - first) as usize] = true;
             self.set_aside.pop_front();
+        }
+    }
+
+    /// Marks the torques in the intervals that the log ignores.
+    fn ignore_torques(&self, block: &mut MotionBlock) {
+        let rows = block.rows;
+        for ignored in &self.ignored_torque {
+            for &joint in &ignored.joints {
+                let first_s = block.first_time_s + self.torque_shift.of(joint) / block.rate_hz;
+                let inside = ignored.rows(first_s, block.rate_hz, rows);
+                if joint < block.joints && !inside.is_empty() {
+                    block.set_aside.resize(block.joints * rows, false);
+                    block.set_aside[joint * rows..(joint + 1) * rows][inside].fill(true);
+                }
+            }
         }
     }
 

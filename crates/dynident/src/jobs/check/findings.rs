@@ -7,6 +7,7 @@ use super::wording::{FindingContext, alternative, evidence, finding};
 use crate::result::{CheckFinding, HypothesisResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
+use dynident_identification::changes::LogLoad;
 use dynident_identification::diagnosis::{
     BeyondLimit, Channels, DescriptionFit, Diagnosis, DuplicateChannel, HeldOutHypothesis, Hypothesis,
     InconsistentTorque, Mistake, Search, UnmodelledPayload,
@@ -74,6 +75,7 @@ pub(super) fn study_check(
         unexplained_percent: Some(100.0 * search.believed().left_of_all),
         noise_percent: diagnosis.noise.iter().map(|noise| 100.0 * noise).collect(),
         noise_of_all_percent: Some(100.0 * diagnosis.noise_of_all),
+        commanded_logs: 0,
     }
 }
 
@@ -184,7 +186,7 @@ fn unrelated_torques(search: &Search) -> CheckFinding {
 
 pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSettings) -> Option<CheckFinding> {
     let index = *study.logs_of_role(Role::Identify).first()?;
-    let torque = study.format_of(index).torque;
+    let torque = study.format_of(index).torque?;
     let units = match torque.unit.as_ref()? {
         OneOrMany::One(unit) => vec![unit.clone()],
         OneOrMany::Many(units) => units.clone(),
@@ -280,7 +282,7 @@ fn inconsistent_torque(torque: &InconsistentTorque, joints: &[String]) -> CheckF
             100.0 * torque.left,
             100.0 * torque.alone,
             noise,
-            torque.times()
+            torque.unexplained_ratio()
         ),
     );
     CheckFinding { level: if torque.is_foreign() { Level::Problem } else { Level::Warning }, ..found }
@@ -324,6 +326,28 @@ fn unmodelled_payload(study: &Study, robot: &StudyRobot, payload: &UnmodelledPay
     found.write = vec![
         section,
         StudyChange { table: format!("[[log]] number {}", number + 1), line: "payload = \"tool\"".to_owned() },
+    ];
+    found
+}
+
+/// A load that one of several training logs carries.
+pub(super) fn log_load(study: &Study, robot: &StudyRobot, load: &LogLoad) -> CheckFinding {
+    let (log, link) = (study.log_name(load.log), robot.model().bodies()[load.body].name());
+    let [x, y, z] = load.com_m;
+    let mut found = finding(
+        "payload",
+        format!("log `{log}` carries {:.2} kg more at `{link}` than the other training logs", load.mass_kg),
+        format!(
+            "separate fits to this log and to the others differ by {:.2} ± {:.2} kg at [{x:.3}, {y:.3}, {z:.3}] m in `{link}` (probability {:.0} %): \
+             declare the load as [[payload]]",
+            load.mass_kg,
+            1.96 * load.mass_std_kg,
+            100.0 * load.probability
+        ),
+    );
+    found.write = vec![
+        StudyChange { table: "[[payload]]".to_owned(), line: format!("name = \"tool\", link = {link:?}") },
+        StudyChange { table: format!("[[log]] number {}", load.log + 1), line: "payload = \"tool\"".to_owned() },
     ];
     found
 }

@@ -1,6 +1,7 @@
 //! `check`: tests whether study, robot and logs are consistent, before any fit.
 
 mod changes;
+mod commands;
 mod description;
 mod findings;
 mod settings;
@@ -12,12 +13,15 @@ use crate::error::Error;
 use crate::inputs::InputFiles;
 use crate::jobs::options::RunOptions;
 use crate::result::{CHECK_SCHEMA, CheckFile, CheckFinding, StudyChange, StudyCheck};
-use crate::study::{Study, StudyFile, StudyRobot};
+use crate::study::{Folders, Study, StudyFile, StudyRobot};
+use commands::{command_findings, is_without_torque};
 use dynident_identification::diagnosis::Diagnosis;
-use dynident_identification::{IdentificationError, IdentificationSettings, StudyExamination, examine_study};
+use dynident_identification::{
+    IdentificationError, IdentificationSettings, RecordingEvents, StudyExamination, event_findings, examine_study,
+};
 use dynident_model::{AuditFinding, AuditLevel, InertialParameters, Mat3, audit};
 use dynident_recording::{ImportReport, Level};
-use findings::{currents_without_scale, study_check};
+use findings::{currents_without_scale, log_load, study_check};
 use std::path::Path;
 
 /// Audit checks for physically inconsistent bodies, independent of the robot's size.
@@ -51,10 +55,13 @@ pub fn check_with(
     let files = InputFiles::of(study, options.data.as_deref());
     let folders = study.folders(options.data.as_deref());
     let robot = study.robot_in(&folders)?;
+    let sources = study.log_sources(&folders)?;
+    if is_without_torque(&study) {
+        return check_commanded(&study, &robot, &folders, &files, thresholds);
+    }
     let in_study = Error::identification::<IdentificationError>(study.path);
     let settings = study.settings(study.path, &robot)?;
     let task = study.task_with(settings, &robot, &folders)?;
-    let sources = study.log_sources(&folders)?;
     study.check_overlap(&sources, &task.recordings).map_err(Error::study(study.path))?;
     let examined = files.while_unchanged(|| examine_study(&task, options.execution()).map_err(in_study))?;
 
@@ -62,15 +69,46 @@ pub fn check_with(
         || StudyCheck { joints: robot.parametric.joint_names(), ..StudyCheck::default() },
         |diagnosis| diagnosis_check(&study, &robot, &task.settings, diagnosis, thresholds),
     );
+    check.findings.extend(examined.loads.iter().map(|load| log_load(&study, &robot, load)));
     for (index, import) in &examined.imports {
         check.findings.extend(import.iter().flat_map(|import| import_findings(&study.log_name(*index), import)));
+    }
+    for RecordingEvents { index, search } in &examined.events {
+        let log = study.log_name(*index);
+        check.findings.extend(event_findings(search, &log).iter().map(|finding| log_finding(&log, finding)));
     }
     // A dead channel distorts the test of the robot description and of every torque that needs it.
     if check.findings.iter().any(|finding| finding.kind == "log" && finding.level == Level::Problem) {
         check.findings.retain(|finding| !["description", "torque"].contains(&&finding.kind[..]));
     }
+    check.findings.extend(command_findings(&study, &robot, &sources, &thresholds.commands)?);
     check.findings.extend(impossible_bodies(&robot));
     check.findings.extend(too_few_rows(&examined, thresholds));
+    check.findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
+    Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study.title(), check })
+}
+
+/// As [`check_with`], for logs with commands in place of torques: no hypothesis about torques is compared.
+fn check_commanded(
+    study: &StudyFile<'_>,
+    robot: &StudyRobot,
+    folders: &Folders,
+    files: &InputFiles,
+    thresholds: &CheckSettings,
+) -> Result<CheckFile, Error> {
+    let sources = study.log_sources(folders)?;
+    let findings = files.while_unchanged(|| {
+        let recordings = study.recordings(robot, folders, &sources)?;
+        study.check_overlap(&sources, &recordings).map_err(Error::study(study.path))?;
+        Ok(command_findings(study, robot, &sources, &thresholds.commands)?)
+    })?;
+    let mut check = StudyCheck {
+        joints: robot.parametric.joint_names(),
+        findings,
+        commanded_logs: sources.len(),
+        ..StudyCheck::default()
+    };
+    check.findings.extend(impossible_bodies(robot));
     check.findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
     Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study.title(), check })
 }
@@ -152,7 +190,11 @@ pub(super) fn diagnosis_check(
 
 fn import_findings(log: &str, import: &ImportReport) -> Vec<CheckFinding> {
     let matters = import.findings.iter().filter(|finding| finding.level != Level::Info);
-    let one = |finding: &dynident_recording::Finding| CheckFinding {
+    matters.map(|finding| log_finding(log, finding)).collect()
+}
+
+fn log_finding(log: &str, finding: &dynident_recording::Finding) -> CheckFinding {
+    CheckFinding {
         level: finding.level,
         kind: "log".to_owned(),
         what: format!("log `{log}`, {}", finding.channel),
@@ -160,6 +202,5 @@ fn import_findings(log: &str, import: &ImportReport) -> Vec<CheckFinding> {
         write: Vec::new(),
         or: Vec::new(),
         code: finding.code.clone(),
-    };
-    matters.map(one).collect()
+    }
 }

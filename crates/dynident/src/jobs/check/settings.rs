@@ -1,13 +1,16 @@
 //! Thresholds of `check`.
 
 use crate::error::{Expected, StudyError};
+use dynident_recording::CommandCheckSettings;
 
 /// Thresholds of the findings of [`check_with`](crate::check_with).
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckSettings {
-    /// Largest unexplained share of all torque for an accepted explanation. Default 0.3; most real data sets have 0.1.
+    /// Largest unexplained share of all torque, 0 to 1, with which a mistake is reported. Default 0.3; most real data
+    /// sets have 0.1.
     pub max_unexplained_share: f64,
-    /// The same relative to the study as written, for noisy logs. Default 0.75.
+    /// For noisy logs: a mistake is also reported if its unexplained share is at most this multiple of that of the
+    /// study as written. Default 0.75.
     pub max_unexplained_ratio: f64,
     /// Unexplained share of all torque above which torque and motion are unrelated. Default 0.92: a correct study with
     /// a noisy log of a slow pendulum has 0.81.
@@ -23,6 +26,8 @@ pub struct CheckSettings {
     /// Equations per parameter below which the logs are short, a warning. Default 3: ten seconds of slow motion have
     /// 2.7, and about half of the fits to such logs are usable.
     pub few_equations: usize,
+    /// Thresholds of the findings about commanded positions.
+    pub commands: CommandCheckSettings,
 }
 
 impl Default for CheckSettings {
@@ -35,6 +40,7 @@ impl Default for CheckSettings {
             max_factor_ratio: 10.0,
             too_few_equations: 2,
             few_equations: 3,
+            commands: CommandCheckSettings::default(),
         }
     }
 }
@@ -51,6 +57,7 @@ impl CheckSettings {
         Expected::Range(0.0, 1.0).check("max_unexplained_beyond_noise", self.max_unexplained_beyond_noise)?;
         Expected::Range(1.0, 1e6).check("max_factor_ratio", self.max_factor_ratio)?;
         let few = self.few_equations as f64;
-        Expected::Range(0.0, few).check("too_few_equations", self.too_few_equations as f64)
+        Expected::Range(0.0, few).check("too_few_equations", self.too_few_equations as f64)?;
+        Ok(self.commands.validate()?)
     }
 }

@@ -1,13 +1,14 @@
 //! Quantity, joint, unit and source of a column from its name.
 
 use super::quantity::Quantity;
-use super::units::ended;
+use super::units::{ended, unit_for};
+use core::ops::Range;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::jobs) enum JointKey {
     /// Index of a joint of the robot.
     Joint(usize),
-    /// A name in brackets that is not a joint of the robot: `effort[elbow]`, in lower case.
+    /// A name that is not a joint of the robot, in lower case: `elbow` of `effort[elbow]` or `elbow.pos`.
     Name(String),
     /// A number in the name: `q3`, `tau[0]`.
     Number(u64),
@@ -18,12 +19,21 @@ pub(in crate::jobs) enum JointKey {
 /// Source of a quantity; a higher value is preferred.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(in crate::jobs) enum Source {
+    /// Computed from a model or estimated, according to the name.
+    Computed,
     /// A commanded value.
     Commanded,
     /// Not stated in the name.
     Unstated,
     /// A measured value, according to the name.
     Measured,
+}
+
+impl Source {
+    /// Whether the quantity comes from the robot: measured, or not stated in the name.
+    pub(in crate::jobs) fn is_recorded(self) -> bool {
+        self > Self::Commanded
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,19 +56,94 @@ const ACCELERATIONS: [&str; 7] = ["ddq", "qdd", "qddot", "acc", "accel", "accele
 const TORQUES: [&str; 10] =
     ["tau", "torque", "torques", "effort", "efforts", "moment", "moments", "trq", "msrtrq", "jointtorque"];
 const CURRENTS: [&str; 5] = ["current", "currents", "curr", "amps", "ampere"];
-const COMMANDED: [&str; 11] =
-    ["cmd", "command", "commanded", "desired", "des", "target", "ref", "reference", "setpoint", "goal", "d"];
-const MEASURED: [&str; 6] = ["actual", "measured", "meas", "msr", "sensor", "sensed"];
-/// Quantities that are neither measured nor commanded: estimates and others.
-const OTHERS: [&str; 16] = [
-    "ext", "external", "error", "err", "residual", "model", "gravity", "grav", "friction", "window", "tcp", "ee",
-    "wrench", "limit", "std", "temp",
+const COMMANDED: [&str; 16] = [
+    "cmd",
+    "cmds",
+    "command",
+    "commands",
+    "commanded",
+    "desired",
+    "des",
+    "target",
+    "targets",
+    "ref",
+    "reference",
+    "setpoint",
+    "goal",
+    "goals",
+    "action",
+    "d",
 ];
+/// Names without a quantity that are positions: a command alone, and the words of a LeRobot data set.
+const COMMANDED_POSITIONS: [&str; 9] =
+    ["cmd", "cmds", "command", "commands", "target", "targets", "goal", "goals", "action"];
+/// Beginning of the columns of the commands in a SAGE recording.
+const SAGE_COMMANDS: &str = "control.";
+const MEASURED: [&str; 6] = ["actual", "measured", "meas", "msr", "sensor", "sensed"];
+const COMPUTED: [&str; 20] = [
+    "computed",
+    "calculated",
+    "calc",
+    "comp",
+    "estimated",
+    "estimate",
+    "est",
+    "predicted",
+    "prediction",
+    "pred",
+    "simulated",
+    "sim",
+    "rnea",
+    "hat",
+    "nominal",
+    "ff",
+    "feedforward",
+    "theoretical",
+    "expected",
+    "reconstructed",
+];
+/// Quantities that are not the total position or torque of a joint: errors, parts of a torque, and others.
+const OTHERS: [&str; 24] = [
+    "ext",
+    "external",
+    "error",
+    "err",
+    "residual",
+    "model",
+    "gravity",
+    "grav",
+    "gravitational",
+    "coriolis",
+    "centrifugal",
+    "inertia",
+    "inertial",
+    "friction",
+    "fric",
+    "window",
+    "tcp",
+    "ee",
+    "wrench",
+    "limit",
+    "std",
+    "temp",
+    "dynamics",
+    "damping",
+];
+/// Suffixes of the parts of a torque, `tau_g`; letters that may be joints or axes in other names.
+const PARTS_OF_TORQUE: [&str; 1] = ["g"];
 
 /// Interprets `name` for a robot with these joints.
 pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
-    let lower = split_camel_case(name).to_lowercase();
-    let (rest, joint) = without_joint(&lower, joints);
+    // As written, `jointGripper.pos`, or split at capital letters, `elbowPosition`.
+    #[allow(clippy::single_match_else, reason = "both cases have the same form")]
+    let (rest, joint) = match without_joint(name, joints) {
+        (rest, Some(joint)) => (split_camel_case(&rest).to_lowercase(), Some(joint)),
+        _ => {
+            let split: Vec<String> = joints.iter().map(|joint| split_camel_case(joint)).collect();
+            let (rest, joint) = without_joint(&split_camel_case(name), &split);
+            (rest.to_lowercase(), joint)
+        }
+    };
     // Only units of joint quantities: the suffix of a motor torque `tau_m` is not metres.
     let with_unit = |text: &str| ended(text).filter(|(_, _, quantity)| quantity.is_some());
     let (rest, unit) = match with_unit(&rest) {
@@ -66,6 +151,11 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         None => (rest, None),
     };
     let (rest, named) = if joint.is_none() { without_brackets(&rest) } else { (rest, None) };
+    let (rest, named) = match named.as_deref().and_then(|named| named.rsplit_once('.')) {
+        // `action[elbow.pos]`: the quantity is a part of the entry's name.
+        Some((own, quantity)) if POSITIONS.contains(&quantity) => (format!("{rest} {quantity}"), Some(own.to_owned())),
+        _ => (rest, named),
+    };
     let words = words(&rest);
     let (number, words) = match words.iter().rposition(|word| word.bytes().all(|byte| byte.is_ascii_digit())) {
         Some(at) => (words[at].parse().ok(), [&words[..at], &words[at + 1..]].concat()),
@@ -81,6 +171,13 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         (&POSITIONS[..], Quantity::Position),
     ];
     let by_word = by_words.into_iter().find(|(list, _)| has(list)).map(|(_, quantity)| quantity);
+    let is_entry = joint.is_some() || named.is_some() || number.is_some();
+    let of_entries = match &words[..] {
+        [word] if COMMANDED_POSITIONS.contains(&&word[..]) => Some(Quantity::Position),
+        [first, second] if first == "observation" && second == "state" => Some(Quantity::Position),
+        _ => None,
+    };
+    let by_word = by_word.or_else(|| of_entries.filter(|_| is_entry && unit.is_none()));
     // A torque in amperes is a current; any other unit is used only if the words give no quantity.
     let of_unit = unit.and_then(|(_, quantity)| quantity);
     let quantity = match (by_word, of_unit) {
@@ -89,8 +186,15 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         (None, Some(Quantity::Current)) if unit.is_some_and(|(unit, _)| unit == "A") => None,
         (by_word, of_unit) => by_word.or(of_unit),
     };
-    let is_of_unit = |(_, of_unit): &(&str, Option<Quantity>)| *of_unit == quantity;
-    let source = if has(&COMMANDED) {
+    let unit = unit.zip(quantity).and_then(|((unit, of_unit), quantity)| unit_for(unit, of_unit, quantity));
+    let is_part = has(&OTHERS) || quantity == Some(Quantity::Torque) && has(&PARTS_OF_TORQUE);
+    let is_unnamed = joint.is_none() && named.is_none() && number.is_none() && quantity.is_some();
+    let own = if is_unnamed { other_words(&words) } else { 0..0 };
+    let stem = [&words[..own.start], &words[own.end..]].concat().join("_");
+    let named = named.or_else(|| (!own.is_empty()).then(|| words[own].join("_")));
+    let source = if has(&COMPUTED) {
+        Source::Computed
+    } else if has(&COMMANDED) || name.starts_with(SAGE_COMMANDS) {
         Source::Commanded
     } else if has(&MEASURED) {
         Source::Measured
@@ -98,13 +202,25 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         Source::Unstated
     };
     Meaning {
-        quantity: quantity.filter(|_| !has(&OTHERS)),
+        quantity: quantity.filter(|_| !is_part),
         joint: (joint.map(JointKey::Joint).or(named.map(JointKey::Name)))
             .or(number.map(JointKey::Number))
             .unwrap_or(JointKey::Alone),
         source,
-        unit: unit.filter(is_of_unit).map(|(unit, _)| unit),
-        stem: words.join("_"),
+        unit,
+        stem,
+    }
+}
+
+/// Places of the words that are neither a quantity nor a source, if they follow each other: `shoulder_pan` of
+/// `shoulder_pan.pos`.
+fn other_words(words: &[String]) -> Range<usize> {
+    let lists: [&[&str]; 8] =
+        [&POSITIONS, &VELOCITIES, &ACCELERATIONS, &TORQUES, &CURRENTS, &COMMANDED, &MEASURED, &COMPUTED];
+    let is_other = |word: &String| !lists.iter().any(|list| list.contains(&word.as_str()));
+    match (words.iter().position(is_other), words.iter().rposition(is_other)) {
+        (Some(first), Some(last)) if words[first..=last].iter().all(is_other) => first..last + 1,
+        _ => 0..0,
     }
 }
 
@@ -128,11 +244,13 @@ fn split_camel_case(name: &str) -> String {
     text
 }
 
-/// Removes the longest joint name that is a separate word; returns the rest and the joint's index.
-fn without_joint(lower: &str, joints: &[String]) -> (String, Option<usize>) {
+/// Removes the longest joint name that is a separate word, in either case; returns the rest and the joint's index.
+fn without_joint(name: &str, joints: &[String]) -> (String, Option<usize>) {
+    // Only ASCII letters change, so that places in both texts are equal.
+    let lower = name.to_ascii_lowercase();
     let mut found: Option<(usize, usize, usize)> = None;
     for (place, joint) in joints.iter().enumerate() {
-        let joint = joint.to_lowercase();
+        let joint = joint.to_ascii_lowercase();
         if joint.is_empty() {
             continue;
         }
@@ -148,8 +266,8 @@ fn without_joint(lower: &str, joints: &[String]) -> (String, Option<usize>) {
         }
     }
     match found {
-        Some((at, length, place)) => (format!("{} {}", &lower[..at], &lower[at + length..]), Some(place)),
-        None => (lower.to_owned(), None),
+        Some((at, length, place)) => (format!("{} {}", &name[..at], &name[at + length..]), Some(place)),
+        None => (name.to_owned(), None),
     }
 }
 
@@ -161,7 +279,7 @@ fn without_brackets(lower: &str) -> (String, Option<String>) {
     }
 }
 
-fn words(text: &str) -> Vec<String> {
+pub(in crate::jobs) fn words(text: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut before: Option<bool> = None;
     for c in text.chars() {
@@ -218,6 +336,21 @@ mod tests {
             ("axis 3 act angle [deg]", Some(Position), Number(3), Source::Unstated, Some("deg")),
             ("Joint 4 angle (deg)", Some(Position), Number(4), Source::Unstated, Some("deg")),
             ("joint_1", None, Joint(3), Source::Unstated, None),
+            ("wrist_flex.pos", Some(Position), Name("wrist_flex".to_owned()), Source::Unstated, None),
+            ("shoulder_pan_joint.vel_deg", Some(Velocity), Joint(2), Source::Unstated, Some("deg/s")),
+            ("tau_est_4", Some(Torque), Number(4), Source::Computed, None),
+            ("tau_g_4", None, Number(4), Source::Unstated, None),
+            ("cmd_2", Some(Position), Number(2), Source::Commanded, None),
+            ("goal_position_3", Some(Position), Number(3), Source::Commanded, None),
+            ("target[Other]", Some(Position), Name("other".to_owned()), Source::Commanded, None),
+            ("cmd_2 [A]", None, Number(2), Source::Commanded, None),
+            ("action[elbow.pos]", Some(Position), Name("elbow".to_owned()), Source::Commanded, None),
+            ("action[2]", Some(Position), Number(2), Source::Commanded, None),
+            ("observation.state[elbow.pos]", Some(Position), Name("elbow".to_owned()), Source::Unstated, None),
+            ("observation.state[1]", Some(Position), Number(1), Source::Unstated, None),
+            ("control.positions[Elbow]", Some(Position), Name("elbow".to_owned()), Source::Commanded, None),
+            ("state_motor.positions[Elbow]", Some(Position), Name("elbow".to_owned()), Source::Unstated, None),
+            ("target", None, Alone, Source::Commanded, None),
         ];
         for (name, quantity, joint, source, unit) in cases {
             let found = meaning(name, &joints);

@@ -6,8 +6,10 @@ mod quantity;
 mod spelling;
 mod units;
 
-pub(in crate::jobs) use families::{Family, best, families};
-pub(in crate::jobs) use meaning::{JointKey, Source};
+pub(in crate::jobs) use families::{
+    Basis, Family, best, best_command, best_torque, families, families_by_order, is_unsigned,
+};
+pub(in crate::jobs) use meaning::{JointKey, Source, words};
 pub(in crate::jobs) use quantity::Quantity;
-pub(in crate::jobs) use spelling::column_list;
+pub(in crate::jobs) use spelling::{column_list, joint_pattern, shown};
 pub(in crate::jobs) use units::{time_as_toml, time_unit_s, unit, with_unit};

@@ -1,5 +1,6 @@
 //! Column names in the notation of a study.
 
+use super::meaning::JointKey;
 use dynident_text::quoted;
 
 /// Splits a name into a common pattern and its own part: `q12_rad` into `q{}_rad` and `12`, `tau[elbow]` into `tau[]`
@@ -44,6 +45,45 @@ pub(in crate::jobs) fn column_list(names: &[String]) -> String {
     format!("[{}]", names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", "))
 }
 
+/// One pattern for columns that differ only by the names of their joints, `effort[{joint}]`; `None` for others.
+pub(in crate::jobs) fn joint_pattern(columns: &[(JointKey, String)]) -> Option<String> {
+    let pattern = |(key, name): &(JointKey, String)| {
+        let JointKey::Name(joint) = key else { return None };
+        let at = name.to_ascii_lowercase().rfind(joint.as_str())?;
+        Some(format!("{}{{joint}}{}", &name[..at], &name[at + joint.len()..]))
+    };
+    let first = pattern(columns.first()?)?;
+    columns.iter().all(|column| pattern(column).as_ref() == Some(&first)).then_some(first)
+}
+
+/// Names of columns in a message: runs of numbers as one pattern, at most `most` entries.
+pub(in crate::jobs) fn shown(names: &[String], most: usize) -> String {
+    let mut parts: Vec<(String, Vec<String>)> = Vec::new();
+    for name in names {
+        let (pattern, own) = split_pattern(name);
+        match parts.iter_mut().find(|(known, _)| !own.is_empty() && *known == pattern) {
+            Some((_, owns)) => owns.push(own),
+            None => parts.push((pattern, vec![own])),
+        }
+    }
+    let one = |(pattern, owns): &(String, Vec<String>)| {
+        let own = match &owns[..] {
+            [first, .., last] => format!("{{{first}..{last}}}"),
+            [own] => own.clone(),
+            [] => String::new(),
+        };
+        // A pattern has empty brackets in place of the part that varies.
+        if pattern.contains("{}") {
+            pattern.replacen("{}", &own, 1)
+        } else {
+            pattern.replacen("[]", &format!("[{own}]"), 1)
+        }
+    };
+    let list: Vec<String> = parts.iter().take(most).map(one).collect();
+    let more = if parts.len() > most { format!(" and {} more kinds", parts.len() - most) } else { String::new() };
+    format!("{}{more}", list.join(", "))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,5 +97,21 @@ mod tests {
         assert_eq!(list(&["q1_rad", "q2_rad"]), "\"q{1..2}_rad\"");
         assert_eq!(list(&["q[0]", "q[1]"]), "\"q[{0..1}]\"");
         assert_eq!(list(&["x[pan]", "x[lift]"]), "[\"x[pan]\", \"x[lift]\"]");
+    }
+
+    #[test]
+    fn columns_of_one_kind_are_shown_once() {
+        let names = ["t", "q1", "q2", "q3", "/a.effort[pan]", "/a.effort[lift]", "speed"].map(str::to_owned);
+        assert_eq!(shown(&names, 9), "t, q{1..3}, /a.effort[{pan..lift}], speed");
+        assert_eq!(shown(&names, 2), "t, q{1..3} and 2 more kinds");
+    }
+
+    #[test]
+    fn names_of_joints_become_a_pattern() {
+        let column = |joint: &str, name: &str| (JointKey::Name(joint.to_owned()), name.to_owned());
+        let columns = [column("elbow", "/js.effort[Elbow]"), column("a1", "/js.effort[A1]")];
+        assert_eq!(joint_pattern(&columns).as_deref(), Some("/js.effort[{joint}]"));
+        assert_eq!(joint_pattern(&[column("elbow", "elbow.pos"), column("a1", "effort[a1]")]), None);
+        assert_eq!(joint_pattern(&[(JointKey::Number(1), "q1".to_owned())]), None);
     }
 }

@@ -4,22 +4,35 @@ use super::quantity::Quantity;
 use std::borrow::Cow;
 
 /// Ending, unit in study notation, and joint quantity with this unit; longest ending first.
-const ENDINGS: [(&str, &str, Option<Quantity>); 30] = [
+const ENDINGS: [(&str, &str, Option<Quantity>); 43] = [
     ("rad_per_s2", "rad/s^2", Some(Quantity::Acceleration)),
     ("rad_s2", "rad/s^2", Some(Quantity::Acceleration)),
     ("rad/s^2", "rad/s^2", Some(Quantity::Acceleration)),
     ("rad/s2", "rad/s^2", Some(Quantity::Acceleration)),
+    ("deg_per_s2", "deg/s^2", Some(Quantity::Acceleration)),
+    ("deg_s2", "deg/s^2", Some(Quantity::Acceleration)),
     ("deg/s^2", "deg/s^2", Some(Quantity::Acceleration)),
+    ("deg/s2", "deg/s^2", Some(Quantity::Acceleration)),
+    ("°/s^2", "deg/s^2", Some(Quantity::Acceleration)),
+    ("°/s2", "deg/s^2", Some(Quantity::Acceleration)),
+    ("°/s²", "deg/s^2", Some(Quantity::Acceleration)),
     ("rad_per_s", "rad/s", Some(Quantity::Velocity)),
     ("rad_s", "rad/s", Some(Quantity::Velocity)),
     ("rad/s", "rad/s", Some(Quantity::Velocity)),
     ("radps", "rad/s", Some(Quantity::Velocity)),
+    ("deg_per_s", "deg/s", Some(Quantity::Velocity)),
     ("deg_s", "deg/s", Some(Quantity::Velocity)),
+    ("degps", "deg/s", Some(Quantity::Velocity)),
+    ("dps", "deg/s", Some(Quantity::Velocity)),
+    ("°/s", "deg/s", Some(Quantity::Velocity)),
     ("deg/s", "deg/s", Some(Quantity::Velocity)),
     ("rpm", "rpm", Some(Quantity::Velocity)),
     ("mrad", "mrad", Some(Quantity::Position)),
+    ("radians", "rad", Some(Quantity::Position)),
     ("rad", "rad", Some(Quantity::Position)),
+    ("degrees", "deg", Some(Quantity::Position)),
     ("deg", "deg", Some(Quantity::Position)),
+    ("°", "deg", Some(Quantity::Position)),
     ("rev", "rev", Some(Quantity::Position)),
     ("mnm", "mN m", Some(Quantity::Torque)),
     ("n m", "N m", Some(Quantity::Torque)),
@@ -37,6 +50,21 @@ const ENDINGS: [(&str, &str, Option<Quantity>); 30] = [
     ("m", "m", None),
     ("s", "s", None),
 ];
+
+/// The unit `unit`, of `of_unit` according to the name, for a column of `quantity`: a velocity in `deg` is in deg/s.
+/// `None` if it is no unit of this quantity.
+pub(super) fn unit_for(unit: &'static str, of_unit: Option<Quantity>, quantity: Quantity) -> Option<&'static str> {
+    if of_unit == Some(quantity) {
+        return Some(unit);
+    }
+    match (quantity, unit) {
+        (Quantity::Velocity, "rad") => Some("rad/s"),
+        (Quantity::Velocity, "deg") => Some("deg/s"),
+        (Quantity::Acceleration, "rad" | "rad/s") => Some("rad/s^2"),
+        (Quantity::Acceleration, "deg" | "deg/s") => Some("deg/s^2"),
+        _ => None,
+    }
+}
 
 const FIELDS: [(&str, &str); 8] = [
     (".position", "rad"),
@@ -125,10 +153,12 @@ pub(in crate::jobs) fn with_unit<'a>(name: &'a str, stated: Option<&str>) -> Cow
 
 /// The time column as the value of a study's `time`; `unit` is that of its channel.
 pub(in crate::jobs) fn time_as_toml(name: &str, unit: Option<&str>) -> String {
-    let unit = match time_unit_s(&with_unit(name, unit)) {
-        Some(1e-3) => ", unit = \"ms\"",
-        Some(1e-6) => ", unit = \"us\"",
-        Some(1e-9) => ", unit = \"ns\"",
+    // A column that was found by its values has no unit in its name.
+    let stated = unit.filter(|_| time_unit_s(name).is_none()).map(|unit| unit.trim_matches(['[', ']', '(', ')']));
+    let unit = match (time_unit_s(&with_unit(name, unit)), stated) {
+        (Some(1e-3), _) | (None, Some("ms")) => ", unit = \"ms\"",
+        (Some(1e-6), _) | (None, Some("us")) => ", unit = \"us\"",
+        (Some(1e-9), _) | (None, Some("ns")) => ", unit = \"ns\"",
         _ => "",
     };
     format!("{{ column = {}{unit} }}", dynident_text::quoted(name))

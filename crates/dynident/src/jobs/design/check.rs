@@ -89,7 +89,7 @@ pub fn check_log(
     let mut setup = DesignSetup::for_log(study, options)?;
     let folders = study.folders(options.data.as_deref());
     let source = study.log_source(&folders, index)?;
-    let (mut pieces, rate_hz) = pieces(study, &setup.robot, &folders, index, &source)?;
+    let (mut pieces, rate_hz) = log_pieces(study, &setup.robot, &folders, index, &source)?;
     let gaps = pieces.len().saturating_sub(1);
     if gaps > 0 {
         setup.notes.push(format!(
@@ -136,7 +136,7 @@ fn log_called(study: &Study, name: &str) -> Result<usize, StudyError> {
 }
 
 /// Continuous pieces of a log as motions, joints in the order of the model, and the sample rate, Hz.
-fn pieces(
+pub(in crate::jobs) fn log_pieces(
     study: StudyFile<'_>,
     robot: &StudyRobot,
     folders: &Folders,
@@ -153,7 +153,7 @@ fn pieces(
     let motion = Logs::new(model, alone, settings.row_settings(), &[0], None, execution)
         .map_err(Error::identification(study.path))?
         .motion;
-    let places = recording.places(model).map_err(Error::identification(study.path))?;
+    let places = recording.joint_indices(model).map_err(Error::identification(study.path))?;
     let Some(mut stream) = recording.open(model, &motion).map_err(Error::identification(study.path))? else {
         return Err(Error::study(study.path)(StudyError::missing(format!("log `{log}`"), "it has no samples")));
     };

@@ -6,7 +6,7 @@ use crate::error::{Error, StudyError};
 use crate::study::{DesignSection, Folders, IterationSection, StudyFile, StudyRobot};
 use dynident_excitation::check::LimitReport;
 use dynident_excitation::limits::{
-    AssumedLimits, KnownTorque, LimitKind, Limits, LimitsInForce, ShapesOfLinks, StartPositions,
+    AssumedLimits, KnownTorque, LimitKind, LimitScale, Limits, LimitsInForce, ShapesOfLinks, StartPositions,
 };
 use dynident_iteration::with_typical_drives;
 use dynident_model::Model;
@@ -39,11 +39,15 @@ pub(super) fn in_force(
     let settings = if purpose == LimitsFor::Log { AssumedLimits::none() } else { section.defaults.clone() };
     let starts = starts(&section, study.iteration.as_ref(), robot.model(), purpose);
     let starts = starts.map_err(Error::section(study.path, "design"))?;
-    let given = &section.limits;
+    let mut given = section.limits.clone();
+    if purpose == LimitsFor::Log {
+        // A log may be of a faster run.
+        given.scale = LimitScale::default();
+    }
     let with_shapes = settings.floor || (settings.self_collision && given.self_collision.is_none());
     let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
     let shapes = if with_shapes { ShapesOfLinks::of(robot.model(), folder) } else { ShapesOfLinks::default() };
-    let mut in_force = LimitsInForce::new(robot.model(), &shapes, &settings, given, &starts)
+    let mut in_force = LimitsInForce::new(robot.model(), &shapes, &settings, &given, &starts)
         .map_err(Error::section(study.path, "design.limits"))?;
     let iteration = study.iteration.as_ref();
     if let Some(envelope) =
@@ -91,7 +95,7 @@ pub(super) fn loaded(study: StudyFile<'_>, robot: &StudyRobot) -> Result<Model, 
         return Err(wrong(StudyError::Unknown { key: "payload", what: "payload", name: name.clone(), known }));
     };
     let Some(known) = section.known() else {
-        let fix = "torque limits need a known payload: give its mass_kg and com_m";
+        let fix = "torque limits need a known payload: add mass_kg and com_m to its [[payload]]";
         return Err(wrong(StudyError::conflict(format!("payload = \"{name}\""), fix)));
     };
     let links = model.bodies().iter().enumerate();
@@ -130,6 +134,25 @@ fn starts(
     };
     let home = iteration.and_then(|own| own.home.as_ref()).map(|home| home.named("home", model)).transpose()?;
     Ok(StartPositions { start, home: home.unwrap_or_default() })
+}
+
+/// Limits of a study's robot for the motion that commands cause: without acceleration, jerk, torque and power, which
+/// the drive limits.
+///
+/// # Errors
+/// As [`in_force`].
+pub(in crate::jobs) fn limits_of_commands(
+    study: StudyFile<'_>,
+    folders: &Folders,
+    robot: &StudyRobot,
+) -> Result<LimitsInForce, Error> {
+    let mut own = (*study).clone();
+    own.design.get_or_insert_default().defaults.acceleration = false;
+    let mut found = in_force(study.with_study(&own), folders, robot, LimitsFor::Ways)?;
+    for limit in &mut found.limits.joints {
+        (limit.acceleration, limit.jerk, limit.torque, limit.power_w) = (None, None, None, None);
+    }
+    Ok(found)
 }
 
 /// The known torque of the robot description and of declared torques with a nominal value.

@@ -13,9 +13,10 @@ mod step_wise;
 mod stopwatch;
 mod table;
 
+pub(super) use check::log_pieces;
 pub use check::{check_log, check_trajectory};
 pub(super) use family::{MotionFamily, motion_family};
-pub(super) use limits_in_force::limits_of;
+pub(super) use limits_in_force::{limits_of, limits_of_commands};
 pub use outcome::DesignOutcome;
 pub(super) use table::trajectory as trajectory_table;
 

@@ -7,6 +7,8 @@ use super::search::SearchResult;
 use super::setup::{DesignSetup, MotionInformation};
 use crate::error::Error;
 use crate::pages::design as pictures;
+use crate::pages::design_page::{SampledDesign, design_page};
+use crate::pages::robot::RobotAppearance;
 use crate::result::{DESIGN_SCHEMA, DesignFile, Provenance, WindowedFile};
 use crate::study::{FamilyChoice, StudyRobot};
 use dynident_dynamics::{Workspace, inverse_dynamics};
@@ -199,6 +201,18 @@ impl DesignOutcome {
             }
         }
         Some(torque)
+    }
+
+    /// `report.html`: verdict, the robot that plays the motion, limits, expected error bars, curves.
+    ///
+    /// # Errors
+    /// [`Error::Report`], which indicates a bug.
+    pub fn report(&self) -> Result<String, Error> {
+        let (times_s, motion) = self.sampled(self.plot_rate_hz());
+        let robot = RobotAppearance::new(self.robot.model(), &self.robot.robot.path);
+        let torque = self.torque_nm(&motion);
+        let sampled = SampledDesign { times_s: &times_s, motion: &motion, torque: torque.as_deref() };
+        design_page(&self.file, &self.limits, &robot, &sampled)
     }
 
     /// `preview.svg`: position, velocity, acceleration and, with known inertials, torque of every joint over time, with

@@ -9,9 +9,11 @@ use crate::clock::now;
 use crate::error::Error;
 use crate::inputs::InputFiles;
 use crate::jobs::check::{CheckSettings, diagnosis_check};
+use crate::jobs::differences::description_comparison;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::{concurrently, provenance};
+use crate::pages::robot::RobotAppearance;
 use crate::result::{LogSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyFile, StudyInput, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
@@ -20,13 +22,15 @@ use dynident_identification::estimators::{Findings, InstrumentSource};
 use dynident_identification::examination::{LogTrace, friction_sign_findings, sign_findings};
 use dynident_identification::friction::FrictionSearch;
 use dynident_identification::{
-    DiagnosisChoice, Identification, IdentificationError, IdentificationTask, conditionals, identify as identify_task,
-    identify_payload, identify_with_instruments as identify_task_with_instruments,
+    DiagnosisChoice, Identification, IdentificationError, IdentificationTask, RecordingEvents, conditionals,
+    event_findings, event_traces, identify as identify_task, identify_payload,
+    identify_with_instruments as identify_task_with_instruments,
 };
 use dynident_model::InertialParameters;
 use dynident_recording::Level;
 use forms::{form_results, stored_model};
 use model_files::{ModelFiles, model_files};
+use nalgebra::DMatrix;
 use sections::{
     base_parameters, bodies, friction_results, joint_results, method_summary, offset_results, physical_fit_result,
     robot_summary, sources, term_results, training_result, verdict,
@@ -57,6 +61,8 @@ pub struct IdentificationOutcome {
     /// Measured and predicted torque over time, training logs first: at most the first 20 000 samples of a training log
     /// and the first 100 000 filtered rows of a held-out log.
     pub traces: Vec<LogTrace>,
+    /// The robot, for its picture.
+    pub robot: RobotAppearance,
 }
 
 impl IdentificationOutcome {
@@ -66,7 +72,7 @@ impl IdentificationOutcome {
     /// # Errors
     /// [`Error::Report`], which indicates a bug.
     pub fn report(&self) -> Result<String, Error> {
-        crate::pages::identification::identification_report(&self.result, &self.traces)
+        crate::pages::identification::identification_report(&self.result, &self.traces, Some(&self.robot))
     }
 }
 
@@ -224,7 +230,13 @@ pub(in crate::jobs) fn build_outcome(
     result.seal();
     let mut traces = found.examination.traces;
     traces.extend(found.held_out.into_iter().filter_map(|log| log.trace));
-    Ok(IdentificationOutcome { result, estimate: found.estimate, inertials, urdf, table, mjcf, sdf, traces })
+    for RecordingEvents { index, search } in &found.events {
+        if let Some(trace) = traces.iter_mut().find(|trace| trace.log == task.recordings[*index].name) {
+            trace.events = event_traces(search, &result.robot.joints);
+        }
+    }
+    let robot = RobotAppearance::new(robot.parametric.model(), &robot.robot.path);
+    Ok(IdentificationOutcome { result, estimate: found.estimate, inertials, urdf, table, mjcf, sdf, traces, robot })
 }
 
 fn known_arm(section: &ArmSection, folders: &Folders) -> Result<(std::path::PathBuf, ResultFile), Error> {
@@ -299,7 +311,9 @@ fn result_file(
 ) -> ResultFile {
     let (model, estimate, base) = (found.model(), found.estimate(), found.training.columns.base());
     let parameters = &found.consistent.parameters;
-    let covariance = estimate.covariance.view((0, 0), (base, base)).into_owned();
+    let rows_of = |matrix: &DMatrix<f64>| -> Vec<Vec<f64>> {
+        (0..base).map(|row| matrix.view((row, 0), (1, base)).iter().copied().collect()).collect()
+    };
     let (mut gross_errors, mut noise_correlation, mut noise_levels) = (None, None, None);
     let (mut series, mut spline_motion, mut simulated) = (None, None, None);
     match found.estimation.findings.clone() {
@@ -331,8 +345,10 @@ fn result_file(
         spline_motion,
         simulated,
         base_parameters: base_parameters(found, &conditionals),
-        base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        base_parameter_covariance: rows_of(&estimate.covariance),
+        base_parameter_joint_covariance: rows_of(&estimate.joint_covariance()),
         bodies: bodies(model, parts.inertials, &sources(model, estimate), &found.consistent.parameter_std),
+        description_differences: description_comparison(found, &task.settings.thresholds.description),
         possible_intervals: found.consistent.intervals.clone(),
         essential: found.essential.clone(),
         correlations: strongest_correlations(estimate, MAX_CORRELATIONS),
@@ -379,6 +395,13 @@ fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSu
     // The best hypothesis gives the mistake; sign findings of single joints are consequences of it.
     let is_explained = found.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.search.best.is_some());
     let mut all: Vec<LogSummary> = training.chain(held_out).collect();
+    let indices = found.training.logs.iter().map(|log| log.index).chain(found.held_out.iter().map(|log| log.index));
+    for (summary, index) in all.iter_mut().zip(indices) {
+        for RecordingEvents { search, .. } in found.events.iter().filter(|of_log| of_log.index == index) {
+            summary.model_findings.extend(event_findings(search, &summary.log));
+            summary.events.clone_from(&search.events);
+        }
+    }
     if is_explained {
         for log in &mut all {
             log.model_findings.retain(|finding| finding.level != Level::Problem);

@@ -16,11 +16,12 @@ mod watch;
 
 pub use stages::RobotMaker;
 pub(super) use trajectory::Trajectory;
-pub use watch::IterationWatch;
+pub use watch::{IterationWatch, MotionObserver};
 
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
 use crate::pages::iteration::{TimeSpent, iteration_report};
+use crate::pages::robot::RobotAppearance;
 use crate::result::IterationsFile;
 use crate::study::{RobotChoice, Study, StudyFile};
 use dynident_iteration::{IterationError, IterationStore};
@@ -114,7 +115,8 @@ fn iterated(
         RobotFiles::none()
     });
     file.base_parameters.clone_from(&found.base_parameters);
-    files.write(&file, Some(iteration_report(&file, &results.traces, &time)?), found)?;
+    let appearance = RobotAppearance::new(inputs.robot.model(), &inputs.robot.robot.path);
+    files.write(&file, Some(iteration_report(&file, &results.traces, &appearance, &time)?), found)?;
     Ok(file)
 }
 

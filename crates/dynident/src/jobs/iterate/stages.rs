@@ -9,7 +9,7 @@ use super::plan::Plan;
 use super::report::{Stage, merged};
 use super::watch::{IterationWatch, StageSupervisor};
 use crate::error::{Error, StudyError};
-use crate::pages::iteration::{RunName, RunTrace};
+use crate::pages::run_trace::{RunName, RunTrace};
 use crate::result::IterationsFile;
 use dynident_iteration::{
     Iteration, IterationError, IterationOutcome, IterationStatus, IterationStore, Robot, RobotRun, RunEstimate,
@@ -111,7 +111,8 @@ impl<'a> Stages<'a> {
             unwritten = self.write_progress(stage, &records, results).err();
             run(record, runs);
         };
-        let mut watched = StageSupervisor { stop: &watch.stop, allow: &mut watch.allow, made: &mut made };
+        let mut watched =
+            StageSupervisor { stop: &watch.stop, allow: &mut watch.allow, made: &mut made, observer: watch.observer };
         let outcome = iterate_supervised(stage.iteration, &mut robots, Some(stage.store), &mut watched);
         let outcome = outcome.map_err(|error| self.job.iteration_error(error))?;
         unwritten.map_or(Ok(outcome), Err)

@@ -18,7 +18,7 @@ const TIME_UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("
 /// Sample rates of robot logs, Hz: slower logs contain no acceleration, faster ones do not exist.
 const MIN_RATE_HZ: f64 = 2.0;
 const MAX_RATE_HZ: f64 = 2e4;
-/// Smallest number of rows whose rate tells the unit: a list of events has no rate.
+/// Smallest number of rows whose rate shows the unit, or whose values show the clock: a list of events has no rate.
 const MIN_ROWS_OF_CLOCK: u64 = 50;
 
 /// Reads a recording of any format once and summarises its contents, with constant memory.
@@ -38,9 +38,10 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     let described: Vec<_> =
         names.iter().enumerate().map(|(column, name)| with_unit(name, table.unit(column)).into_owned()).collect();
     let groups = table.groups();
-    let times: Vec<_> = groups.iter().map(|group| time_column(group, &described[group.columns.clone()])).collect();
+    let named_times: Vec<_> =
+        groups.iter().map(|group| time_column(group, &described[group.columns.clone()])).collect();
     let mut read: Vec<GroupStatistics> = groups.iter().map(|group| GroupStatistics::new(group.columns.len())).collect();
-    table.all_rows(&mut |group, row| read[group].add(row, times[group].map(|(column, _)| column)))?;
+    table.all_rows(&mut |group, row| read[group].add(row, named_times[group].map(|(column, _)| column)))?;
     let mut found = LogContents {
         schema: LOG_SCHEMA.to_owned(),
         file: path.display().to_string(),
@@ -52,10 +53,12 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
         notes: table.notes(),
         study_format: String::new(),
     };
-    for (index, (group, GroupStatistics { rows, channels, clock })) in groups.iter().zip(read).enumerate() {
+    for (index, (group, statistics)) in groups.iter().zip(read).enumerate() {
         let columns = group.columns.clone();
         let names = &names[columns.clone()];
-        let time = times[index];
+        let time = named_times[index].or_else(|| Some((statistics.time_by_values()?, 1.0)));
+        let clock = time.map_or_else(Clock::default, |(column, _)| statistics.clocks[column]);
+        let GroupStatistics { rows, channels, .. } = statistics;
         let is_stated =
             |column: usize| group.time.is_some() || unit(&described[group.columns.start + column]).is_some();
         let seconds = time.and_then(|(column, unit_s)| {
@@ -126,20 +129,35 @@ fn time_column(group: &LogGroup, names: &[String]) -> Option<(usize, f64)> {
 struct GroupStatistics {
     rows: u64,
     channels: Vec<ChannelStatistics>,
-    clock: Clock,
+    /// One for each column; only that of the time column is used if its name is known.
+    clocks: Vec<Clock>,
 }
 
 impl GroupStatistics {
     fn new(columns: usize) -> Self {
-        Self { rows: 0, channels: vec![ChannelStatistics::default(); columns], clock: Clock::default() }
+        Self { rows: 0, channels: vec![ChannelStatistics::default(); columns], clocks: vec![Clock::default(); columns] }
     }
 
-    /// Adds a row; column `time` contains the time.
+    /// The column that rises most evenly, as a clock does.
+    fn time_by_values(&self) -> Option<usize> {
+        if self.rows < MIN_ROWS_OF_CLOCK {
+            return None;
+        }
+        let deviations = self.clocks.iter().enumerate().filter_map(|(column, clock)| {
+            let rate = clock.rate(self.rows, self.channels[column].increase()?)?;
+            unit_of_rate(rate)?;
+            Some((column, clock.step_deviation()?))
+        });
+        deviations.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(column, _)| column)
+    }
+
+    /// Adds a row; column `time` contains the time. Without it, every column may.
     fn add(&mut self, row: &[f64], time: Option<usize>) {
         self.rows += 1;
         self.channels.iter_mut().zip(row).for_each(|(tally, value)| tally.add(*value));
-        if let Some(column) = time {
-            self.clock.add(row[column]);
+        match time {
+            Some(column) => self.clocks[column].add(row[column]),
+            None => self.clocks.iter_mut().zip(row).for_each(|(clock, value)| clock.add(*value)),
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Assigns the columns of a family to the robot's joints.
 
-use crate::jobs::columns::{Family, JointKey};
+use crate::jobs::columns::{Basis, Family, JointKey, words};
+use crate::result::LogContents;
+use std::path::Path;
 
 /// Joint of each column, and whether the assignment is certain.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -11,44 +13,154 @@ pub(super) struct LoggedJoints {
     pub(super) is_sure: bool,
 }
 
-/// Assigns the columns of `family` to the joints; `free` are the indices of joints that do not follow others,
-/// `is_rotary` whether a joint is revolute. `None` if there are more columns than joints.
-pub(super) fn logged_joints(
-    family: &Family,
-    free: &[usize],
-    is_rotary: impl Fn(usize) -> bool,
-) -> Option<LoggedJoints> {
+/// The joints of a robot that columns can belong to.
+#[derive(Clone, Debug)]
+pub(super) struct RobotJoints<'a> {
+    /// Names of all joints.
+    pub(super) names: &'a [String],
+    /// Indices of the joints that do not follow others.
+    pub(super) free: Vec<usize>,
+    /// Indices of the revolute ones among them.
+    pub(super) turning: Vec<usize>,
+}
+
+/// Assigns the columns of `family` to the joints: by the names of joints, then by numbers, then in order. `left_out`
+/// are joint names of further columns of the same kind. `None` if there are more columns than joints.
+pub(super) fn logged_joints(family: &Family, robot: &RobotJoints<'_>, left_out: &[String]) -> Option<LoggedJoints> {
+    let RobotJoints { free, turning, .. } = robot;
     let of_name = |(key, _): &(JointKey, String)| match key {
         JointKey::Joint(place) => Some(*place),
         JointKey::Name(_) | JointKey::Number(_) | JointKey::Alone => None,
     };
     let named: Option<Vec<usize>> = family.columns.iter().map(of_name).collect();
     if let Some(joints) = named {
-        return Some(LoggedJoints { joints, reason: "joints from the column names".to_owned(), is_sure: true });
+        let is_complete = free.iter().all(|joint| joints.contains(joint));
+        let reason = match left_out.first().filter(|_| !is_complete) {
+            Some(name) => format!(
+                "joints from the column names; the robot description has no joint `{name}`, its column is not used"
+            ),
+            None => "joints from the column names".to_owned(),
+        };
+        return Some(LoggedJoints { joints, reason, is_sure: left_out.is_empty() || is_complete });
     }
     let count = family.columns.len();
-    let turning: Vec<usize> = free.iter().copied().filter(|&joint| is_rotary(joint)).collect();
-    let of_all = format!("{count} columns for the {count} joints, in the order of the robot description");
-    let of_turning = format!("{count} columns for the {count} revolute joints, in the order of the robot description");
+    let in_order = |reason: String, is_sure| {
+        (count <= free.len()).then(|| LoggedJoints { joints: free[..count].to_vec(), reason, is_sure })
+    };
+    let foreign: Option<Vec<&str>> = family
+        .columns
+        .iter()
+        .map(|(key, _)| match key {
+            JointKey::Name(name) => Some(name.as_str()),
+            JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
+        })
+        .collect();
+    if let Some(names) = foreign {
+        if let Some(joints) = by_words(&names, robot) {
+            let reason = "joints from the column names, which are parts of the joint names".to_owned();
+            return Some(LoggedJoints { joints, reason, is_sure: true });
+        }
+        let unknown = format!("the robot description has no joint `{}`: {count} columns", names[0]);
+        return match by_numbers(&names) {
+            Some(places) if count <= free.len() => {
+                let joints = places.into_iter().map(|place| free[place]).collect();
+                Some(LoggedJoints { joints, reason: format!("{unknown}, assigned by their numbers"), is_sure: false })
+            }
+            _ => in_order(format!("{unknown}, assigned in their order in the log"), false),
+        };
+    }
     let of_first =
         format!("{count} columns for {} joints: assigned to the first joints of the robot description", free.len());
-    // Names that are not in the robot description do not determine the order.
-    let foreign = family.columns.iter().find_map(|(key, _)| match key {
-        JointKey::Name(name) => Some(name),
-        JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
-    });
-    if let Some(name) = foreign {
-        let reason = format!("the robot description has no joint `{name}`: {count} columns, assigned in order");
-        return (count <= free.len()).then(|| LoggedJoints { joints: free[..count].to_vec(), reason, is_sure: false });
-    }
-    match count {
-        _ if count == free.len() => Some(LoggedJoints { joints: free.to_vec(), reason: of_all, is_sure: true }),
-        _ if count == turning.len() => Some(LoggedJoints { joints: turning, reason: of_turning, is_sure: true }),
-        _ if count < free.len() => {
-            Some(LoggedJoints { joints: free[..count].to_vec(), reason: of_first, is_sure: false })
+    let (joints, of_joints) = match count {
+        _ if count == free.len() => (free.clone(), "joints"),
+        _ if count == turning.len() => (turning.clone(), "revolute joints"),
+        _ => return in_order(of_first, false),
+    };
+    let reason = format!("{count} columns for the {count} {of_joints}, in the order of the robot description");
+    let unnamed = match family.basis {
+        Basis::Order => "; the columns have no names",
+        _ if family.in_message_order => "; the message has no joint names",
+        Basis::ColumnNames | Basis::FileName => "",
+    };
+    Some(LoggedJoints { joints, reason: format!("{reason}{unnamed}"), is_sure: unnamed.is_empty() })
+}
+
+/// The joint of each name whose words are part of the joint's name, or the reverse: `elbow` and `elbow_joint`. `None`
+/// if a name has no joint or several, or two names have one.
+fn by_words(names: &[&str], robot: &RobotJoints<'_>) -> Option<Vec<usize>> {
+    let of_joints: Vec<Vec<String>> = robot.names.iter().map(|name| words(&name.to_lowercase())).collect();
+    let contains = |all: &[String], part: &[String]| all.windows(part.len().max(1)).any(|window| window == part);
+    let mut joints = Vec::new();
+    for name in names {
+        let own = words(name);
+        let mut found = robot
+            .free
+            .iter()
+            .copied()
+            .filter(|&joint| contains(&of_joints[joint], &own) || contains(&own, &of_joints[joint]));
+        match (found.next(), found.next()) {
+            (Some(joint), None) if !joints.contains(&joint) => joints.push(joint),
+            _ => return None,
         }
-        _ => None,
     }
+    Some(joints)
+}
+
+/// The rank of each name by its last number, for names that differ in it alone: `j_1, j_2, j_0` gives 1, 2, 0.
+fn by_numbers(names: &[&str]) -> Option<Vec<usize>> {
+    let split = |name: &&str| {
+        let words = words(name);
+        let at = words.iter().rposition(|word| word.bytes().all(|byte| byte.is_ascii_digit()))?;
+        let number: u64 = words[at].parse().ok()?;
+        Some(([&words[..at], &words[at + 1..]].concat(), number))
+    };
+    let parts: Option<Vec<(Vec<String>, u64)>> = names.iter().map(split).collect();
+    let parts = parts.filter(|parts| parts.windows(2).all(|pair| pair[0].0 == pair[1].0))?;
+    let mut numbers: Vec<u64> = parts.iter().map(|(_, number)| *number).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let ranks = parts.iter().map(|(_, number)| numbers.binary_search(number).ok());
+    if numbers.len() == names.len() { ranks.collect() } else { None }
+}
+
+/// Joins families in which the log has a column for each of the free joints, but less than half of the names are those
+/// of joints: `Wrist_Roll` next to `Jaw`. Their columns are then foreign names in the order of the file.
+pub(super) fn with_partly_foreign_names(
+    all: &[Family],
+    logs: &[(&Path, LogContents)],
+    robot: &RobotJoints<'_>,
+) -> Vec<Family> {
+    let is_named = |family: &Family| matches!(family.columns[0].0, JointKey::Joint(_));
+    let is_foreign = |family: &Family| matches!(family.columns[0].0, JointKey::Name(_));
+    let kind = |family: &Family| (family.file, family.group, family.quantity, family.stem.clone());
+    let is_few_next_to = |named: &Family, foreign: &Family| {
+        is_named(named) && is_foreign(foreign) && named.columns.len() < foreign.columns.len()
+    };
+    let mut joined: Vec<Family> = Vec::new();
+    for family in all {
+        let other = all.iter().find(|other| {
+            kind(other) == kind(family)
+                && (is_few_next_to(family, other) || is_few_next_to(other, family))
+                && family.columns.len() + other.columns.len() == robot.free.len()
+        });
+        let Some(other) = other else {
+            joined.push(family.clone());
+            continue;
+        };
+        // Both are joined when the foreign family is met.
+        if is_named(family) {
+            continue;
+        }
+        let name_of = |(key, column): &(JointKey, String)| match key {
+            JointKey::Joint(joint) => (JointKey::Name(robot.names[*joint].to_lowercase()), column.clone()),
+            _ => (key.clone(), column.clone()),
+        };
+        let mut columns: Vec<_> = family.columns.iter().chain(&other.columns).map(name_of).collect();
+        let place = |column: &String| logs[family.file].1.channels.iter().position(|channel| channel.name == *column);
+        columns.sort_by_key(|(_, column)| place(column));
+        joined.push(Family { columns, ..family.clone() });
+    }
+    joined
 }
 
 /// The columns of `family` in the order of `joints`; `None` if one is missing.
@@ -65,8 +177,11 @@ pub(super) fn in_order(family: &Family, logged: &Family, joints: &[usize]) -> Op
 mod tests {
     use super::*;
     use crate::jobs::columns::{Quantity, Source, best, families};
-    use crate::result::{LOG_SCHEMA, LogChannel, LogContents};
-    use std::path::Path;
+    use crate::result::{LOG_SCHEMA, LogChannel};
+
+    fn robot(names: &[String], free: usize, turning: usize) -> RobotJoints<'_> {
+        RobotJoints { names, free: (0..free).collect(), turning: (0..turning).collect() }
+    }
 
     fn contents(names: &[&str]) -> LogContents {
         let channel = |name: &&str| LogChannel {
@@ -101,7 +216,7 @@ mod tests {
         let found = families(logs.iter().map(|(path, log)| (*path, log)), &joints);
         let position = best(&found, Quantity::Position, |_| true).unwrap();
         assert_eq!(position.source, Source::Measured);
-        let logged = logged_joints(position, &[0, 1], |_| true).unwrap();
+        let logged = logged_joints(position, &robot(&joints, 2, 2), &[]).unwrap();
         assert!(logged.is_sure && logged.joints == [0, 1]);
         let torque = best(&found, Quantity::Torque, |_| true).unwrap();
         // In the order of the positions, not of the file.
@@ -118,7 +233,7 @@ mod tests {
         ];
         let found = families(logs.iter().map(|(path, log)| (*path, log)), &joints);
         assert_eq!(best(&found, Quantity::Position, |_| true).unwrap().file, 0);
-        assert!(best(&found, Quantity::Current, |_| true).unwrap().by_file_name);
+        assert!(best(&found, Quantity::Current, |_| true).unwrap().basis == Basis::FileName);
     }
 
     #[test]
@@ -126,10 +241,36 @@ mod tests {
         let names: Vec<String> = (1..=7).map(|k| format!("q{k}_rad")).collect();
         let logs = [(Path::new("run.csv"), contents(&names.iter().map(String::as_str).collect::<Vec<_>>()))];
         let found = families(logs.iter().map(|(path, log)| (*path, log)), &[]);
-        let free: Vec<usize> = (0..9).collect();
-        let logged = logged_joints(&found[0], &free, |joint| joint < 7).unwrap();
+        let logged = logged_joints(&found[0], &robot(&[], 9, 7), &[]).unwrap();
         assert!(logged.is_sure && logged.joints == (0..7).collect::<Vec<_>>(), "{logged:?}");
-        assert!(!logged_joints(&found[0], &free, |_| true).unwrap().is_sure);
-        assert_eq!(logged_joints(&found[0], &free[..5], |_| true), None);
+        assert!(!logged_joints(&found[0], &robot(&[], 9, 9), &[]).unwrap().is_sure);
+        assert_eq!(logged_joints(&found[0], &robot(&[], 5, 5), &[]), None);
+    }
+
+    #[test]
+    fn names_of_joints_come_before_the_order_of_the_message() {
+        let joints = ["A1", "A2", "A3"].map(str::to_owned);
+        let assigned = |columns: [&str; 3], joints: &[String]| {
+            let logs = [(Path::new("run.mcap"), contents(&columns))];
+            let found = families(logs.iter().map(|(path, log)| (*path, log)), joints);
+            let logged = logged_joints(&found[0], &robot(joints, 3, 3), &[]).unwrap();
+            let columns = in_order(&found[0], &found[0], &logged.joints).unwrap();
+            let pairs = logged.joints.iter().zip(columns).map(|(joint, column)| format!("{} {column}", joints[*joint]));
+            (pairs.collect::<Vec<_>>(), logged.is_sure)
+        };
+        let (pairs, is_sure) = assigned(["p.effort[A3]", "p.effort[A1]", "p.effort[A2]"], &joints);
+        assert_eq!(
+            (&pairs[..], is_sure),
+            (&["A1 p.effort[A1]", "A2 p.effort[A2]", "A3 p.effort[A3]"].map(str::to_owned)[..], true)
+        );
+        let shuffled = ["p.effort[lbr_joint_1]", "p.effort[lbr_joint_2]", "p.effort[lbr_joint_0]"];
+        let (pairs, is_sure) = assigned(shuffled, &joints);
+        assert_eq!(pairs, ["A2 p.effort[lbr_joint_1]", "A3 p.effort[lbr_joint_2]", "A1 p.effort[lbr_joint_0]"]);
+        assert!(!is_sure);
+        assert!(!assigned(["p.effort[x]", "p.effort[y]", "p.effort[z]"], &joints).1);
+        let long = ["pan_joint", "lift_joint", "elbow_joint"].map(str::to_owned);
+        let (pairs, is_sure) = assigned(["p.effort[lift]", "p.effort[elbow]", "p.effort[pan]"], &long);
+        assert_eq!(pairs, ["lift_joint p.effort[lift]", "elbow_joint p.effort[elbow]", "pan_joint p.effort[pan]"]);
+        assert!(is_sure);
     }
 }

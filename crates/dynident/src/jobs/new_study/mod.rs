@@ -3,23 +3,30 @@
 mod channels;
 mod draft;
 mod drives;
+mod position_units;
+mod reasons;
 mod settings;
 
 pub use settings::NewStudySettings;
 
 use crate::error::{Error, NewStudyError};
 use crate::jobs::check::check;
-use crate::jobs::columns::{Family, Quantity, Source, best, column_list, families, time_as_toml};
+use crate::jobs::columns::{
+    Basis, Family, JointKey, Quantity, Source, best, best_command, best_torque, column_list, families,
+    families_by_order, is_unsigned, time_as_toml, time_unit_s, with_unit,
+};
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
 use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
 use crate::study::{LoadSettings, Study, XacroSettings, load_robot, relative_path};
-use channels::{LoggedJoints, in_order, logged_joints};
+use channels::{LoggedJoints, RobotJoints, in_order, logged_joints, with_partly_foreign_names};
 use draft::{Draft, Table};
 use drives::{DriveInertiaFinding, drive_inertia};
 use dynident_model::{JointKind, Model, Robot};
 use dynident_recording::Level;
 use dynident_text::quoted;
+use position_units::PositionUnits;
+use reasons::{alternatives, basis, recognised};
 use std::path::{Path, PathBuf};
 
 const MAX_ROUNDS: usize = 3;
@@ -57,7 +64,8 @@ impl NewStudy {
 /// written.
 ///
 /// # Errors
-/// A robot description or recording that cannot be read, or without recognisable columns of positions and torques.
+/// A robot description or recording that cannot be read, or without recognisable columns of positions and of torques or
+/// commands.
 pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStudyFile, Error> {
     new_study_with(request, options, &NewStudySettings::default())
 }
@@ -76,9 +84,16 @@ pub fn new_study_with(
         Some(robot) => (**robot).clone(),
         None => load_robot(&request.robot, &LoadSettings { xacro: request.xacro.clone(), ..LoadSettings::default() })?,
     };
-    let logs: Vec<(&Path, LogContents)> =
-        request.logs.iter().map(|path| Ok((path.as_path(), log_contents(path)?))).collect::<Result<_, Error>>()?;
+    // Each episode of a file is a recording.
+    let (mut logs, mut parts) = (Vec::new(), Vec::new());
+    for path in &request.logs {
+        for (part, contents) in log_contents(path)?.episodes() {
+            logs.push((path.as_path(), contents));
+            parts.push(part);
+        }
+    }
     let recorded = RecognisedColumns::find(&robot.model, &logs, thresholds).map_err(Error::NewStudy)?;
+    let recorded = RecognisedColumns { parts, ..recorded };
     let mut draft = recorded.draft(request, &robot.model, &logs);
     for change in &request.stated {
         draft.apply(change, "As stated");
@@ -105,7 +120,7 @@ pub fn new_study_with(
         proposed: finding.write.iter().filter(|change| change.is_well_formed()).cloned().collect(),
         reason: finding.sentence(),
     }));
-    if unsure.is_empty() && examined.is_some() {
+    if unsure.is_empty() && examined.is_some() && !recorded.has_commands() {
         match drive_inertia(request, &draft, options)? {
             DriveInertiaFinding::Present(table) => draft = draft.with(table),
             DriveInertiaFinding::Absent(figures) => draft = draft.with(Table::new("", figures)),
@@ -125,14 +140,27 @@ struct RecognisedColumns {
     /// Joint assignment, in the order of the columns.
     logged: LoggedJoints,
     position: Family,
-    torque: Family,
+    /// Torques, or commanded positions in a log without torque.
+    drive: Family,
     velocity: Option<Family>,
     columns: [Vec<String>; 2],
     velocity_columns: Option<Vec<String>>,
     /// Recordings with these columns; recordings with torques only belong to one of them.
     files: Vec<usize>,
-    /// The value of `time`, and the mean rate, Hz.
-    time: Option<(String, Option<f64>)>,
+    /// The episode of each recording, for files with several.
+    parts: Vec<Option<String>>,
+    time: Option<LogClock>,
+    /// Other columns of the quantities of positions, velocities and torques.
+    alternatives: [String; 3],
+}
+
+struct LogClock {
+    /// The value of `time`.
+    key: String,
+    /// Mean rate, Hz.
+    rate_hz: Option<f64>,
+    /// Whether its name, not its values, shows that it is the clock.
+    is_named: bool,
 }
 
 impl RecognisedColumns {
@@ -142,16 +170,35 @@ impl RecognisedColumns {
         thresholds: &NewStudySettings,
     ) -> Result<Self, NewStudyError> {
         let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
-        let all = families(logs.iter().map(|(path, log)| (*path, log)), &names);
-        let missing = |quantity| NewStudyError::NotRecognised {
-            quantity,
-            columns: logs.iter().flat_map(|(_, log)| &log.channels).map(|channel| channel.name.clone()).collect(),
-        };
-        let position = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions"))?;
         let free: Vec<usize> = (0..model.dof()).filter(|&joint| model.joints()[joint].mimic.is_none()).collect();
-        let is_rotary = |joint: usize| model.joints()[joint].kind != JointKind::Prismatic;
-        let logged = logged_joints(position, &free, is_rotary)
-            .ok_or(NewStudyError::MoreColumnsThanJoints { columns: position.columns.len(), joints: free.len() })?;
+        let is_rotary = |joint: &usize| model.joints()[*joint].kind != JointKind::Prismatic;
+        let turning = free.iter().copied().filter(is_rotary).collect();
+        let robot = RobotJoints { names: &names, free, turning };
+        let mut all = families(logs.iter().map(|(path, log)| (*path, log)), &names);
+        if all.is_empty() {
+            let counts = [robot.free.len(), robot.turning.len()];
+            all = logs.iter().enumerate().flat_map(|(file, (_, log))| families_by_order(file, log, &counts)).collect();
+        }
+        let all = with_partly_foreign_names(&all, logs, &robot);
+        let missing = |quantity| NewStudyError::NotRecognised { quantity, found: recognised(&all, logs) };
+        let position = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions"))?;
+        let same_kind = |family: &&Family| {
+            (family.file, family.group, family.quantity, &family.stem)
+                == (position.file, position.group, position.quantity, &position.stem)
+        };
+        let left_out: Vec<String> = all
+            .iter()
+            .filter(same_kind)
+            .flat_map(|family| &family.columns)
+            .filter_map(|(key, _)| match key {
+                JointKey::Name(name) => Some(name.clone()),
+                JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
+            })
+            .collect();
+        let logged = logged_joints(position, &robot, &left_out).ok_or(NewStudyError::MoreColumnsThanJoints {
+            columns: position.columns.len(),
+            joints: robot.free.len(),
+        })?;
         let ordered = |family: &Family| in_order(family, position, &logged.joints);
 
         // In the file of the positions if present, otherwise in another file with the same number of rows.
@@ -160,50 +207,63 @@ impl RecognisedColumns {
         let in_other_file = |family: &Family| {
             family.file != position.file && rows(family) == rows(position) && ordered(family).is_some()
         };
-        let measured = |quantity, fits: &dyn Fn(&Family) -> bool| best(&all, quantity, fits);
-        let torque = measured(Quantity::Torque, &in_same_file)
-            .or_else(|| measured(Quantity::Current, &in_same_file))
-            .or_else(|| measured(Quantity::Torque, &in_other_file))
-            .or_else(|| measured(Quantity::Current, &in_other_file))
-            .ok_or_else(|| missing("torques or currents"))?;
-        let velocity = measured(Quantity::Velocity, &in_same_file)
-            .or_else(|| measured(Quantity::Velocity, &in_other_file))
-            .filter(|family| family.source != Source::Commanded);
+        let is_commanded = |family: &Family| position.source != Source::Commanded && family != position;
+        let command = best_command(&all, |family| is_commanded(family) && in_same_file(family))
+            .or_else(|| best_command(&all, |family| is_commanded(family) && in_other_file(family)));
+        let is_torque = |family: &Family| command.is_none() || !is_unsigned(family, &logs[family.file].1);
+        let torques = |is_recorded: bool, fits: &dyn Fn(&Family) -> bool| {
+            let is_usable = |family: &Family| is_torque(family) && (family.source.is_recorded() || !is_recorded);
+            best_torque(&all, |family| is_usable(family) && fits(family))
+        };
+        let torque = torques(true, &in_same_file)
+            .or_else(|| torques(true, &in_other_file))
+            .or_else(|| torques(false, &in_same_file))
+            .or_else(|| torques(false, &in_other_file));
+        let drive = torque.or(command).ok_or_else(|| missing("torques, currents or commanded positions"))?;
+        let velocity = best(&all, Quantity::Velocity, in_same_file)
+            .or_else(|| best(&all, Quantity::Velocity, in_other_file))
+            .filter(|family| family.source.is_recorded());
+        let fits = |family: &&Family| in_same_file(family) || in_other_file(family);
+        let alternatives = [Some(position), velocity, Some(drive)]
+            .map(|chosen| chosen.map_or_else(String::new, |chosen| alternatives(chosen, all.iter().filter(fits))));
 
-        let (Some(of_position), Some(of_torque)) = (ordered(position), ordered(torque)) else {
-            return Err(missing("torques or currents"));
+        let (Some(of_position), Some(of_drive)) = (ordered(position), ordered(drive)) else {
+            return Err(missing("torques, currents or commanded positions"));
         };
         let has = |log: &LogContents, columns: &[String]| {
             columns.iter().all(|column| log.channels.iter().any(|channel| channel.name == *column))
         };
-        let is_pair = torque.file != position.file;
+        let is_pair = drive.file != position.file;
         let holds = |file: &usize| {
             let log = &logs[*file].1;
-            if is_pair { *file == position.file } else { has(log, &of_position) && has(log, &of_torque) }
+            if is_pair { *file == position.file } else { has(log, &of_position) && has(log, &of_drive) }
         };
         let contents = &logs[position.file].1;
         let group = contents.groups.get(position.group);
         let time = group.and_then(|group| {
             let name = group.time.as_ref()?;
-            Some((time_as_toml(name, contents.unit(position.group, name)), group.rate_hz))
+            let unit = contents.unit(position.group, name);
+            let is_named = group.name.is_some() || time_unit_s(&with_unit(name, unit)).is_some();
+            Some(LogClock { key: time_as_toml(name, unit), rate_hz: group.rate_hz, is_named })
         });
         let files = (0..logs.len()).filter(holds).collect();
         Ok(Self {
             thresholds: thresholds.clone(),
-            columns: [of_position, of_torque],
+            columns: [of_position, of_drive],
             velocity_columns: velocity.and_then(ordered),
             files,
+            parts: vec![None; logs.len()],
             time,
             logged,
             position: position.clone(),
-            torque: torque.clone(),
+            drive: drive.clone(),
             velocity: velocity.cloned(),
+            alternatives,
         })
     }
 
     fn unused_recordings(&self, logs: &[(&Path, LogContents)]) -> Vec<Unsure> {
-        let channel_files =
-            [Some(&self.torque), self.velocity.as_ref()].into_iter().flatten().map(|family| family.file);
+        let channel_files = [Some(&self.drive), self.velocity.as_ref()].into_iter().flatten().map(|family| family.file);
         let used: Vec<usize> = self.files.iter().copied().chain(channel_files).collect();
         let unused = logs.iter().enumerate().filter(|(number, _)| !used.contains(number));
         let reason = |path: &Path| {
@@ -217,9 +277,13 @@ impl RecognisedColumns {
         let joints = model.joints();
         let tables = [
             vec![self.robot_table(request, model, from), self.time_table(request)],
-            vec![self.position_table(model, &logs[self.position.file].1)],
+            vec![self.position_table(model, logs)],
             self.velocity_table(logs, from).into_iter().collect(),
-            vec![self.torque_table(logs, from)],
+            vec![if self.has_commands() {
+                self.command_table(model, logs, from)
+            } else {
+                self.torque_table(logs, from)
+            }],
             self.log_tables(logs, from),
         ];
         let mut tables = tables.concat();
@@ -252,62 +316,49 @@ impl RecognisedColumns {
         if request.xacro.limit_s != XacroSettings::DEFAULT_LIMIT_S {
             table = table.with("xacro_limit_s", format!("{:?}", request.xacro.limit_s), "As given");
         }
-        if joints.len() == model.dof() && joints.is_sorted() {
+        if *is_sure && joints.len() == model.dof() && joints.is_sorted() {
             return table;
         }
         let names: Vec<String> = joints.iter().map(|&joint| quoted(&model.joints()[joint].name)).collect();
-        let reason = format!("{reason}; every other joint is locked");
+        let locked = if joints.len() == model.dof() { "" } else { "; every other joint is locked" };
+        let reason = format!("{reason}{locked}");
         table.with_line("joints", format!("[{}]", names.join(", ")), reason, *is_sure)
     }
 
     fn time_table(&self, request: &NewStudy) -> Table {
         let table = Table::new("[format]", "");
         match (&self.time, request.rate_hz) {
-            (Some((time, rate_hz)), _) => {
-                let reason = rate_hz.map_or_else(String::new, |rate_hz| format!("{rate_hz:.4} Hz on average"));
-                table.with("time", time.clone(), reason)
+            (Some(LogClock { key, rate_hz, is_named }), _) => {
+                let rate = rate_hz.map_or_else(String::new, |rate_hz| format!("{rate_hz:.4} Hz on average"));
+                let by = if *is_named { "" } else { ", a column that rises evenly" };
+                table.with("time", key.clone(), format!("{rate}{by}"))
             }
             (None, Some(rate_hz)) => {
-                table.with("rate_hz", format!("{rate_hz:?}"), "As given: no time column recognised by name")
+                table.with("rate_hz", format!("{rate_hz:?}"), "As given: no time column recognised")
             }
             (None, None) => table.with_unsure(
                 "rate_hz",
                 "1000.0",
-                "no time column recognised by name: give the sample rate, or time = { column = .. }",
+                "no time column recognised: give the sample rate, or time = { column = .. }",
             ),
         }
     }
 
-    fn position_table(&self, model: &Model, log: &LogContents) -> Table {
+    fn position_table(&self, model: &Model, logs: &[(&Path, LogContents)]) -> Table {
         let [columns, _] = &self.columns;
-        let table = Table::new("[format.position]", basis(&self.position, "positions")).with(
-            "columns",
-            column_list(columns),
-            &self.logged.reason,
-        );
-        if let Some(unit) = self.position.unit.filter(|unit| *unit != "rad") {
-            return table.with("unit", quoted(unit), "by the names");
-        }
-        // Without a unit in the name, angles of many turns are degrees.
-        let range = |name: &String| log.channels.iter().find(|channel| channel.name == *name)?.range;
-        let largest = |joint: usize, name: &String| {
-            let most = range(name)?.map(f64::abs).into_iter().fold(0.0, f64::max);
-            (model.joints()[joint].kind != JointKind::Prismatic).then_some(most)
-        };
-        let pairs = self.logged.joints.iter().zip(columns);
-        let most = pairs.filter_map(|(&joint, name)| largest(joint, name)).fold(0.0, f64::max);
-        if self.position.unit.is_none() && most > self.thresholds.max_radian_turns * core::f64::consts::TAU {
-            let reason = format!(
-                "a joint moves to {most:.1}, which is implausible in radians: degrees, or motor-side positions"
-            );
-            return table.with_unsure("unit", quoted("deg"), reason);
-        }
-        table
+        let table = Table::new("[format.position]", basis(&self.position, "positions", &self.alternatives[0]))
+            .with_line("columns", column_list(columns), &self.logged.reason, self.position.basis != Basis::Order);
+        PositionUnits::of(self, model, logs).with_unit(table, self.position.unit)
     }
 
     fn velocity_table(&self, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
-        let (family, columns) = self.velocity.as_ref().zip(self.velocity_columns.as_ref())?;
-        let table = Table::new("[format.velocity]", "Compared with the derivative of the positions");
+        // Commands are compared with positions alone.
+        let velocity = self.velocity.as_ref().filter(|_| !self.has_commands());
+        let (family, columns) = velocity.zip(self.velocity_columns.as_ref())?;
+        let table = Table::new(
+            "[format.velocity]",
+            format!("Compared with the derivative of the positions{}", self.alternatives[1]),
+        );
         let table = self.with_file(table, family, logs, from).with("columns", column_list(columns), "");
         Some(match family.unit.filter(|unit| *unit != "rad/s") {
             Some(unit) => table.with("unit", quoted(unit), "by the names"),
@@ -315,22 +366,44 @@ impl RecognisedColumns {
         })
     }
 
+    /// Whether the log has commanded positions in place of torques.
+    fn has_commands(&self) -> bool {
+        self.drive.quantity == Quantity::Position
+    }
+
+    fn command_table(&self, model: &Model, logs: &[(&Path, LogContents)], from: &Path) -> Table {
+        let [_, columns] = &self.columns;
+        let reason = format!(
+            "{}. The log has no signed torque or current: commands and positions identify the servos together with the robot",
+            basis(&self.drive, "positions", &self.alternatives[2])
+        );
+        let table = self.with_file(Table::new("[format.command]", reason), &self.drive, logs, from);
+        let table = table.with("columns", column_list(columns), "");
+        PositionUnits::of(self, model, logs).with_unit(table, self.drive.unit)
+    }
+
     fn torque_table(&self, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         let [_, columns] = &self.columns;
-        let table = Table::new("[format.torque]", basis(&self.torque, "torques"));
-        let table = self.with_file(table, &self.torque, logs, from);
-        let table = match self.torque.source {
+        let table = Table::new("[format.torque]", basis(&self.drive, "torques", &self.alternatives[2]));
+        let table = self.with_file(table, &self.drive, logs, from);
+        let table = match self.drive.source {
             Source::Commanded => {
                 table.with_unsure("columns", column_list(columns), "commanded, not measured: no other torque was found")
             }
+            Source::Computed => {
+                table.with_unsure("columns", column_list(columns), "computed, not measured: no other torque was found")
+            }
+            Source::Unstated | Source::Measured if self.drive.basis == Basis::Order => {
+                table.with_unsure("columns", column_list(columns), "the columns have no names: assigned in order")
+            }
             Source::Unstated | Source::Measured => table.with("columns", column_list(columns), ""),
         };
-        if self.torque.quantity == Quantity::Current {
-            let unit = self.torque.unit.unwrap_or("A");
+        if self.drive.quantity == Quantity::Current {
+            let unit = self.drive.unit.unwrap_or("A");
             let reason = "Nm/A: gear ratio times motor constant, one value per joint; with 1 torques remain in amperes";
             return table.with("unit", quoted(unit), "a current").with_unsure("scale", "1.0", reason);
         }
-        match self.torque.unit.filter(|unit| *unit != "N m") {
+        match self.drive.unit.filter(|unit| *unit != "N m") {
             Some(unit) => table.with("unit", quoted(unit), "by the names"),
             None => table,
         }
@@ -347,15 +420,17 @@ impl RecognisedColumns {
     }
 
     fn log_tables(&self, logs: &[(&Path, LogContents)], from: &Path) -> Vec<Table> {
-        let file = |number: usize| quoted(&path_in_study(logs[number].0, from));
+        let with_file = |table: Table, number: usize| {
+            let table = table.with("file", quoted(&path_in_study(logs[number].0, from)), "");
+            let part = self.parts.get(number).and_then(|part| part.as_deref());
+            part.iter().fold(table, |table, part| table.with("part", quoted(part), ""))
+        };
         if let [only] = self.files[..] {
             let part = |[from, to]: [f64; 2]| format!("[{from:?}, {to:?}]");
+            let first = Table::new("[[log]]", "One recording: the first part is for training, the last for validation");
             return vec![
-                Table::new("[[log]]", "One recording: the first part is for training, the last for validation")
-                    .with("file", file(only), "")
-                    .with("fraction", part(self.thresholds.training_fraction), ""),
-                Table::new("[[log]]", "")
-                    .with("file", file(only), "")
+                with_file(first, only).with("fraction", part(self.thresholds.training_fraction), ""),
+                with_file(Table::new("[[log]]", ""), only)
                     .with("fraction", part(self.thresholds.validation_fraction), "")
                     .with("role", quoted("validate"), ""),
             ];
@@ -363,7 +438,7 @@ impl RecognisedColumns {
         let last = self.files.len().saturating_sub(1);
         let table = |(place, &number): (usize, &usize)| {
             let reason = if place == last { "the last recording is for validation" } else { "" };
-            let table = Table::new("[[log]]", reason).with("file", file(number), "");
+            let table = with_file(Table::new("[[log]]", reason), number);
             if place == last { table.with("role", quoted("validate"), "") } else { table }
         };
         self.files.iter().enumerate().map(table).collect()
@@ -372,17 +447,6 @@ impl RecognisedColumns {
 
 fn key(name: &str) -> String {
     if name.contains(['.', '/']) { quoted(name) } else { name.to_owned() }
-}
-
-fn basis(family: &Family, what: &str) -> String {
-    let by = if family.by_file_name { "by file name" } else { "by column names" };
-    let source = match family.source {
-        Source::Measured => "measured ",
-        Source::Commanded => "commanded ",
-        Source::Unstated => "",
-    };
-    let unit = family.unit.map_or_else(String::new, |unit| format!(", in {unit}"));
-    format!("{source}{what} {by}{unit}")
 }
 
 /// `path` relative to `folder`, with `/`; unchanged if there is no relative path.

@@ -458,7 +458,7 @@ fn one_absurd_torque_is_left_out_and_named() {
         let rows: Vec<String> = train.lines().enumerate().map(row).collect();
         std::fs::write(folder.path().join("train.csv"), rows.join("\n") + "\n").unwrap();
         let result = Job::new(folder.path(), &study).identify().result;
-        let says = |finding: &dynident::recording::Finding| finding.message.contains("stand far off");
+        let says = |finding: &dynident::recording::Finding| finding.message.contains("differ strongly");
         let said = result.logs[0].import.findings.iter().any(says);
         assert!(said == absurd && result.problems.is_empty(), "{:?}", result.logs[0].import.findings);
         result.validation[0].model.relative_error_percent.unwrap()

@@ -37,7 +37,7 @@ fn a_link_of_another_length_is_named_with_its_factor() {
             problems(&check_text(folder.path(), &study_with(folder.path(), &urdf.replace(ELBOW, described), |_| {})));
         let [(kind, sentence)] = &found[..] else { panic!("{found:?}") };
         assert!(kind == "description" && sentence.contains("`elbow_joint`"), "{found:?}");
-        let told = sentence.split("of its origin by ").nth(1).and_then(|rest| rest.split(':').next()).unwrap();
+        let told = sentence.split("of this joint by ").nth(1).and_then(|rest| rest.split(':').next()).unwrap();
         let told: f64 = told.trim().parse().unwrap();
         // To a fifth of the step between tested factors.
         assert!((told / factor).ln().abs() < 0.1, "{sentence}");

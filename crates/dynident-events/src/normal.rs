@@ -1,0 +1,81 @@
+//! Normal equations of one joint.
+
+use crate::rows::LogRows;
+use core::ops::Range;
+use nalgebra::{DMatrix, DVector};
+
+/// Regularisation relative to the mean diagonal; columns have similar scales.
+const RIDGE: f64 = 1e-7;
+
+/// `[W τ]ᵀ [W τ]` over some bins of one joint.
+#[derive(Clone, Debug)]
+pub(crate) struct Normal {
+    /// Number of bins.
+    pub(crate) bins: f64,
+    gram: DMatrix<f64>,
+}
+
+impl Normal {
+    pub(crate) fn zero(width: usize) -> Self {
+        Self { bins: 0.0, gram: DMatrix::zeros(width + 1, width + 1) }
+    }
+
+    /// Sums over the usable bins of a range that are not excluded, with `further` columns for each bin.
+    pub(crate) fn of_range(
+        rows: &LogRows,
+        joint: usize,
+        range: Range<usize>,
+        is_kept: impl Fn(usize) -> bool,
+        further: impl Fn(usize, &mut Vec<f64>),
+    ) -> Self {
+        let kept: Vec<usize> = range.filter(|&bin| rows.usable[bin] && is_kept(bin)).collect();
+        let mut values = Vec::new();
+        for &bin in &kept {
+            values.extend_from_slice(rows.row(joint, bin));
+            further(bin, &mut values);
+            values.push(rows.tau[joint][bin]);
+        }
+        if kept.is_empty() {
+            let mut none = Vec::new();
+            further(0, &mut none);
+            return Self::zero(rows.width[joint] + none.len());
+        }
+        let width = values.len() / kept.len();
+        // Column-major storage of the transposed rows.
+        let transposed = DMatrix::from_vec(width, kept.len(), values);
+        Self { bins: kept.len() as f64, gram: &transposed * transposed.transpose() }
+    }
+
+    /// Number of columns without the torque.
+    pub(crate) fn width(&self) -> usize {
+        self.gram.nrows() - 1
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.bins += other.bins;
+        self.gram += &other.gram;
+    }
+
+    /// Least squares parameters; `None` without rows.
+    pub(crate) fn solution(&self) -> Option<DVector<f64>> {
+        let width = self.gram.nrows() - 1;
+        if width == 0 || self.bins == 0.0 {
+            return None;
+        }
+        let mut matrix = self.gram.view((0, 0), (width, width)).into_owned();
+        let ridge = RIDGE * matrix.trace() / width as f64 + f64::MIN_POSITIVE;
+        for place in 0..width {
+            matrix[(place, place)] += ridge;
+        }
+        let right = self.gram.view((0, width), (width, 1)).column(0).into_owned();
+        Some(matrix.cholesky()?.solve(&right))
+    }
+
+    /// Sum of squared residuals with the given parameters.
+    pub(crate) fn squares(&self, theta: &DVector<f64>) -> f64 {
+        let width = theta.len();
+        let product = self.gram.view((0, 0), (width, width)) * theta;
+        let right = self.gram.view((0, width), (width, 1));
+        (self.gram[(width, width)] - 2.0 * theta.dot(&right.column(0)) + theta.dot(&product)).max(0.0)
+    }
+}

@@ -1,0 +1,182 @@
+//! Overflow of the number format of a torque: its value jumps from one end of its range to the other.
+
+use crate::normal::Normal;
+use crate::rows::{LogRows, TorquePiece, median};
+
+/// Distance of both ends of a jump from the ends of the range, relative to the range.
+const END_SHARE: f64 = 0.15;
+/// Maximum duration of a jump, s; at least one step of the log. The cleaning of outliers can spread it.
+const MAX_JUMP_S: f64 = 0.02;
+/// Minimum mean square residual of a fit to all parts, relative to a fit to the normal parts. Dry friction also jumps,
+/// at a reversal, but one model explains both directions.
+const MIN_RESIDUAL_RATIO: f64 = 10.0;
+/// Shortest overflow and shortest normal part between two, bins.
+const MIN_BINS: usize = 2;
+/// Jumps up to this distance are noise at the limit of the range, bins.
+const MAX_NOISE_BINS: f64 = 4.0;
+/// Mean residual of an overflow relative to the jump.
+const JUMP_RATIO: [f64; 2] = [0.6, 1.4];
+/// Rounds of fit and assignment of the parts.
+const ROUNDS: usize = 5;
+/// Maximum share of the bins of a joint in overflow.
+const MAX_SHARE: f64 = 0.5;
+
+/// Overflow of the torque of one joint.
+pub(crate) struct Overflow {
+    pub(crate) joint: usize,
+    /// Start and end of each interval, s.
+    pub(crate) times_s: Vec<[f64; 2]>,
+    /// Size of the jump, Nm or N.
+    pub(crate) jump_nm: f64,
+    /// Root mean square residual of the joint outside of the intervals, Nm or N.
+    pub(crate) usual_nm: f64,
+}
+
+/// A part of the log between two jumps.
+#[derive(Debug)]
+struct Part {
+    times_s: [f64; 2],
+    bins: Vec<usize>,
+    is_wrapped: bool,
+}
+
+/// Joints whose torque jumps to the other end of its range and back, if the model of the other parts has a residual of
+/// one jump in between.
+pub(crate) fn overflows(rows: &LogRows) -> Vec<Overflow> {
+    (0..rows.joints()).filter_map(|joint| overflow(rows, joint)).collect()
+}
+
+fn overflow(rows: &LogRows, joint: usize) -> Option<Overflow> {
+    let (mut parts, jumps) = parts(rows, joint);
+    if jumps.is_empty() {
+        return None;
+    }
+    let jump_nm = median(jumps.iter().map(|(_, size)| *size).collect());
+    let mut usual_nm = 0.0;
+    let fit_of = |parts: &[Part], is_used: &dyn Fn(&Part) -> bool| {
+        let mut used = vec![false; rows.len()];
+        parts.iter().filter(|part| is_used(part)).flat_map(|part| &part.bins).for_each(|&bin| used[bin] = true);
+        let fit = Normal::of_range(rows, joint, 0..rows.len(), |bin| used[bin], |_, _| ());
+        fit.solution().map(|theta| ((fit.squares(&theta) / fit.bins.max(1.0)).sqrt(), theta))
+    };
+    for _ in 0..ROUNDS {
+        let theta;
+        (usual_nm, theta) = fit_of(&parts, &|part| !part.is_wrapped)?;
+        let residual = |bin: &usize| -> f64 {
+            rows.tau[joint][*bin] - rows.row(joint, *bin).iter().zip(theta.iter()).map(|(a, b)| a * b).sum::<f64>()
+        };
+        let mut is_same = true;
+        for part in &mut parts {
+            let mean = part.bins.iter().map(residual).sum::<f64>() / part.bins.len() as f64;
+            let is_wrapped = (JUMP_RATIO[0]..JUMP_RATIO[1]).contains(&(mean.abs() / jump_nm));
+            is_same &= is_wrapped == part.is_wrapped;
+            part.is_wrapped = is_wrapped;
+        }
+        if is_same {
+            break;
+        }
+    }
+    let wrapped: usize = parts.iter().filter(|part| part.is_wrapped).map(|part| part.bins.len()).sum();
+    let all_nm = fit_of(&parts, &|_| true)?.0;
+    let is_explained = all_nm.powi(2) < MIN_RESIDUAL_RATIO * usual_nm.powi(2);
+    if wrapped == 0 || wrapped as f64 > MAX_SHARE * rows.len() as f64 || is_explained {
+        return None;
+    }
+    let mut times_s: Vec<[f64; 2]> = parts.iter().filter(|part| part.is_wrapped).map(|part| part.times_s).collect();
+    // Noise at the limit of the range jumps several times.
+    let near_s = MAX_NOISE_BINS * rows.bin_s;
+    times_s.extend(jumps.windows(2).map(|two| [two[0].0, two[1].0]).filter(|[from, to]| to - from <= near_s));
+    times_s.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut merged: Vec<[f64; 2]> = Vec::new();
+    for [from, to] in times_s {
+        match merged.last_mut() {
+            Some(last) if from - last[1] <= rows.bin_s => last[1] = last[1].max(to),
+            _ => merged.push([from, to]),
+        }
+    }
+    Some(Overflow { joint, times_s: merged, jump_nm, usual_nm })
+}
+
+/// Parts of the log between two jumps of a joint's torque, and time and size of the jumps. Parts of less than
+/// [`MIN_BINS`] bins are left out. A joint that is at one end of the range after an odd number of jumps is wrapped.
+fn parts(rows: &LogRows, joint: usize) -> (Vec<Part>, Vec<(f64, f64)>) {
+    let all = || rows.samples.iter().flat_map(|piece| piece.tau[joint].iter().copied());
+    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), tau| (low.min(tau), high.max(tau)));
+    let (mut parts, mut sizes) = (Vec::new(), Vec::new());
+    for piece in &rows.samples {
+        let samples = piece.tau[joint].len();
+        let time_s = |at: usize| piece.first_s + at as f64 / piece.rate_hz;
+        let found = jumps(piece, joint, [low, high]);
+        sizes.extend(found.iter().map(|(at, size)| (time_s(*at), size.abs())));
+        let ends = found.iter().map(|(at, _)| *at).chain([samples]);
+        let (mut from, mut count) = (0, 0_i32);
+        for (number, to) in ends.enumerate() {
+            let times_s = [time_s(from), time_s(to.max(1) - 1)];
+            let is_inside = |bin: &usize| {
+                let half = 0.5 * rows.bin_s;
+                rows.usable[*bin] && rows.time_s[*bin] - half >= times_s[0] && rows.time_s[*bin] + half <= times_s[1]
+            };
+            let bins: Vec<usize> = (0..rows.len()).filter(is_inside).collect();
+            let moving = bins.iter().filter(|&&bin| rows.is_moving(bin)).count();
+            // The parts at rest are for the test of drives that are off.
+            if bins.len() >= MIN_BINS && 2 * moving >= bins.len() {
+                parts.push(Part { times_s, bins, is_wrapped: count != 0 });
+            }
+            count += found.get(number).map_or(0, |(_, size)| if *size < 0.0 { 1 } else { -1 });
+            from = to;
+        }
+    }
+    // The longer state is the normal one.
+    let length = |is_wrapped: bool| -> usize {
+        parts.iter().filter(|part| part.is_wrapped == is_wrapped).map(|part| part.bins.len()).sum()
+    };
+    if length(true) > length(false) {
+        for part in &mut parts {
+            part.is_wrapped = !part.is_wrapped;
+        }
+    }
+    (parts, sizes)
+}
+
+/// First sample after each jump from one end of the range to the other, and the change of the torque.
+fn jumps(piece: &TorquePiece, joint: usize, [low, high]: [f64; 2]) -> Vec<(usize, f64)> {
+    let near = END_SHARE * (high - low);
+    let longest = ((MAX_JUMP_S * piece.rate_hz) as usize).max(1);
+    let (mut last, mut found) = ([None::<usize>; 2], Vec::new());
+    let tau = &piece.tau[joint];
+    for (at, value) in tau.iter().enumerate() {
+        let end = if *value <= low + near {
+            0
+        } else if *value >= high - near {
+            1
+        } else {
+            continue;
+        };
+        if let (Some(other), own) = (last[1 - end], last[end])
+            && at - other <= longest
+            && own.is_none_or(|own| own < other)
+        {
+            found.push((at, value - tau[other]));
+        }
+        last[end] = Some(at);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrapped_sine_jumps_twice_a_period_and_a_sine_never() {
+        let sine: Vec<f64> = (0..1000).map(|k| 12.0 * (0.01 * f64::from(k)).sin()).collect();
+        let tau: Vec<f64> = sine.iter().map(|&tau| if tau > 10.0 { tau - 20.0 } else { tau }).collect();
+        let piece = TorquePiece { first_s: 3.0, rate_hz: 100.0, tau: vec![tau, sine] };
+        // The sine is above 10/12 from 0.985 to 2.156 rad and one period later.
+        let found = jumps(&piece, 0, [-12.0, 10.0]);
+        let at: Vec<usize> = found.iter().map(|(at, _)| *at).collect();
+        assert_eq!(at, [99, 216, 727, 844], "{found:?}");
+        assert!(found.iter().all(|(_, size)| (size.abs() - 20.0).abs() < 0.2), "{found:?}");
+        assert!(jumps(&piece, 1, [-12.0, 12.0]).is_empty());
+    }
+}

@@ -1,0 +1,336 @@
+//! Search for intervals that the model of the other bins does not explain.
+
+use crate::noise::usual_variance;
+use crate::normal::Normal;
+use crate::robust::{Blocks, Fit, dry_friction, residuals};
+use crate::rows::{LogRows, rms};
+use crate::settings::EventSettings;
+use core::ops::Range;
+
+/// Relative square residual below which a bin does not belong to an event.
+const BIN_RATIO: f64 = 9.0;
+/// Largest relative square residual of a bin in the search: two events do not join over a longer normal part.
+const MAX_BIN_RATIO: f64 = 18.0;
+/// Loss of a bin without reliable motion or torque in the search.
+const UNUSABLE_LOSS: f64 = 3.0;
+/// Minimum sum of contributions of an interval.
+const MIN_SUM: f64 = 20.0;
+/// Minimum number of bins of an interval.
+const MIN_BINS: usize = 2;
+/// Intervals with a smaller distance are one event, s.
+const MERGE_S: f64 = 0.3;
+/// Torque of a joint relative to the largest of all joints below which its own torque is not the reference.
+const MIN_TORQUE_SHARE: f64 = 0.1;
+/// Ratio of predicted to measured torque (squares) of a robot without drives, and minimum predicted torque relative to
+/// its usual residual (squares).
+const OFF_RATIO: f64 = 10.0;
+const OFF_PREDICTED: f64 = 16.0;
+/// Torque of each joint without drives relative to its root mean square, and minimum duration, s.
+const OFF_TORQUE_SHARE: f64 = 0.1;
+const MIN_OFF_S: f64 = 0.3;
+/// Gap in a rest without torque, for noise.
+const OFF_GAP_BINS: usize = 2;
+/// Share of the bins of a range in which a joint at rest rests.
+const MIN_REST_BINS: f64 = 0.75;
+/// Distance from the end of the travel in the log at a stop, relative to the travel, and minimum mean torque at a stop
+/// relative to the usual residual (squares).
+const STOP_SHARE: f64 = 0.03;
+/// Travel of another joint meanwhile, relative to its travel in the log.
+const STOP_TRAVEL: f64 = 0.1;
+const STOP_RATIO: f64 = 9.0;
+/// Rounds of search and refit.
+const ROUNDS: usize = 4;
+/// Maximum number of intervals.
+const MAX_INTERVALS: usize = 12;
+
+/// An interval with its evidence.
+#[derive(Clone, Debug)]
+pub(crate) struct Interval {
+    pub(crate) bins: Range<usize>,
+    /// Mean square of unexplained torque of each joint.
+    pub(crate) excess: Vec<f64>,
+    /// The same, relative to the usual variance.
+    pub(crate) ratio: Vec<f64>,
+    /// The same, relative to the worst other interval of this length.
+    pub(crate) prominence: Vec<f64>,
+    /// The same (root), relative to the torque of the joint.
+    pub(crate) effect: Vec<f64>,
+    /// Joint with the strongest evidence.
+    pub(crate) strongest: usize,
+    /// Whether all joints rest without the torque that carries their weight.
+    pub(crate) is_off: bool,
+    /// Whether a joint rests at the end of its travel with more torque than friction holds, while others move.
+    pub(crate) is_stop: bool,
+    pub(crate) is_clear: bool,
+}
+
+/// Intervals, and the model of the other bins.
+pub(crate) struct Scan {
+    pub(crate) intervals: Vec<Interval>,
+    pub(crate) residuals: Vec<Vec<f64>>,
+    pub(crate) variance: Vec<Vec<f64>>,
+    /// Bins outside of all intervals.
+    pub(crate) kept: Vec<bool>,
+}
+
+/// Searches one log. `None` if it has too few rows.
+pub(crate) fn scan(rows: &LogRows, settings: &EventSettings) -> Option<Scan> {
+    let blocks = Blocks::new(rows);
+    let mut fit = blocks.trimmed_fit()?;
+    let mut kept = vec![true; rows.len()];
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for _ in 0..ROUNDS {
+        let left = residuals(rows, &fit);
+        let variance = usual_variance(rows, &left, &dry_friction(rows, &fit), &kept);
+        let next = candidates(rows, &left, &variance);
+        if next == found {
+            break;
+        }
+        kept.fill(true);
+        for range in &next {
+            kept[range.clone()].fill(false);
+        }
+        found = next;
+        fit = blocks.fit(&kept)?.1;
+    }
+    // An interval that a joint fit explains is unusual motion and returns to the fit.
+    loop {
+        let (sums, refit) = blocks.fit(&kept)?;
+        let left = residuals(rows, &refit);
+        let variance = usual_variance(rows, &left, &dry_friction(rows, &refit), &kept);
+        let judged: Vec<Interval> = found
+            .iter()
+            .filter_map(|range| judged(rows, range, &kept, (&sums, &refit), (&left, &variance), settings))
+            .collect();
+        let is_event = |one: &Interval| {
+            one.is_off || one.is_stop || one.passes(settings.warn_ratio, settings.warn_prominence, settings.min_effect)
+        };
+        let remaining: Vec<Range<usize>> =
+            judged.iter().filter(|one| is_event(one)).map(|one| one.bins.clone()).collect();
+        if remaining.len() == found.len() {
+            return Some(Scan { intervals: judged, residuals: left, variance, kept });
+        }
+        found = remaining;
+        kept.fill(true);
+        for range in &found {
+            kept[range.clone()].fill(false);
+        }
+    }
+}
+
+impl Interval {
+    fn passes(&self, ratio: f64, prominence: f64, effect: f64) -> bool {
+        (0..self.ratio.len()).any(|joint| {
+            self.ratio[joint] >= ratio && self.prominence[joint] >= prominence && self.effect[joint] >= effect
+        })
+    }
+}
+
+/// Disjoint intervals with the largest sums of relative square residuals above [`BIN_RATIO`], in order of time.
+fn candidates(rows: &LogRows, left: &[Vec<f64>], variance: &[Vec<f64>]) -> Vec<Range<usize>> {
+    let gain = |bin: usize| {
+        if !rows.usable[bin] {
+            return -UNUSABLE_LOSS;
+        }
+        let ratios = (0..rows.joints()).map(|joint| left[joint][bin].powi(2) / variance[joint][bin]);
+        ratios.fold(0.0, f64::max).min(MAX_BIN_RATIO) - BIN_RATIO
+    };
+    let mut gains: Vec<f64> = (0..rows.len()).map(gain).collect();
+    let mut found: Vec<Range<usize>> = Vec::new();
+    while found.len() < MAX_INTERVALS {
+        let Some((range, sum)) = best_interval(&gains) else { break };
+        if sum < MIN_SUM || range.len() < MIN_BINS {
+            break;
+        }
+        gains[range.clone()].fill(f64::NEG_INFINITY);
+        found.push(range);
+    }
+    found.extend(without_torque(rows));
+    found.sort_by_key(|range| range.start);
+    let apart = (MERGE_S / rows.bin_s).ceil() as usize;
+    let mut merged: Vec<Range<usize>> = Vec::new();
+    for range in found {
+        match merged.last_mut() {
+            Some(last) if range.start <= last.end + apart => last.end = last.end.max(range.end),
+            _ => merged.push(range),
+        }
+    }
+    merged
+}
+
+/// Ranges of at least [`MIN_OFF_S`] in which all joints rest with little torque: without drives, or in a posture that
+/// needs none.
+fn without_torque(rows: &LogRows) -> Vec<Range<usize>> {
+    let is_quiet = quiet(rows);
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for bin in (0..rows.len()).filter(|&bin| is_quiet[bin] && !rows.is_moving(bin)) {
+        match found.last_mut() {
+            Some(last) if last.end + OFF_GAP_BINS >= bin => last.end = bin + 1,
+            _ => found.push(bin..bin + 1),
+        }
+    }
+    found.retain(|range| range.len() as f64 * rows.bin_s >= MIN_OFF_S);
+    found
+}
+
+/// Whether all torques of a bin are small.
+fn quiet(rows: &LogRows) -> Vec<bool> {
+    let largest = rows.tau.iter().map(|tau| rms(tau)).fold(0.0, f64::max);
+    let scale = |tau: &Vec<f64>| OFF_TORQUE_SHARE * rms(tau).max(MIN_TORQUE_SHARE * largest);
+    let scales: Vec<f64> = rows.tau.iter().map(scale).collect();
+    let is_quiet = |bin: usize| (0..rows.joints()).all(|joint| rows.tau[joint][bin].abs() <= scales[joint]);
+    (0..rows.len()).map(is_quiet).collect()
+}
+
+/// The longest rest without torque inside a range, and the same with the adjacent bins without torque: brakes stop a
+/// robot without torque, and the torque returns before the motion.
+pub(crate) fn off_ranges(rows: &LogRows, range: &Range<usize>) -> Option<[Range<usize>; 2]> {
+    let inside = without_torque(rows).into_iter().filter(|off| off.start < range.end && off.end > range.start);
+    let at_rest = inside.max_by_key(Range::len)?;
+    let is_quiet = quiet(rows);
+    let from = (0..at_rest.start).rev().take_while(|&bin| is_quiet[bin]).last().unwrap_or(at_rest.start);
+    let to = (at_rest.end..rows.len()).take_while(|&bin| is_quiet[bin]).last().map_or(at_rest.end, |bin| bin + 1);
+    Some([at_rest, from..to])
+}
+
+/// The interval with the largest sum.
+fn best_interval(gains: &[f64]) -> Option<(Range<usize>, f64)> {
+    let (mut sum, mut from) = (0.0, 0);
+    let mut best: Option<(Range<usize>, f64)> = None;
+    for (bin, gain) in gains.iter().enumerate() {
+        if sum <= 0.0 {
+            (sum, from) = (0.0, bin);
+        }
+        sum += gain;
+        if sum > 0.0 && best.as_ref().is_none_or(|(_, most)| sum > *most) {
+            best = Some((from..bin + 1, sum));
+        }
+    }
+    best
+}
+
+/// Evidence of one interval: the increase of the squared residuals if its bins are added to the fit of the others.
+fn judged(
+    rows: &LogRows,
+    range: &Range<usize>,
+    kept: &[bool],
+    (sums, fit): (&[Normal], &Fit),
+    (left, variance): (&[Vec<f64>], &[Vec<f64>]),
+    settings: &EventSettings,
+) -> Option<Interval> {
+    let joints = rows.joints();
+    let mut one = Interval {
+        bins: range.clone(),
+        excess: vec![0.0; joints],
+        ratio: vec![0.0; joints],
+        prominence: vec![0.0; joints],
+        effect: vec![0.0; joints],
+        strongest: 0,
+        is_off: false,
+        is_stop: false,
+        is_clear: false,
+    };
+    let largest = rows.tau.iter().map(|tau| rms(tau)).fold(f64::MIN_POSITIVE, f64::max);
+    for joint in 0..joints {
+        let inside = Normal::of_range(rows, joint, range.clone(), |_| true, |_, _| ());
+        if inside.bins == 0.0 {
+            continue;
+        }
+        let mut both = sums[joint].clone();
+        both.add(&inside);
+        let increase = both.squares(&both.solution()?) - sums[joint].squares(&fit[joint]);
+        let excess = (increase / inside.bins).max(0.0);
+        // Bins with a well-known torque count most.
+        let usual = range.len() as f64 / variance[joint][range.clone()].iter().map(|one| one.recip()).sum::<f64>();
+        one.excess[joint] = excess;
+        one.ratio[joint] = excess / usual;
+        one.prominence[joint] = excess / worst_window(rows, &left[joint], kept, range.len()).max(0.25 * usual);
+        one.effect[joint] = excess.sqrt() / rms(&rows.tau[joint]).max(MIN_TORQUE_SHARE * largest);
+    }
+    one.strongest = (0..joints).max_by(|a, b| one.ratio[*a].total_cmp(&one.ratio[*b])).unwrap_or(0);
+    one.is_off = off_ranges(rows, range).is_some_and(|[at_rest, _]| is_off(rows, &at_rest, left, variance));
+    let is_at_stop = |joint: &usize| {
+        let effect = one.effect[*joint].max(mean_effect(rows, range, &left[*joint], *joint));
+        effect >= settings.min_effect && is_stop(rows, range, *joint, &left[*joint], &variance[*joint])
+    };
+    let at_stop = (0..joints).find(is_at_stop);
+    one.is_stop = at_stop.is_some_and(|joint| others_move(rows, range, joint));
+    if let (true, Some(joint)) = (one.is_stop, at_stop) {
+        one.strongest = joint;
+    }
+    let share = range.len() as f64 / rows.len() as f64;
+    let is_evident = one.passes(settings.clear_ratio, settings.clear_prominence, settings.clear_effect);
+    // A robot without drives is never the normal part.
+    one.is_clear = one.is_off || (one.is_stop || is_evident) && share <= settings.max_share;
+    Some(one)
+}
+
+/// Whether one joint rests in most bins of a range.
+pub(crate) fn rests(rows: &LogRows, range: &Range<usize>, joint: usize) -> bool {
+    let still = range.clone().filter(|&bin| rows.dq[joint][bin].abs() <= rows.rest[joint]).count();
+    still as f64 >= MIN_REST_BINS * range.len() as f64
+}
+
+/// Whether another joint moves clearly while one joint rests.
+fn others_move(rows: &LogRows, range: &Range<usize>, resting: usize) -> bool {
+    let still = || range.clone().filter(|&bin| rows.dq[resting][bin].abs() <= rows.rest[resting]);
+    let travel = |q: &mut dyn Iterator<Item = f64>| {
+        let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)));
+        high - low
+    };
+    let moves = |joint: usize| {
+        let q = &rows.q[joint];
+        travel(&mut still().map(|bin| q[bin])) >= STOP_TRAVEL * travel(&mut q.iter().copied())
+    };
+    (0..rows.joints()).any(|joint| joint != resting && moves(joint))
+}
+
+/// Root mean square residual in a range relative to the torque of the joint.
+fn mean_effect(rows: &LogRows, range: &Range<usize>, left: &[f64], joint: usize) -> f64 {
+    rms(&left[range.clone()]) / rms(&rows.tau[joint]).max(f64::MIN_POSITIVE)
+}
+
+/// Whether one joint rests at the end of its travel with a residual of one sign that is larger than its friction. Its
+/// free parameters could explain such a torque in one posture, so this is tested separately.
+fn is_stop(rows: &LogRows, range: &Range<usize>, joint: usize, left: &[f64], variance: &[f64]) -> bool {
+    let mean = |values: &[f64]| values[range.clone()].iter().sum::<f64>() / range.len() as f64;
+    let q = &rows.q[joint];
+    let (low, high) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(*q), high.max(*q)));
+    let near = STOP_SHARE * (high - low);
+    let is_at_end = mean(q) <= low + near || mean(q) >= high - near;
+    is_at_end && rests(rows, range, joint) && mean(left).powi(2) > STOP_RATIO * mean(variance)
+}
+
+/// Whether all joints rest, and the torque that carries the weight is missing at some joint while all torques are
+/// small. One posture alone hardly changes a fit, so this is tested separately.
+fn is_off(rows: &LogRows, range: &Range<usize>, left: &[Vec<f64>], variance: &[Vec<f64>]) -> bool {
+    let joints = rows.joints();
+    if !(0..joints).all(|joint| rests(rows, range, joint)) {
+        return false;
+    }
+    let mean = |value: &dyn Fn(usize) -> f64| range.clone().map(value).sum::<f64>() / range.len() as f64;
+    let (mut is_missing, mut measured, mut predicted) = (false, 0.0, 0.0);
+    for joint in 0..joints {
+        let scale = rms(&rows.tau[joint]).max(f64::MIN_POSITIVE).powi(2);
+        let tau = mean(&|bin| rows.tau[joint][bin].powi(2));
+        let model = mean(&|bin| (rows.tau[joint][bin] - left[joint][bin]).powi(2));
+        let usual = mean(&|bin| variance[joint][bin]);
+        measured += tau / scale;
+        predicted += model / scale;
+        is_missing |= model > OFF_PREDICTED * usual && model > OFF_RATIO * tau;
+    }
+    is_missing && predicted > OFF_RATIO * measured
+}
+
+/// Largest mean square residual of the kept bins over windows of this length.
+fn worst_window(rows: &LogRows, left: &[f64], kept: &[bool], length: usize) -> f64 {
+    let square = |bin: usize| if kept[bin] && rows.usable[bin] { left[bin].powi(2) } else { 0.0 };
+    let length = length.min(rows.len());
+    let mut sum: f64 = (0..length).map(square).sum();
+    let mut worst = sum;
+    for bin in length..rows.len() {
+        sum += square(bin) - square(bin - length);
+        worst = worst.max(sum);
+    }
+    worst / length.max(1) as f64
+}

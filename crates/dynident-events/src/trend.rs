@@ -1,0 +1,90 @@
+//! Slow changes during a log: drift of a torque offset, friction that changes with time.
+
+use crate::kind::EventKind;
+use crate::normal::Normal;
+use crate::rows::{LogRows, rms};
+use crate::scan::Scan;
+use crate::settings::EventSettings;
+
+/// A slow change of one joint's torque.
+#[derive(Clone, Debug)]
+pub(crate) struct Trend {
+    pub(crate) joint: usize,
+    pub(crate) kind: EventKind,
+    /// Root mean square of the change, Nm or N.
+    pub(crate) size_nm: f64,
+    /// Root mean square of the residual with the change in the model, Nm or N.
+    pub(crate) left_nm: f64,
+    /// First bin after a sudden change of the offset, and whether a step explains it clearly better than a slow change.
+    pub(crate) step: Option<usize>,
+}
+
+/// Residual of a step relative to that of a slow change (squares), below which the change was sudden.
+const MAX_STEP_RATIO: f64 = 0.7;
+/// Number of times at which a sudden change is tried first.
+const STEP_TIMES: usize = 40;
+
+/// Mean square residual and first bin of the best sudden change of one joint's offset.
+fn best_step(rows: &LogRows, joint: usize, kept: &[bool]) -> Option<(f64, usize)> {
+    let bins = rows.len();
+    let at = |first: usize| {
+        let step = |bin: usize, values: &mut Vec<f64>| values.push(f64::from(u8::from(bin >= first)));
+        let normal = Normal::of_range(rows, joint, 0..bins, |bin| kept[bin], step);
+        normal.solution().map(|theta| (normal.squares(&theta) / normal.bins, first))
+    };
+    let least = |found: Option<(f64, usize)>, next: (f64, usize)| match found {
+        Some(found) if found.0 <= next.0 => Some(found),
+        _ => Some(next),
+    };
+    let spacing = bins.div_ceil(STEP_TIMES).max(1);
+    let coarse = (spacing..bins).step_by(spacing).filter_map(at).fold(None, least)?;
+    let near = coarse.1.saturating_sub(spacing).max(1)..(coarse.1 + spacing).min(bins);
+    near.filter_map(at).fold(Some(coarse), least)
+}
+
+/// Slow changes that explain at least [`EventSettings::min_trend_share`] of a joint's residual.
+pub(crate) fn trends(rows: &LogRows, scan: &Scan, settings: &EventSettings) -> Vec<Trend> {
+    let bins = rows.len();
+    let place = |bin: usize| 2.0 * bin as f64 / (bins - 1).max(1) as f64 - 1.0;
+    let polynomials = |bin: usize| {
+        let x = place(bin);
+        [x, 1.5 * x * x - 0.5, 2.5 * x.powi(3) - 1.5 * x]
+    };
+    let mut found = Vec::new();
+    for joint in 0..rows.joints() {
+        let step = rows.step[joint];
+        let scale = rms(&rows.dq[joint]).max(f64::MIN_POSITIVE);
+        let drift = |bin: usize, values: &mut Vec<f64>| values.extend(polynomials(bin));
+        let warm_up = |bin: usize, values: &mut Vec<f64>| {
+            let dq = rows.dq[joint][bin];
+            for p in polynomials(bin) {
+                values.extend([p * (dq / step).tanh(), p * dq / scale]);
+            }
+        };
+        let squares = |further: &dyn Fn(usize, &mut Vec<f64>)| {
+            let normal = Normal::of_range(rows, joint, 0..bins, |bin| scan.kept[bin], further);
+            normal.solution().map(|theta| (normal.squares(&theta) / normal.bins, normal.bins))
+        };
+        let (Some((plain, _)), Some((drifting, _)), Some((warming, _))) =
+            (squares(&|_, _| ()), squares(&drift), squares(&warm_up))
+        else {
+            continue;
+        };
+        let torque = rms(&rows.tau[joint]);
+        let (kind, least) =
+            if drifting <= warming { (EventKind::Drift, drifting) } else { (EventKind::WarmUp, warming) };
+        let size_nm = (plain - least).max(0.0).sqrt();
+        if plain > 0.0
+            && plain - least >= settings.min_trend_share * plain
+            && size_nm >= settings.min_trend_effect * torque
+        {
+            let step = if kind == EventKind::Drift { best_step(rows, joint, &scan.kept) } else { None };
+            let step = step.filter(|(squares, _)| *squares < MAX_STEP_RATIO * least);
+            let (least, step) = step.map_or((least, None), |(squares, bin)| (squares, Some(bin)));
+            let size_nm = (plain - least).max(0.0).sqrt();
+            let kind = if step.is_some() { EventKind::OffsetChange } else { kind };
+            found.push(Trend { joint, kind, size_nm, left_nm: least.max(0.0).sqrt(), step });
+        }
+    }
+    found
+}

@@ -1,0 +1,114 @@
+//! A load that only one of several training logs carries.
+
+use super::parts::{Part, parts};
+use crate::between_logs::{fit_alone, fit_without};
+use crate::training::Training;
+use dynident_estimation::changes::{ChangeSettings, explanations};
+use dynident_estimation::{Estimate, EstimationError, WeightedSettings, weighted_least_squares};
+use dynident_model::terms::TorqueTerm;
+use nalgebra::{DMatrix, DVector};
+
+/// Smallest probability of all explanations with the body.
+const MIN_PROBABILITY: f64 = 0.95;
+
+/// Smallest mass of a load in its standard deviations.
+const MIN_DEVIATIONS: f64 = 5.0;
+
+/// A load that one training log carries and the others do not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LogLoad {
+    /// Number of the recording.
+    pub log: usize,
+    /// Index of the body.
+    pub body: usize,
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Standard deviation of the mass, kg.
+    pub mass_std_kg: f64,
+    /// Centre of mass in the frame of the body, m.
+    pub com_m: [f64; 3],
+    /// Probability that the body differs between the logs.
+    pub probability: f64,
+}
+
+/// Loads of single training logs: for each log, explanations of the difference between the fit to this log and the fit
+/// to the others, from their factors. Empty for a single log, and if the study declares payloads.
+///
+/// # Errors
+/// As [`weighted_least_squares`] and [`explanations`].
+pub(crate) fn log_loads(training: &Training, settings: &WeightedSettings) -> Result<Vec<LogLoad>, EstimationError> {
+    let problem = &training.problem;
+    let logs: Vec<usize> = training
+        .logs
+        .iter()
+        .filter(|log| log.factors.iter().any(|factor| factor.rows() > 0))
+        .map(|log| log.index)
+        .collect();
+    if logs.len() < 2 || logs.len() != problem.logs().len() || !training.columns.is_plain() {
+        return Ok(Vec::new());
+    }
+    let all = weighted_least_squares(problem, settings)?;
+    let mut found: Vec<LogLoad> = Vec::new();
+    // The difference of two logs is the same for both.
+    let tested = if logs.len() == 2 { 1 } else { logs.len() };
+    for log in 0..tested {
+        // A log that does not determine the parameters alone cannot be tested.
+        let fits = fit_alone(problem, log, settings, &all)
+            .and_then(|own| Ok((own, fit_without(problem, log, settings, &all)?)));
+        let Ok((own, others)) = fits else { continue };
+        let Some(mut load) = load_between(training, &own, &others)? else { continue };
+        load.log = logs[log];
+        if load.mass_kg < 0.0 {
+            if logs.len() > 2 {
+                continue;
+            }
+            load = LogLoad { log: logs[1], mass_kg: -load.mass_kg, ..load };
+        }
+        found.push(load);
+    }
+    Ok(found)
+}
+
+/// The load by which `own` differs from `others`; negative if the others have it.
+fn load_between(training: &Training, own: &Estimate, others: &Estimate) -> Result<Option<LogLoad>, EstimationError> {
+    let robot = &training.model.parametric;
+    let base = robot.base();
+    let is_fixed = |fit: &Estimate, row: usize| fit.rank.fixed.iter().any(|fixed| fixed.column == row);
+    let rows: Vec<usize> = (0..base.count()).filter(|&row| !is_fixed(own, row) && !is_fixed(others, row)).collect();
+    let difference = DVector::from_fn(rows.len(), |k, _| own.values[rows[k]] - others.values[rows[k]]);
+    let both = own.joint_covariance() + others.joint_covariance();
+    let covariance = DMatrix::from_fn(rows.len(), rows.len(), |a, b| both[(rows[a], rows[b])]);
+    let inertial = robot.model().inertial_count();
+    let size = |term: &TorqueTerm| {
+        let column = robot.terms().iter().position(|other| other == term).map(|place| inertial + place);
+        let row = base.independent().iter().position(|&independent| Some(independent) == column);
+        row.map_or(0.0, |row| {
+            let of = |fit: &Estimate| fit.values[row].abs() + fit.std[row];
+            of(own).max(of(others))
+        })
+    };
+    let parts = parts(robot.model(), base, &rows, &size);
+    if rows.is_empty() || parts.groups.is_empty() {
+        return Ok(None);
+    }
+    let found = explanations(&difference, &[covariance], &parts.groups, &ChangeSettings::default())?;
+    let Some(best) = found.first().filter(|best| best.groups.len() <= 2) else { return Ok(None) };
+    let mut loads = best.groups.iter().zip(&best.changes).filter_map(|(&group, (values, covariance))| {
+        let Part::Body(body) = parts.parts[group] else { return None };
+        let sizes = &parts.sizes[group];
+        let has_body = |own: &&dynident_estimation::changes::Explanation| own.groups.contains(&group);
+        let probability: f64 = found.iter().filter(has_body).map(|own| own.probability).sum();
+        let mass = values[0] * sizes[0];
+        Some(LogLoad {
+            log: 0,
+            body,
+            mass_kg: mass,
+            mass_std_kg: covariance[(0, 0)].max(0.0).sqrt() * sizes[0],
+            com_m: core::array::from_fn(|axis| values[axis + 1] * sizes[axis + 1] / mass),
+            probability,
+        })
+    });
+    let is_clear =
+        |load: &LogLoad| load.probability >= MIN_PROBABILITY && load.mass_kg.abs() >= MIN_DEVIATIONS * load.mass_std_kg;
+    Ok(loads.find(is_clear))
+}

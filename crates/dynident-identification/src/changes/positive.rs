@@ -1,0 +1,59 @@
+//! Explanations in which a body would have a negative mass.
+
+use super::description::DescriptionDifferences;
+use dynident_estimation::changes::Explanation;
+use dynident_estimation::normal_below;
+
+impl DescriptionDifferences {
+    /// Conditions the probabilities on positive masses of the bodies that an explanation names. The evidence of
+    /// normally distributed changes does not know that a body of 0.3 kg cannot lose 1 kg. Given m > 0 for each of these
+    /// bodies, the evidence of explanation e is multiplied by
+    ///
+    /// ```text
+    /// Π P_e(m > 0 | d) / P_e(m > 0)
+    /// ```
+    ///
+    /// (Gelfand, Smith and Lee, JASA 87 (1992) 523, section 2). `nominal` are the parameters of all bodies in the
+    /// description, ten for each.
+    pub(super) fn exclude_negative_masses(&mut self, nominal: &[f64]) {
+        let factors: Vec<f64> = self.explanations.iter().map(|own| self.positive_factor(own, nominal)).collect();
+        for (own, factor) in self.explanations.iter_mut().zip(factors) {
+            own.probability *= factor;
+        }
+        // Explanations without named bodies keep their factor 1, so the sum is positive.
+        let total: f64 = self.explanations.iter().map(|own| own.probability).sum();
+        for own in &mut self.explanations {
+            own.probability /= total;
+        }
+        self.explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    }
+
+    fn positive_factor(&self, explanation: &Explanation, nominal: &[f64]) -> f64 {
+        let of_body = |body: usize| {
+            let (change, covariance) = self.change_of(explanation, body);
+            let groups = explanation.groups.iter().filter(|&&group| self.bodies[group] == body);
+            let expected: f64 = groups.map(|&group| self.unknowns[group].row(0).norm_squared()).sum();
+            let mass = nominal[10 * body].max(0.0);
+            let before = positive(mass, explanation.scale.powi(2) * expected);
+            positive(mass + change[0], covariance[(0, 0)]) / before
+        };
+        self.bodies_of(explanation).into_iter().map(of_body).product()
+    }
+}
+
+/// Probability that a normal variable with this mean and variance is positive.
+fn positive(mean: f64, variance: f64) -> f64 {
+    if variance > 0.0 { normal_below(mean / variance.sqrt()) } else { f64::from(mean >= 0.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::positive;
+
+    #[test]
+    fn a_certain_value_is_positive_or_not() {
+        assert!((positive(1.0, 1.0) - 0.841_344_746).abs() < 1e-9);
+        assert!((positive(0.0, 4.0) - 0.5).abs() < 1e-12);
+        assert_eq!([positive(0.0, 0.0), positive(1.0, 0.0), positive(-1.0, 0.0)], [1.0, 1.0, 0.0]);
+    }
+}

@@ -1,0 +1,123 @@
+//! Columns by joint name, by file and by part; one row in n.
+
+use dynident_recording::{Log, LogFormat, LogReader, RawBlock};
+use std::fmt::Write as _;
+use std::path::Path;
+
+const JOINTS: [&str; 2] = ["elbow", "shoulder"];
+
+/// All rows of the log at `path`.
+fn read(path: &Path, format: &str) -> Result<RawBlock, String> {
+    let format: LogFormat = toml::from_str(format).unwrap();
+    let log = Log::file(path, format, &JOINTS.map(str::to_owned));
+    let mut reader = LogReader::open(&log).map_err(|error| error.to_string())?;
+    let (mut all, mut block) =
+        (RawBlock { q: vec![Vec::new(); 2], tau: vec![Vec::new(); 2], ..RawBlock::default() }, RawBlock::default());
+    while reader.next_block(&mut block).map_err(|error| error.to_string())? {
+        all.row.extend(&block.row);
+        all.time_s.extend(&block.time_s);
+        for joint in 0..2 {
+            all.q[joint].extend(&block.q[joint]);
+            all.tau[joint].extend(&block.tau[joint]);
+        }
+    }
+    Ok(all)
+}
+
+/// Time, then positions and torques of shoulder and elbow; the values show column and row.
+fn table(rows: impl Iterator<Item = usize>) -> String {
+    let mut text = "t,pos[shoulder],pos[elbow],tau[shoulder],tau[elbow]\n".to_owned();
+    for row in rows {
+        writeln!(text, "{},1{row},2{row},3{row},4{row}", row as f64 * 0.5).unwrap();
+    }
+    text
+}
+
+const BY_NAME: &str = "time.column = \"t\"\nposition.columns = \"pos[{joint}]\"\ntorque.columns = \"tau[{joint}]\"\n";
+
+#[test]
+fn columns_follow_the_names_of_joints() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, table(0..3)).unwrap();
+    let found = read(&path, BY_NAME).unwrap();
+    assert_eq!(found.q, [[20.0, 21.0, 22.0], [10.0, 11.0, 12.0]]);
+    assert_eq!(found.tau, [[40.0, 41.0, 42.0], [30.0, 31.0, 32.0]]);
+    let missing = read(&path, &BY_NAME.replace("pos[", "place[")).unwrap_err();
+    assert!(missing.contains("place[elbow]"), "{missing}");
+}
+
+#[test]
+fn one_row_in_n_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, thinned] = ["log.csv", "thinned.csv"].map(|name| folder.path().join(name));
+    for rows in [1, 6, 7, 9] {
+        std::fs::write(&path, table(0..rows)).unwrap();
+        std::fs::write(&thinned, table((0..rows).step_by(3))).unwrap();
+        for more in ["", "fraction = [0.0, 0.5]\n", "rows = [1, 3]\n", "drop_rows = [[0, 1]]\n"] {
+            let expected = read(&thinned, &format!("{more}{BY_NAME}"));
+            let found = read(&path, &format!("keep_every = 3\n{more}{BY_NAME}"));
+            assert_eq!(found.is_ok(), expected.is_ok(), "{rows} {more}");
+            assert_eq!(found.ok(), expected.ok(), "{rows} {more}");
+        }
+    }
+    // The rate is that of the file.
+    let at_rate = BY_NAME.replace("time.column = \"t\"", "rate_hz = 2.0");
+    assert_eq!(read(&path, &format!("keep_every = 4\n{at_rate}")).unwrap().time_s, [0.0, 2.0, 4.0]);
+    let refused = read(&path, &format!("keep_every = 0\n{BY_NAME}")).unwrap_err();
+    assert!(refused.contains("keep_every"), "{refused}");
+}
+
+#[test]
+fn a_log_may_have_a_file_for_each_joint_and_for_the_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("shoulder.csv", "q,tau\n10,30\n11,31\n");
+    write("elbow.csv", "q,tau\n20,40\n21,41\n");
+    write("clock.csv", "t\n5.0\n5.5\n");
+    let format = "time = { column = \"t\", file = \"clock.csv\" }\n\
+        position = { columns = \"q\", file = \"{joint}.csv\" }\ntorque = { columns = \"tau\", file = \"{joint}.csv\" }\n";
+    let found = read(&folder.path().join("shoulder.csv"), format).unwrap();
+    assert_eq!(
+        (found.time_s, found.q, found.tau),
+        (vec![0.0, 0.5], vec![vec![20.0, 21.0], vec![10.0, 11.0]], vec![vec![40.0, 41.0], vec![30.0, 31.0]])
+    );
+
+    // Numbers in the names of files, and one column for each of them.
+    for (name, old) in [("axis1.csv", "elbow.csv"), ("axis2.csv", "shoulder.csv")] {
+        std::fs::copy(folder.path().join(old), folder.path().join(name)).unwrap();
+    }
+    let numbered = format.replace("{joint}.csv", "axis{1..2}.csv");
+    assert_eq!(read(&folder.path().join("axis1.csv"), &numbered).unwrap().q, [[20.0, 21.0], [10.0, 11.0]]);
+    let refused = read(&folder.path().join("axis1.csv"), &format.replace("{joint}.csv", "axis{1..3}.csv")).unwrap_err();
+    assert!(refused.contains("position"), "{refused}");
+    write("axis2.csv", "q,tau\n10,30\n");
+    let refused = read(&folder.path().join("axis1.csv"), &numbered).unwrap_err();
+    assert!(refused.contains("axis2.csv"), "{refused}");
+}
+
+#[test]
+fn a_pattern_names_columns_without_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, table(0..3).lines().skip(1).collect::<Vec<_>>().join("\n")).unwrap();
+    let format = "time.column = \"0\"\nposition.columns = \"{1..2}\"\ntorque.columns = [4, \"3\"]\n";
+    let found = read(&path, format).unwrap();
+    assert_eq!((found.q[0][1], found.q[1][1], found.tau[0][1], found.tau[1][1]), (11.0, 21.0, 41.0, 31.0));
+    assert!(read(&path, &format.replace("\"3\"", "\"9\"")).unwrap_err().contains("`9`"));
+}
+
+#[test]
+fn a_part_of_a_file_is_a_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.jsonl");
+    let row = |part: &str, k: usize| format!("\"{part}\": {{\"t\": {k}, \"q\": [1{k}, 2{k}], \"tau\": [3{k}, 4{k}]}}");
+    let lines: Vec<String> = (0..3).map(|k| format!("{{{}, {}}}", row("first", k), row("second", k + 5))).collect();
+    std::fs::write(&path, lines.join("\n") + "\n").unwrap();
+    let format = "time.column = \"t\"\nposition.columns = \"q[{0..1}]\"\ntorque.columns = \"tau[{0..1}]\"\n";
+    let of_part = |part: &str| read(&path, &format!("part = \"{part}\"\n{format}"));
+    assert_eq!(of_part("first").unwrap().q, [[10.0, 11.0, 12.0], [20.0, 21.0, 22.0]]);
+    assert_eq!(of_part("second").unwrap().q[0], [15.0, 16.0, 17.0]);
+    let message = of_part("third").unwrap_err();
+    assert!(message.contains("`part`") && message.contains("`third`"), "{message}");
+}

@@ -1,0 +1,305 @@
+//! The coordinates whose simulated motion is most like the measured one.
+//!
+//! The errors `e` of joint `j` give the cost `Σ_j n_j / c_j · ln(mean e² + floor²) + Σ (z / sd)²`: minus twice the
+//! logarithm of a normal density with unknown variance of each joint, and of the priors. `c_j` is the number of
+//! neighbouring samples with the same error. Levenberg and Marquardt's method decreases the cost, with exact
+//! derivatives of the simulation.
+//!
+//! The search begins at the given coordinates and at those of the joints' responses (`start.rs`). From each it descends
+//! with long time steps and short simulations that restart from the measured motion, which leave few local minima, then
+//! without restarts. The better end is refined with accurate time steps.
+
+use crate::error::ServoError;
+use crate::normal::{JointTotal, Simulation, period_sums, sums, symmetric, totals};
+use crate::parameters::{Change, FreeParameter, ServoRobot, VariedRobot};
+use crate::run::Run;
+use crate::settings::ServoSettings;
+use crate::start::response_coordinates;
+use crate::step_state::Stepping;
+use nalgebra::{DMatrix, DVector};
+
+/// The first stages simulate with steps this many times longer.
+const COARSE: f64 = 4.0;
+/// Time between restarts in the first stage, s: longer than the response of a servo.
+const RESTART_S: f64 = 0.5;
+/// Largest difference of coordinates of starts that are treated as one.
+const SAME_START: f64 = 1e-3;
+/// Most steps of each of the first stages.
+const ROUGH_ITERATIONS: usize = 15;
+/// The first stages end when the cost falls by less than this.
+const ROUGH_TOLERANCE: f64 = 1.0;
+/// Most periods of all runs together, which need memory for a matrix each.
+const MOST_PERIODS: f64 = 500.0;
+/// First value of the number of neighbouring samples with the same error.
+const FIRST_CORRELATED: f64 = 25.0;
+/// Longest change of the logarithm of a value in one step; other coordinates change at most by their prior deviation.
+const LONGEST_STEP: f64 = 1.0;
+/// Most attempts to find a shorter step that decreases the cost.
+const ATTEMPTS: usize = 12;
+
+/// The end of a search.
+#[derive(Clone, Debug)]
+pub struct Search {
+    /// Coordinates of the unknowns.
+    pub coordinates: Vec<f64>,
+    /// Their covariance by a jackknife over periods: robust to errors of the model that last shorter than a period.
+    pub covariance: DMatrix<f64>,
+    /// Information of the data alone: the Hessian of half of the cost without the priors.
+    pub information: DMatrix<f64>,
+    /// Cost, in units of minus twice the log-likelihood.
+    pub cost: f64,
+    /// Root mean square error of each joint over all runs, rad (m).
+    pub errors: Vec<f64>,
+    /// Number of steps.
+    pub iterations: usize,
+    /// Whether the last step changed the cost by less than the tolerance.
+    pub settled: bool,
+}
+
+/// Cost and its derivatives at some coordinates.
+struct Point {
+    totals: Vec<JointTotal>,
+    cost: f64,
+    weights: Vec<f64>,
+}
+
+/// A search among the coordinates of the unknowns.
+struct Searcher<'a> {
+    nominal: &'a ServoRobot,
+    parameters: &'a [FreeParameter],
+    runs: &'a [Run],
+    settings: &'a ServoSettings,
+    stepping: Stepping,
+    /// Decrease of the cost at which a descent ends.
+    tolerance: f64,
+    /// Number of neighbouring samples with the same error, for each joint.
+    correlated: Vec<f64>,
+}
+
+impl Searcher<'_> {
+    fn simulation(&self, with_derivatives: bool) -> Simulation {
+        let length = |run: &Run| run.times_s[run.times_s.len() - 1] - run.times_s[0];
+        let total_s: f64 = self.runs.iter().map(length).sum();
+        let period_s = self.settings.period_s.max(total_s / MOST_PERIODS);
+        Simulation { stepping: self.stepping, period_s, with_derivatives }
+    }
+
+    fn point(&self, z: &[f64], with_derivatives: bool) -> Option<Point> {
+        let varied = VariedRobot::new(self.nominal, self.parameters, z).ok()?;
+        let totals = totals(&sums(&varied, self.runs, self.simulation(with_derivatives))?);
+        let variance = |total: &JointTotal| total.squares / total.count + self.settings.least_error.powi(2);
+        let data: f64 =
+            totals.iter().zip(&self.correlated).map(|(total, c)| total.count / c * variance(total).ln()).sum();
+        let prior: f64 = self.parameters.iter().zip(z).map(|(p, z)| (z / p.prior_sd).powi(2)).sum();
+        let weights = totals.iter().zip(&self.correlated).map(|(total, c)| 1.0 / (c * variance(total))).collect();
+        Some(Point { totals, cost: data + prior, weights })
+    }
+
+    /// Hessian of half of the data's cost, and its negative gradient.
+    fn information(&self, point: &Point) -> (DMatrix<f64>, DVector<f64>) {
+        let columns = self.parameters.len();
+        let (mut gram, mut moment) = (DMatrix::zeros(columns, columns), DVector::zeros(columns));
+        for (total, &weight) in point.totals.iter().zip(&point.weights) {
+            gram += &total.gram * weight;
+            for period in &total.moments {
+                moment.axpy(weight, period, 1.0);
+            }
+        }
+        (gram, moment)
+    }
+
+    fn with_priors(&self, gram: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut matrix = gram.clone();
+        for (k, parameter) in self.parameters.iter().enumerate() {
+            matrix[(k, k)] += parameter.prior_sd.powi(-2);
+        }
+        matrix
+    }
+
+    /// Steps until the cost settles. Returns the number of steps and whether it did.
+    fn descend(&self, z: &mut Vec<f64>, now: &mut Point, most: usize) -> (usize, bool) {
+        let mut damping = 1e-3;
+        for iteration in 1..=most {
+            let (gram, mut moment) = self.information(now);
+            for (k, parameter) in self.parameters.iter().enumerate() {
+                moment[k] -= z[k] / parameter.prior_sd.powi(2);
+            }
+            let matrix = self.with_priors(&gram);
+            let Some(next) = self.lower(z, now.cost, &matrix, &moment, &mut damping) else {
+                return (iteration, true);
+            };
+            let Some(point) = self.point(&next, true) else { return (iteration, false) };
+            let fall = now.cost - point.cost;
+            *z = next;
+            *now = point;
+            if fall < self.tolerance {
+                return (iteration, true);
+            }
+        }
+        (most, false)
+    }
+
+    /// Coordinates with a lower cost; `None` if no step decreases it by more than the tolerance.
+    fn lower(
+        &self,
+        z: &[f64],
+        cost: f64,
+        matrix: &DMatrix<f64>,
+        moment: &DVector<f64>,
+        damping: &mut f64,
+    ) -> Option<Vec<f64>> {
+        for _ in 0..ATTEMPTS {
+            let mut damped = matrix.clone();
+            for k in 0..z.len() {
+                damped[(k, k)] *= 1.0 + *damping;
+            }
+            let mut step = damped.cholesky()?.solve(moment);
+            if step.dot(moment) < 0.01 * self.tolerance {
+                return None;
+            }
+            let excess = |(step, parameter): (&f64, &FreeParameter)| match parameter.change {
+                Change::Factor => step.abs() / LONGEST_STEP,
+                Change::Sum => step.abs() / parameter.prior_sd,
+            };
+            let excess = step.iter().zip(self.parameters).map(excess).fold(0.0, f64::max);
+            if excess > 1.0 {
+                step /= excess;
+            }
+            let next: Vec<f64> = z.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
+            if self.point(&next, false).is_some_and(|point| point.cost < cost) {
+                *damping = (*damping * 0.2).max(1e-9);
+                return Some(next);
+            }
+            *damping *= 5.0;
+        }
+        None
+    }
+
+    /// Number of neighbouring samples with the same error, for each joint: the variance of the periods' moments over
+    /// that of independent samples, median over the coordinates.
+    fn correlated(&self, point: &Point) -> Vec<f64> {
+        let of_joint = |total: &JointTotal| {
+            let variance = total.squares / total.count;
+            let mut ratios: Vec<f64> = (0..self.parameters.len())
+                .filter(|&k| total.gram[(k, k)] > 0.0)
+                .map(|k| {
+                    let together: f64 = total.moments.iter().map(|moment| moment[k].powi(2)).sum();
+                    together / (variance * total.gram[(k, k)])
+                })
+                .collect();
+            ratios.sort_by(f64::total_cmp);
+            ratios.get(ratios.len() / 2).map_or(1.0, |ratio| ratio.max(1.0))
+        };
+        point.totals.iter().map(of_joint).collect()
+    }
+
+    /// Covariance of the coordinates: from the priors, and from the changes `(H - G)⁻¹ s` without one of the periods,
+    /// which has the information `G` and the moments `s` (jackknife over clusters: MacKinnon and White 1985; Bell and
+    /// McCaffrey 2002). The moments alone (White 1980) are too small if one period determines much of a coordinate.
+    fn covariance(&self, z: &[f64], point: &Point, gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let columns = self.parameters.len();
+        let hessian = self.with_priors(gram);
+        let inverse = hessian.clone().cholesky()?.inverse();
+        let varied = VariedRobot::new(self.nominal, self.parameters, z).ok()?;
+        let periods = period_sums(&varied, self.runs, self.simulation(true), &point.weights)?;
+        let count = periods.len() as f64;
+        if count < 2.0 {
+            return Some(inverse);
+        }
+        let changes: Vec<DVector<f64>> = periods
+            .iter()
+            .map(|period| {
+                let rest = &hessian - symmetric(&period.gram, columns);
+                Some(rest.cholesky()?.solve(&DVector::from_column_slice(&period.moment)))
+            })
+            .collect::<Option<_>>()?;
+        let mean = changes.iter().sum::<DVector<f64>>() / count;
+        let priors = self.parameters.iter().map(|parameter| parameter.prior_sd.powi(-2));
+        let priors = DMatrix::from_diagonal(&DVector::from_iterator(columns, priors));
+        let mut covariance = &inverse * priors * &inverse;
+        for change in &changes {
+            let own = change - &mean;
+            covariance.ger((count - 1.0) / count, &own, &own, 1.0);
+        }
+        Some(covariance)
+    }
+
+    /// The better of the ends of descents from `starts`; `None` if no start can be simulated.
+    fn best_of(&mut self, starts: Vec<Vec<f64>>) -> (Option<Vec<f64>>, usize) {
+        let (mut best, mut iterations): (Option<(f64, Vec<f64>)>, usize) = (None, 0);
+        let step_s = COARSE * self.settings.step_s;
+        for mut z in starts {
+            let mut cost = f64::INFINITY;
+            for restart_s in [RESTART_S, f64::INFINITY] {
+                self.stepping = Stepping { step_s, end_weight: 1.0, restart_s };
+                let Some(mut now) = self.point(&z, true) else { continue };
+                iterations += self.descend(&mut z, &mut now, ROUGH_ITERATIONS.min(self.settings.iterations)).0;
+                cost = now.cost;
+            }
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, z));
+            }
+        }
+        (best.filter(|(cost, _)| cost.is_finite()).map(|(_, z)| z), iterations)
+    }
+}
+
+/// Searches for the coordinates with the least cost: first with long time steps, then with those of the settings.
+///
+/// # Errors
+/// Invalid settings or runs; a first simulation that fails.
+pub fn search(
+    nominal: &ServoRobot,
+    parameters: &[FreeParameter],
+    start: &[f64],
+    runs: &[Run],
+    settings: &ServoSettings,
+) -> Result<Search, ServoError> {
+    settings.validate()?;
+    let first = runs.first().ok_or(ServoError::NoRuns)?;
+    for run in runs {
+        run.validate(nominal.model.dof())?;
+    }
+    let no_start = || ServoError::Start { run: first.name.clone() };
+    let mut searcher = Searcher {
+        nominal,
+        parameters,
+        runs,
+        settings,
+        stepping: Stepping::accurate(settings.step_s),
+        tolerance: settings.tolerance.max(ROUGH_TOLERANCE),
+        correlated: vec![FIRST_CORRELATED; nominal.model.dof()],
+    };
+    let mut starts = vec![start.to_vec()];
+    let responses = response_coordinates(nominal, parameters, runs);
+    if responses.iter().zip(start).any(|(response, start)| (response - start).abs() > SAME_START) {
+        starts.push(responses);
+    }
+    let (z, mut iterations) = searcher.best_of(starts);
+    let mut z = z.ok_or_else(no_start)?;
+    let mut now = searcher.point(&z, true).ok_or_else(no_start)?;
+    searcher.correlated = searcher.correlated(&now);
+    searcher.stepping = Stepping::accurate(settings.step_s);
+    let mut settled = false;
+    // The number of neighbouring samples with the same error is that at the end of the search.
+    for tolerance in [settings.tolerance.max(ROUGH_TOLERANCE), settings.tolerance] {
+        searcher.tolerance = tolerance;
+        now = searcher.point(&z, true).ok_or_else(no_start)?;
+        let (steps, ended) = searcher.descend(&mut z, &mut now, settings.iterations);
+        (iterations, settled) = (iterations + steps, ended);
+        if tolerance > settings.tolerance {
+            searcher.correlated = searcher.correlated(&now);
+        }
+    }
+    let (information, _) = searcher.information(&now);
+    let covariance = searcher.covariance(&z, &now, &information).ok_or_else(no_start)?;
+    Ok(Search {
+        covariance,
+        information,
+        cost: now.cost,
+        errors: now.totals.iter().map(|total| (total.squares / total.count).sqrt()).collect(),
+        coordinates: z,
+        iterations,
+        settled,
+    })
+}

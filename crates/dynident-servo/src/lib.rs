@@ -1,0 +1,43 @@
+//! Which drives and bodies turn a robot's commands into the motion that was measured?
+//!
+//! For robots without torque sensors: servo arms, and every robot behind its own position loop. [`search`] fits the
+//! drives ([`Drive`]) and bodies of a [`ServoRobot`] so that its simulated motion along the recorded commands of the
+//! [`Run`]s is most like the measured one (output-error method: Gautier, Janot and Vandanjon, IEEE TCST 2013; Brunot et
+//! al., ASME JDSMC 142, 2020).
+#![forbid(unsafe_code)]
+
+mod command;
+#[cfg(test)]
+mod derivative_tests;
+mod design;
+mod drive;
+mod error;
+mod fit;
+mod floor;
+mod normal;
+mod parameters;
+mod quantity;
+mod rollout;
+mod run;
+mod sensitivity;
+mod settings;
+mod start;
+mod step;
+mod step_state;
+mod unknowns;
+mod validation;
+mod values;
+
+pub use design::{CommandRange, DesignedCommands, Forecast, MotionCheck, ServoDesignSettings, design_commands};
+pub use drive::Drive;
+pub use error::{RunFault, ServoError};
+pub use fit::{Search, search};
+pub use floor::{Floor, FloorPoint};
+pub use parameters::{Change, FreeParameter, ServoRobot, robot_at};
+pub use quantity::{Axis, Quantity};
+pub use run::Run;
+pub use settings::ServoSettings;
+pub use start::start_drives;
+pub use unknowns::unknowns;
+pub use validation::{errors, simulate};
+pub use values::{Scale, ServoValue, values};

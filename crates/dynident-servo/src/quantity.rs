@@ -1,0 +1,104 @@
+//! The numbers of a drive and of a body that a fit can change.
+
+use serde::{Deserialize, Serialize};
+
+/// A number of one joint's drive, or of one body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum Quantity {
+    /// Position gain `kp`, Nm/rad (N/m).
+    Stiffness,
+    /// Torque per velocity, Nm s/rad (N s/m): gain of the velocity, viscous friction and back-EMF together.
+    Damping,
+    /// Inertia of rotor and gear at the joint, kg m² (kg).
+    Armature,
+    /// Coulomb friction without load, Nm (N).
+    Coulomb,
+    /// Friction per torque that the gear carries, without unit.
+    LoadFriction,
+    /// Friction at rest above that in motion, Nm (N).
+    Stribeck,
+    /// Largest torque of the motor, Nm (N).
+    TorqueLimit,
+    /// Time from a command to its effect, s.
+    Delay,
+    /// Time from a stamp to the measurement of the position, s.
+    ReadDelay,
+    /// Position of the model minus the measured position, rad (m).
+    Zero,
+    /// Height of the floor, m.
+    FloorHeight,
+    /// Mass of a body; its inertia about the centre of mass grows in proportion. kg.
+    Mass,
+    /// Centre of mass of a body along one axis of its frame, m.
+    Centre(Axis),
+}
+
+/// Axis of a body's frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// First axis.
+    X,
+    /// Second axis.
+    Y,
+    /// Third axis.
+    Z,
+}
+
+impl Quantity {
+    /// Name in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stiffness => "stiffness",
+            Self::Damping => "damping",
+            Self::Armature => "armature",
+            Self::Coulomb => "Coulomb friction",
+            Self::LoadFriction => "friction per load",
+            Self::Stribeck => "extra friction at rest",
+            Self::TorqueLimit => "torque limit",
+            Self::Delay => "delay",
+            Self::ReadDelay => "read delay",
+            Self::Zero => "zero",
+            Self::FloorHeight => "height of the floor",
+            Self::Mass => "mass",
+            Self::Centre(Axis::X) => "centre of mass, x",
+            Self::Centre(Axis::Y) => "centre of mass, y",
+            Self::Centre(Axis::Z) => "centre of mass, z",
+        }
+    }
+
+    /// Unit for a rotary joint, or for a slide.
+    pub fn unit(self, is_rotary: bool) -> &'static str {
+        match (self, is_rotary) {
+            (Self::Stiffness, true) => "Nm/rad",
+            (Self::Stiffness, false) => "N/m",
+            (Self::Damping, true) => "Nm s/rad",
+            (Self::Damping, false) => "N s/m",
+            (Self::Armature, true) => "kg m²",
+            (Self::Armature, false) | (Self::Mass, _) => "kg",
+            (Self::Coulomb | Self::Stribeck | Self::TorqueLimit, true) => "Nm",
+            (Self::Coulomb | Self::Stribeck | Self::TorqueLimit, false) => "N",
+            (Self::LoadFriction, _) => "",
+            (Self::Delay | Self::ReadDelay, _) => "s",
+            (Self::Zero, true) => "rad",
+            (Self::Zero, false) | (Self::FloorHeight | Self::Centre(_), _) => "m",
+        }
+    }
+
+    /// Whether the value is a torque, an inertia or a mass, which positions give only up to one common factor.
+    pub fn has_scale(self) -> bool {
+        matches!(
+            self,
+            Self::Stiffness
+                | Self::Damping
+                | Self::Armature
+                | Self::Coulomb
+                | Self::Stribeck
+                | Self::TorqueLimit
+                | Self::Mass
+        )
+    }
+}

@@ -1,0 +1,210 @@
+//! The motion that a robot's drives make of recorded commands.
+//!
+//! One step of length `h` with the state `(q, v)` at its beginning solves for the velocity `x` at its end
+//!
+//! ```text
+//! τ(q + (1 - w) h v, v, a) + armature a = t(u)        a = (x - v) / h        u = w x + (1 - w) v        q' = q + h u
+//! ```
+//!
+//! where `τ` is the inverse dynamics of the bodies and `t` the torque of the drives (`step.rs`). With the weight
+//! `w = 1/2` the smooth parts are exact to second order: their midpoint rule adds no damping, whereas `w = 1` adds
+//! stiffness × h. Dry friction has the sign of `x`. The derivatives are in `sensitivity.rs`.
+
+use crate::command::HeldCommand;
+use crate::parameters::VariedRobot;
+use crate::quantity::Quantity;
+use crate::run::Run;
+use crate::sensitivity::Sensitivity;
+use crate::step::{JointLaw, StepSolver};
+use crate::step_state::{StepState, Stepping};
+use dynident_dynamics::{Workspace, mass_matrix_and_bias};
+use dynident_model::Model;
+
+/// A simulation along the commands of one run.
+#[derive(Debug)]
+pub(crate) struct Rollout<'a> {
+    varied: &'a VariedRobot,
+    run: &'a Run,
+    /// The bodies with the run's payloads.
+    model: Model,
+    workspace: Workspace,
+    solver: StepSolver,
+    step: StepState,
+    stepping: Stepping,
+    /// If derivatives are computed.
+    sensitivity: Option<Sensitivity>,
+}
+
+/// The simulated position of one joint at one stamp, and its derivatives.
+pub(crate) struct Predicted<'a> {
+    pub(crate) joint: usize,
+    pub(crate) sample: usize,
+    pub(crate) position: f64,
+    /// One value for each coordinate; empty without derivatives.
+    pub(crate) derivatives: &'a [f64],
+}
+
+impl<'a> Rollout<'a> {
+    /// `None` if a payload of the run has no valid body.
+    pub(crate) fn new(
+        varied: &'a VariedRobot,
+        run: &'a Run,
+        stepping: Stepping,
+        with_derivatives: bool,
+    ) -> Option<Self> {
+        let dof = varied.robot.model.dof();
+        let points = varied.robot.floor.as_ref().map_or(0, |floor| floor.points.len());
+        let model = with_payloads(&varied.robot.model, run)?;
+        let q = run.positions.iter().map(|joint| joint[0]).collect();
+        let step = StepState::at_rest(q, &stepping, points);
+        Some(Self {
+            varied,
+            run,
+            workspace: Workspace::new(&model),
+            model,
+            solver: StepSolver::new(dof),
+            step,
+            stepping,
+            sensitivity: with_derivatives.then(|| Sensitivity::new(dof, varied.columns)),
+        })
+    }
+
+    /// Simulates from the first measured position at rest to the last stamp, and calls `each` for each joint and stamp
+    /// in order of time. Returns false if a step has no solution, or the motion is not a number.
+    #[must_use]
+    pub(crate) fn simulate(mut self, mut each: impl FnMut(&Predicted<'_>)) -> bool {
+        let drives = &self.varied.robot.drives;
+        let stamps = &self.run.times_s;
+        let latest = drives.iter().map(|drive| drive.read_delay_s).fold(0.0, f64::max);
+        let (start, end) = (stamps[0], stamps[stamps.len() - 1] + latest);
+        let mut commands: Vec<HeldCommand<'_>> =
+            self.run.commands.iter().map(|values| HeldCommand::held(stamps, values)).collect();
+        let mut next = vec![0; drives.len()];
+        let mut derivatives = vec![0.0; if self.sensitivity.is_some() { self.varied.columns } else { 0 }];
+        let h = self.step.h;
+        let steps = ((end - start) / h).floor() as usize + 1;
+        let period = (self.stepping.restart_s / h).max(1.0);
+        for step in 0..steps {
+            let from = start + h * step as f64;
+            let to = from + h;
+            // The conversion saturates without restarts.
+            if step > 0 && step % period as usize == 0 {
+                self.restart(from);
+            }
+            if !self.advance(&mut commands, from, to) {
+                return false;
+            }
+            for (joint, next) in next.iter_mut().enumerate() {
+                while let Some(stamp) = stamps.get(*next) {
+                    let rest = to - (stamp + drives[joint].read_delay_s);
+                    if rest <= 0.0 {
+                        break;
+                    }
+                    self.derivatives_before_end(joint, rest, &mut derivatives);
+                    let position = self.step.q[joint] - rest * self.step.mean[joint];
+                    each(&Predicted { joint, sample: *next, position, derivatives: &derivatives });
+                    *next += 1;
+                }
+            }
+        }
+        self.step.q.iter().all(|q| q.is_finite())
+    }
+
+    fn derivatives_before_end(&self, joint: usize, rest: f64, out: &mut [f64]) {
+        let Some(sensitivity) = &self.sensitivity else { return };
+        sensitivity.before_end(joint, rest, out);
+        let is_own = |quantity: Quantity, index: usize| quantity == Quantity::ReadDelay && index == joint;
+        for effect in self.varied.effects.iter().filter(|effect| is_own(effect.quantity, effect.index)) {
+            out[effect.column] += self.step.mean[joint] * effect.derivative;
+        }
+    }
+
+    /// Makes one step. Returns false without a solution.
+    fn advance(&mut self, commands: &mut [HeldCommand<'_>], from: f64, to: f64) -> bool {
+        self.set_equation(commands, from, to);
+        let step = &mut self.step;
+        if !self.solver.solve(&step.a, &step.w, &mut step.laws, &mut step.x) {
+            return false;
+        }
+        let weight = step.end_weight;
+        for ((mean, x), v) in step.mean.iter_mut().zip(&step.x).zip(&step.v) {
+            *mean = weight * x + (1.0 - weight) * v;
+        }
+        if let Some(sensitivity) = &mut self.sensitivity {
+            sensitivity.advance(self.varied, (&self.model, &mut self.workspace), &self.solver, step);
+        }
+        step.v.copy_from_slice(&step.x);
+        for (q, mean) in step.q.iter_mut().zip(&step.mean) {
+            *q += step.h * mean;
+        }
+        true
+    }
+
+    /// Sets the state to the measured motion at time `at`.
+    fn restart(&mut self, at: f64) {
+        let drives = &self.varied.robot.drives;
+        for (joint, drive) in drives.iter().enumerate() {
+            (self.step.q[joint], self.step.v[joint]) = self.run.measured(joint, at - drive.read_delay_s);
+        }
+        if let Some(sensitivity) = &mut self.sensitivity {
+            sensitivity.restart();
+        }
+    }
+
+    /// Sets matrix, right side and laws of the step.
+    fn set_equation(&mut self, commands: &mut [HeldCommand<'_>], from: f64, to: f64) {
+        let (robot, step) = (&self.varied.robot, &mut self.step);
+        let dof = step.q.len();
+        let (weight, h) = (step.end_weight, step.h);
+        // Part of the mean velocity that is known before the step.
+        let known = 1.0 - weight;
+        for (joint, drive) in robot.drives.iter().enumerate() {
+            step.in_model[joint] = step.q[joint] + drive.zero + known * h * step.v[joint];
+        }
+        let (mass, bias) = mass_matrix_and_bias(&self.model, &mut self.workspace, &step.in_model, &step.v);
+        step.loads.copy_from_slice(bias);
+        for (a, mass) in step.a.iter_mut().zip(mass) {
+            *a = mass / step.h;
+        }
+        for (joint, drive) in robot.drives.iter().enumerate() {
+            step.a[joint * dof + joint] += drive.armature / step.h;
+            let (command, rate) = commands[joint].mean(from - drive.delay_s, to - drive.delay_s);
+            step.command_rates[joint] = -rate;
+            step.at_rest[joint] = (-(step.v[joint] / drive.stribeck_speed).powi(2)).exp();
+            step.laws.joints[joint] = JointLaw {
+                pull: drive.stiffness * (command - step.q[joint] - weight * known * h * step.v[joint]),
+                slope: drive.stiffness * h * weight * weight,
+                limit: drive.torque_limit,
+                damping: drive.damping * weight,
+                friction: drive.coulomb
+                    + drive.load_friction * step.loads[joint].abs()
+                    + drive.stribeck * step.at_rest[joint],
+            };
+            let row = &step.a[joint * dof..(joint + 1) * dof];
+            step.w[joint] = row.iter().zip(&step.v).map(|(a, v)| a * v).sum::<f64>()
+                - step.loads[joint]
+                - drive.damping * known * step.v[joint];
+        }
+        let Some(floor) = &robot.floor else { return };
+        for ((point, height), contact) in floor.points.iter().zip(&mut step.heights).zip(&mut step.laws.contacts) {
+            height.compute(&self.model, &mut self.workspace, &step.q, point);
+            let rise: f64 = height.first.iter().zip(&step.v).map(|(j, v)| j * v).sum();
+            contact.push = floor.stiffness * (floor.height_m - height.height - known * h * rise);
+            contact.slope = floor.stiffness * h * weight;
+            contact.by_joint.copy_from_slice(&height.first);
+        }
+    }
+}
+
+/// The model with the payloads of a run.
+fn with_payloads(model: &Model, run: &Run) -> Option<Model> {
+    if run.payloads.is_empty() {
+        return Some(model.clone());
+    }
+    let mut inertials = model.inertials().to_vec();
+    for (body, payload) in &run.payloads {
+        let inertial = inertials.get_mut(*body)?;
+        *inertial = inertial.plus(payload);
+    }
+    model.with_inertials(&inertials).ok()
+}

@@ -1,0 +1,70 @@
+//! A recorded run: commands and measured positions.
+
+use crate::error::{RunFault, ServoError};
+use dynident_model::InertialParameters;
+
+/// Longest time between two samples, s: the simulation continues with the command before a gap.
+const LONGEST_GAP_S: f64 = 10.0;
+/// Samples before and after a time that give its velocity: quantisation makes single differences noisy.
+const VELOCITY_SAMPLES: usize = 2;
+/// Least number of samples of a run.
+const LEAST_SAMPLES: usize = 20;
+
+/// A recording of commands and measured positions of all joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Name in messages.
+    pub name: String,
+    /// Stamps, s, rising.
+    pub times_s: Vec<f64>,
+    /// Commands of each joint at the stamps, rad (m); each holds until the next.
+    pub commands: Vec<Vec<f64>>,
+    /// Measured positions of each joint at the stamps, rad (m).
+    pub positions: Vec<Vec<f64>>,
+    /// Known loads during the run: body, and inertial parameters in its frame.
+    pub payloads: Vec<(usize, InertialParameters)>,
+}
+
+impl Run {
+    /// # Errors
+    /// Columns that do not fit the robot's joints, too few samples, stamps that do not rise, values that are not
+    /// numbers.
+    pub fn validate(&self, joints: usize) -> Result<(), ServoError> {
+        self.fault(joints).map_or(Ok(()), |fault| Err(ServoError::Run { run: self.name.clone(), fault }))
+    }
+
+    /// Measured position of a joint at a time, interpolated, and its mean velocity over the samples nearby.
+    pub(crate) fn measured(&self, joint: usize, time_s: f64) -> (f64, f64) {
+        let (times, positions) = (&self.times_s, &self.positions[joint]);
+        let last = times.len() - 1;
+        let after = times.partition_point(|time| *time <= time_s).clamp(1, last);
+        let part = ((time_s - times[after - 1]) / (times[after] - times[after - 1])).clamp(0.0, 1.0);
+        let position = positions[after - 1] + part * (positions[after] - positions[after - 1]);
+        let (from, to) = (after.saturating_sub(VELOCITY_SAMPLES), (after + VELOCITY_SAMPLES - 1).min(last));
+        (position, (positions[to] - positions[from]) / (times[to] - times[from]))
+    }
+
+    fn fault(&self, joints: usize) -> Option<RunFault> {
+        let samples = self.times_s.len();
+        let columns = || self.commands.iter().chain(&self.positions);
+        for found in [self.commands.len(), self.positions.len()] {
+            if found != joints {
+                return Some(RunFault::Joints { found, expected: joints });
+            }
+        }
+        if columns().any(|column| column.len() != samples) {
+            return Some(RunFault::Lengths);
+        }
+        if samples < LEAST_SAMPLES {
+            return Some(RunFault::Samples { found: samples, least: LEAST_SAMPLES });
+        }
+        if let Some(sample) = columns().find_map(|column| column.iter().position(|value| !value.is_finite())) {
+            return Some(RunFault::NotANumber { sample });
+        }
+        let rises = |pair: &[f64]| pair[1] > pair[0] && pair[1].is_finite();
+        let stamps = self.times_s.windows(2).position(|pair| !rises(pair));
+        let gap = || self.times_s.windows(2).position(|pair| pair[1] - pair[0] > LONGEST_GAP_S);
+        let of_gap = |at: usize| RunFault::Gap { sample: at + 1, gap_s: self.times_s[at + 1] - self.times_s[at] };
+        stamps.map(|at| RunFault::Stamps { sample: at + 1 }).or_else(|| gap().map(of_gap))
+    }
+}

@@ -1,0 +1,103 @@
+//! Settings of a fit.
+
+use crate::error::ServoError;
+use serde::{Deserialize, Serialize};
+
+/// Settings of a fit. Standard deviations describe what is known before the fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct ServoSettings {
+    /// Time step of the simulation, s. The search begins with four times this step. Default 0.0025.
+    pub step_s: f64,
+    /// Most steps of the search. Default 60; fits of an SO-101 need 10 to 40.
+    pub iterations: usize,
+    /// The search ends when the cost, in units of minus twice the log-likelihood, falls by less than this. Default
+    /// 0.01: by chance, one parameter changes it by 1.
+    pub tolerance: f64,
+    /// Length of the periods that error bars treat as independent, s. Default 2: errors of the model of an SO-101 last
+    /// up to 1 s.
+    pub period_s: f64,
+    /// Least standard deviation of a measured position, rad (m). Default 0.00044: an encoder with 4,096 counts.
+    pub least_error: f64,
+    /// Whether all joints have the same servo: common values, with a deviation of each joint. Otherwise each joint has
+    /// its own values. Default false.
+    pub alike: bool,
+    /// Deviation of each joint's stiffness, damping and armature from the common value, relative. Default 0.1: servos
+    /// of one type differ by a few per cent in gain and motor constant.
+    pub deviation: f64,
+    /// Deviation of each joint's Coulomb friction from the common value, relative. Default 1: gears of one type differ
+    /// by their wear and by the preload of their bearings.
+    pub friction_deviation: f64,
+    /// Friction per load and friction at rest as further unknowns. Default true; a value that the motion does not need
+    /// becomes small.
+    pub load_friction: bool,
+    /// Standard deviation of each mass, relative. Default 0.3, as for logs with torque.
+    pub mass: f64,
+    /// Standard deviation of each coordinate of a centre of mass, as a part of the robot's reach. Default 0.05.
+    pub centre: f64,
+    /// Standard deviation of each joint's zero, rad (m). Default 0, known zeros: a rotated zero has almost the effect
+    /// of a moved centre of mass.
+    pub zero: f64,
+    /// Standard deviation of the delay, s. Default 0.03.
+    pub delay_s: f64,
+    /// Standard deviation of the differences of the joints' read times, s. Default 0.005: servos on one bus are read
+    /// one after another.
+    pub read_delay_s: f64,
+}
+
+impl Default for ServoSettings {
+    fn default() -> Self {
+        Self {
+            step_s: 0.0025,
+            iterations: 60,
+            tolerance: 0.01,
+            period_s: 2.0,
+            least_error: 4.4e-4,
+            alike: false,
+            deviation: 0.1,
+            friction_deviation: 1.0,
+            load_friction: true,
+            mass: 0.3,
+            centre: 0.05,
+            zero: 0.0,
+            delay_s: 0.03,
+            read_delay_s: 0.005,
+        }
+    }
+}
+
+/// Shortest time step, s: with a shorter one, a simulation needs minutes.
+const LEAST_STEP_S: f64 = 1e-4;
+/// Longest time step, s: a servo's response is not longer.
+const LONGEST_STEP_S: f64 = 0.05;
+
+impl ServoSettings {
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// A value that is not positive, or not a number; a time step outside of 0.1 to 50 ms.
+    pub fn validate(&self) -> Result<(), ServoError> {
+        if !(LEAST_STEP_S..=LONGEST_STEP_S).contains(&self.step_s) {
+            return Err(ServoError::Setting { setting: "step_s", value: self.step_s });
+        }
+        let positive = [
+            ("tolerance", self.tolerance),
+            ("period_s", self.period_s),
+            ("least_error", self.least_error),
+            ("deviation", self.deviation),
+            ("friction_deviation", self.friction_deviation),
+            ("mass", self.mass),
+            ("centre", self.centre),
+            ("delay_s", self.delay_s),
+            ("read_delay_s", self.read_delay_s),
+        ];
+        if !self.zero.is_finite() || self.zero < 0.0 {
+            return Err(ServoError::Setting { setting: "zero", value: self.zero });
+        }
+        match positive.into_iter().find(|(_, value)| !value.is_finite() || *value <= 0.0) {
+            Some((setting, value)) => Err(ServoError::Setting { setting, value }),
+            None => Ok(()),
+        }
+    }
+}

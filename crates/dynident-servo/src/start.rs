@@ -1,0 +1,199 @@
+//! First values of the drives, from the response of each joint.
+//!
+//! Each joint alone is treated as `ẍ = ω² (r - x) - 2 ζ ω ẋ` with the late command `r`. The best of a grid of ω, ζ and
+//! delays gives stiffness and damping, with the mean inertia of the joint during the motion.
+
+use crate::command::HeldCommand;
+use crate::drive::Drive;
+use crate::parameters::{Change, FreeParameter, ServoRobot, robot_value};
+use crate::quantity::Quantity;
+use crate::run::Run;
+use dynident_dynamics::{Workspace, mass_matrix};
+use dynident_model::Model;
+use rayon::prelude::*;
+
+/// Natural frequencies of a position loop, rad/s.
+const FREQUENCIES: [f64; 9] = [3.0, 5.0, 8.0, 13.0, 20.0, 32.0, 50.0, 80.0, 130.0];
+/// Damping ratios of a position loop.
+const RATIOS: [f64; 6] = [0.3, 0.6, 1.0, 1.6, 2.5, 4.0];
+/// Most samples of a run that are used, for speed.
+const MOST_SAMPLES: usize = 1500;
+/// Part of the joint's inertia that the first guess gives to the drive.
+const DRIVE_PART: f64 = 0.5;
+/// First friction, as a part of the stiffness times the median distance from the command.
+const FRICTION_PART: f64 = 0.3;
+/// Velocity at which most of the friction at rest is gone, rad/s (m/s): that of Rhoban's servo models.
+const STRIBECK_SPEED: f64 = 0.1;
+/// Delay of a typical servo, s.
+const TYPICAL_DELAY_S: f64 = 0.01;
+/// Delays of a position loop, s.
+const DELAYS_S: [f64; 5] = [0.0, 0.01, 0.02, 0.04, 0.06];
+
+impl Drive {
+    /// A drive with these values (units of the fields), and typical other friction and delay, without a torque limit.
+    pub fn typical(stiffness: f64, damping: f64, armature: f64, coulomb: f64) -> Self {
+        Self {
+            stiffness,
+            damping,
+            armature,
+            coulomb,
+            load_friction: 0.1,
+            stribeck: 0.3 * coulomb,
+            stribeck_speed: STRIBECK_SPEED,
+            torque_limit: f64::INFINITY,
+            delay_s: TYPICAL_DELAY_S,
+            read_delay_s: 0.0,
+            zero: 0.0,
+        }
+    }
+}
+
+/// First values of all drives; equal ones if all joints have the same servo (`alike`).
+pub fn start_drives(model: &Model, runs: &[Run], alike: bool) -> Vec<Drive> {
+    let inertias = mean_inertias(model, runs);
+    let mut drives: Vec<Drive> = (0..model.dof())
+        .map(|joint| {
+            let Response { frequency, ratio, delay_s } = response(runs, joint);
+            let inertia = inertias[joint] / (1.0 - DRIVE_PART);
+            let stiffness = inertia * frequency * frequency;
+            let friction = FRICTION_PART * stiffness * median_distance(runs, joint);
+            let drive = Drive::typical(stiffness, 2.0 * ratio * frequency * inertia, DRIVE_PART * inertia, friction);
+            Drive { delay_s, ..drive }
+        })
+        .collect();
+    // Delays are common: those of the electronics.
+    let mut delays: Vec<f64> = drives.iter().map(|drive| drive.delay_s).collect();
+    delays.sort_by(f64::total_cmp);
+    for drive in &mut drives {
+        drive.delay_s = delays[delays.len() / 2];
+    }
+    if alike {
+        let mean = |value: fn(&Drive) -> f64| {
+            let sum: f64 = drives.iter().map(|drive| value(drive).ln()).sum();
+            (sum / drives.len() as f64).exp()
+        };
+        let common = Drive {
+            stiffness: mean(|drive| drive.stiffness),
+            damping: mean(|drive| drive.damping),
+            armature: mean(|drive| drive.armature),
+            coulomb: mean(|drive| drive.coulomb),
+            stribeck: mean(|drive| drive.stribeck),
+            ..drives[0]
+        };
+        drives.fill(common);
+    }
+    drives
+}
+
+/// Mean diagonal of the mass matrix over the runs.
+fn mean_inertias(model: &Model, runs: &[Run]) -> Vec<f64> {
+    let dof = model.dof();
+    let mut workspace = Workspace::new(model);
+    let (mut sums, mut count) = (vec![0.0; dof], 0.0);
+    for run in runs {
+        for sample in (0..run.times_s.len()).step_by((run.times_s.len() / 50).max(1)) {
+            let q: Vec<f64> = run.positions.iter().map(|joint| joint[sample]).collect();
+            let matrix = mass_matrix(model, &mut workspace, &q);
+            for (joint, sum) in sums.iter_mut().enumerate() {
+                *sum += matrix[joint * dof + joint];
+            }
+            count += 1.0;
+        }
+    }
+    // A joint without mass behind it still has a drive.
+    sums.iter().map(|sum| (sum / count).max(1e-6)).collect()
+}
+
+fn median_distance(runs: &[Run], joint: usize) -> f64 {
+    let mut distances: Vec<f64> = runs
+        .iter()
+        .flat_map(|run| run.commands[joint].iter().zip(&run.positions[joint]))
+        .map(|(command, position)| (command - position).abs())
+        .collect();
+    distances.sort_by(f64::total_cmp);
+    distances[distances.len() / 2].max(1e-5)
+}
+
+/// Coordinates of the responses of the joints, for a search whose nominal drives may be far away: values that several
+/// joints share get the mean, individual deviations from it are zero.
+pub(crate) fn response_coordinates(nominal: &ServoRobot, parameters: &[FreeParameter], runs: &[Run]) -> Vec<f64> {
+    let dof = nominal.model.dof();
+    let drives = start_drives(&nominal.model, runs, false);
+    let responses = ServoRobot { drives, ..nominal.clone() };
+    let is_shared = |quantity: Quantity| {
+        parameters.iter().any(|other| other.quantity == quantity && other.members.len() == dof && dof > 1)
+    };
+    let coordinate = |parameter: &FreeParameter| {
+        let quantity = parameter.quantity;
+        let is_found = matches!(
+            quantity,
+            Quantity::Stiffness
+                | Quantity::Damping
+                | Quantity::Armature
+                | Quantity::Coulomb
+                | Quantity::Stribeck
+                | Quantity::Delay
+        );
+        if !is_found || (parameter.members.len() == 1 && is_shared(quantity)) {
+            return 0.0;
+        }
+        let difference = |&joint: &usize| {
+            let [found, stated] = [&responses, nominal].map(|robot| robot_value(robot, quantity, joint));
+            match parameter.change {
+                Change::Factor => (found / stated).ln(),
+                Change::Sum => found - stated,
+            }
+        };
+        let mean = parameter.members.iter().map(difference).sum::<f64>() / parameter.members.len() as f64;
+        if mean.is_finite() { mean } else { 0.0 }
+    };
+    parameters.iter().map(coordinate).collect()
+}
+
+/// Response of one joint: natural frequency, rad/s, damping ratio and delay.
+#[derive(Clone, Copy)]
+struct Response {
+    frequency: f64,
+    ratio: f64,
+    delay_s: f64,
+}
+
+/// The response with the least error.
+fn response(runs: &[Run], joint: usize) -> Response {
+    let grid = DELAYS_S.iter().flat_map(|&delay_s| {
+        FREQUENCIES
+            .iter()
+            .flat_map(move |&frequency| RATIOS.iter().map(move |&ratio| Response { frequency, ratio, delay_s }))
+    });
+    let all: Vec<Response> = grid.collect();
+    let squares = |response: &Response| runs.iter().map(|run| response_error(run, joint, *response)).sum::<f64>();
+    let errors: Vec<f64> = all.par_iter().map(squares).collect();
+    let best = (0..all.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0);
+    all[best]
+}
+
+/// Sum of squared errors of the response, by implicit steps from stamp to stamp, without the mean error, which is the
+/// effect of gravity.
+fn response_error(run: &Run, joint: usize, response: Response) -> f64 {
+    let (commands, positions) = (&run.commands[joint], &run.positions[joint]);
+    let Response { frequency, ratio, delay_s } = response;
+    let stiffness = frequency * frequency;
+    let (mut x, mut v) = (positions[0], 0.0);
+    let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
+    let mut command = HeldCommand::held(&run.times_s, commands);
+    for sample in 1..run.times_s.len().min(MOST_SAMPLES) {
+        let parts = 4.0;
+        let h = (run.times_s[sample] - run.times_s[sample - 1]) / parts;
+        for part in 0..parts as usize {
+            let from = run.times_s[sample - 1] + h * part as f64 - delay_s;
+            let pull = stiffness * (command.mean(from, from + h).0 - x);
+            v = (v + h * pull) / (1.0 + h * 2.0 * ratio * frequency + h * h * stiffness);
+            x += h * v;
+        }
+        let error = positions[sample] - x;
+        sum += error;
+        squares += error * error;
+        count += 1.0;
+    }
+    squares - sum * sum / count
+}

@@ -1,0 +1,81 @@
+//! State and equation of one time step.
+
+use crate::floor::PointHeight;
+use crate::step::{Contact, JointLaw, Mode, StepLaws};
+
+/// How a simulation steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stepping {
+    /// Length of a step, s.
+    pub(crate) step_s: f64,
+    /// Weight of the velocity at the end of a step in its mean velocity: 1/2 is exact to second order, 1 damps and is
+    /// stable for long steps.
+    pub(crate) end_weight: f64,
+    /// The simulation restarts from the measured motion after this time, s; never if infinite.
+    pub(crate) restart_s: f64,
+}
+
+impl Stepping {
+    /// Accurate steps without restarts.
+    pub(crate) fn accurate(step_s: f64) -> Self {
+        Self { step_s, end_weight: 0.5, restart_s: f64::INFINITY }
+    }
+}
+
+/// A step: the state at its beginning, the equation, and the velocity at its end.
+#[derive(Debug)]
+pub(crate) struct StepState {
+    /// Length, s.
+    pub(crate) h: f64,
+    /// Weight of the velocity at the end in the mean velocity.
+    pub(crate) end_weight: f64,
+    /// Measured positions: those of the encoders.
+    pub(crate) q: Vec<f64>,
+    /// Positions in the model, with the zeros of the joints, where bodies are evaluated: those expected in the middle
+    /// of the step if `end_weight` is 1/2, those at its beginning if it is 1.
+    pub(crate) in_model: Vec<f64>,
+    pub(crate) v: Vec<f64>,
+    /// `(M + armature) / h`.
+    pub(crate) a: Vec<f64>,
+    pub(crate) w: Vec<f64>,
+    /// Torques of weight and velocity.
+    pub(crate) loads: Vec<f64>,
+    /// Part of the friction at rest that is left at the velocity.
+    pub(crate) at_rest: Vec<f64>,
+    /// Derivatives of the commands by the delay.
+    pub(crate) command_rates: Vec<f64>,
+    pub(crate) laws: StepLaws,
+    pub(crate) heights: Vec<PointHeight>,
+    /// Velocities at the end.
+    pub(crate) x: Vec<f64>,
+    /// Mean velocities `end_weight x + (1 - end_weight) v`.
+    pub(crate) mean: Vec<f64>,
+}
+
+impl StepState {
+    /// The first step from rest at `q`, with `points` that can touch the floor.
+    pub(crate) fn at_rest(q: Vec<f64>, stepping: &Stepping, points: usize) -> Self {
+        let dof = q.len();
+        let zeros = || vec![0.0; dof];
+        Self {
+            h: stepping.step_s,
+            end_weight: stepping.end_weight,
+            q,
+            in_model: zeros(),
+            v: zeros(),
+            a: vec![0.0; dof * dof],
+            w: zeros(),
+            loads: zeros(),
+            at_rest: zeros(),
+            command_rates: zeros(),
+            laws: StepLaws {
+                joints: vec![JointLaw::default(); dof],
+                modes: vec![Mode::default(); dof],
+                contacts: vec![Contact { by_joint: zeros(), ..Contact::default() }; points],
+            },
+            heights: (0..points).map(|_| PointHeight::new(dof)).collect(),
+            x: zeros(),
+            mean: zeros(),
+        }
+    }
+}

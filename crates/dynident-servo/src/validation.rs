@@ -1,0 +1,31 @@
+//! Motion of a fitted robot along recorded commands.
+
+use crate::error::ServoError;
+use crate::parameters::{ServoRobot, VariedRobot};
+use crate::rollout::Rollout;
+use crate::run::Run;
+use crate::step_state::Stepping;
+
+/// Simulated positions of each joint at the stamps of a run, rad (m), from the first measured position at rest, without
+/// resets. `None` if the simulation does not give numbers.
+///
+/// # Errors
+/// A run that does not fit the robot.
+pub fn simulate(robot: &ServoRobot, run: &Run, step_s: f64) -> Result<Option<Vec<Vec<f64>>>, ServoError> {
+    run.validate(robot.model.dof())?;
+    let varied = VariedRobot::new(robot, &[], &[])?;
+    let mut positions = vec![vec![0.0; run.times_s.len()]; run.positions.len()];
+    let ended = Rollout::new(&varied, run, Stepping::accurate(step_s), false).is_some_and(|rollout| {
+        rollout.simulate(|predicted| positions[predicted.joint][predicted.sample] = predicted.position)
+    });
+    Ok(ended.then_some(positions))
+}
+
+/// Root mean square of the measured minus the given positions, for each joint, rad (m).
+pub fn errors(run: &Run, positions: &[Vec<f64>]) -> Vec<f64> {
+    let error = |(measured, simulated): (&Vec<f64>, &Vec<f64>)| {
+        let squares: f64 = measured.iter().zip(simulated).map(|(m, s)| (m - s).powi(2)).sum();
+        (squares / measured.len() as f64).sqrt()
+    };
+    run.positions.iter().zip(positions).map(error).collect()
+}

@@ -1,0 +1,80 @@
+//! Values of a simulated arm are found within their error bars.
+
+use crate::arm;
+use dynident_model::{InertialParameters, Mat3, Vec3};
+use dynident_servo::{
+    Quantity, Run, Search, ServoRobot, ServoSettings, errors, robot_at, search, simulate, start_drives, unknowns,
+};
+
+const COUNT: f64 = core::f64::consts::TAU / 4096.0;
+
+/// Commands of two joints: sums of sines, and steps with rests.
+fn commands(seed: f64) -> Run {
+    let times_s: Vec<f64> = (0..1500).map(|k| 0.02 * f64::from(k)).collect();
+    let motion = |joint: f64, t: f64| {
+        let sines = 0.4 * ((0.9 + 0.3 * joint + 0.1 * seed) * t).sin() + 0.2 * ((2.7 + 0.5 * joint) * t + seed).sin();
+        let steps = 0.3 * ((0.21 * t + 0.3 * joint + 0.17 * seed).fract() * 4.0).floor();
+        if t < 18.0 { sines } else { steps - 0.4 }
+    };
+    let commands: Vec<Vec<f64>> = [0.0, 1.0].map(|joint| times_s.iter().map(|&t| motion(joint, t)).collect()).into();
+    Run { name: format!("run {seed}"), positions: commands.clone(), commands, times_s, payloads: Vec::new() }
+}
+
+/// The run with the counts of an encoder.
+fn measured(robot: &ServoRobot, mut run: Run, step_s: f64) -> Run {
+    let positions = simulate(robot, &run, step_s).unwrap().unwrap();
+    run.positions = positions.into_iter().map(|q| q.iter().map(|q| (q / COUNT).round() * COUNT).collect()).collect();
+    run
+}
+
+fn fitted(runs: &[Run], settings: &ServoSettings) -> (ServoRobot, Search, Vec<dynident_servo::FreeParameter>) {
+    let model = arm().model;
+    let nominal = ServoRobot { drives: start_drives(&model, runs, settings.alike), model, floor: None };
+    let parameters = unknowns(&nominal, settings);
+    let found = search(&nominal, &parameters, &vec![0.0; parameters.len()], runs, settings).unwrap();
+    (robot_at(&nominal, &parameters, &found.coordinates).unwrap(), found, parameters)
+}
+
+#[test]
+fn a_quantised_motion_is_explained_to_the_count_and_predicts_another() {
+    let truth = arm();
+    let settings = ServoSettings { load_friction: true, ..ServoSettings::default() };
+    let runs: Vec<Run> = [0.0, 1.0].map(|seed| measured(&truth, commands(seed), settings.step_s)).into();
+    let (robot, found, _) = fitted(&runs, &settings);
+    assert!(found.settled);
+    // The error of rounding to counts is 0.29 counts.
+    for error in &found.errors {
+        assert!(*error < 0.5 * COUNT, "{:?} {:?}", found.errors, robot.drives);
+    }
+    let other = measured(&truth, commands(2.0), settings.step_s);
+    let predicted = simulate(&robot, &other, settings.step_s).unwrap().unwrap();
+    assert!(errors(&other, &predicted).iter().all(|error| *error < 0.6 * COUNT));
+    for (found, drive) in robot.drives.iter().zip(&truth.drives) {
+        let delay = found.delay_s - found.read_delay_s;
+        assert!((delay - drive.delay_s).abs() < 0.001, "{delay}");
+        // Positions determine ratios.
+        let ratio = (found.damping / found.stiffness) / (drive.damping / drive.stiffness);
+        assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
+    }
+}
+
+#[test]
+fn the_scale_is_open_without_a_payload_and_found_with_one() {
+    let truth = arm();
+    let settings = ServoSettings::default();
+    let free: Vec<Run> = [0.0, 1.0].map(|seed| measured(&truth, commands(seed), settings.step_s)).into();
+    let (_, found, parameters) = fitted(&free, &settings);
+    let stiffness = parameters.iter().position(|parameter| parameter.quantity == Quantity::Stiffness).unwrap();
+    assert!(found.covariance[(stiffness, stiffness)].sqrt() > 0.1, "a scale that positions do not contain");
+    let mut loaded = commands(3.0);
+    let load = InertialParameters::from_centre_of_mass(4.0, Vec3([0.5, 0.0, 0.0]), &Mat3::IDENTITY.scale(0.01));
+    loaded.payloads.push((1, load));
+    let mut runs = free;
+    runs.push(measured(&truth, loaded, settings.step_s));
+    let (robot, found, _) = fitted(&runs, &settings);
+    for (found, drive) in robot.drives.iter().zip(&truth.drives) {
+        let ratio = found.stiffness / drive.stiffness;
+        assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
+    }
+    assert!(found.covariance[(stiffness, stiffness)].sqrt() < 0.03);
+}

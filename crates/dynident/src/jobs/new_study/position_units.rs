@@ -1,0 +1,100 @@
+//! Units of positions and commands whose names state none, and grippers that are logged as a share of their range.
+
+use super::RecognisedColumns;
+use super::draft::Table;
+use crate::result::LogContents;
+use dynident_model::{JointKind, Model};
+use dynident_text::quoted;
+use std::path::Path;
+
+/// Parts of the names of joints that are often logged as a share of their range.
+const GRIPPERS: [&str; 4] = ["gripper", "jaw", "finger", "claw"];
+/// Full range of such a joint in logs: a share or percent.
+const FULL_RANGES: [f64; 2] = [1.0, 100.0];
+/// Part of the full range by which a logged share may exceed it.
+const MAX_EXCESS: f64 = 0.1;
+
+/// A gripper that is logged as a share of its range.
+struct Gripper {
+    /// Place among the columns.
+    place: usize,
+    /// Its full range in the log: 1 or 100.
+    full: f64,
+    /// Its limits, rad or m.
+    limits: [f64; 2],
+}
+
+/// Units of positions and commands that follow from their values.
+pub(super) struct PositionUnits {
+    columns: usize,
+    gripper: Option<Gripper>,
+    /// Largest position of a revolute joint that is implausible in radians.
+    implausible: Option<f64>,
+}
+
+impl PositionUnits {
+    pub(super) fn of(recognised: &RecognisedColumns, model: &Model, logs: &[(&Path, LogContents)]) -> Self {
+        let [positions, drive] = &recognised.columns;
+        let joints = &recognised.logged.joints;
+        let range = |name: &String, file: usize| {
+            let channel = logs[file].1.channels.iter().find(|channel| channel.name == *name)?;
+            channel.range
+        };
+        // A command log has the same unit in both quantities.
+        let ranges = |place: usize| {
+            let is_alone = recognised.drive.file != recognised.position.file || !recognised.has_commands();
+            let files = if is_alone { &[recognised.position.file][..] } else { &recognised.files[..] };
+            let own = files.iter().filter_map(|&file| range(&positions[place], file));
+            let of_drive = if is_alone { &[recognised.drive.file][..] } else { files };
+            let commands = of_drive.iter().filter(|_| recognised.has_commands());
+            own.chain(commands.filter_map(|&file| range(&drive[place], file)))
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], [from, to]| [low.min(from), high.max(to)])
+        };
+        let gripper = |place: usize| {
+            let joint = &model.joints()[joints[place]];
+            let is_named = GRIPPERS.iter().any(|name| joint.name.to_lowercase().contains(name));
+            let limits = [joint.limits.lower?, joint.limits.upper?];
+            let [low, high] = ranges(place);
+            let is_share = |full: &f64| low >= -MAX_EXCESS * full && high <= (1.0 + MAX_EXCESS) * full;
+            let full = FULL_RANGES.into_iter().find(is_share)?;
+            (is_named && limits[0] < limits[1]).then_some(Gripper { place, full, limits })
+        };
+        let gripper = (0..joints.len()).find_map(|place| gripper(place).filter(|_| recognised.has_commands()));
+        let is_turning = |place: &usize| {
+            model.joints()[joints[*place]].kind != JointKind::Prismatic
+                && gripper.as_ref().is_none_or(|gripper| gripper.place != *place)
+        };
+        let most = (0..joints.len()).filter(is_turning).map(|place| {
+            let [low, high] = ranges(place);
+            if low <= high { high.max(-low) } else { 0.0 }
+        });
+        let most = most.fold(0.0, f64::max);
+        let limit = recognised.thresholds.max_radian_turns * core::f64::consts::TAU;
+        Self { columns: joints.len(), gripper, implausible: (most > limit).then_some(most) }
+    }
+
+    /// `table` with the unit of its columns, and the range of a gripper.
+    pub(super) fn with_unit(&self, table: Table, stated: Option<&'static str>) -> Table {
+        let table = match (stated, self.implausible) {
+            (Some("rad"), _) | (None, None) => table,
+            (Some(unit), _) => table.with("unit", quoted(unit), "by the names"),
+            (None, Some(most)) => {
+                let reason = format!(
+                    "a joint moves to {most:.1}, which is implausible in radians: degrees, or motor-side positions"
+                );
+                table.with_unsure("unit", quoted("deg"), reason)
+            }
+        };
+        let Some(Gripper { place, full, limits: [low, high] }) = &self.gripper else { return table };
+        let degrees = stated == Some("deg") || stated.is_none() && self.implausible.is_some();
+        let unit = if degrees { core::f64::consts::PI / 180.0 } else { 1.0 };
+        let list = |usual: f64, own: f64| {
+            let values = (0..self.columns).map(|column| if column == *place { own } else { usual });
+            format!("[{}]", values.map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", "))
+        };
+        let reason = format!(
+            "the gripper is logged from 0 to {full}, probably a share of its range: mapped to the limits of the robot description"
+        );
+        table.with_unsure("scale", list(1.0, (high - low) / full / unit), reason).with("offset", list(0.0, *low), "rad")
+    }
+}

@@ -1,0 +1,205 @@
+//! Content of `result.json` for a study with commands.
+
+use super::{Found, RoleRun};
+use crate::error::Error;
+use crate::result::{SERVO_SCHEMA, ServoBody, ServoDrive, ServoFile, ServoLog, ServoMotion, ServoNumber, ServoScale};
+use crate::study::{ServoSection, StudyFile};
+use dynident_dynamics::{Workspace, mass_matrix_and_bias};
+use dynident_estimation::HALF_WIDTH_95;
+use dynident_identification::Role;
+use dynident_model::{JointKind, Model};
+use dynident_servo::{Drive, Quantity, Run, Scale, ServoValue, errors, values};
+
+/// Largest number of samples of a motion.
+const MOST_SAMPLES: usize = 1500;
+/// A value is determined if its interval is at most this part of that before the fit.
+pub(super) const DETERMINED: f64 = 0.5;
+/// The scale is determined if its interval is at most this part of that before the fit: without an anchor, the fit
+/// narrows it by less than a quarter.
+const SCALE_DETERMINED: f64 = 0.5;
+
+pub(super) fn servo_file(
+    study: StudyFile<'_>,
+    model: &Model,
+    runs: &[RoleRun],
+    found: &Found,
+    section: &ServoSection,
+) -> Result<ServoFile, Error> {
+    let (list, scale) = values(&found.nominal, &found.parameters, &found.search)
+        .map_err(|error| Error::section(study.path, "drive.servo")(dynident_servo::ServoError::from(error)))?;
+    let rotary: Vec<bool> = model.joints().iter().map(|joint| joint.kind != JointKind::Prismatic).collect();
+    let joints: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+    let loads = mean_loads(&found.robot.model, runs);
+    let number = |value: &ServoValue, is_rotary: bool| number(value, is_rotary);
+    let drives = found.robot.drives.iter().enumerate().map(|(joint, drive)| {
+        let own = list.iter().filter(|value| value.index == joint && !is_of_body(value.quantity));
+        drive_of(drive, loads[joint], own.map(|value| number(value, rotary[joint])).collect())
+    });
+    let bodies = found.robot.model.inertials().iter().enumerate().map(|(body, inertial)| ServoBody {
+        body: found.robot.model.bodies()[body].name().to_owned(),
+        parameters: inertial.0,
+        nominal_mass_kg: model.inertials()[body].mass_kg(),
+        values: list
+            .iter()
+            .filter(|value| value.index == body && is_of_body(value.quantity))
+            .map(|value| number(value, true))
+            .collect(),
+    });
+    let mut file = ServoFile {
+        schema: SERVO_SCHEMA.to_owned(),
+        study: study.title(),
+        robot: model.name().to_owned(),
+        step_s: section.fit.step_s,
+        unknowns: found.parameters.len(),
+        iterations: found.search.iterations,
+        settled: found.search.settled,
+        drives: drives.collect(),
+        bodies: bodies.collect(),
+        scale: scale_of(&scale),
+        joints,
+        rotary,
+        ..ServoFile::default()
+    };
+    for (run, simulated) in runs.iter().zip(&found.simulated) {
+        let Some(simulated) = simulated else {
+            file.problems.push(format!("the simulation of {} fails: its motion is outside of the model", run.run.name));
+            continue;
+        };
+        let log = log_of(run, simulated);
+        if run.role == Role::Validate { file.validation.push(log) } else { file.training.push(log) }
+    }
+    remarks(&mut file);
+    Ok(file)
+}
+
+pub(super) fn is_of_body(quantity: Quantity) -> bool {
+    matches!(quantity, Quantity::Mass | Quantity::Centre(_))
+}
+
+fn number(value: &ServoValue, is_rotary: bool) -> ServoNumber {
+    ServoNumber {
+        name: value.quantity.name().to_owned(),
+        unit: value.quantity.unit(is_rotary).to_owned(),
+        value: value.value,
+        half_width_95: HALF_WIDTH_95 * value.std,
+        half_width_95_at_scale: HALF_WIDTH_95 * value.std_at_scale,
+        half_width_95_before: HALF_WIDTH_95 * value.prior_std,
+        determined: value.std_at_scale <= DETERMINED * value.prior_std,
+    }
+}
+
+fn drive_of(drive: &Drive, mean_load: f64, values: Vec<ServoNumber>) -> ServoDrive {
+    ServoDrive {
+        stiffness: drive.stiffness,
+        damping: drive.damping,
+        armature: drive.armature,
+        coulomb: drive.coulomb,
+        load_friction: drive.load_friction,
+        stribeck: drive.stribeck,
+        stribeck_speed: drive.stribeck_speed,
+        torque_limit: drive.torque_limit.is_finite().then_some(drive.torque_limit),
+        delay_s: drive.delay_s,
+        read_delay_s: drive.read_delay_s,
+        zero: drive.zero,
+        mean_load,
+        values,
+    }
+}
+
+fn scale_of(scale: &Scale) -> ServoScale {
+    let determined = scale.std <= SCALE_DETERMINED * scale.prior_std;
+    let percent = 100.0 * HALF_WIDTH_95 * scale.std;
+    let anchor = if determined {
+        format!("The known payloads of the logs give the scale to ±{percent:.0} %.")
+    } else {
+        format!(
+            "Positions do not contain the scale of torques, inertias and masses. All of them use the total mass of the \
+             robot description, {:.3} kg ± {percent:.0} %. Record one log with a known payload and name it in \
+             [[payload]] to measure the scale.",
+            scale.mass_kg
+        )
+    };
+    ServoScale { determined, mass_kg: scale.mass_kg, half_width_95_percent: percent, anchor }
+}
+
+/// Mean torque of weight and velocity without sign, at the measured positions of the training logs.
+fn mean_loads(model: &Model, runs: &[RoleRun]) -> Vec<f64> {
+    let (mut sums, mut count) = (vec![0.0; model.dof()], 0.0);
+    let mut workspace = Workspace::new(model);
+    let still = vec![0.0; model.dof()];
+    for run in runs.iter().filter(|run| run.role != Role::Validate) {
+        for sample in (0..run.run.times_s.len()).step_by(10) {
+            let q: Vec<f64> = run.run.positions.iter().map(|joint| joint[sample]).collect();
+            let (_, load) = mass_matrix_and_bias(model, &mut workspace, &q, &still);
+            for (sum, load) in sums.iter_mut().zip(load) {
+                *sum += load.abs();
+            }
+            count += 1.0;
+        }
+    }
+    sums.iter().map(|sum| sum / count).collect()
+}
+
+fn log_of(run: &RoleRun, simulated: &[Vec<f64>]) -> ServoLog {
+    let run = &run.run;
+    let samples = run.times_s.len();
+    ServoLog {
+        name: run.name.clone(),
+        samples,
+        duration_s: run.times_s[samples - 1] - run.times_s[0],
+        errors: errors(run, simulated),
+        command_errors: errors(run, &run.commands),
+    }
+}
+
+/// The motions of all logs, held-out logs first.
+pub(super) fn motions(runs: &[RoleRun], found: &Found) -> Vec<ServoMotion> {
+    let all = || runs.iter().zip(&found.simulated);
+    let held_out = |(run, _): &(&RoleRun, _)| run.role == Role::Validate;
+    let ordered = all().filter(held_out).chain(all().filter(|own| !held_out(own)));
+    ordered.filter_map(|(run, simulated)| Some(motion_of(&run.run, simulated.as_ref()?))).collect()
+}
+
+fn motion_of(run: &Run, simulated: &[Vec<f64>]) -> ServoMotion {
+    let step = run.times_s.len().div_ceil(MOST_SAMPLES).max(1);
+    let thin = |values: &Vec<f64>| values.iter().step_by(step).copied().collect::<Vec<f64>>();
+    ServoMotion {
+        name: run.name.clone(),
+        times_s: thin(&run.times_s),
+        measured: run.positions.iter().map(thin).collect(),
+        simulated: simulated.iter().map(thin).collect(),
+        commands: run.commands.iter().map(thin).collect(),
+    }
+}
+
+/// Adds values that are not determined, and reasons not to use the result.
+fn remarks(file: &mut ServoFile) {
+    let name = |owner: &str, value: &ServoNumber| format!("{} of {owner}", value.name);
+    for (joint, drive) in file.joints.iter().zip(&file.drives) {
+        let open = drive.values.iter().filter(|value| !value.determined);
+        file.not_determined.extend(open.map(|value| name(joint, value)));
+    }
+    for body in &file.bodies {
+        let open = body.values.iter().filter(|value| !value.determined);
+        file.not_determined.extend(open.map(|value| name(&body.body, value)));
+    }
+    if !file.settled {
+        file.problems.push("the search did not settle: raise drive.servo.fit.iterations".to_owned());
+    }
+    for log in &file.validation {
+        let worse = file.joints.iter().zip(log.errors.iter().zip(&log.command_errors));
+        let worse: Vec<&str> =
+            worse.filter(|(_, (error, command))| error > command).map(|(joint, _)| joint.as_str()).collect();
+        if !worse.is_empty() {
+            file.notes.push(format!(
+                "{}: the simulation of {} is further from the measured motion than the command is; look for contact or \
+                 a clamped command",
+                log.name,
+                worse.join(", ")
+            ));
+        }
+    }
+    if file.validation.is_empty() {
+        file.notes.push("no held-out log: give a log the role \"validate\" to test the model".to_owned());
+    }
+}

@@ -1,0 +1,70 @@
+//! Differences from the robot description in words.
+
+use crate::result::{ChangeExplanation, ChangedPart, DescriptionComparison, ResultFile};
+use dynident_report::short;
+
+/// Probability of an explanation by single bodies from which it is reported.
+const MIN_REPORTED_PROBABILITY: f64 = 0.5;
+
+/// Probability from which another explanation is listed.
+const MIN_ALTERNATIVE_PROBABILITY: f64 = 0.1;
+
+/// One sentence for each fact, if one or two bodies differ from the robot description: which, how much, how certain,
+/// the alternatives, and the edit test. Empty if nothing or everything differs.
+pub fn difference_words(r: &ResultFile) -> Vec<String> {
+    let Some(found) = &r.description_differences else { return Vec::new() };
+    let Some(best) = found.explanations.first() else { return Vec::new() };
+    let few: f64 = found.explanations.iter().filter(|own| !own.parts.is_empty()).map(|own| own.probability).sum();
+    if best.parts.is_empty() || few < MIN_REPORTED_PROBABILITY {
+        return Vec::new();
+    }
+    let changes: Vec<String> = best.parts.iter().map(change).collect();
+    let mut words = vec![format!("{} (probability {:.0} %)", changes.join("; "), 100.0 * best.probability)];
+    let is_other = |own: &&ChangeExplanation| own.probability >= MIN_ALTERNATIVE_PROBABILITY && !own.parts.is_empty();
+    let others: Vec<String> = found.explanations.iter().skip(1).filter(is_other).map(alternative).collect();
+    if !others.is_empty() {
+        words.push(format!("It could also be: {}", others.join("; or ")));
+    }
+    words.push(String::from(if found.is_followed {
+        "The written model follows this; the other bodies keep the values of the robot description within its tolerance"
+    } else {
+        "The written model does not follow this, so the change may be spread over several bodies"
+    }));
+    words.extend(best.parts.iter().filter_map(|part| edit_test(found, part)));
+    words
+}
+
+fn change(part: &ChangedPart) -> String {
+    let Some((mass, bar)) = part.mass_kg.zip(part.half_width_95_kg) else { return part.part.clone() };
+    if mass.abs() <= bar {
+        return format!(
+            "{} differs from the robot description, its mass by {} ± {} kg",
+            part.part,
+            short(mass, 3),
+            short(bar, 2)
+        );
+    }
+    let [verb, more] = if mass > 0.0 { ["carries", "more"] } else { ["has", "less"] };
+    let centre = part.centre_m.filter(|_| mass > 0.0).map_or_else(String::new, |at| {
+        format!(", centred at ({}, {}, {}) m", short(at[0], 2), short(at[1], 2), short(at[2], 2))
+    });
+    let words = format!("{} ± {} kg {more} than the robot description", short(mass.abs(), 3), short(bar, 2));
+    format!("{} {verb} {words}{centre}", part.part)
+}
+
+fn alternative(explanation: &ChangeExplanation) -> String {
+    let parts: Vec<&str> = explanation.parts.iter().map(|part| part.part.as_str()).collect();
+    format!("{} ({:.0} %)", parts.join(" and "), 100.0 * explanation.probability)
+}
+
+/// Torque error after the body gets the values of the description again.
+fn edit_test(found: &DescriptionComparison, part: &ChangedPart) -> Option<String> {
+    let body = found.bodies.iter().find(|body| part.part == format!("body `{}`", body.name))?;
+    let (error, most) = body.error_percent.zip(body.error_95_percent)?;
+    Some(format!(
+        "Edit test: with {} as in the robot description, the expected torque error is {} %, at most {} % (95 %)",
+        part.part,
+        short(error, 2),
+        short(most, 2)
+    ))
+}
