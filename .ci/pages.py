@@ -19,6 +19,8 @@ import time
 
 # Maximum time for a response, s.
 PATIENCE = 60.0
+# Exit status if the browser has crashed or hangs. It says nothing about the pages, so the caller may repeat the check.
+BROWSER_LOST = 75
 
 # A plot is visible if its static SVG or its canvas is not empty. Every section with a headline has an SVG or a canvas.
 UNSEEN = """(() => {
@@ -97,7 +99,9 @@ class Browser:
     def __init__(self, program, folder):
         to_browser, ours_to = os.pipe()
         ours_from, from_browser = os.pipe()
-        options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--remote-debugging-pipe", f"--user-data-dir={folder}"]
+        # Containers often have only 64 MB in /dev/shm, which large pages exceed.
+        options = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader"]
+        options += ["--remote-debugging-pipe", f"--user-data-dir={folder}"]
         # The protocol uses file descriptors 3 and 4.
         command = f'exec "$0" "$@" 3<&{to_browser} 4>&{from_browser}'
         self.process = subprocess.Popen(
@@ -110,27 +114,39 @@ class Browser:
         os.close(from_browser)
         self.writer, self.reader = ours_to, ours_from
         os.set_blocking(self.reader, False)
-        self.rest, self.number, self.session, self.events = b"", 0, None, []
+        self.rest, self.number, self.session, self.events, self.method = b"", 0, None, [], "start"
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        for domain in ("Page", "Runtime", "Log"):
+        for domain in ("Page", "Runtime", "Log", "Inspector"):
             self.call(f"{domain}.enable")
         # The content security policy of the page would block the injected axe-core.
         self.call("Page.setBypassCSP", enabled=True)
 
     def message(self, deadline):
         while b"\0" not in self.rest:
-            if time.monotonic() > deadline or self.process.poll() is not None:
-                raise SystemExit("the browser does not answer")
+            if self.process.poll() is not None:
+                self.lost(f"it ended with status {self.process.returncode}")
+            if time.monotonic() > deadline:
+                self.lost(f"no answer in {PATIENCE:.0f} s")
             try:
                 self.rest += os.read(self.reader, 1 << 20)
             except BlockingIOError:
                 time.sleep(0.005)
         message, self.rest = self.rest.split(b"\0", 1)
-        return json.loads(message)
+        message = json.loads(message)
+        if message.get("method") == "Inspector.targetCrashed":
+            self.lost("the process of the page crashed")
+        return message
+
+    def lost(self, reason):
+        """Ends the check, because the browser can no longer be used."""
+        print(f"the browser was lost at {self.method}: {reason}", file=sys.stderr)
+        self.process.kill()
+        sys.exit(BROWSER_LOST)
 
     def call(self, method, **parameters):
         self.number += 1
+        self.method = method
         request = {"id": self.number, "method": method, "params": parameters}
         if self.session:
             request["sessionId"] = self.session
@@ -147,6 +163,7 @@ class Browser:
             self.events.append(message)
 
     def wait_for(self, event):
+        self.method = event
         deadline = time.monotonic() + PATIENCE
         while not any(message.get("method") == event for message in self.events):
             self.events.append(self.message(deadline))

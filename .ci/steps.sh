@@ -111,14 +111,27 @@ browser() {
 }
 export -f browser
 
+# with_browser COMMAND..: repeats a check once if the browser crashed or hung (status 75, see .ci/pages.py).
+with_browser() {
+    local status=0
+    "$@" || status=$?
+    if [ "$status" -eq 75 ]; then
+        echo 'once more, with a new browser' >&2
+        status=0
+        "$@" || status=$?
+    fi
+    return "$status"
+}
+export -f with_browser
+
 # pages_in_a_browser SCRATCH: checks the generated reports in a browser; see .ci/pages.py.
 pages_in_a_browser() {
     local program
     program=$(browser)
     "$1/venv/bin/pip" install --quiet --disable-pip-version-check --no-deps --target "$1/page_libraries" -r .ci/requirements.txt
-    python3 .ci/pages.py "$program" "$1/page_libraries" "$1"/commands/{paper,result,iteration,motion}/report.html "$1"/commands/{gallery,view,logs,changes}.html
-    "$1/venv/bin/python" .ci/view.py target/release/dynident "$program" "$1"
-    python3 .ci/live.py target/release/dynident "$program" "$1/page_libraries" "$1"
+    with_browser python3 .ci/pages.py "$program" "$1/page_libraries" "$1"/commands/{paper,result,iteration,motion}/report.html "$1"/commands/{gallery,view,logs,changes}.html
+    with_browser "$1/venv/bin/python" .ci/view.py target/release/dynident "$program" "$1"
+    with_browser python3 .ci/live.py target/release/dynident "$program" "$1/page_libraries" "$1"
 }
 export -f pages_in_a_browser
 
@@ -135,6 +148,6 @@ book_in_a_browser() {
     local program
     program=$(browser)
     target/mdbook/bin/mdbook build docs
-    python3 .ci/book.py "$program" target/book
+    with_browser python3 .ci/book.py "$program" target/book
 }
 export -f book_in_a_browser

@@ -105,6 +105,12 @@ pub struct ServoDrive {
     pub stribeck_speed: f64,
     /// Largest torque, Nm (N); null without limit.
     pub torque_limit: Option<f64>,
+    /// Largest acceleration of the set point, rad/s² (m/s²); null without limit.
+    #[serde(default)]
+    pub profile_acceleration: Option<f64>,
+    /// Largest speed of the set point, rad/s (m/s); null without limit.
+    #[serde(default)]
+    pub profile_speed: Option<f64>,
     /// Time from a command to its effect, s.
     pub delay_s: f64,
     /// Time from a stamp to the measurement of the position, s.
@@ -113,6 +119,9 @@ pub struct ServoDrive {
     pub zero: f64,
     /// Mean torque of weight and velocity over the training logs, without sign, Nm (N).
     pub mean_load: f64,
+    /// Mean of the largest friction over the training logs, Nm (N): the one number of the written robot descriptions.
+    #[serde(default)]
+    pub mean_friction: f64,
     /// Values with error bars.
     pub values: Vec<ServoNumber>,
 }

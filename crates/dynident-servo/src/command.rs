@@ -1,4 +1,7 @@
-//! The command as the drive sees it: held between stamps, and late.
+//! The set point of a drive: the command held between stamps, or a profile that follows it.
+
+use crate::drive::Drive;
+use crate::profile::{Profile, profile};
 
 /// Commands of one joint at rising times, each held until the next.
 #[derive(Debug)]
@@ -30,5 +33,67 @@ impl<'a> HeldCommand<'a> {
         sum += self.values[at] * (end_s - from);
         let span = end_s - start_s;
         (sum / span, (self.values[at] - first) / span)
+    }
+}
+
+/// Relative change of a limit for the derivative of a profile: a central difference over less has the errors of the
+/// profile's steps.
+const LIMIT_CHANGE: f64 = 0.01;
+
+/// The set point of one joint during a run.
+#[derive(Debug)]
+pub(crate) enum SetPoint<'a> {
+    /// The command itself.
+    Held(HeldCommand<'a>),
+    /// A profile, and its derivatives by the logarithms of acceleration and speed where they are finite and needed.
+    Profile { own: Profile, by_log: [Option<[Profile; 2]>; 2] },
+}
+
+/// Mean of the set point over one step, with its derivatives.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct StepCommand {
+    /// The mean, rad (m).
+    pub(crate) mean: f64,
+    /// Derivative by a shift of the times.
+    pub(crate) rate: f64,
+    /// Derivatives by the logarithm of the acceleration and of the speed of the profile.
+    pub(crate) by_log: [f64; 2],
+}
+
+impl<'a> SetPoint<'a> {
+    pub(crate) fn new(times_s: &'a [f64], values: &'a [f64], drive: &Drive, with_derivatives: bool) -> Self {
+        let limits = [drive.profile_acceleration, drive.profile_speed];
+        if limits.iter().all(|limit| limit.is_infinite()) {
+            return Self::Held(HeldCommand::held(times_s, values));
+        }
+        let by_log = |which: usize| {
+            let changed = |sign: f64| {
+                let mut limits = limits;
+                limits[which] *= (sign * LIMIT_CHANGE).exp();
+                profile(times_s, values, limits)
+            };
+            (with_derivatives && limits[which].is_finite()).then(|| [changed(1.0), changed(-1.0)])
+        };
+        Self::Profile { own: profile(times_s, values, limits), by_log: [by_log(0), by_log(1)] }
+    }
+
+    /// The set point from `start_s` to `end_s`. Calls must have rising times.
+    pub(crate) fn during(&mut self, start_s: f64, end_s: f64) -> StepCommand {
+        match self {
+            Self::Held(command) => {
+                let (mean, rate) = command.mean(start_s, end_s);
+                StepCommand { mean, rate, by_log: [0.0; 2] }
+            }
+            Self::Profile { own, by_log } => {
+                let difference = |[above, below]: &[Profile; 2]| {
+                    (above.mean(start_s, end_s) - below.mean(start_s, end_s)) / (2.0 * LIMIT_CHANGE)
+                };
+                StepCommand {
+                    mean: own.mean(start_s, end_s),
+                    rate: (own.at(end_s) - own.at(start_s)) / (end_s - start_s),
+                    by_log: by_log.each_ref().map(|limits| limits.as_ref().map_or(0.0, difference)),
+                }
+            }
+        }
     }
 }

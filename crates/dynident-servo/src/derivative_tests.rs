@@ -3,6 +3,7 @@
 use crate::drive::Drive;
 use crate::floor::{Floor, FloorPoint};
 use crate::parameters::{FreeParameter, ServoRobot, VariedRobot};
+use crate::quantity::Quantity;
 use crate::rollout::Rollout;
 use crate::run::Run;
 use crate::settings::ServoSettings;
@@ -25,6 +26,8 @@ fn robot(friction: f64) -> ServoRobot {
         stribeck: 10.0 * friction,
         stribeck_speed: 0.1,
         torque_limit: f64::INFINITY,
+        profile_acceleration: f64::INFINITY,
+        profile_speed: f64::INFINITY,
         delay_s: 0.013,
         read_delay_s: 0.002,
         zero: 0.01,
@@ -114,4 +117,32 @@ fn derivatives_hold_at_the_torque_limit_and_on_the_floor() {
     robot.floor = Some(Floor { height_m: 0.75, stiffness: 20_000.0, points: vec![point] });
     let largest = largest_difference(&robot, &run(6), true);
     assert!(largest < 1e-4, "{largest:e}");
+}
+
+/// The derivatives of a profile are central differences over the same change of its limits; bodies and drives are
+/// differentiated exactly.
+#[test]
+fn derivatives_by_the_limits_of_a_profile_equal_differences() {
+    let mut robot = robot(0.0);
+    for drive in &mut robot.drives {
+        (drive.profile_acceleration, drive.profile_speed) = (4.0, 0.5);
+    }
+    let (run, parameters) = (run(6), parameters(&robot));
+    let z = vec![0.0; parameters.len()];
+    let exact = simulate(&robot, &parameters, &z, &run);
+    for quantity in [Quantity::ProfileAcceleration, Quantity::ProfileSpeed] {
+        let k = parameters.iter().position(|own| own.quantity == quantity).unwrap();
+        let moved = |sign: f64| {
+            let mut z = z.clone();
+            z[k] += sign * 0.01;
+            simulate(&robot, &parameters, &z, &run)
+        };
+        let (above, below) = (moved(1.0), moved(-1.0));
+        let size = exact.iter().map(|(_, d)| d[k].abs()).fold(0.0, f64::max);
+        assert!(size > 0.01, "{quantity:?} {size}");
+        for ((above, below), (_, derivatives)) in above.iter().zip(&below).zip(&exact) {
+            let difference = ((above.0 - below.0) / 0.02 - derivatives[k]).abs() / size;
+            assert!(difference < 1e-3, "{quantity:?} {difference}");
+        }
+    }
 }

@@ -1,8 +1,9 @@
 //! The drive of one joint: a position controller, a motor and a gear with friction.
 
-/// Drive of one joint, in SI units at the joint. With the delayed command `r`, measured position `q` and velocity `v`:
+/// Drive of one joint, in SI units at the joint. With the delayed set point `r`, measured position `q` and velocity `v`:
 ///
 /// ```text
+/// set point r    follows the command with limited acceleration and speed (`profile.rs`)
 /// motor torque   clip(stiffness (r - q), ±torque_limit) - damping v
 /// friction       at most coulomb + load_friction |load| + stribeck exp(-(v / stribeck_speed)²)
 /// ```
@@ -27,6 +28,11 @@ pub struct Drive {
     pub stribeck_speed: f64,
     /// Largest torque of the position controller, Nm (N); infinite without limit.
     pub torque_limit: f64,
+    /// Largest acceleration of the set point, rad/s² (m/s²); infinite without limit. Servos call it "acceleration" or
+    /// "profile acceleration".
+    pub profile_acceleration: f64,
+    /// Largest speed of the set point, rad/s (m/s); infinite without limit.
+    pub profile_speed: f64,
     /// Time from a command to its effect, s.
     pub delay_s: f64,
     /// Time from a stamp to the measurement of the position, s.

@@ -1,16 +1,15 @@
 //! The coordinates whose simulated motion is most like the measured one.
 //!
-//! The errors `e` of joint `j` give the cost `Σ_j n_j / c_j · ln(mean e² + floor²) + Σ (z / sd)²`: minus twice the
-//! logarithm of a normal density with unknown variance of each joint, and of the priors. `c_j` is the number of
-//! neighbouring samples with the same error. Levenberg and Marquardt's method decreases the cost, with exact
-//! derivatives of the simulation.
+//! The cost is minus twice the logarithm of the likelihood of all joints (`likelihood.rs`) and of the priors,
+//! `Σ (z / sd)²`. Levenberg and Marquardt's method decreases the cost, with exact derivatives of the simulation.
 //!
 //! The search begins at the given coordinates and at those of the joints' responses (`start.rs`). From each it descends
 //! with long time steps and short simulations that restart from the measured motion, which leave few local minima, then
 //! without restarts. The better end is refined with accurate time steps.
 
 use crate::error::ServoError;
-use crate::normal::{JointTotal, Simulation, period_sums, sums, symmetric, totals};
+use crate::likelihood::{JointLikelihood, joint_likelihood};
+use crate::normal::{PeriodSums, Periods, period_errors, period_sums, symmetric, total_gram};
 use crate::parameters::{Change, FreeParameter, ServoRobot, VariedRobot};
 use crate::run::Run;
 use crate::settings::ServoSettings;
@@ -32,6 +31,8 @@ const ROUGH_TOLERANCE: f64 = 1.0;
 const MOST_PERIODS: f64 = 500.0;
 /// First value of the number of neighbouring samples with the same error.
 const FIRST_CORRELATED: f64 = 25.0;
+/// A period with a smaller weight is reported as not explained: its error is at least five times the usual one.
+const UNEXPLAINED_WEIGHT: f64 = 0.05;
 /// Longest change of the logarithm of a value in one step; other coordinates change at most by their prior deviation.
 const LONGEST_STEP: f64 = 1.0;
 /// Most attempts to find a shorter step that decreases the cost.
@@ -50,17 +51,29 @@ pub struct Search {
     pub cost: f64,
     /// Root mean square error of each joint over all runs, rad (m).
     pub errors: Vec<f64>,
+    /// Intervals that the model does not explain. They have little weight in the fit.
+    pub unexplained: Vec<Unexplained>,
     /// Number of steps.
     pub iterations: usize,
     /// Whether the last step changed the cost by less than the tolerance.
     pub settled: bool,
 }
 
-/// Cost and its derivatives at some coordinates.
+/// An interval in which the error of a joint is much larger than elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unexplained {
+    /// Index of the run.
+    pub run: usize,
+    /// The joint.
+    pub joint: usize,
+    /// Begin and end, s, in stamps of the run.
+    pub interval_s: [f64; 2],
+}
+
+/// Likelihood and cost at some coordinates.
 struct Point {
-    totals: Vec<JointTotal>,
+    joints: Vec<JointLikelihood>,
     cost: f64,
-    weights: Vec<f64>,
 }
 
 /// A search among the coordinates of the unknowns.
@@ -69,6 +82,7 @@ struct Searcher<'a> {
     parameters: &'a [FreeParameter],
     runs: &'a [Run],
     settings: &'a ServoSettings,
+    periods: Periods,
     stepping: Stepping,
     /// Decrease of the cost at which a descent ends.
     tolerance: f64,
@@ -77,35 +91,22 @@ struct Searcher<'a> {
 }
 
 impl Searcher<'_> {
-    fn simulation(&self, with_derivatives: bool) -> Simulation {
-        let length = |run: &Run| run.times_s[run.times_s.len() - 1] - run.times_s[0];
-        let total_s: f64 = self.runs.iter().map(length).sum();
-        let period_s = self.settings.period_s.max(total_s / MOST_PERIODS);
-        Simulation { stepping: self.stepping, period_s, with_derivatives }
-    }
-
-    fn point(&self, z: &[f64], with_derivatives: bool) -> Option<Point> {
+    fn point(&self, z: &[f64]) -> Option<Point> {
         let varied = VariedRobot::new(self.nominal, self.parameters, z).ok()?;
-        let totals = totals(&sums(&varied, self.runs, self.simulation(with_derivatives))?);
-        let variance = |total: &JointTotal| total.squares / total.count + self.settings.least_error.powi(2);
-        let data: f64 =
-            totals.iter().zip(&self.correlated).map(|(total, c)| total.count / c * variance(total).ln()).sum();
+        let errors = period_errors(&varied, self.runs, self.stepping, &self.periods)?;
+        let (floor, freedom) = (self.settings.least_error, self.settings.period_freedom);
+        let likelihood = |(own, &correlated): (&Vec<_>, &f64)| joint_likelihood(own, floor, correlated, freedom);
+        let joints: Vec<JointLikelihood> = errors.iter().zip(&self.correlated).map(likelihood).collect();
         let prior: f64 = self.parameters.iter().zip(z).map(|(p, z)| (z / p.prior_sd).powi(2)).sum();
-        let weights = totals.iter().zip(&self.correlated).map(|(total, c)| 1.0 / (c * variance(total))).collect();
-        Some(Point { totals, cost: data + prior, weights })
+        let cost = joints.iter().map(|own| own.cost).sum::<f64>() + prior;
+        cost.is_finite().then_some(Point { joints, cost })
     }
 
-    /// Hessian of half of the data's cost, and its negative gradient.
-    fn information(&self, point: &Point) -> (DMatrix<f64>, DVector<f64>) {
-        let columns = self.parameters.len();
-        let (mut gram, mut moment) = (DMatrix::zeros(columns, columns), DVector::zeros(columns));
-        for (total, &weight) in point.totals.iter().zip(&point.weights) {
-            gram += &total.gram * weight;
-            for period in &total.moments {
-                moment.axpy(weight, period, 1.0);
-            }
-        }
-        (gram, moment)
+    /// Sums of each period with the weights of a point.
+    fn sums(&self, z: &[f64], point: &Point) -> Option<Vec<PeriodSums>> {
+        let varied = VariedRobot::new(self.nominal, self.parameters, z).ok()?;
+        let weights: Vec<Vec<f64>> = point.joints.iter().map(|own| own.weights.clone()).collect();
+        period_sums(&varied, self.runs, (self.stepping, &self.periods), &weights)
     }
 
     fn with_priors(&self, gram: &DMatrix<f64>) -> DMatrix<f64> {
@@ -120,15 +121,15 @@ impl Searcher<'_> {
     fn descend(&self, z: &mut Vec<f64>, now: &mut Point, most: usize) -> (usize, bool) {
         let mut damping = 1e-3;
         for iteration in 1..=most {
-            let (gram, mut moment) = self.information(now);
+            let Some(sums) = self.sums(z, now) else { return (iteration, false) };
+            let mut moment: DVector<f64> = sums.iter().map(PeriodSums::moment).sum();
             for (k, parameter) in self.parameters.iter().enumerate() {
                 moment[k] -= z[k] / parameter.prior_sd.powi(2);
             }
-            let matrix = self.with_priors(&gram);
-            let Some(next) = self.lower(z, now.cost, &matrix, &moment, &mut damping) else {
+            let matrix = self.with_priors(&total_gram(&sums, z.len()));
+            let Some((next, point)) = self.lower(z, now.cost, &matrix, &moment, &mut damping) else {
                 return (iteration, true);
             };
-            let Some(point) = self.point(&next, true) else { return (iteration, false) };
             let fall = now.cost - point.cost;
             *z = next;
             *now = point;
@@ -147,7 +148,7 @@ impl Searcher<'_> {
         matrix: &DMatrix<f64>,
         moment: &DVector<f64>,
         damping: &mut f64,
-    ) -> Option<Vec<f64>> {
+    ) -> Option<(Vec<f64>, Point)> {
         for _ in 0..ATTEMPTS {
             let mut damped = matrix.clone();
             for k in 0..z.len() {
@@ -166,9 +167,9 @@ impl Searcher<'_> {
                 step /= excess;
             }
             let next: Vec<f64> = z.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
-            if self.point(&next, false).is_some_and(|point| point.cost < cost) {
+            if let Some(point) = self.point(&next).filter(|point| point.cost < cost) {
                 *damping = (*damping * 0.2).max(1e-9);
-                return Some(next);
+                return Some((next, point));
             }
             *damping *= 5.0;
         }
@@ -177,31 +178,29 @@ impl Searcher<'_> {
 
     /// Number of neighbouring samples with the same error, for each joint: the variance of the periods' moments over
     /// that of independent samples, median over the coordinates.
-    fn correlated(&self, point: &Point) -> Vec<f64> {
-        let of_joint = |total: &JointTotal| {
-            let variance = total.squares / total.count;
+    fn correlated(&self, sums: &[PeriodSums]) -> Vec<f64> {
+        let of_joint = |(joint, now): (usize, &f64)| {
             let mut ratios: Vec<f64> = (0..self.parameters.len())
-                .filter(|&k| total.gram[(k, k)] > 0.0)
-                .map(|k| {
-                    let together: f64 = total.moments.iter().map(|moment| moment[k].powi(2)).sum();
-                    together / (variance * total.gram[(k, k)])
+                .filter_map(|k| {
+                    let expected: f64 = sums.iter().map(|own| own.diagonals[joint][k]).sum();
+                    let together: f64 = sums.iter().map(|own| own.moments[joint][k].powi(2)).sum();
+                    // The moments have the weights 1 / (variance × correlated).
+                    (expected > 0.0).then(|| now * together / expected)
                 })
                 .collect();
             ratios.sort_by(f64::total_cmp);
             ratios.get(ratios.len() / 2).map_or(1.0, |ratio| ratio.max(1.0))
         };
-        point.totals.iter().map(of_joint).collect()
+        self.correlated.iter().enumerate().map(of_joint).collect()
     }
 
     /// Covariance of the coordinates: from the priors, and from the changes `(H - G)⁻¹ s` without one of the periods,
     /// which has the information `G` and the moments `s` (jackknife over clusters: MacKinnon and White 1985; Bell and
     /// McCaffrey 2002). The moments alone (White 1980) are too small if one period determines much of a coordinate.
-    fn covariance(&self, z: &[f64], point: &Point, gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    fn covariance(&self, periods: &[PeriodSums], gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let columns = self.parameters.len();
         let hessian = self.with_priors(gram);
         let inverse = hessian.clone().cholesky()?.inverse();
-        let varied = VariedRobot::new(self.nominal, self.parameters, z).ok()?;
-        let periods = period_sums(&varied, self.runs, self.simulation(true), &point.weights)?;
         let count = periods.len() as f64;
         if count < 2.0 {
             return Some(inverse);
@@ -210,7 +209,7 @@ impl Searcher<'_> {
             .iter()
             .map(|period| {
                 let rest = &hessian - symmetric(&period.gram, columns);
-                Some(rest.cholesky()?.solve(&DVector::from_column_slice(&period.moment)))
+                Some(rest.cholesky()?.solve(&period.moment()))
             })
             .collect::<Option<_>>()?;
         let mean = changes.iter().sum::<DVector<f64>>() / count;
@@ -232,7 +231,7 @@ impl Searcher<'_> {
             let mut cost = f64::INFINITY;
             for restart_s in [RESTART_S, f64::INFINITY] {
                 self.stepping = Stepping { step_s, end_weight: 1.0, restart_s };
-                let Some(mut now) = self.point(&z, true) else { continue };
+                let Some(mut now) = self.point(&z) else { continue };
                 iterations += self.descend(&mut z, &mut now, ROUGH_ITERATIONS.min(self.settings.iterations)).0;
                 cost = now.cost;
             }
@@ -261,11 +260,14 @@ pub fn search(
         run.validate(nominal.model.dof())?;
     }
     let no_start = || ServoError::Start { run: first.name.clone() };
+    let length = |run: &Run| run.times_s[run.times_s.len() - 1] - run.times_s[0];
+    let total_s: f64 = runs.iter().map(length).sum();
     let mut searcher = Searcher {
         nominal,
         parameters,
         runs,
         settings,
+        periods: Periods::new(runs, settings.period_s.max(total_s / MOST_PERIODS)),
         stepping: Stepping::accurate(settings.step_s),
         tolerance: settings.tolerance.max(ROUGH_TOLERANCE),
         correlated: vec![FIRST_CORRELATED; nominal.model.dof()],
@@ -277,29 +279,56 @@ pub fn search(
     }
     let (z, mut iterations) = searcher.best_of(starts);
     let mut z = z.ok_or_else(no_start)?;
-    let mut now = searcher.point(&z, true).ok_or_else(no_start)?;
-    searcher.correlated = searcher.correlated(&now);
+    searcher.stepping = Stepping { restart_s: f64::INFINITY, ..searcher.stepping };
+    let rough = |searcher: &Searcher<'_>, z: &[f64]| {
+        let now = searcher.point(z)?;
+        searcher.sums(z, &now)
+    };
+    searcher.correlated = searcher.correlated(&rough(&searcher, &z).ok_or_else(no_start)?);
     searcher.stepping = Stepping::accurate(settings.step_s);
     let mut settled = false;
+    let mut end = None;
     // The number of neighbouring samples with the same error is that at the end of the search.
     for tolerance in [settings.tolerance.max(ROUGH_TOLERANCE), settings.tolerance] {
         searcher.tolerance = tolerance;
-        now = searcher.point(&z, true).ok_or_else(no_start)?;
+        let mut now = searcher.point(&z).ok_or_else(no_start)?;
         let (steps, ended) = searcher.descend(&mut z, &mut now, settings.iterations);
         (iterations, settled) = (iterations + steps, ended);
+        let sums = searcher.sums(&z, &now).ok_or_else(no_start)?;
         if tolerance > settings.tolerance {
-            searcher.correlated = searcher.correlated(&now);
+            searcher.correlated = searcher.correlated(&sums);
         }
+        end = Some((now, sums));
     }
-    let (information, _) = searcher.information(&now);
-    let covariance = searcher.covariance(&z, &now, &information).ok_or_else(no_start)?;
+    let (now, sums) = end.ok_or_else(no_start)?;
+    let information = total_gram(&sums, z.len());
+    let covariance = searcher.covariance(&sums, &information).ok_or_else(no_start)?;
     Ok(Search {
         covariance,
         information,
         cost: now.cost,
-        errors: now.totals.iter().map(|total| (total.squares / total.count).sqrt()).collect(),
+        errors: now.joints.iter().map(|own| own.error).collect(),
+        unexplained: unexplained(&now.joints, &searcher.periods, runs),
         coordinates: z,
         iterations,
         settled,
     })
+}
+
+/// Intervals in which the error of a joint is much larger than elsewhere.
+fn unexplained(joints: &[JointLikelihood], periods: &Periods, runs: &[Run]) -> Vec<Unexplained> {
+    let mut found: Vec<Unexplained> = Vec::new();
+    for (joint, own) in joints.iter().enumerate() {
+        for (period, _) in own.relative.iter().enumerate().filter(|(_, weight)| **weight < UNEXPLAINED_WEIGHT) {
+            let (run, begin_s) = periods.place(period);
+            let interval_s = [begin_s, begin_s + periods.length_s()].map(|time| time + runs[run].times_s[0]);
+            match found.last_mut() {
+                Some(last) if last.joint == joint && last.run == run && last.interval_s[1] >= interval_s[0] - 1e-9 => {
+                    last.interval_s[1] = interval_s[1];
+                }
+                _ => found.push(Unexplained { run, joint, interval_s }),
+            }
+        }
+    }
+    found
 }

@@ -1,161 +1,177 @@
-//! Sums over all samples that a step of the search needs.
+//! Sums over all samples that a step of the search needs, for periods of the runs.
 
 use crate::parameters::VariedRobot;
 use crate::rollout::Rollout;
 use crate::run::Run;
 use crate::step_state::Stepping;
+use dynident_lanes::{Kernel, Lane, Level, dispatch_single};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Sums of one joint over one run. `g` are the derivatives of a simulated position, `e` is the measured position minus
-/// it.
+/// The periods of all runs, one after another.
 #[derive(Clone, Debug)]
-pub(crate) struct JointSums {
-    /// `Σ g gᵀ`, lower triangle, row by row.
-    pub(crate) gram: Vec<f64>,
-    /// `Σ g e` of each period.
-    pub(crate) moments: Vec<Vec<f64>>,
-    /// `Σ e²`.
-    pub(crate) squares: f64,
-    /// Number of samples.
-    pub(crate) count: usize,
+pub(crate) struct Periods {
+    length_s: f64,
+    /// Index of the first period of each run, and the number of all periods.
+    firsts: Vec<usize>,
 }
 
-/// Sums of all joints over one run.
-pub(crate) type RunSums = Vec<JointSums>;
-
-/// How to simulate.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Simulation {
-    pub(crate) stepping: Stepping,
-    pub(crate) period_s: f64,
-    pub(crate) with_derivatives: bool,
-}
-
-/// Sums of each run; `None` if the simulation of one fails.
-pub(crate) fn sums(varied: &VariedRobot, runs: &[Run], simulation: Simulation) -> Option<Vec<RunSums>> {
-    runs.par_iter().map(|run| run_sums(varied, run, simulation)).collect()
-}
-
-fn run_sums(varied: &VariedRobot, run: &Run, simulation: Simulation) -> Option<RunSums> {
-    let columns = if simulation.with_derivatives { varied.columns } else { 0 };
-    let periods = period(run, simulation, run.times_s.len() - 1) + 1;
-    let empty = JointSums {
-        gram: vec![0.0; columns * (columns + 1) / 2],
-        moments: vec![vec![0.0; columns]; periods],
-        squares: 0.0,
-        count: 0,
-    };
-    let mut joints = vec![empty; varied.robot.model.dof()];
-    let rollout = Rollout::new(varied, run, simulation.stepping, simulation.with_derivatives)?;
-    let ended = rollout.simulate(|predicted| {
-        let error = run.positions[predicted.joint][predicted.sample] - predicted.position;
-        let sums = &mut joints[predicted.joint];
-        sums.squares += error * error;
-        sums.count += 1;
-        add_gram(&mut sums.gram, predicted.derivatives, 1.0);
-        let moment = &mut sums.moments[period(run, simulation, predicted.sample)];
-        for (sum, g) in moment.iter_mut().zip(predicted.derivatives) {
-            *sum += g * error;
+impl Periods {
+    pub(crate) fn new(runs: &[Run], length_s: f64) -> Self {
+        let own = |run: &Run| ((run.times_s[run.times_s.len() - 1] - run.times_s[0]) / length_s) as usize + 1;
+        let mut firsts = vec![0];
+        for run in runs {
+            firsts.push(firsts[firsts.len() - 1] + own(run));
         }
-    });
-    let finite = joints.iter().all(|sums| sums.squares.is_finite());
-    (ended && finite).then_some(joints)
-}
+        Self { length_s, firsts }
+    }
 
-/// Sums of one period over all joints, with a weight of each joint.
-#[derive(Clone, Debug)]
-pub(crate) struct PeriodSums {
-    /// `Σ w g gᵀ`, lower triangle, row by row.
-    pub(crate) gram: Vec<f64>,
-    /// `Σ w g e`.
-    pub(crate) moment: Vec<f64>,
-}
+    /// Length of a period, s.
+    pub(crate) fn length_s(&self) -> f64 {
+        self.length_s
+    }
 
-/// Sums of each period of all runs; `None` if the simulation of one fails.
-pub(crate) fn period_sums(
-    varied: &VariedRobot,
-    runs: &[Run],
-    simulation: Simulation,
-    weights: &[f64],
-) -> Option<Vec<PeriodSums>> {
-    let of_run = |run: &Run| {
-        let columns = varied.columns;
-        let empty = PeriodSums { gram: vec![0.0; columns * (columns + 1) / 2], moment: vec![0.0; columns] };
-        let mut periods = vec![empty; period(run, simulation, run.times_s.len() - 1) + 1];
-        let rollout = Rollout::new(varied, run, simulation.stepping, true)?;
-        let ended = rollout.simulate(|predicted| {
-            let weight = weights[predicted.joint];
-            let error = run.positions[predicted.joint][predicted.sample] - predicted.position;
-            let sums = &mut periods[period(run, simulation, predicted.sample)];
-            add_gram(&mut sums.gram, predicted.derivatives, weight);
-            for (sum, g) in sums.moment.iter_mut().zip(predicted.derivatives) {
-                *sum += weight * g * error;
-            }
-        });
-        ended.then_some(periods)
-    };
-    let all: Option<Vec<Vec<PeriodSums>>> = runs.par_iter().map(of_run).collect();
-    Some(all?.into_iter().flatten().collect())
-}
+    /// Number of periods of a run.
+    fn of_run(&self, run: usize) -> usize {
+        self.firsts[run + 1] - self.firsts[run]
+    }
 
-/// Period of a sample.
-fn period(run: &Run, simulation: Simulation, sample: usize) -> usize {
-    ((run.times_s[sample] - run.times_s[0]) / simulation.period_s) as usize
-}
+    /// Period of a sample, from the first of its run.
+    fn at(&self, run: &Run, sample: usize) -> usize {
+        ((run.times_s[sample] - run.times_s[0]) / self.length_s) as usize
+    }
 
-/// Adds `weight g gᵀ` to a lower triangle.
-fn add_gram(gram: &mut [f64], derivatives: &[f64], weight: f64) {
-    let mut at = 0;
-    for (row, &g) in derivatives.iter().enumerate() {
-        if g != 0.0 {
-            for (sum, other) in gram[at..=at + row].iter_mut().zip(derivatives) {
-                *sum += weight * g * other;
-            }
-        }
-        at += row + 1;
+    /// Run of a period, and the time at which it begins, from the first stamp of the run.
+    pub(crate) fn place(&self, period: usize) -> (usize, f64) {
+        let run = self.firsts.partition_point(|first| *first <= period) - 1;
+        (run, (period - self.firsts[run]) as f64 * self.length_s)
     }
 }
 
-/// The symmetric matrix of a lower triangle, row by row.
-pub(crate) fn symmetric(triangle: &[f64], columns: usize) -> nalgebra::DMatrix<f64> {
-    nalgebra::DMatrix::from_fn(columns, columns, |row, column| {
-        let (low, high) = (row.min(column), row.max(column));
-        triangle[high * (high + 1) / 2 + low]
-    })
-}
-
-/// Sums of one joint over all runs.
-#[derive(Clone, Debug)]
-pub(crate) struct JointTotal {
-    /// `Σ g gᵀ`.
-    pub(crate) gram: nalgebra::DMatrix<f64>,
-    /// `Σ g e` of each period of each run.
-    pub(crate) moments: Vec<nalgebra::DVector<f64>>,
-    /// `Σ e²`.
+/// Error of one joint in one period.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct PeriodError {
+    /// `Σ e²`, where `e` is the measured position minus the simulated one.
     pub(crate) squares: f64,
     /// Number of samples.
     pub(crate) count: f64,
 }
 
-/// Sums of each joint over all runs.
-pub(crate) fn totals(runs: &[RunSums]) -> Vec<JointTotal> {
-    let columns = runs[0][0].moments[0].len();
-    (0..runs[0].len())
-        .map(|joint| {
-            let own = || runs.iter().map(move |run| &run[joint]);
-            let mut gram = vec![0.0; runs[0][joint].gram.len()];
-            for sums in own() {
-                gram.iter_mut().zip(&sums.gram).for_each(|(total, part)| *total += part);
+/// Errors of each joint in each period; `None` if the simulation of a run fails.
+pub(crate) fn period_errors(
+    varied: &VariedRobot,
+    runs: &[Run],
+    stepping: Stepping,
+    periods: &Periods,
+) -> Option<Vec<Vec<PeriodError>>> {
+    let joints = varied.robot.model.dof();
+    let of_run = |(index, run): (usize, &Run)| {
+        let mut errors = vec![vec![PeriodError::default(); periods.of_run(index)]; joints];
+        let ended = Rollout::new(varied, run, stepping, false)?.simulate(|predicted| {
+            let error = run.positions[predicted.joint][predicted.sample] - predicted.position;
+            let own = &mut errors[predicted.joint][periods.at(run, predicted.sample)];
+            own.squares += error * error;
+            own.count += 1.0;
+        });
+        let finite = errors.iter().flatten().all(|own| own.squares.is_finite());
+        (ended && finite).then_some(errors)
+    };
+    let all: Vec<Vec<Vec<PeriodError>>> = runs.par_iter().enumerate().map(of_run).collect::<Option<_>>()?;
+    Some((0..joints).map(|joint| all.iter().flat_map(|run| run[joint].iter().copied()).collect()).collect())
+}
+
+/// Sums of one period with the weights `w` of its joints. `g` are the derivatives of a simulated position.
+#[derive(Clone, Debug)]
+pub(crate) struct PeriodSums {
+    /// `Σ w g gᵀ` over all joints, lower triangle, row by row.
+    pub(crate) gram: Vec<f64>,
+    /// `Σ w g e` of each joint.
+    pub(crate) moments: Vec<DVector<f64>>,
+    /// Diagonal of `Σ w g gᵀ` of each joint.
+    pub(crate) diagonals: Vec<DVector<f64>>,
+}
+
+impl PeriodSums {
+    /// `Σ w g e` over all joints.
+    pub(crate) fn moment(&self) -> DVector<f64> {
+        self.moments.iter().sum()
+    }
+}
+
+/// Sums of each period, with a weight of each joint in each period; `None` if the simulation of a run fails.
+pub(crate) fn period_sums(
+    varied: &VariedRobot,
+    runs: &[Run],
+    (stepping, periods): (Stepping, &Periods),
+    weights: &[Vec<f64>],
+) -> Option<Vec<PeriodSums>> {
+    let (columns, joints) = (varied.columns, weights.len());
+    let of_run = |(index, run): (usize, &Run)| {
+        let zeros = vec![DVector::zeros(columns); joints];
+        let empty =
+            PeriodSums { gram: vec![0.0; columns * (columns + 1) / 2], moments: zeros.clone(), diagonals: zeros };
+        let mut sums = vec![empty; periods.of_run(index)];
+        let ended = Rollout::new(varied, run, stepping, true)?.simulate(|predicted| {
+            let joint = predicted.joint;
+            let period = periods.at(run, predicted.sample);
+            let weight = weights[joint][periods.firsts[index] + period];
+            let error = run.positions[joint][predicted.sample] - predicted.position;
+            let own = &mut sums[period];
+            add_gram(&mut own.gram, predicted.derivatives, weight);
+            let (moment, diagonal) = (&mut own.moments[joint], &mut own.diagonals[joint]);
+            for ((moment, diagonal), g) in moment.iter_mut().zip(diagonal.iter_mut()).zip(predicted.derivatives) {
+                *moment += weight * g * error;
+                *diagonal += weight * g * g;
             }
-            JointTotal {
-                gram: symmetric(&gram, columns),
-                moments: own()
-                    .flat_map(|sums| &sums.moments)
-                    .map(|moment| nalgebra::DVector::from_column_slice(moment))
-                    .collect(),
-                squares: own().map(|sums| sums.squares).sum(),
-                count: own().map(|sums| sums.count as f64).sum(),
+        });
+        ended.then_some(sums)
+    };
+    let all: Option<Vec<Vec<PeriodSums>>> = runs.par_iter().enumerate().map(of_run).collect();
+    Some(all?.into_iter().flatten().collect())
+}
+
+/// Adds `weight g gᵀ` to a lower triangle.
+pub(crate) fn add_gram(gram: &mut [f64], derivatives: &[f64], weight: f64) {
+    dispatch_single(Level::detect(), AddGram { gram, derivatives, weight });
+}
+
+struct AddGram<'a> {
+    gram: &'a mut [f64],
+    derivatives: &'a [f64],
+    weight: f64,
+}
+
+impl Kernel for AddGram<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let mut at = 0;
+        for (row, &g) in self.derivatives.iter().enumerate() {
+            if g != 0.0 {
+                let own = self.weight * g;
+                for (sum, other) in self.gram[at..=at + row].iter_mut().zip(self.derivatives) {
+                    *sum += own * other;
+                }
             }
-        })
-        .collect()
+            at += row + 1;
+        }
+    }
+}
+
+/// The symmetric matrix of a lower triangle, row by row.
+pub(crate) fn symmetric(triangle: &[f64], columns: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(columns, columns, |row, column| {
+        let (low, high) = (row.min(column), row.max(column));
+        triangle[high * (high + 1) / 2 + low]
+    })
+}
+
+/// `Σ w g gᵀ` over all periods.
+pub(crate) fn total_gram(periods: &[PeriodSums], columns: usize) -> DMatrix<f64> {
+    let mut gram = vec![0.0; columns * (columns + 1) / 2];
+    for own in periods {
+        gram.iter_mut().zip(&own.gram).for_each(|(total, part)| *total += part);
+    }
+    symmetric(&gram, columns)
 }

@@ -198,6 +198,8 @@ fn value_mut(drive: &mut Drive, quantity: Quantity) -> &mut f64 {
         Quantity::LoadFriction => &mut drive.load_friction,
         Quantity::Stribeck => &mut drive.stribeck,
         Quantity::TorqueLimit => &mut drive.torque_limit,
+        Quantity::ProfileAcceleration => &mut drive.profile_acceleration,
+        Quantity::ProfileSpeed => &mut drive.profile_speed,
         Quantity::Delay => &mut drive.delay_s,
         Quantity::ReadDelay => &mut drive.read_delay_s,
         Quantity::Zero => &mut drive.zero,

@@ -21,6 +21,10 @@ pub enum Quantity {
     Stribeck,
     /// Largest torque of the motor, Nm (N).
     TorqueLimit,
+    /// Largest acceleration of the set point, rad/s² (m/s²).
+    ProfileAcceleration,
+    /// Largest speed of the set point, rad/s (m/s).
+    ProfileSpeed,
     /// Time from a command to its effect, s.
     Delay,
     /// Time from a stamp to the measurement of the position, s.
@@ -59,6 +63,8 @@ impl Quantity {
             Self::LoadFriction => "friction per load",
             Self::Stribeck => "extra friction at rest",
             Self::TorqueLimit => "torque limit",
+            Self::ProfileAcceleration => "acceleration of the set point",
+            Self::ProfileSpeed => "speed of the set point",
             Self::Delay => "delay",
             Self::ReadDelay => "read delay",
             Self::Zero => "zero",
@@ -81,6 +87,10 @@ impl Quantity {
             (Self::Armature, false) | (Self::Mass, _) => "kg",
             (Self::Coulomb | Self::Stribeck | Self::TorqueLimit, true) => "Nm",
             (Self::Coulomb | Self::Stribeck | Self::TorqueLimit, false) => "N",
+            (Self::ProfileAcceleration, true) => "rad/s²",
+            (Self::ProfileAcceleration, false) => "m/s²",
+            (Self::ProfileSpeed, true) => "rad/s",
+            (Self::ProfileSpeed, false) => "m/s",
             (Self::LoadFriction, _) => "",
             (Self::Delay | Self::ReadDelay, _) => "s",
             (Self::Zero, true) => "rad",

@@ -10,7 +10,7 @@
 //! `w = 1/2` the smooth parts are exact to second order: their midpoint rule adds no damping, whereas `w = 1` adds
 //! stiffness × h. Dry friction has the sign of `x`. The derivatives are in `sensitivity.rs`.
 
-use crate::command::HeldCommand;
+use crate::command::SetPoint;
 use crate::parameters::VariedRobot;
 use crate::quantity::Quantity;
 use crate::run::Run;
@@ -65,7 +65,7 @@ impl<'a> Rollout<'a> {
             solver: StepSolver::new(dof),
             step,
             stepping,
-            sensitivity: with_derivatives.then(|| Sensitivity::new(dof, varied.columns)),
+            sensitivity: with_derivatives.then(|| Sensitivity::new(dof, varied.robot.model.body_count(), varied.columns)),
         })
     }
 
@@ -77,8 +77,10 @@ impl<'a> Rollout<'a> {
         let stamps = &self.run.times_s;
         let latest = drives.iter().map(|drive| drive.read_delay_s).fold(0.0, f64::max);
         let (start, end) = (stamps[0], stamps[stamps.len() - 1] + latest);
-        let mut commands: Vec<HeldCommand<'_>> =
-            self.run.commands.iter().map(|values| HeldCommand::held(stamps, values)).collect();
+        let with_derivatives = self.sensitivity.is_some();
+        let set_point = |(values, drive)| SetPoint::new(stamps, values, drive, with_derivatives);
+        let mut commands: Vec<SetPoint<'_>> =
+            self.run.commands.iter().map(Vec::as_slice).zip(drives).map(set_point).collect();
         let mut next = vec![0; drives.len()];
         let mut derivatives = vec![0.0; if self.sensitivity.is_some() { self.varied.columns } else { 0 }];
         let h = self.step.h;
@@ -120,7 +122,7 @@ impl<'a> Rollout<'a> {
     }
 
     /// Makes one step. Returns false without a solution.
-    fn advance(&mut self, commands: &mut [HeldCommand<'_>], from: f64, to: f64) -> bool {
+    fn advance(&mut self, commands: &mut [SetPoint<'_>], from: f64, to: f64) -> bool {
         self.set_equation(commands, from, to);
         let step = &mut self.step;
         if !self.solver.solve(&step.a, &step.w, &mut step.laws, &mut step.x) {
@@ -152,7 +154,7 @@ impl<'a> Rollout<'a> {
     }
 
     /// Sets matrix, right side and laws of the step.
-    fn set_equation(&mut self, commands: &mut [HeldCommand<'_>], from: f64, to: f64) {
+    fn set_equation(&mut self, commands: &mut [SetPoint<'_>], from: f64, to: f64) {
         let (robot, step) = (&self.varied.robot, &mut self.step);
         let dof = step.q.len();
         let (weight, h) = (step.end_weight, step.h);
@@ -168,11 +170,11 @@ impl<'a> Rollout<'a> {
         }
         for (joint, drive) in robot.drives.iter().enumerate() {
             step.a[joint * dof + joint] += drive.armature / step.h;
-            let (command, rate) = commands[joint].mean(from - drive.delay_s, to - drive.delay_s);
-            step.command_rates[joint] = -rate;
+            let command = commands[joint].during(from - drive.delay_s, to - drive.delay_s);
+            step.commands[joint] = command;
             step.at_rest[joint] = (-(step.v[joint] / drive.stribeck_speed).powi(2)).exp();
             step.laws.joints[joint] = JointLaw {
-                pull: drive.stiffness * (command - step.q[joint] - weight * known * h * step.v[joint]),
+                pull: drive.stiffness * (command.mean - step.q[joint] - weight * known * h * step.v[joint]),
                 slope: drive.stiffness * h * weight * weight,
                 limit: drive.torque_limit,
                 damping: drive.damping * weight,

@@ -1,13 +1,15 @@
 //! Derivatives of a simulated motion by all unknowns.
 //!
 //! The derivative of the equation of a step (`rollout.rs`) by one coordinate, with the derivatives `S_q`, `S_v` of the
-//! state at its beginning and `D` of the bodies' torque with constant `a`, gives that of the velocity at its end:
+//! state at its beginning, gives that of the velocity at its end:
 //!
 //! ```text
-//! (A + slopes) S_x = A S_v - D + ∂t/∂state + ∂t/∂coordinate        A = (M + armature) / h        S_u = w S_x + (1 - w) S_v
+//! (A + slopes) S_x = C_q S_q + C_v S_v + effect of the coordinate        A = (M + armature) / h        S_u = w S_x + (1 - w) S_v
 //! ```
 //!
-//! for the moving joints; a resting joint has `S_x = 0`. `A + slopes` is the matrix that solved the step.
+//! for the moving joints; a resting joint has `S_x = 0`. `A + slopes` is the matrix that solved the step. `C_q` and
+//! `C_v` contain the derivatives of the torques of bodies, drives and contacts by the state, with constant `A`. They are
+//! computed once for all coordinates.
 
 use crate::floor::Floor;
 use crate::parameters::VariedRobot;
@@ -15,35 +17,47 @@ use crate::quantity::Quantity;
 use crate::step::{Clip, StepSolver, subtract};
 use crate::step_state::StepState;
 use dynident_dynamics::{Workspace, inverse_dynamics_derivatives, torque_regressor};
+use dynident_lanes::{Kernel, Lane, Level, dispatch_single};
 use dynident_model::Model;
 
 /// Derivatives of position and velocity: dof rows with one value for each coordinate.
 #[derive(Debug)]
 pub(crate) struct Sensitivity {
     columns: usize,
+    level: Level,
     by_q: Vec<f64>,
     by_v: Vec<f64>,
     /// Of the mean velocity of the last step.
     by_mean: Vec<f64>,
+    /// Direct effects of the coordinates, then the right sides and the derivatives of the velocity at the end.
     rows: Vec<f64>,
-    loads: Vec<f64>,
+    /// `C_q` and `C_v`, dof × dof, row-major.
+    of_q: Vec<f64>,
+    of_v: Vec<f64>,
+    /// Regressor of the bodies' torque.
+    regressor: Vec<f64>,
     still: Vec<f64>,
     acceleration: Vec<f64>,
+    /// Change of each joint's friction by its load.
+    by_load: Vec<f64>,
 }
 
 impl Sensitivity {
-    pub(crate) fn new(dof: usize, columns: usize) -> Self {
-        let zeros = || vec![0.0; dof * columns];
-        let (still, acceleration) = (vec![0.0; dof], vec![0.0; dof]);
+    pub(crate) fn new(dof: usize, bodies: usize, columns: usize) -> Self {
+        let zeros = |count: usize| vec![0.0; count];
         Self {
             columns,
-            by_q: zeros(),
-            by_v: zeros(),
-            by_mean: zeros(),
-            rows: zeros(),
-            loads: zeros(),
-            still,
-            acceleration,
+            level: Level::detect(),
+            by_q: zeros(dof * columns),
+            by_v: zeros(dof * columns),
+            by_mean: zeros(dof * columns),
+            rows: zeros(dof * columns),
+            of_q: zeros(dof * dof),
+            of_v: zeros(dof * dof),
+            regressor: zeros(dof * 10 * bodies),
+            still: zeros(dof),
+            acceleration: zeros(dof),
+            by_load: zeros(dof),
         }
     }
 
@@ -69,62 +83,100 @@ impl Sensitivity {
         solver: &StepSolver,
         step: &StepState,
     ) {
-        let (dof, columns) = (step.q.len(), self.columns);
         for (joint, acceleration) in self.acceleration.iter_mut().enumerate() {
             *acceleration = (step.x[joint] - step.v[joint]) / step.h;
         }
-        let states = (&self.by_q[..], &self.by_v[..]);
-        if varied.has_load_friction {
-            bodies(&mut self.loads, states, varied, (model, &mut *workspace), (step, &self.still));
-        }
-        bodies(&mut self.rows, states, varied, (model, workspace), (step, &self.acceleration));
-        for joint in 0..dof {
-            let row = &mut self.rows[joint * columns..(joint + 1) * columns];
-            for value in &mut *row {
-                *value = -*value;
-            }
-            for (other, a) in step.a[joint * dof..(joint + 1) * dof].iter().enumerate() {
-                subtract(row, &self.by_v[other * columns..(other + 1) * columns], -a);
-            }
-        }
+        self.of_q.fill(0.0);
+        self.of_v.copy_from_slice(&step.a);
+        self.rows.fill(0.0);
+        self.add_bodies(varied, (model, workspace), step);
         if let Some(floor) = &varied.robot.floor {
             self.add_contacts(floor, varied, step);
         }
         self.add_drives(varied, step);
-        self.solve(solver, step);
+        let level = self.level;
+        dispatch_single(level, Solve { sensitivity: self, solver, step });
+    }
+
+    /// Subtracts the derivatives of the bodies' torque `τ(q + (1 - w) h v, v, a)` with constant acceleration, and of the
+    /// friction by the load `τ(q + (1 - w) h v, v, 0)`.
+    fn add_bodies(&mut self, varied: &VariedRobot, (model, workspace): (&Model, &mut Workspace), step: &StepState) {
+        let dof = step.q.len();
+        for ((by_load, drive), (mode, load)) in
+            self.by_load.iter_mut().zip(&varied.robot.drives).zip(step.laws.modes.iter().zip(&step.loads))
+        {
+            *by_load = mode.motion.sign() * drive.load_friction * load.signum();
+        }
+        let width = 10 * model.body_count();
+        self.regressor.fill(0.0);
+        // The position in the middle of the step depends on the velocity.
+        let ahead = (1.0 - step.end_weight) * step.h;
+        let has_load = varied.has_load_friction && self.by_load.iter().any(|by_load| *by_load != 0.0);
+        let parts = [(&self.acceleration, false), (&self.still, true)];
+        for (acceleration, is_load) in parts.into_iter().take(if has_load { 2 } else { 1 }) {
+            let by = inverse_dynamics_derivatives(model, workspace, &step.in_model, &step.v, acceleration);
+            for joint in 0..dof {
+                let part = if is_load { self.by_load[joint] } else { 1.0 };
+                for at in joint * dof..(joint + 1) * dof {
+                    self.of_q[at] -= part * by.by_position[at];
+                    self.of_v[at] -= part * (by.by_velocity[at] + ahead * by.by_position[at]);
+                }
+            }
+            if varied.body_effects.is_empty() {
+                continue;
+            }
+            let regressor = torque_regressor(model, workspace, &step.in_model, &step.v, acceleration);
+            for (joint, (sum, own)) in
+                self.regressor.chunks_exact_mut(width).zip(regressor.chunks_exact(width)).enumerate()
+            {
+                let part = if is_load { self.by_load[joint] } else { 1.0 };
+                sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += part * own);
+            }
+        }
+        // The zero of a joint moves the position in the model.
+        for effect in varied.effects.iter().filter(|effect| effect.quantity == Quantity::Zero) {
+            for joint in 0..dof {
+                self.rows[joint * self.columns + effect.column] +=
+                    self.of_q[joint * dof + effect.index] * effect.derivative;
+            }
+        }
+        for effect in &varied.body_effects {
+            for joint in 0..dof {
+                let block = &self.regressor[joint * width + 10 * effect.body..][..10];
+                self.rows[joint * self.columns + effect.column] -=
+                    block.iter().zip(&effect.derivative).map(|(y, d)| y * d).sum::<f64>();
+            }
+        }
     }
 
     /// Adds the derivatives of the drives' torques.
     fn add_drives(&mut self, varied: &VariedRobot, step: &StepState) {
-        let (columns, robot) = (self.columns, &varied.robot);
+        let (columns, robot, dof) = (self.columns, &varied.robot, step.q.len());
         let (weight, known) = (step.end_weight, 1.0 - step.end_weight);
         for (joint, drive) in robot.drives.iter().enumerate() {
             let mode = step.laws.modes[joint];
-            let own = joint * columns..(joint + 1) * columns;
-            let row = &mut self.rows[own.clone()];
+            let own = joint * dof + joint;
             if mode.clip == Clip::Inside {
-                subtract(row, &self.by_q[own.clone()], drive.stiffness);
-                subtract(row, &self.by_v[own.clone()], drive.stiffness * weight * known * step.h);
-            }
-            subtract(row, &self.by_v[own.clone()], drive.damping * known);
-            let sign = mode.motion.sign();
-            if varied.has_load_friction {
-                let factor = sign * drive.load_friction * step.loads[joint].signum();
-                subtract(row, &self.loads[own.clone()], factor);
+                self.of_q[own] -= drive.stiffness;
+                self.of_v[own] -= drive.stiffness * weight * known * step.h;
             }
             let by_v = drive.stribeck * step.at_rest[joint] * -2.0 * step.v[joint] / drive.stribeck_speed.powi(2);
-            subtract(row, &self.by_v[own], sign * by_v);
+            self.of_v[own] -= drive.damping * known + mode.motion.sign() * by_v;
         }
         for effect in varied.effects.iter().filter(|effect| effect.quantity != Quantity::FloorHeight) {
             let joint = effect.index;
             let (mode, drive) = (step.laws.modes[joint], &robot.drives[joint]);
-            let (x, sign) = (step.x[joint], mode.motion.sign());
+            let (x, sign, command) = (step.x[joint], mode.motion.sign(), &step.commands[joint]);
             let inside = mode.clip == Clip::Inside;
             let torque = match effect.quantity {
                 Quantity::Stiffness if inside => {
                     step.laws.joints[joint].pull / drive.stiffness - step.h * weight * weight * x
                 }
-                Quantity::Delay if inside => drive.stiffness * step.command_rates[joint],
+                Quantity::Delay if inside => -drive.stiffness * command.rate,
+                Quantity::ProfileAcceleration if inside => {
+                    drive.stiffness * command.by_log[0] / drive.profile_acceleration
+                }
+                Quantity::ProfileSpeed if inside => drive.stiffness * command.by_log[1] / drive.profile_speed,
                 Quantity::Damping => -step.mean[joint],
                 Quantity::Armature => -self.acceleration[joint],
                 Quantity::Coulomb => -sign,
@@ -151,12 +203,9 @@ impl Sensitivity {
                 let turned: f64 = (0..dof).map(|k| step.mean[k] * height.second[k * dof + other]).sum();
                 let by_force = floor.stiffness * (height.first[other] + step.h * turned);
                 for joint in 0..dof {
-                    let factor = contact.force * height.second[joint * dof + other] - height.first[joint] * by_force;
-                    let row = &mut self.rows[joint * columns..(joint + 1) * columns];
-                    let own = other * columns..(other + 1) * columns;
-                    subtract(row, &self.by_q[own.clone()], -factor);
-                    let by_v = height.first[joint] * floor.stiffness * known * step.h * height.first[other];
-                    subtract(row, &self.by_v[own], by_v);
+                    let at = joint * dof + other;
+                    self.of_q[at] += contact.force * height.second[at] - height.first[joint] * by_force;
+                    self.of_v[at] -= height.first[joint] * floor.stiffness * known * step.h * height.first[other];
                 }
             }
             for effect in varied.effects.iter().filter(|effect| effect.quantity == Quantity::FloorHeight) {
@@ -167,69 +216,47 @@ impl Sensitivity {
             }
         }
     }
-
-    /// Derivatives of the velocity at the end of the step, and of the position.
-    fn solve(&mut self, solver: &StepSolver, step: &StepState) {
-        let (columns, weight) = (self.columns, step.end_weight);
-        for (row, &joint) in solver.moving.iter().enumerate() {
-            if row != joint {
-                self.rows.copy_within(joint * columns..(joint + 1) * columns, row * columns);
-            }
-        }
-        solver.apply_inverse(&mut self.rows, columns);
-        for (mean, v) in self.by_mean.iter_mut().zip(&self.by_v) {
-            *mean = (1.0 - weight) * v;
-        }
-        self.by_v.fill(0.0);
-        for (row, &joint) in solver.moving.iter().enumerate() {
-            let solved = &self.rows[row * columns..(row + 1) * columns];
-            let own = joint * columns..(joint + 1) * columns;
-            self.by_v[own.clone()].copy_from_slice(solved);
-            subtract(&mut self.by_mean[own], solved, -weight);
-        }
-        subtract(&mut self.by_q, &self.by_mean, -step.h);
-    }
 }
 
-/// `D`: derivatives of the bodies' torque `τ(q + (1 - w) h v, v, a)` with constant acceleration.
-fn bodies(
-    out: &mut [f64],
-    (by_q, by_v): (&[f64], &[f64]),
-    varied: &VariedRobot,
-    (model, workspace): (&Model, &mut Workspace),
-    (step, acceleration): (&StepState, &[f64]),
-) {
-    let (dof, columns) = (step.q.len(), varied.columns);
-    out.fill(0.0);
-    let by = inverse_dynamics_derivatives(model, workspace, &step.in_model, &step.v, acceleration);
-    for joint in 0..dof {
-        let row = &mut out[joint * columns..(joint + 1) * columns];
-        for other in 0..dof {
-            let p = by.by_position[joint * dof + other];
-            // The position in the middle of the step depends on the velocity.
-            let s = by.by_velocity[joint * dof + other] + (1.0 - step.end_weight) * step.h * p;
-            let own = other * columns..(other + 1) * columns;
-            for ((row, q), v) in row.iter_mut().zip(&by_q[own.clone()]).zip(&by_v[own]) {
-                *row += p * q + s * v;
+/// Computes the right sides and solves for the derivatives at the end of the step.
+struct Solve<'a> {
+    sensitivity: &'a mut Sensitivity,
+    solver: &'a StepSolver,
+    step: &'a StepState,
+}
+
+impl Kernel for Solve<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let Self { sensitivity: own, solver, step } = self;
+        let (dof, columns, weight) = (step.q.len(), own.columns, step.end_weight);
+        // Right sides of the moving joints, in the rows that the solver expects.
+        for (row, &joint) in solver.moving.iter().enumerate() {
+            if row != joint {
+                own.rows.copy_within(joint * columns..(joint + 1) * columns, row * columns);
+            }
+            let sum = &mut own.rows[row * columns..(row + 1) * columns];
+            for other in 0..dof {
+                let (of_q, of_v) = (own.of_q[joint * dof + other], own.of_v[joint * dof + other]);
+                let states = other * columns..(other + 1) * columns;
+                for ((sum, q), v) in sum.iter_mut().zip(&own.by_q[states.clone()]).zip(&own.by_v[states]) {
+                    *sum += of_q * q + of_v * v;
+                }
             }
         }
-    }
-    // The zero of a joint moves the position in the model.
-    for effect in varied.effects.iter().filter(|effect| effect.quantity == Quantity::Zero) {
-        for joint in 0..dof {
-            out[joint * columns + effect.column] += by.by_position[joint * dof + effect.index] * effect.derivative;
+        solver.apply_inverse(&mut own.rows, columns);
+        for (mean, v) in own.by_mean.iter_mut().zip(&own.by_v) {
+            *mean = (1.0 - weight) * v;
         }
-    }
-    if varied.body_effects.is_empty() {
-        return;
-    }
-    let width = 10 * model.body_count();
-    let regressor = torque_regressor(model, workspace, &step.in_model, &step.v, acceleration);
-    for effect in &varied.body_effects {
-        for joint in 0..dof {
-            let block = &regressor[joint * width + 10 * effect.body..][..10];
-            out[joint * columns + effect.column] +=
-                block.iter().zip(&effect.derivative).map(|(y, d)| y * d).sum::<f64>();
+        own.by_v.fill(0.0);
+        for (row, &joint) in solver.moving.iter().enumerate() {
+            let solved = &own.rows[row * columns..(row + 1) * columns];
+            let states = joint * columns..(joint + 1) * columns;
+            own.by_v[states.clone()].copy_from_slice(solved);
+            subtract(&mut own.by_mean[states], solved, -weight);
         }
+        subtract(&mut own.by_q, &own.by_mean, -step.h);
     }
 }

@@ -18,6 +18,11 @@ pub struct ServoSettings {
     /// Length of the periods that error bars treat as independent, s. Default 2: errors of the model of an SO-101 last
     /// up to 1 s.
     pub period_s: f64,
+    /// Degrees of freedom of the variance of the errors in a period. Default 30: a period with ten times the usual error
+    /// has about 3 % of the weight of others, so a contact or an effect that the model does not have hardly changes the
+    /// fit. With 4 to 10, fits of an SO-101 ignore a joint in a whole log; with 30, its values from the first quarter of
+    /// each training log are those of the whole logs. Large values give all periods the same variance.
+    pub period_freedom: f64,
     /// Least standard deviation of a measured position, rad (m). Default 0.00044: an encoder with 4,096 counts.
     pub least_error: f64,
     /// Whether all joints have the same servo: common values, with a deviation of each joint. Otherwise each joint has
@@ -29,6 +34,12 @@ pub struct ServoSettings {
     /// Deviation of each joint's Coulomb friction from the common value, relative. Default 1: gears of one type differ
     /// by their wear and by the preload of their bearings.
     pub friction_deviation: f64,
+    /// Deviation of each joint's torque limit from the common value, relative. Default 1: firmware limits the torque of
+    /// single joints, for example of a gripper.
+    pub torque_limit_deviation: f64,
+    /// Standard deviation of a stated acceleration or speed of the set point, relative. Default 0.1: the registers are
+    /// known, their unit is often not exact.
+    pub profile: f64,
     /// Friction per load and friction at rest as further unknowns. Default true; a value that the motion does not need
     /// becomes small.
     pub load_friction: bool,
@@ -53,10 +64,13 @@ impl Default for ServoSettings {
             iterations: 60,
             tolerance: 0.01,
             period_s: 2.0,
+            period_freedom: 30.0,
             least_error: 4.4e-4,
             alike: false,
             deviation: 0.1,
             friction_deviation: 1.0,
+            torque_limit_deviation: 1.0,
+            profile: 0.1,
             load_friction: true,
             mass: 0.3,
             centre: 0.05,
@@ -84,9 +98,12 @@ impl ServoSettings {
         let positive = [
             ("tolerance", self.tolerance),
             ("period_s", self.period_s),
+            ("period_freedom", self.period_freedom),
             ("least_error", self.least_error),
             ("deviation", self.deviation),
             ("friction_deviation", self.friction_deviation),
+            ("torque_limit_deviation", self.torque_limit_deviation),
+            ("profile", self.profile),
             ("mass", self.mass),
             ("centre", self.centre),
             ("delay_s", self.delay_s),

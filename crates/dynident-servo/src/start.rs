@@ -3,7 +3,7 @@
 //! Each joint alone is treated as `ẍ = ω² (r - x) - 2 ζ ω ẋ` with the late command `r`. The best of a grid of ω, ζ and
 //! delays gives stiffness and damping, with the mean inertia of the joint during the motion.
 
-use crate::command::HeldCommand;
+use crate::command::{HeldCommand, SetPoint};
 use crate::drive::Drive;
 use crate::parameters::{Change, FreeParameter, ServoRobot, robot_value};
 use crate::quantity::Quantity;
@@ -41,6 +41,8 @@ impl Drive {
             stribeck: 0.3 * coulomb,
             stribeck_speed: STRIBECK_SPEED,
             torque_limit: f64::INFINITY,
+            profile_acceleration: f64::INFINITY,
+            profile_speed: f64::INFINITY,
             delay_s: TYPICAL_DELAY_S,
             read_delay_s: 0.0,
             zero: 0.0,
@@ -48,8 +50,9 @@ impl Drive {
     }
 }
 
-/// First values of all drives; equal ones if all joints have the same servo (`alike`).
-pub fn start_drives(model: &Model, runs: &[Run], alike: bool) -> Vec<Drive> {
+/// First values of all drives; equal ones if all joints have the same servo (`alike`). Profiles are those of `stated`.
+pub fn start_drives(model: &Model, runs: &[Run], stated: &[Drive], alike: bool) -> Vec<Drive> {
+    let runs: &[Run] = &runs.iter().map(|run| behind_profiles(run, stated)).collect::<Vec<_>>();
     let inertias = mean_inertias(model, runs);
     let mut drives: Vec<Drive> = (0..model.dof())
         .map(|joint| {
@@ -58,7 +61,8 @@ pub fn start_drives(model: &Model, runs: &[Run], alike: bool) -> Vec<Drive> {
             let stiffness = inertia * frequency * frequency;
             let friction = FRICTION_PART * stiffness * median_distance(runs, joint);
             let drive = Drive::typical(stiffness, 2.0 * ratio * frequency * inertia, DRIVE_PART * inertia, friction);
-            Drive { delay_s, ..drive }
+            let Drive { profile_acceleration, profile_speed, .. } = stated[joint];
+            Drive { delay_s, profile_acceleration, profile_speed, ..drive }
         })
         .collect();
     // Delays are common: those of the electronics.
@@ -80,9 +84,24 @@ pub fn start_drives(model: &Model, runs: &[Run], alike: bool) -> Vec<Drive> {
             stribeck: mean(|drive| drive.stribeck),
             ..drives[0]
         };
-        drives.fill(common);
+        for drive in &mut drives {
+            let Drive { profile_acceleration, profile_speed, .. } = *drive;
+            *drive = Drive { profile_acceleration, profile_speed, ..common };
+        }
     }
     drives
+}
+
+/// The run with the set points of the drives' profiles as commands.
+fn behind_profiles(run: &Run, drives: &[Drive]) -> Run {
+    let times = &run.times_s;
+    let commands = run.commands.iter().zip(drives).map(|(commands, drive)| {
+        let mut set_point = SetPoint::new(times, commands, drive, false);
+        let mut shaped: Vec<f64> = times.windows(2).map(|pair| set_point.during(pair[0], pair[1]).mean).collect();
+        shaped.extend(commands.last());
+        shaped
+    });
+    Run { commands: commands.collect(), ..run.clone() }
 }
 
 /// Mean diagonal of the mass matrix over the runs.
@@ -118,7 +137,7 @@ fn median_distance(runs: &[Run], joint: usize) -> f64 {
 /// joints share get the mean, individual deviations from it are zero.
 pub(crate) fn response_coordinates(nominal: &ServoRobot, parameters: &[FreeParameter], runs: &[Run]) -> Vec<f64> {
     let dof = nominal.model.dof();
-    let drives = start_drives(&nominal.model, runs, false);
+    let drives = start_drives(&nominal.model, runs, &nominal.drives, false);
     let responses = ServoRobot { drives, ..nominal.clone() };
     let is_shared = |quantity: Quantity| {
         parameters.iter().any(|other| other.quantity == quantity && other.members.len() == dof && dof > 1)

@@ -251,6 +251,7 @@ impl StepSolver {
     }
 
     /// Solves for several right sides at once: `rows` has one row of `width` values for each moving joint.
+    #[inline(always)]
     pub(crate) fn apply_inverse(&self, rows: &mut [f64], width: usize) {
         let dof = self.dof;
         let count = self.moving.len();
@@ -274,12 +275,14 @@ impl StepSolver {
 }
 
 /// `own -= factor · other`.
+#[inline(always)]
 pub(crate) fn subtract(own: &mut [f64], other: &[f64], factor: f64) {
     for (own, other) in own.iter_mut().zip(other) {
         *own -= factor * other;
     }
 }
 
+#[inline(always)]
 fn scale(own: &mut [f64], factor: f64) {
     for own in own {
         *own *= factor;

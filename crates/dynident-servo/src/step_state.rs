@@ -1,5 +1,6 @@
 //! State and equation of one time step.
 
+use crate::command::StepCommand;
 use crate::floor::PointHeight;
 use crate::step::{Contact, JointLaw, Mode, StepLaws};
 
@@ -42,8 +43,8 @@ pub(crate) struct StepState {
     pub(crate) loads: Vec<f64>,
     /// Part of the friction at rest that is left at the velocity.
     pub(crate) at_rest: Vec<f64>,
-    /// Derivatives of the commands by the delay.
-    pub(crate) command_rates: Vec<f64>,
+    /// Set points of the joints.
+    pub(crate) commands: Vec<StepCommand>,
     pub(crate) laws: StepLaws,
     pub(crate) heights: Vec<PointHeight>,
     /// Velocities at the end.
@@ -67,7 +68,7 @@ impl StepState {
             w: zeros(),
             loads: zeros(),
             at_rest: zeros(),
-            command_rates: zeros(),
+            commands: vec![StepCommand::default(); dof],
             laws: StepLaws {
                 joints: vec![JointLaw::default(); dof],
                 modes: vec![Mode::default(); dof],

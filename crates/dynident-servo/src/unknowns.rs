@@ -31,6 +31,9 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
     factor(Quantity::Damping, settings.deviation);
     factor(Quantity::Armature, settings.deviation);
     factor(Quantity::Coulomb, settings.friction_deviation);
+    if robot.drives.iter().all(|drive| drive.torque_limit.is_finite()) {
+        factor(Quantity::TorqueLimit, settings.torque_limit_deviation);
+    }
     let has = |value: fn(&crate::drive::Drive) -> f64| robot.drives.iter().any(|drive| value(drive) > 0.0);
     if settings.load_friction && has(|drive| drive.load_friction) {
         common(&mut list, &joints, Quantity::LoadFriction, WIDE);
@@ -38,8 +41,12 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
     if settings.load_friction && has(|drive| drive.stribeck) {
         common(&mut list, &joints, Quantity::Stribeck, WIDE);
     }
-    if robot.drives.iter().all(|drive| drive.torque_limit.is_finite()) {
-        common(&mut list, &joints, Quantity::TorqueLimit, WIDE);
+    let is_limited = |limit: fn(&crate::drive::Drive) -> f64| robot.drives.iter().all(|own| limit(own).is_finite());
+    if is_limited(|drive| drive.profile_acceleration) {
+        common(&mut list, &joints, Quantity::ProfileAcceleration, settings.profile);
+    }
+    if is_limited(|drive| drive.profile_speed) {
+        common(&mut list, &joints, Quantity::ProfileSpeed, settings.profile);
     }
     sum(&mut list, joints.clone(), Quantity::Delay, settings.delay_s);
     for joint in 0..dof {

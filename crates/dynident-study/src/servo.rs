@@ -37,6 +37,12 @@ pub struct ServoSection {
     pub delay_s: Option<PerJoint>,
     /// Largest torque, Nm (N), in the scale of the other values. Without limit by default.
     pub torque_limit: Option<PerJoint>,
+    /// Largest acceleration of the set point, rad/s² (m/s²), if the servo moves it to a command with a profile: the
+    /// register "acceleration" of Feetech servos times 100 counts/s², "profile acceleration" of Dynamixel servos.
+    /// Without limit by default.
+    pub profile_acceleration: Option<PerJoint>,
+    /// Largest speed of the set point, rad/s (m/s). Without limit by default.
+    pub profile_speed: Option<PerJoint>,
     /// Least and greatest command that each servo accepts, rad (m); it replaces a command beyond. No limit by default.
     pub command_range: Option<Vec<[f64; 2]>>,
     /// A floor that the robot can touch. None by default.
@@ -104,6 +110,8 @@ impl ServoSection {
             ("coulomb", &self.coulomb),
             ("delay_s", &self.delay_s),
             ("torque_limit", &self.torque_limit),
+            ("profile_acceleration", &self.profile_acceleration),
+            ("profile_speed", &self.profile_speed),
         ];
         all.into_iter().filter_map(|(key, value)| Some((key, value.as_ref()?)))
     }
@@ -127,8 +135,13 @@ impl ServoSection {
             ));
         }
         let stated = self.drives(vec![Drive::typical(1.0, 1.0, 1.0, 1.0); joints])?;
-        let typical = |own: &Drive| Drive::typical(own.stiffness, own.damping, own.armature, own.coulomb);
-        Ok(stated.iter().map(|own| Drive { torque_limit: own.torque_limit, ..typical(own) }).collect())
+        let with_limits = |own: &Drive| Drive {
+            torque_limit: own.torque_limit,
+            profile_acceleration: own.profile_acceleration,
+            profile_speed: own.profile_speed,
+            ..Drive::typical(own.stiffness, own.damping, own.armature, own.coulomb)
+        };
+        Ok(stated.iter().map(with_limits).collect())
     }
 
     /// The drives where the search begins: `start` with the stated values.
@@ -153,7 +166,9 @@ impl ServoSection {
                     "armature" => drive.armature = value,
                     "coulomb" => drive.coulomb = value,
                     "delay_s" => drive.delay_s = value,
-                    _ => drive.torque_limit = value,
+                    "torque_limit" => drive.torque_limit = value,
+                    "profile_acceleration" => drive.profile_acceleration = value,
+                    _ => drive.profile_speed = value,
                 }
             }
         }

@@ -24,9 +24,10 @@ pub struct ServoChange {
 /// Longest time between two values of a delayed command, s: MuJoCo keeps one for each step of its default length.
 const DELAY_STEP_S: f64 = 0.002;
 
-/// Constraint of a joint's friction that hardly creeps. With MuJoCo's default a joint at rest moves by some
-/// milliradians a second.
-const STIFF_FRICTION: [(&str, &str); 2] = [("solreffriction", "0.005 1"), ("solimpfriction", "0.99 0.99 0.001 0.5 2")];
+/// Constraint of a joint's friction that hardly creeps: MuJoCo's largest impedance. With its default a joint at rest
+/// moves by some milliradians a second, and faster with little armature.
+const STIFF_FRICTION: [(&str, &str); 2] =
+    [("solreffriction", "0.005 1"), ("solimpfriction", "0.9999 0.9999 0.001 0.5 2")];
 
 /// Writes gain, torque limit and delay into the `position` actuators of `original`, and adds one for each joint
 /// without. The damping belongs to the joint, whose friction becomes stiff. All other bytes stay.

@@ -1,6 +1,7 @@
 //! Information of commands about the unknowns of a fit, from the simulated motion.
 
 use crate::fit::Search;
+use crate::normal::{add_gram, symmetric};
 use crate::parameters::VariedRobot;
 use crate::rollout::Rollout;
 use crate::run::Run;
@@ -30,20 +31,9 @@ pub(super) fn simulated(
     let mut sums = vec![0.0; columns * (columns + 1) / 2];
     let ended = Rollout::new(varied, &run, Stepping::accurate(step_s), true)?.simulate(|predicted| {
         positions[predicted.joint][predicted.sample] = predicted.position;
-        let mut at = 0;
-        for (row, &g) in predicted.derivatives.iter().enumerate() {
-            if g != 0.0 {
-                for (sum, other) in sums[at..=at + row].iter_mut().zip(predicted.derivatives) {
-                    *sum += weight * g * other;
-                }
-            }
-            at += row + 1;
-        }
+        add_gram(&mut sums, predicted.derivatives, weight);
     });
-    let information = DMatrix::from_fn(columns, columns, |row, column| {
-        let (high, low) = (row.max(column), row.min(column));
-        sums[high * (high + 1) / 2 + low]
-    });
+    let information = symmetric(&sums, columns);
     (ended && sums.iter().all(|sum| sum.is_finite())).then_some(Simulated { positions, information })
 }
 
@@ -74,6 +64,7 @@ pub(super) fn forecast(information: &DMatrix<f64>, prior: &DMatrix<f64>) -> Opti
         information: information.clone(),
         cost: 0.0,
         errors: Vec::new(),
+        unexplained: Vec::new(),
         iterations: 0,
         settled: true,
     })

@@ -28,8 +28,20 @@ fn measured(robot: &ServoRobot, mut run: Run, step_s: f64) -> Run {
 }
 
 fn fitted(runs: &[Run], settings: &ServoSettings) -> (ServoRobot, Search, Vec<dynident_servo::FreeParameter>) {
-    let model = arm().model;
-    let nominal = ServoRobot { drives: start_drives(&model, runs, settings.alike), model, floor: None };
+    fitted_from(arm(), runs, settings)
+}
+
+/// The fit from the responses of the joints, with the profiles and torque limits of `stated`.
+fn fitted_from(
+    stated: ServoRobot,
+    runs: &[Run],
+    settings: &ServoSettings,
+) -> (ServoRobot, Search, Vec<dynident_servo::FreeParameter>) {
+    let mut drives = start_drives(&stated.model, runs, &stated.drives, settings.alike);
+    for (drive, stated) in drives.iter_mut().zip(&stated.drives) {
+        drive.torque_limit = stated.torque_limit;
+    }
+    let nominal = ServoRobot { drives, ..stated };
     let parameters = unknowns(&nominal, settings);
     let found = search(&nominal, &parameters, &vec![0.0; parameters.len()], runs, settings).unwrap();
     (robot_at(&nominal, &parameters, &found.coordinates).unwrap(), found, parameters)
@@ -77,4 +89,58 @@ fn the_scale_is_open_without_a_payload_and_found_with_one() {
         assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
     }
     assert!(found.covariance[(stiffness, stiffness)].sqrt() < 0.03);
+}
+
+/// Servos that follow steps with a profile, one with a smaller torque limit.
+#[test]
+fn profiles_and_torque_limits_are_found() {
+    let mut truth = arm();
+    for drive in &mut truth.drives {
+        drive.profile_acceleration = 12.0;
+        drive.torque_limit = 60.0;
+    }
+    truth.drives[1].torque_limit = 15.0;
+    let settings = ServoSettings { alike: true, ..ServoSettings::default() };
+    let runs: Vec<Run> = [0.0, 1.0].map(|seed| measured(&truth, commands(seed), settings.step_s)).into();
+    let mut stated = arm();
+    for drive in &mut stated.drives {
+        (drive.profile_acceleration, drive.torque_limit) = (11.0, 40.0);
+    }
+    let (robot, found, parameters) = fitted_from(stated.clone(), &runs, &settings);
+    let [first, second] = [0, 1].map(|joint| robot.drives[joint]);
+    // A ratio, because positions do not contain the scale of torques. The first joint does not reach its limit.
+    let ratio = second.torque_limit / second.stiffness;
+    assert!((ratio / (15.0 / 300.0) - 1.0).abs() < 0.03, "{second:?}");
+    let place = parameters.iter().position(|own| own.quantity == Quantity::ProfileAcceleration).unwrap();
+    let bar = found.covariance[(place, place)].sqrt() * 12.0;
+    let error = (first.profile_acceleration - 12.0).abs();
+    assert!(error < 0.2 && error < 3.0 * bar && bar < 0.3, "{} ± {bar}", first.profile_acceleration);
+    for error in &found.errors {
+        assert!(*error < 0.6 * COUNT, "{:?} {:?}", found.errors, robot.drives);
+    }
+    // The same without a profile.
+    let mut without = stated;
+    without.drives.iter_mut().for_each(|drive| drive.profile_acceleration = f64::INFINITY);
+    let (_, worse, _) = fitted_from(without, &runs, &settings);
+    assert!(worse.errors[0] > 3.0 * found.errors[0], "{:?} and {:?}", worse.errors, found.errors);
+}
+
+/// A push of 0.1 rad for two seconds, which no drive explains.
+#[test]
+fn a_push_hardly_changes_the_fit() {
+    let truth = arm();
+    let settings = ServoSettings { load_friction: true, ..ServoSettings::default() };
+    let mut runs: Vec<Run> = [0.0, 1.0].map(|seed| measured(&truth, commands(seed), settings.step_s)).into();
+    let (clean, ..) = fitted(&runs, &settings);
+    for sample in 500..600 {
+        runs[0].positions[0][sample] += 0.1;
+    }
+    let (robust, found, _) = fitted(&runs, &settings);
+    let (normal, ..) = fitted(&runs, &ServoSettings { period_freedom: 1e6, ..settings.clone() });
+    // Damping over stiffness: without the scale of torques.
+    let ratio = |robot: &ServoRobot| robot.drives[0].damping / robot.drives[0].stiffness;
+    let change = |robot: &ServoRobot| (ratio(robot) / ratio(&clean) - 1.0).abs();
+    assert!(change(&robust) < 0.02 && change(&robust) < 0.3 * change(&normal), "{} {}", change(&robust), change(&normal));
+    let intervals: Vec<_> = found.unexplained.iter().filter(|own| own.run == 0 && own.joint == 0).collect();
+    assert!(intervals.len() == 1 && intervals[0].interval_s == [10.0, 12.0], "{:?}", found.unexplained);
 }

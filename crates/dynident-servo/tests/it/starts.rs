@@ -23,6 +23,8 @@ fn truth() -> ServoRobot {
         stribeck: 0.02,
         stribeck_speed: 0.1,
         torque_limit: f64::INFINITY,
+        profile_acceleration: f64::INFINITY,
+        profile_speed: f64::INFINITY,
         delay_s: 0.02,
         read_delay_s: 0.0,
         zero: 0.0,
@@ -53,7 +55,7 @@ fn fitted(drive: Drive, run: &Run, settings: &ServoSettings) -> Search {
 fn starts_within_a_factor_of_five_end_at_the_same_motion() {
     let (truth, settings) = (truth(), ServoSettings::default());
     let run = recording(&truth, settings.step_s);
-    let start = start_drives(&truth.model, std::slice::from_ref(&run), false)[0];
+    let start = start_drives(&truth.model, std::slice::from_ref(&run), &truth.drives, false)[0];
     let best = fitted(start, &run, &settings).errors[0];
     assert!(best < 0.5 * COUNT, "{best}");
     // All corners of stiffness, damping and armature, with friction and delay in turn.

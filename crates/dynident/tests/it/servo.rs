@@ -20,6 +20,8 @@ fn write_log(path: &Path, phase: f64) {
         stribeck: 0.0,
         stribeck_speed: 0.1,
         torque_limit: f64::INFINITY,
+        profile_acceleration: f64::INFINITY,
+        profile_speed: f64::INFINITY,
         delay_s: 0.02,
         read_delay_s: 0.0,
         zero: 0.0,

@@ -1,7 +1,7 @@
 //! `design` for drives with a position controller: commands that determine drives and bodies.
 
 use super::result::{DETERMINED, is_of_body};
-use super::training_runs;
+use super::{first_drives, training_runs};
 use crate::error::Error;
 use crate::inputs::InputFiles;
 use crate::jobs::design::limits_of_commands;
@@ -16,7 +16,7 @@ use dynident_excitation::check::check_limits;
 use dynident_excitation::limits::{LimitError, Limits, LimitsInForce};
 use dynident_model::{JointKind, Model};
 use dynident_servo::{
-    CommandRange, DesignedCommands, Drive, ServoError, ServoRobot, ServoValue, design_commands, start_drives, unknowns,
+    CommandRange, DesignedCommands, Drive, ServoError, ServoRobot, ServoValue, design_commands, unknowns,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -122,7 +122,7 @@ fn drives(
     for run in &runs {
         run.validate(robot.model().dof()).map_err(|error| Error::section(study.path, "drive.servo")(error))?;
     }
-    section.drives(start_drives(robot.model(), &runs, section.fit.alike)).map_err(in_study)
+    first_drives(robot.model(), &runs, section).map_err(in_study)
 }
 
 /// Range and speed of each joint's commands.

@@ -16,7 +16,8 @@ pub(super) struct ServoModelFiles {
     pub(super) missing: Option<String>,
 }
 
-/// Writes the found values into the user's MJCF or URDF. Friction is one number there: that at the mean load.
+/// Writes the found values into the user's MJCF or URDF. Friction is one number there: the mean of the training
+/// logs. Simulators read positions without a delay, so the file has the delay from a command to its measurement.
 pub(super) fn model_files(robot: &StudyRobot, found: &ServoRobot, result: &ServoFile) -> ServoModelFiles {
     let description = &robot.robot;
     let written = match description.format {
@@ -39,7 +40,7 @@ fn joint_changes(result: &ServoFile) -> Vec<JointChange> {
     let change = |(joint, drive): (&String, &crate::result::ServoDrive)| JointChange {
         joint: joint.clone(),
         damping: Some(drive.damping),
-        friction: Some(drive.coulomb + drive.load_friction * drive.mean_load),
+        friction: Some(drive.mean_friction),
         drive_inertia: Some(drive.armature),
         stiffness: None,
     };
@@ -59,7 +60,7 @@ fn mjcf(robot: &StudyRobot, found: &ServoRobot, result: &ServoFile) -> Result<St
             joint: joint.clone(),
             stiffness: drive.stiffness,
             torque_limit: drive.torque_limit,
-            delay_s: drive.delay_s,
+            delay_s: (drive.delay_s - drive.read_delay_s).max(0.0),
         })
         .collect();
     rewrite_servos(&text, &servos).map_err(|error| error.to_string())

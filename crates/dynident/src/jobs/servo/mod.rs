@@ -18,7 +18,7 @@ use crate::study::{
 use dynident_identification::Role;
 use dynident_model::Model;
 use dynident_recording::CommandedMotion;
-use dynident_servo::{Run, Search, ServoRobot, robot_at, search, simulate, start_drives, unknowns};
+use dynident_servo::{Drive, Run, Search, ServoRobot, robot_at, search, simulate, start_drives, unknowns};
 use files::{ServoModelFiles, model_files};
 use std::path::Path;
 use std::time::Instant;
@@ -183,10 +183,9 @@ fn fitted(study: StudyFile<'_>, fit: &Fit, options: &RunOptions<'_>) -> Result<F
     }
     let work = || {
         options.progress.begin("search for drives and bodies", None);
-        let start = start_drives(model, &training, settings.alike);
         let nominal = ServoRobot {
             model: model.clone(),
-            drives: fit.section.drives(start).map_err(in_study)?,
+            drives: first_drives(model, &training, &fit.section).map_err(in_study)?,
             floor: fit.section.floor(model).map_err(in_study)?,
         };
         let parameters = unknowns(&nominal, settings);
@@ -203,6 +202,17 @@ fn fitted(study: StudyFile<'_>, fit: &Fit, options: &RunOptions<'_>) -> Result<F
         Ok(Found { nominal, parameters, search, robot, simulated })
     };
     on_threads(options.threads, work)
+}
+
+/// The drives where a search begins: stated values, torque limits of the robot description, and other values from the
+/// responses of the joints.
+fn first_drives(model: &Model, runs: &[Run], section: &ServoSection) -> Result<Vec<Drive>, StudyError> {
+    let stated = section.drives(vec![Drive::typical(1.0, 1.0, 1.0, 1.0); model.dof()])?;
+    let mut start = start_drives(model, runs, &stated, section.fit.alike);
+    for (drive, joint) in start.iter_mut().zip(model.joints()) {
+        drive.torque_limit = joint.limits.effort.filter(|effort| *effort > 0.0).unwrap_or(f64::INFINITY);
+    }
+    section.drives(start)
 }
 
 /// Runs `work` with a pool of threads; without threads on this one.

@@ -8,7 +8,7 @@ use dynident_dynamics::{Workspace, mass_matrix_and_bias};
 use dynident_estimation::HALF_WIDTH_95;
 use dynident_identification::Role;
 use dynident_model::{JointKind, Model};
-use dynident_servo::{Drive, Quantity, Run, Scale, ServoValue, errors, values};
+use dynident_servo::{Drive, Quantity, Run, Scale, ServoRobot, ServoValue, errors, values};
 
 /// Largest number of samples of a motion.
 const MOST_SAMPLES: usize = 1500;
@@ -29,11 +29,11 @@ pub(super) fn servo_file(
         .map_err(|error| Error::section(study.path, "drive.servo")(dynident_servo::ServoError::from(error)))?;
     let rotary: Vec<bool> = model.joints().iter().map(|joint| joint.kind != JointKind::Prismatic).collect();
     let joints: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
-    let loads = mean_loads(&found.robot.model, runs);
+    let means = means(&found.robot, runs);
     let number = |value: &ServoValue, is_rotary: bool| number(value, is_rotary);
     let drives = found.robot.drives.iter().enumerate().map(|(joint, drive)| {
         let own = list.iter().filter(|value| value.index == joint && !is_of_body(value.quantity));
-        drive_of(drive, loads[joint], own.map(|value| number(value, rotary[joint])).collect())
+        drive_of(drive, means[joint], own.map(|value| number(value, rotary[joint])).collect())
     });
     let bodies = found.robot.model.inertials().iter().enumerate().map(|(body, inertial)| ServoBody {
         body: found.robot.model.bodies()[body].name().to_owned(),
@@ -68,8 +68,29 @@ pub(super) fn servo_file(
         let log = log_of(run, simulated);
         if run.role == Role::Validate { file.validation.push(log) } else { file.training.push(log) }
     }
+    file.notes.extend(unexplained(&file, runs, found));
     remarks(&mut file);
     Ok(file)
+}
+
+/// A sentence for each log with intervals that the model does not explain.
+fn unexplained(file: &ServoFile, runs: &[RoleRun], found: &Found) -> Vec<String> {
+    let training: Vec<&RoleRun> = runs.iter().filter(|run| run.role != Role::Validate).collect();
+    let of_log = |(index, run): (usize, &&RoleRun)| {
+        let own = found.search.unexplained.iter().filter(|own| own.run == index);
+        let intervals: Vec<String> = own
+            .map(|own| format!("{} {:.0} to {:.0} s", file.joints[own.joint], own.interval_s[0], own.interval_s[1]))
+            .collect();
+        (!intervals.is_empty()).then(|| {
+            format!(
+                "{}: the model does not explain {}. These rows have little weight in the fit; look for a contact, a \
+                 push, or a limit of the drive that the study does not state",
+                run.run.name,
+                intervals.join(", ")
+            )
+        })
+    };
+    training.iter().enumerate().filter_map(of_log).collect()
 }
 
 pub(super) fn is_of_body(quantity: Quantity) -> bool {
@@ -88,7 +109,12 @@ fn number(value: &ServoValue, is_rotary: bool) -> ServoNumber {
     }
 }
 
-fn drive_of(drive: &Drive, mean_load: f64, values: Vec<ServoNumber>) -> ServoDrive {
+/// A limit, or `None` without one.
+fn finite(limit: f64) -> Option<f64> {
+    limit.is_finite().then_some(limit)
+}
+
+fn drive_of(drive: &Drive, means: DriveMeans, values: Vec<ServoNumber>) -> ServoDrive {
     ServoDrive {
         stiffness: drive.stiffness,
         damping: drive.damping,
@@ -97,11 +123,14 @@ fn drive_of(drive: &Drive, mean_load: f64, values: Vec<ServoNumber>) -> ServoDri
         load_friction: drive.load_friction,
         stribeck: drive.stribeck,
         stribeck_speed: drive.stribeck_speed,
-        torque_limit: drive.torque_limit.is_finite().then_some(drive.torque_limit),
+        torque_limit: finite(drive.torque_limit),
+        profile_acceleration: finite(drive.profile_acceleration),
+        profile_speed: finite(drive.profile_speed),
         delay_s: drive.delay_s,
         read_delay_s: drive.read_delay_s,
         zero: drive.zero,
-        mean_load,
+        mean_load: means.load,
+        mean_friction: means.friction,
         values,
     }
 }
@@ -122,22 +151,37 @@ fn scale_of(scale: &Scale) -> ServoScale {
     ServoScale { determined, mass_kg: scale.mass_kg, half_width_95_percent: percent, anchor }
 }
 
-/// Mean torque of weight and velocity without sign, at the measured positions of the training logs.
-fn mean_loads(model: &Model, runs: &[RoleRun]) -> Vec<f64> {
-    let (mut sums, mut count) = (vec![0.0; model.dof()], 0.0);
-    let mut workspace = Workspace::new(model);
-    let still = vec![0.0; model.dof()];
-    for run in runs.iter().filter(|run| run.role != Role::Validate) {
-        for sample in (0..run.run.times_s.len()).step_by(10) {
-            let q: Vec<f64> = run.run.positions.iter().map(|joint| joint[sample]).collect();
-            let (_, load) = mass_matrix_and_bias(model, &mut workspace, &q, &still);
-            for (sum, load) in sums.iter_mut().zip(load) {
-                *sum += load.abs();
+/// Means of a joint over the measured motion of the training logs.
+#[derive(Clone, Copy, Debug, Default)]
+struct DriveMeans {
+    /// Torque of weight and velocity without sign, Nm (N).
+    load: f64,
+    /// Largest friction at the load and velocity, Nm (N).
+    friction: f64,
+}
+
+/// Means of each joint over the inner samples of the training logs.
+fn means(robot: &ServoRobot, runs: &[RoleRun]) -> Vec<DriveMeans> {
+    let dof = robot.model.dof();
+    let (mut sums, mut count) = (vec![DriveMeans::default(); dof], 0.0);
+    let mut workspace = Workspace::new(&robot.model);
+    for RoleRun { run, .. } in runs.iter().filter(|run| run.role != Role::Validate) {
+        for sample in (1..run.times_s.len() - 1).step_by(10) {
+            let q: Vec<f64> = run.positions.iter().map(|joint| joint[sample]).collect();
+            let span = run.times_s[sample + 1] - run.times_s[sample - 1];
+            let v: Vec<f64> =
+                run.positions.iter().map(|joint| (joint[sample + 1] - joint[sample - 1]) / span).collect();
+            let (_, loads) = mass_matrix_and_bias(&robot.model, &mut workspace, &q, &v);
+            for (((sum, load), drive), v) in sums.iter_mut().zip(loads).zip(&robot.drives).zip(&v) {
+                sum.load += load.abs();
+                sum.friction += drive.coulomb
+                    + drive.load_friction * load.abs()
+                    + drive.stribeck * (-(v / drive.stribeck_speed).powi(2)).exp();
             }
             count += 1.0;
         }
     }
-    sums.iter().map(|sum| sum / count).collect()
+    sums.iter().map(|sum| DriveMeans { load: sum.load / count, friction: sum.friction / count }).collect()
 }
 
 fn log_of(run: &RoleRun, simulated: &[Vec<f64>]) -> ServoLog {

@@ -1,0 +1,101 @@
+//! Likelihood of the errors of one joint, robust to periods that the model does not explain.
+//!
+//! A contact, a push or an effect that the drive's law does not have makes single periods much worse than others. In
+//! period `p` with `n_p` samples, `N_p = n_p / c` of them independent, errors are normally distributed with variance
+//! `σ² λ_p`, and `1/λ_p` has a gamma distribution with mean 1 and `ν` degrees of freedom. Without `λ_p`, minus twice the
+//! logarithm of the density is
+//!
+//! ```text
+//! Σ_p (ν + N_p) ln(1 + S_p / (c ν σ²)) + N_p ln σ²        S_p = Σ (e² + floor²)        w_p = (ν + N_p) / (ν + S_p / (c σ²))
+//! ```
+//!
+//! a multivariate t distribution (Lange, Little and Taylor, JASA 84, 1989). The derivative by an error is
+//! `2 w_p e / (c σ²)`, so a period has the weight `w_p`. `σ²` with the largest likelihood is `Σ w_p S_p / Σ n_p`.
+
+use crate::normal::PeriodError;
+
+/// Most iterations for the variance. Each increases the likelihood.
+const MOST_ITERATIONS: usize = 200;
+/// Relative change of the variance at which the iterations end.
+const LEAST_CHANGE: f64 = 1e-9;
+
+/// Errors of one joint.
+#[derive(Clone, Debug)]
+pub(crate) struct JointLikelihood {
+    /// Minus twice the logarithm of the likelihood.
+    pub(crate) cost: f64,
+    /// Weight of the samples of each period: `w_p / (c σ²)`.
+    pub(crate) weights: Vec<f64>,
+    /// `w_p`: 1 for a period with the usual error, small for one that the model does not explain.
+    pub(crate) relative: Vec<f64>,
+    /// Root mean square error over all periods.
+    pub(crate) error: f64,
+}
+
+/// The likelihood with the best variance. `correlated` is c, `freedom` is ν.
+pub(crate) fn joint_likelihood(errors: &[PeriodError], floor: f64, correlated: f64, freedom: f64) -> JointLikelihood {
+    let square = |own: &PeriodError| own.squares + own.count * floor * floor;
+    let samples: f64 = errors.iter().map(|own| own.count).sum();
+    let weight = |own: &PeriodError, variance: f64| {
+        (freedom + own.count / correlated) / (freedom + square(own) / (correlated * variance))
+    };
+    let mut variance = errors.iter().map(square).sum::<f64>() / samples;
+    for _ in 0..MOST_ITERATIONS {
+        let next = errors.iter().map(|own| weight(own, variance) * square(own)).sum::<f64>() / samples;
+        let change = (next - variance).abs();
+        variance = next;
+        if change <= LEAST_CHANGE * variance {
+            break;
+        }
+    }
+    let relative: Vec<f64> = errors.iter().map(|own| weight(own, variance)).collect();
+    let of_period = |own: &PeriodError| {
+        let independent = own.count / correlated;
+        let outside = (square(own) / (correlated * freedom * variance)).ln_1p();
+        (freedom + independent) * outside + independent * variance.ln()
+    };
+    JointLikelihood {
+        cost: errors.iter().map(of_period).sum(),
+        weights: relative.iter().map(|relative| relative / (correlated * variance)).collect(),
+        relative,
+        error: (errors.iter().map(|own| own.squares).sum::<f64>() / samples).sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn errors(bad: f64) -> Vec<PeriodError> {
+        let of = |k: usize| if k == 3 { bad } else { 1.0 + 0.2 * (k as f64).sin() };
+        (0..20).map(|k| PeriodError { squares: 100.0 * of(k).powi(2), count: 100.0 }).collect()
+    }
+
+    #[test]
+    fn a_bad_period_has_little_weight() {
+        let found = joint_likelihood(&errors(30.0), 0.0, 25.0, 4.0);
+        assert!(found.relative[3] < 0.01, "{:?}", found.relative);
+        assert!(found.relative.iter().enumerate().all(|(k, w)| k == 3 || (0.7..1.4).contains(w)), "{:?}", found.relative);
+    }
+
+    /// With many degrees of freedom the cost is `n / c ln(mean square)` plus a constant.
+    #[test]
+    fn many_degrees_of_freedom_give_the_normal_distribution() {
+        let cost = |bad: f64| joint_likelihood(&errors(bad), 0.0, 25.0, 1e9).cost;
+        let mean = |bad: f64| errors(bad).iter().map(|own| own.squares).sum::<f64>() / 2000.0;
+        let expected = 80.0 * (mean(3.0) / mean(1.0)).ln();
+        assert!(((cost(3.0) - cost(1.0)) / expected - 1.0).abs() < 1e-4, "{} {expected}", cost(3.0) - cost(1.0));
+    }
+
+    /// The weight is the derivative of the cost by the squares.
+    #[test]
+    fn weights_are_derivatives() {
+        let at = |add: f64| {
+            let mut errors = errors(5.0);
+            errors[3].squares += add;
+            joint_likelihood(&errors, 0.1, 25.0, 4.0)
+        };
+        let difference = (at(0.5).cost - at(-0.5).cost) / 1.0;
+        assert!((difference / at(0.0).weights[3] - 1.0).abs() < 1e-4, "{difference} {}", at(0.0).weights[3]);
+    }
+}
