@@ -45,8 +45,16 @@ const LIMIT_CHANGE: f64 = 0.01;
 pub(crate) enum SetPoint<'a> {
     /// The command itself.
     Held(HeldCommand<'a>),
-    /// A profile, and its derivatives by the logarithms of acceleration and speed where they are finite and needed.
-    Profile { own: Profile, by_log: [Option<[Profile; 2]>; 2] },
+    /// A profile.
+    Profile(Box<ProfileSetPoint>),
+}
+
+/// A profile, and its derivatives by the logarithms of acceleration and speed where they are finite and needed.
+#[derive(Debug)]
+pub(crate) struct ProfileSetPoint {
+    own: Profile,
+    /// The profiles with a larger and a smaller limit.
+    by_log: [Option<[Profile; 2]>; 2],
 }
 
 /// Mean of the set point over one step, with its derivatives.
@@ -74,7 +82,10 @@ impl<'a> SetPoint<'a> {
             };
             (with_derivatives && limits[which].is_finite()).then(|| [changed(1.0), changed(-1.0)])
         };
-        Self::Profile { own: profile(times_s, values, limits), by_log: [by_log(0), by_log(1)] }
+        Self::Profile(Box::new(ProfileSetPoint {
+            own: profile(times_s, values, limits),
+            by_log: [by_log(0), by_log(1)],
+        }))
     }
 
     /// The set point from `start_s` to `end_s`. Calls must have rising times.
@@ -84,7 +95,8 @@ impl<'a> SetPoint<'a> {
                 let (mean, rate) = command.mean(start_s, end_s);
                 StepCommand { mean, rate, by_log: [0.0; 2] }
             }
-            Self::Profile { own, by_log } => {
+            Self::Profile(set_point) => {
+                let ProfileSetPoint { own, by_log } = &**set_point;
                 let difference = |[above, below]: &[Profile; 2]| {
                     (above.mean(start_s, end_s) - below.mean(start_s, end_s)) / (2.0 * LIMIT_CHANGE)
                 };

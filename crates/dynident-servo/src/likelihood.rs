@@ -75,7 +75,11 @@ mod tests {
     fn a_bad_period_has_little_weight() {
         let found = joint_likelihood(&errors(30.0), 0.0, 25.0, 4.0);
         assert!(found.relative[3] < 0.01, "{:?}", found.relative);
-        assert!(found.relative.iter().enumerate().all(|(k, w)| k == 3 || (0.7..1.4).contains(w)), "{:?}", found.relative);
+        assert!(
+            found.relative.iter().enumerate().all(|(k, w)| k == 3 || (0.7..1.4).contains(w)),
+            "{:?}",
+            found.relative
+        );
     }
 
     /// With many degrees of freedom the cost is `n / c ln(mean square)` plus a constant.

@@ -129,7 +129,8 @@ mod tests {
             let omega = core::f64::consts::TAU * frequency;
             let commands: Vec<f64> = times.iter().map(|t| 0.15 * (omega * t).sin()).collect();
             let own = profile(&times, &commands, [39.0, f64::INFINITY]);
-            let part = |phase: f64| (1000..3000).map(|k| own.at(times[k]) * (omega * times[k] + phase).sin()).sum::<f64>();
+            let part =
+                |phase: f64| (1000..3000).map(|k| own.at(times[k]) * (omega * times[k] + phase).sin()).sum::<f64>();
             (-part(core::f64::consts::FRAC_PI_2)).atan2(part(0.0)).to_degrees()
         };
         // 0.15 (2π f)² is 24 rad/s² at 2 Hz and 59 rad/s² at 3.16 Hz.

@@ -65,7 +65,8 @@ impl<'a> Rollout<'a> {
             solver: StepSolver::new(dof),
             step,
             stepping,
-            sensitivity: with_derivatives.then(|| Sensitivity::new(dof, varied.robot.model.body_count(), varied.columns)),
+            sensitivity: with_derivatives
+                .then(|| Sensitivity::new(dof, varied.robot.model.body_count(), varied.columns)),
         })
     }
 

@@ -62,7 +62,7 @@ pub fn start_drives(model: &Model, runs: &[Run], stated: &[Drive], alike: bool) 
             let friction = FRICTION_PART * stiffness * median_distance(runs, joint);
             let drive = Drive::typical(stiffness, 2.0 * ratio * frequency * inertia, DRIVE_PART * inertia, friction);
             let Drive { profile_acceleration, profile_speed, .. } = stated[joint];
-            Drive { delay_s, profile_acceleration, profile_speed, ..drive }
+            Drive { profile_acceleration, profile_speed, delay_s, ..drive }
         })
         .collect();
     // Delays are common: those of the electronics.

@@ -24,27 +24,51 @@ impl Spread {
     pub fn largest(self) -> f64 {
         self.shape.max(self.scale)
     }
+
+    /// Prior probability: small and large differences have half each, in equal parts.
+    fn probability(self) -> f64 {
+        let is_small = |own: &Self| own.largest() <= SMALL;
+        let count = SPREADS.iter().filter(|own| is_small(own) == is_small(&self)).count();
+        let total = if is_small(&self) { SMALL_PROBABILITY } else { 1.0 - SMALL_PROBABILITY };
+        total / count as f64
+    }
 }
 
-/// Sizes of differences of all bodies, each with the same prior probability: rounding of a description, tolerances of
-/// manufacturing, wrong densities, and descriptions that are only rough. A common factor may be large while the shape
-/// is exact: otherwise single bodies would explain densities that are wrong in every body. About half of them are
-/// small ([`DescriptionThresholds::max_small_share`]), so that neither few nor all bodies are preferred.
-pub const SPREADS: [Spread; 13] = [
+/// Sizes of differences of all bodies: rounding of a description, tolerances of manufacturing, wrong densities, and
+/// descriptions that are only rough. A common factor may be large while the shape is exact: otherwise single bodies would
+/// explain densities that are wrong in every body. Neighbouring sizes of large differences have a ratio of 1.7, less than
+/// the uncertainty of a deviation that seven bodies determine: with a ratio of 3, bars were too narrow or too wide for
+/// the sizes between.
+pub const SPREADS: [Spread; 22] = [
     Spread { shape: 0.003, scale: 0.003 },
     Spread { shape: 0.003, scale: 0.01 },
     Spread { shape: 0.003, scale: 0.03 },
-    Spread { shape: 0.003, scale: 0.1 },
-    Spread { shape: 0.003, scale: 0.3 },
     Spread { shape: 0.01, scale: 0.01 },
     Spread { shape: 0.01, scale: 0.03 },
-    Spread { shape: 0.01, scale: 0.1 },
     Spread { shape: 0.03, scale: 0.03 },
+    Spread { shape: 0.003, scale: 0.1 },
+    Spread { shape: 0.003, scale: 0.3 },
+    Spread { shape: 0.01, scale: 0.1 },
+    Spread { shape: 0.01, scale: 0.3 },
+    Spread { shape: 0.03, scale: 0.1 },
+    Spread { shape: 0.03, scale: 0.17 },
     Spread { shape: 0.03, scale: 0.3 },
+    Spread { shape: 0.06, scale: 0.17 },
+    Spread { shape: 0.06, scale: 0.3 },
     Spread { shape: 0.1, scale: 0.1 },
+    Spread { shape: 0.1, scale: 0.17 },
+    Spread { shape: 0.1, scale: 0.3 },
     Spread { shape: 0.1, scale: 1.0 },
+    Spread { shape: 0.17, scale: 0.17 },
+    Spread { shape: 0.17, scale: 0.3 },
     Spread { shape: 0.3, scale: 0.3 },
 ];
+
+/// Largest deviation of a small difference of all bodies.
+const SMALL: f64 = 0.03;
+
+/// Prior probability of all small differences, and of all large ones: neither few nor all bodies are preferred.
+const SMALL_PROBABILITY: f64 = 0.5;
 
 /// Expected common factor of all values of a body that changed, minus 1.
 const EXPECTED_FACTOR: f64 = 0.5;
@@ -125,8 +149,22 @@ impl DescriptionDifferences {
         let settings = ChangeSettings { together: false, probability: CHANGE_PROBABILITY, ..ChangeSettings::default() };
         let explanations = explanations(&difference, &covariances, &groups, &settings)?;
         let mut found = Self { explanations, bodies, unknowns, difference, covariance, effects, spreads };
+        let priors: Vec<f64> = found.explanations.iter().map(|own| SPREADS[own.covariance].probability()).collect();
+        found.reweight(&priors);
         found.exclude_negative_masses(robot.nominal());
         Ok(Some(found))
+    }
+
+    /// Multiplies the probability of each explanation by a factor; at least one must be positive.
+    pub(super) fn reweight(&mut self, factors: &[f64]) {
+        for (own, factor) in self.explanations.iter_mut().zip(factors) {
+            own.probability *= factor;
+        }
+        let total: f64 = self.explanations.iter().map(|own| own.probability).sum();
+        for own in &mut self.explanations {
+            own.probability /= total;
+        }
+        self.explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     }
 
     /// Probability that every body differs by more than the small differences of `limits`, and none differs by more

@@ -16,16 +16,9 @@ impl DescriptionDifferences {
     /// (Gelfand, Smith and Lee, JASA 87 (1992) 523, section 2). `nominal` are the parameters of all bodies in the
     /// description, ten for each.
     pub(super) fn exclude_negative_masses(&mut self, nominal: &[f64]) {
+        // Explanations without named bodies keep their factor 1.
         let factors: Vec<f64> = self.explanations.iter().map(|own| self.positive_factor(own, nominal)).collect();
-        for (own, factor) in self.explanations.iter_mut().zip(factors) {
-            own.probability *= factor;
-        }
-        // Explanations without named bodies keep their factor 1, so the sum is positive.
-        let total: f64 = self.explanations.iter().map(|own| own.probability).sum();
-        for own in &mut self.explanations {
-            own.probability /= total;
-        }
-        self.explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        self.reweight(&factors);
     }
 
     fn positive_factor(&self, explanation: &Explanation, nominal: &[f64]) -> f64 {

@@ -52,8 +52,10 @@ pub fn usual_errors_of_bodies(robot: &ParametricModel, settings: &ConsistencySet
     directions
 }
 
-/// Change of all parameters of the bodies for independent errors of one relative standard deviation of 1, ten for each
-/// body (the directions of [`nominal_covariance`] divided by its 30 %). `None` if a body has no consistent description.
+/// Change of all parameters of the bodies for independent errors of one relative standard deviation of 1, eleven for
+/// each body: the directions of [`nominal_covariance`] divided by its 30 %, and the distance of the centre of mass from
+/// the joint. Links are nearly symmetric about their length; the position of a motor along it may be wrong by more than
+/// a part of the motor's size. `None` if a body has no consistent description.
 pub(crate) fn body_spread(robot: &ParametricModel, settings: &ConsistencySettings) -> Option<DMatrix<f64>> {
     let bodies = robot.model().bodies();
     let is_described = |(index, body): (usize, &Body)| {
@@ -62,11 +64,12 @@ pub(crate) fn body_spread(robot: &ParametricModel, settings: &ConsistencySetting
     if !bodies.iter().enumerate().all(is_described) {
         return None;
     }
-    let mut spread = DMatrix::zeros(10 * bodies.len(), 10 * bodies.len());
+    let mut spread = DMatrix::zeros(10 * bodies.len(), 11 * bodies.len());
     for (index, body) in reference_bodies(robot, settings).iter().enumerate() {
-        for (k, direction) in body_directions(body, 0.0).iter().enumerate() {
+        let of_shape = body_directions(body, 0.0).into_iter().map(|own| own.map(|value| value / MASS_STD_RATIO));
+        for (k, direction) in of_shape.chain([along_link(body)]).enumerate() {
             for (row, value) in direction.iter().enumerate() {
-                spread[(10 * index + row, 10 * index + k)] = value / MASS_STD_RATIO;
+                spread[(10 * index + row, 11 * index + k)] = *value;
             }
         }
     }
@@ -106,6 +109,16 @@ fn body_directions(body: &[f64; 10], thicker: f64) -> Vec<[f64; 10]> {
             parameters_of(&(root * symmetric * root))
         })
         .collect()
+}
+
+/// Derivative of the ten parameters by a factor on the distance of the centre of mass from the origin, with constant mass
+/// and inertia about it. The parameters are quadratic in this factor, so a central difference is exact.
+fn along_link(body: &[f64; 10]) -> [f64; 10] {
+    let own = InertialParameters(*body);
+    let (Some(centre), Some(inertia)) = (own.com_m(), own.inertia_at_com()) else { return [0.0; 10] };
+    let [above, below] =
+        [2.0, 0.0].map(|factor| InertialParameters::from_centre_of_mass(body[0], centre.scale(factor), &inertia).0);
+    core::array::from_fn(|k| 0.5 * (above[k] - below[k]))
 }
 
 /// The ten parameters of a pseudo-inertia.

@@ -140,7 +140,12 @@ fn a_push_hardly_changes_the_fit() {
     // Damping over stiffness: without the scale of torques.
     let ratio = |robot: &ServoRobot| robot.drives[0].damping / robot.drives[0].stiffness;
     let change = |robot: &ServoRobot| (ratio(robot) / ratio(&clean) - 1.0).abs();
-    assert!(change(&robust) < 0.02 && change(&robust) < 0.3 * change(&normal), "{} {}", change(&robust), change(&normal));
+    assert!(
+        change(&robust) < 0.02 && change(&robust) < 0.3 * change(&normal),
+        "{} {}",
+        change(&robust),
+        change(&normal)
+    );
     let intervals: Vec<_> = found.unexplained.iter().filter(|own| own.run == 0 && own.joint == 0).collect();
     assert!(intervals.len() == 1 && intervals[0].interval_s == [10.0, 12.0], "{:?}", found.unexplained);
 }
