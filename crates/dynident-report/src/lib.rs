@@ -41,6 +41,7 @@ mod path_picture;
 mod pen;
 mod plot_data;
 mod print_figure;
+mod print_file;
 mod scene;
 mod scene_picture;
 mod surface;
