@@ -253,7 +253,7 @@ class Model:
         """Draws ``"residuals"``, ``"parameters"`` or ``"friction"`` for a paper, as ``dynident plot`` does.
 
         ``out`` is a file or several: ``.svg``, ``.pdf`` or ``.png`` for the picture, ``.csv`` for its data, ``.tex`` or
-        ``.md`` for the table. ``dpi`` is the resolution of a PNG. The residuals are those of the held-out logs, or of
+        ``.md`` for the table. ``dpi`` is the resolution of a PNG. PDF and PNG need a build with these forms, which the wheel is not. The residuals are those of the held-out logs, or of
         all logs if none is held out. Needs no other package.
         """
         return _picture.Picture(self._native.plot(figure, _picture.files(out), width_mm, font_pt, dpi, threads))

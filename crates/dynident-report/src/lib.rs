@@ -66,7 +66,7 @@ pub use motion_picture::{MotionCurve, MotionPicture};
 pub use page::{Report, Section};
 pub use path_picture::{ArmPose, ColumnShape, PathPicture, Place};
 pub use print_figure::{PrintFigure, PrintPanel, PrintStyle};
-pub use scene::{BodyMotion, Colouring, Ellipsoid, Gauge, Scene, SceneBody, SceneMotion};
+pub use scene::{BodyMotion, BodyPair, Colouring, Ellipsoid, Gauge, Scene, SceneBody, SceneMotion};
 pub use surface::Surface;
 pub use table::{Cell, Table};
 pub use text::Text;
