@@ -119,6 +119,7 @@ pages_in_a_browser() {
     python3 .ci/pages.py "$program" "$1/page_libraries" "$1"/commands/{paper,result,iteration,motion}/report.html "$1"/commands/{gallery,view,logs,changes}.html
     "$1/venv/bin/python" .ci/view.py target/release/dynident "$program" "$1"
     python3 .ci/plot.py target/release/dynident "$program" "$1/page_libraries" "$1"
+    python3 .ci/screenshots.py "$program" "$1"
     python3 .ci/live.py target/release/dynident "$program" "$1/page_libraries" "$1"
 }
 export -f pages_in_a_browser
