@@ -92,6 +92,30 @@ MARK = """(() => {
   return marks;
 })()"""
 
+# Means of all colours in blocks of two pictures: differences in the order of size, largest first, and the share of blocks of each picture that are not white.
+COMPARE = """(async ([first, second, block]) => {
+  const means = async (source) => {
+    const image = new Image();
+    image.src = source;
+    await image.decode();
+    const [columns, rows] = [image.width, image.height].map((length) => Math.floor(length / block));
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [image.width, image.height];
+    const pen = canvas.getContext("2d", { willReadFrequently: true });
+    pen.drawImage(image, 0, 0);
+    const { data: pixels, width } = pen.getImageData(0, 0, image.width, image.height);
+    const sums = Array.from({ length: 3 * columns * rows }, () => 0);
+    for (let y = 0; y < rows * block; y++) for (let x = 0; x < columns * block; x++) for (let part = 0; part < 3; part++) {
+      sums[3 * (Math.floor(y / block) * columns + Math.floor(x / block)) + part] += pixels[4 * (y * width + x) + part];
+    }
+    return { size: [image.width, image.height], means: sums.map((sum) => sum / (block * block)) };
+  };
+  const [a, b] = [await means(first), await means(second)];
+  const used = (of) => of.means.filter((mean) => mean < 250).length / of.means.length;
+  const apart = a.means.length === b.means.length ? a.means.map((mean, k) => Math.abs(mean - b.means[k])).sort((p, q) => q - p) : [255];
+  return { sizes: [a.size, b.size], apart, used: [used(a), used(b)] };
+})"""
+
 
 class Browser:
     """A headless Chromium with one page."""
@@ -189,6 +213,12 @@ class Browser:
         found = [json.dumps(message["params"])[:400] for message in self.events if message.get("method") in kinds]
         # These checks read the pixels of the pictures, which the page itself does not.
         return [message for message in found if "GPU stall due to ReadPixels" not in message]
+
+
+def compared(browser, form, first, second, block):
+    """Compares two pictures (bytes) of a form such as `png`; see COMPARE."""
+    sources = [f"data:image/{form};base64,{base64.b64encode(picture).decode()}" for picture in (first, second)]
+    return browser.value(f"{COMPARE}({json.dumps([*sources, block])})")
 
 
 def checked(browser, page, axe, reader):

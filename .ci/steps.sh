@@ -131,6 +131,8 @@ pages_in_a_browser() {
     "$1/venv/bin/pip" install --quiet --disable-pip-version-check --no-deps --target "$1/page_libraries" -r .ci/requirements.txt
     with_browser python3 .ci/pages.py "$program" "$1/page_libraries" "$1"/commands/{paper,result,iteration,motion}/report.html "$1"/commands/{gallery,view,logs,changes}.html
     with_browser "$1/venv/bin/python" .ci/view.py target/release/dynident "$program" "$1"
+    with_browser python3 .ci/plot.py target/release/dynident "$program" "$1/page_libraries" "$1"
+    with_browser python3 .ci/screenshots.py "$program" "$1"
     with_browser python3 .ci/live.py target/release/dynident "$program" "$1/page_libraries" "$1"
 }
 export -f pages_in_a_browser

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from . import _native
+from . import _native, _picture
 from ._model import Model
 from ._native import ResultError, Robot, Run, Study
 from ._study import study as make_study
@@ -39,6 +39,18 @@ class Iteration:
         """The runs in chronological order."""
         found: list[dict[str, Any]] = self.result["runs"]
         return found
+
+    def plot(
+        self,
+        out: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
+        *,
+        width_mm: float = 88.0,
+        font_pt: float = 8.0,
+        dpi: float = 300.0,
+    ) -> _picture.Picture:
+        """Draws tracking error and error bars by run; the arguments are those of ``Model.plot``."""
+        place = self.folder / "iterations.json"
+        return _picture.Picture(_native._plot_convergence(place, _picture.files(out), width_mm, font_pt, dpi))
 
     def model(self) -> Model:
         """The identified model. Raises ``ResultError`` if no model was identified."""

@@ -12,9 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from . import _picture
 from ._native import FittedModel, Robot, Study, Watch, _write_files
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
     from matplotlib.figure import Figure
 
@@ -236,6 +239,24 @@ class Model:
             "result.json": json.dumps(self.result, indent=2) + "\n",
         }
         _write_files(fspath(folder), texts)
+
+    def plot(
+        self,
+        figure: str,
+        out: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
+        *,
+        width_mm: float = 88.0,
+        font_pt: float = 8.0,
+        dpi: float = 300.0,
+        threads: int | None = None,
+    ) -> _picture.Picture:
+        """Draws ``"residuals"``, ``"parameters"`` or ``"friction"`` for a paper, as ``dynident plot`` does.
+
+        ``out`` is a file or several: ``.svg``, ``.pdf`` or ``.png`` for the picture, ``.csv`` for its data, ``.tex`` or
+        ``.md`` for the table. ``dpi`` is the resolution of a PNG. PDF and PNG need a build with these forms, which the wheel is not. The residuals are those of the held-out logs, or of
+        all logs if none is held out. Needs no other package.
+        """
+        return _picture.Picture(self._native.plot(figure, _picture.files(out), width_mm, font_pt, dpi, threads))
 
     def plot_parameters(self) -> Figure:
         """Plots the base parameters with 95 % intervals and their nominal values."""

@@ -33,6 +33,7 @@ __all__ = [
     "_iterate",
     "_log_contents",
     "_new",
+    "_plot_convergence",
     "_reduce",
     "_simulate",
     "_spread",
@@ -194,6 +195,15 @@ class FittedModel:
         half_window: int | None = None,
     ) -> Watch: ...
     def export(self, target: str) -> tuple[str, list[str]]: ...
+    def plot(
+        self,
+        figure: str,
+        out: Sequence[str | PathLike[str]],
+        width_mm: float,
+        font_pt: float,
+        dpi: float,
+        threads: int | None = None,
+    ) -> str: ...
     def simulator(self) -> tuple[str, str]: ...
     def payload(self, reader: str, name: str | None = None) -> tuple[str, list[str]]: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
@@ -286,6 +296,13 @@ def _design(
     study: Study, rate_hz: float | None = None, threads: int | None = None
 ) -> tuple[str, str, str, _Array, list[_Array]]: ...
 def _simulate(study: Study, threads: int | None = None) -> tuple[str, str]: ...
+def _plot_convergence(
+    iterations: str | PathLike[str],
+    out: Sequence[str | PathLike[str]],
+    width_mm: float,
+    font_pt: float,
+    dpi: float,
+) -> str: ...
 def _iterate(
     study: Study,
     out: str | PathLike[str],

@@ -227,6 +227,30 @@ def test_threads_and_processes_give_the_same(planar: dynident.Robot, planar_logs
             assert all(found == expected for found in processes.map(_values, [study] * 2, timeout=300))
 
 
+def test_figures_for_papers(model: dynident.Model, tmp_path: Path) -> None:
+    files = [tmp_path / name for name in ("f.svg", "f.csv", "f.tex")]
+    for figure in ["parameters", "friction", "residuals"]:
+        picture = model.plot(figure, files, width_mm=100.0)
+        svg, csv, tex = (file.read_bytes() for file in files)
+        assert picture._repr_svg_() == svg.decode() and 'width="100.0mm"' in picture.svg
+        assert b"\\begin{tabular}" in tex
+        assert len(csv.splitlines()) > 10
+    rows = [line.split(",") for line in csv.decode().splitlines()[1:]]
+    # The residuals are those of the validation, in the band of the fit.
+    (tested,) = dynident.validate(model)["validation"]
+    for joint in tested["in_fit_band"]["joints"]:
+        own = np.array([float(row[5]) for row in rows if row[1] == joint["name"]])
+        assert np.sqrt(np.mean(own**2)) == pytest.approx(joint["rmse_nm"], rel=1e-6)
+    # The wheel has no room for PDF and PNG.
+    for form in ["PDF", "PNG"]:
+        with pytest.raises(dynident.Error, match=f"writes no {form}"):
+            model.plot("friction", tmp_path / f"f.{form.lower()}")
+    with pytest.raises(dynident.ResultError, match="residuals, parameters, friction"):
+        model.plot("nothing")
+    with pytest.raises(dynident.Error, match=r"\.svg, \.pdf"):
+        model.plot("friction", tmp_path / "f.bmp")
+
+
 def test_pictures(model: dynident.Model) -> None:
     pytest.importorskip("matplotlib")
     t, q, dq, ddq = motion(2, seed=5)

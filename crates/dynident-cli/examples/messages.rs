@@ -67,6 +67,7 @@ pub(crate) const SECTIONS: &[(&str, &str, &str)] = &[
     ("ExportError", "Export", "export.md"),
     ("TrajectoryExportError", "Export of a motion", "design.md"),
     ("ReportError", "Report page", "commands.md"),
+    ("FigureError", "Figures", "plot.md"),
     ("ServoError", "Fits to commands", "servo.md"),
     ("RunFault", "Logs of commands", "servo.md"),
     ("SimulationError", "Simulation", "simulation.md"),

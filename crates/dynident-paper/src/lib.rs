@@ -21,6 +21,7 @@ mod page;
 mod piece;
 mod problem;
 mod references;
+mod scene;
 mod strokes;
 mod verification;
 
@@ -131,6 +132,7 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
     ];
     let quotient = comparison.cases.first().map_or(f64::NAN, |case| case.quotient);
     let statements = outcomes::statements(&runs, optimised.fitness, &comparison.statement, quotient);
+    let scene = scene::scene(&arm, &runs.as_paper, &both);
     let JointRuns { literal_errors, own_errors, .. } = runs;
     figures.extend(runs.figures);
     let (figure_15, comparison_plot) = comparison::figure_15(&both);
@@ -155,7 +157,7 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
         references: references(),
         seconds: begun.elapsed().as_secs_f64(),
     };
-    let extras = page::Extras { comparison_plots, noisy_plots, own_errors };
+    let extras = page::Extras { scene, comparison_plots, noisy_plots, own_errors };
     write(out, &file, &tables, &extras)?;
     Ok(file)
 }

@@ -4,10 +4,11 @@ use crate::PaperFile;
 use crate::index::{DEVIATION_TITLE, EQUAL, REFERENCES, STATEMENTS, TORQUES, index};
 use crate::piece::{PaperCell, PaperFigure, PaperPicture, PaperTable, shown};
 use dynident::Error;
-use dynident_report::{Cell, Heading, KeyFigures, LinePlot, Report, Section, Table, Text, Tone};
+use dynident_report::{Cell, Heading, KeyFigures, LinePlot, Report, Scene, Section, Table, Text, Tone};
 
 /// Content of the page in addition to the paper's tables and figures.
 pub(crate) struct Extras {
+    pub(crate) scene: Scene,
     pub(crate) comparison_plots: Vec<LinePlot>,
     pub(crate) noisy_plots: Vec<LinePlot>,
     /// Largest parameter error of our variant after one, three and six runs.
@@ -24,6 +25,7 @@ pub(crate) fn page(file: &PaperFile, tables: &[PaperTable], extras: &Extras) -> 
     page.add(key_figures(file));
     page.add(Text::new(file.comparison.statement.clone()));
     page.add(Text::new(file.comparison.one_run(extras.own_errors)));
+    page.add(extras.scene.clone());
     page.add(Heading::new(INDEX));
     page.add(index(file, tables));
     for (title, table_numbers, figure_numbers) in CHAPTERS {

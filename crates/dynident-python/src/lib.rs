@@ -34,7 +34,7 @@ mod _native {
         _validate, _write_files,
     };
     #[pymodule_export]
-    use crate::model::FittedModel;
+    use crate::model::{_plot_convergence, FittedModel};
     #[pymodule_export]
     use crate::robot::Robot;
     #[pymodule_export]

@@ -3,6 +3,7 @@
 use crate::arrays::{Motion, array, joint_major, sample_major};
 use crate::callables::{Callables, guarded};
 use crate::errors;
+use crate::jobs;
 use crate::study::Study;
 use crate::watch::OnlineWatch;
 use dynident::export::{ControllerBrand, Target};
@@ -10,8 +11,8 @@ use dynident::identification::examination::LogTrace;
 use dynident::model::terms::JointMotion;
 use dynident::online::WatchSettings;
 use dynident::{
-    IdentificationOutcome, ResultFile, RobotAppearance, TorquePredictor, export_payload_of, export_result,
-    export_simulator_of, identification_report,
+    Error, Figure, IdentificationOutcome, IterationsFile, PrintStyle, ResultFile, RobotAppearance, RunOptions,
+    TorquePredictor, export_payload_of, export_result, export_simulator_of, identification_report, validation_traces,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -39,6 +40,28 @@ pub(crate) struct FittedModel {
     descriptions: Descriptions,
     page: Page,
     predictor: OnceLock<TorquePredictor>,
+}
+
+/// Writes the files of a figure, and returns it as SVG.
+fn drawn(figure: &Figure, out: &[PathBuf], style: &PrintStyle) -> Result<String, Error> {
+    figure.write(out, style)?;
+    Ok(figure.svg(style)?)
+}
+
+/// Writes the convergence figure of the file `iterations.json`, and returns it as SVG.
+#[pyfunction]
+pub(crate) fn _plot_convergence(
+    py: Python<'_>,
+    iterations: PathBuf,
+    out: Vec<PathBuf>,
+    width_mm: f64,
+    font_pt: f64,
+    dpi: f64,
+) -> PyResult<String> {
+    jobs::run(py, 1, None, move |_| {
+        let figure = Figure::convergence(&IterationsFile::read(&iterations)?);
+        drawn(&figure, &out, &PrintStyle { width_mm, font_pt, dpi })
+    })
 }
 
 enum Page {
@@ -214,6 +237,39 @@ impl FittedModel {
         let made = || guarded(|| export_result(&self.result, Path::new(RESULT), of.0, of.1, None, wanted));
         let exported = py.detach(made)?.map_err(|error| errors::job(py, &error))?;
         Ok((exported.text, exported.notes))
+    }
+
+    /// Writes a figure, and returns it as SVG.
+    #[pyo3(signature = (figure, out, width_mm, font_pt, dpi, threads=None))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+    fn plot(
+        &self,
+        py: Python<'_>,
+        figure: &str,
+        out: Vec<PathBuf>,
+        width_mm: f64,
+        font_pt: f64,
+        dpi: f64,
+        threads: Option<usize>,
+    ) -> PyResult<String> {
+        let (result, study, path) = (self.result.clone(), self.study.clone(), self.path.clone());
+        let style = PrintStyle { width_mm, font_pt, dpi };
+        let place = Path::new(RESULT);
+        let threads = jobs::threads(threads);
+        match figure {
+            "parameters" => jobs::run(py, threads, None, move |_| drawn(&Figure::parameters(&result), &out, &style)),
+            "friction" => {
+                jobs::run(py, threads, None, move |_| drawn(&Figure::friction(&result, place)?, &out, &style))
+            }
+            "residuals" => jobs::run(py, threads, None, move |watch| {
+                let options = RunOptions { data: None, threads, progress: watch };
+                let traces = validation_traces(&result, place, &study, &path, &options)?;
+                drawn(&Figure::residuals(&result, &traces), &out, &style)
+            }),
+            _ => Err(errors::ResultError::new_err(format!(
+                "no figure `{figure}`: give one of residuals, parameters, friction"
+            ))),
+        }
     }
 
     /// Drive parameters in the conventions of simulators: JSON and a Markdown table.

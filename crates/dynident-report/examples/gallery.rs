@@ -3,8 +3,8 @@
 //! `cargo run -p dynident-report --example gallery -- gallery.html`
 
 use dynident_report::{
-    BarPlot, BodyMotion, Cell, Colouring, ConvergencePlot, Ellipsoid, Gauge, Heading, HeatMap, KeyFigures, LinePlot,
-    Report, Scene, SceneBody, SceneMotion, Surface, Table, Text, Tone,
+    BarPlot, BodyMotion, BodyPair, Cell, Colouring, ConvergencePlot, Ellipsoid, Gauge, Heading, HeatMap, KeyFigures,
+    LinePlot, Report, Scene, SceneBody, SceneMotion, Surface, Table, Text, Tone,
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -101,6 +101,7 @@ fn robot() -> Scene {
     let times_s: Vec<f64> = (0..500).map(|k| 0.02 * f64::from(k)).collect();
     let wave = |joint: usize| times_s.iter().map(|t| (t * (0.6 + 0.3 * joint as f64)).sin()).collect::<Vec<f64>>();
     let q: Vec<Vec<f64>> = (0..4).map(wave).collect();
+    let distance_m: Vec<f64> = times_s.iter().map(|t| 0.25 + 0.25 * (t + 1.0).cos()).collect();
     let gauge = Gauge { name: "position, rad".into(), values: q.clone(), limits: vec![Some([-1.0, 1.0]); 4] };
     Scene {
         title: "A robot of four joints".into(),
@@ -130,6 +131,13 @@ fn robot() -> Scene {
             ghost: q.iter().rev().cloned().collect(),
             q,
             gauges: vec![gauge],
+            pairs: vec![BodyPair {
+                name: "link 1 and link 3".into(),
+                clearance_m: 0.05,
+                near_m: 0.3,
+                points_m: distance_m.iter().map(|distance| [[0.3, 0.0, 0.4], [0.3 + distance, 0.0, 0.4]]).collect(),
+                distance_m,
+            }],
         }],
         floor_m: Some(-0.03),
         column_m: Some([0.6, 0.0, 0.1]),

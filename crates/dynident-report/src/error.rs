@@ -45,6 +45,44 @@ pub enum ReportError {
         /// Size of the text, pt.
         font_pt: f64,
     },
+    /// An invalid resolution of a PNG.
+    #[error("invalid resolution of a PNG, {dpi} dpi: give 30 to 2400 dpi")]
+    Resolution {
+        /// Pixels per inch.
+        dpi: f64,
+    },
+    /// A PNG with too many pixels.
+    #[error(
+        "a PNG of {width_px} × {height_px} pixels is too large: reduce the resolution to at most 50 million pixels"
+    )]
+    Pixels {
+        /// Width, pixels.
+        width_px: f64,
+        /// Height, pixels.
+        height_px: f64,
+    },
+    /// Characters that the embedded font of PDF and PNG lacks.
+    #[error(
+        "the font of PDF and PNG has no glyph for {characters:?}: write .svg, which uses the fonts of the computer, or rename the joint or parameter"
+    )]
+    Characters {
+        /// The characters.
+        characters: String,
+    },
+    /// A form of figures that is not part of this build.
+    #[error("this build of Dynident writes no {form}: write .svg and convert it, or use the program of the releases")]
+    NotBuilt {
+        /// The form.
+        form: &'static str,
+    },
+    /// A picture that cannot be converted, a bug in this crate.
+    #[error("cannot write the {form} of a figure: {message}")]
+    Conversion {
+        /// The form.
+        form: &'static str,
+        /// The problem.
+        message: String,
+    },
     /// A template that failed, a bug in this crate.
     #[error("a template of the page failed: {0}")]
     Template(#[from] minijinja::Error),

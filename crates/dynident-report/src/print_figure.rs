@@ -31,11 +31,13 @@ pub struct PrintStyle {
     pub width_mm: f64,
     /// Size of the text, typographic points. Default 8.
     pub font_pt: f64,
+    /// Pixels per inch of a PNG. Default 300.
+    pub dpi: f64,
 }
 
 impl Default for PrintStyle {
     fn default() -> Self {
-        Self { width_mm: 88.0, font_pt: 8.0 }
+        Self { width_mm: 88.0, font_pt: 8.0, dpi: 300.0 }
     }
 }
 
@@ -75,7 +77,7 @@ impl PrintFigure {
     /// # Errors
     /// A plot with inconsistent lists or a decreasing axis; a width or text size without room for a plot.
     pub fn svg(&self, style: &PrintStyle) -> Result<String, ReportError> {
-        let PrintStyle { width_mm, font_pt } = *style;
+        let PrintStyle { width_mm, font_pt, .. } = *style;
         let mm_per_px = font_pt * MM_PER_POINT / TEXT_PX;
         let width = width_mm / mm_per_px;
         if !(width.is_finite() && (MIN_WIDTH..=MAX_WIDTH).contains(&width) && font_pt > 0.0) {
@@ -190,10 +192,10 @@ mod tests {
         // 12 px are 8 pt, or 2.822 mm: 88 mm are 374.2 px.
         assert_eq!(widths(&narrow)[0], 374.2);
         assert!(narrow.contains("width=\"88.0mm\"") && !narrow.contains("currentColor") && !narrow.contains("var("));
-        let wide = figure.svg(&PrintStyle { width_mm: 180.0, font_pt: 8.0 }).unwrap();
+        let wide = figure.svg(&PrintStyle { width_mm: 180.0, ..PrintStyle::default() }).unwrap();
         let [all, first, second, third] = widths(&wide)[..] else { panic!("{:?}", widths(&wide)) };
         assert!(first < 0.5 * all && first == second && second == third, "{first} of {all}");
-        let small = figure.svg(&PrintStyle { width_mm: 88.0, font_pt: 6.0 }).unwrap();
+        let small = figure.svg(&PrintStyle { font_pt: 6.0, ..PrintStyle::default() }).unwrap();
         assert!(widths(&small)[0] > widths(&narrow)[0]);
     }
 
@@ -215,7 +217,8 @@ mod tests {
     #[test]
     fn sizes_without_room_are_refused() {
         for (width_mm, font_pt) in [(0.0, 8.0), (88.0, 0.0), (f64::NAN, 8.0), (20.0, 12.0), (88.0, -8.0), (1e9, 8.0)] {
-            let error = figure(vec![lines()]).svg(&PrintStyle { width_mm, font_pt }).unwrap_err().to_string();
+            let error =
+                figure(vec![lines()]).svg(&PrintStyle { width_mm, font_pt, dpi: 300.0 }).unwrap_err().to_string();
             assert!(error.contains("mm"), "{error}");
         }
         assert!(figure(Vec::new()).svg(&PrintStyle::default()).is_ok());

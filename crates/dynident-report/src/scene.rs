@@ -99,6 +99,23 @@ pub struct SceneMotion {
     pub ghost: Vec<Vec<f64>>,
     /// Quantities of the joints.
     pub gauges: Vec<Gauge>,
+    /// Distances of bodies.
+    pub pairs: Vec<BodyPair>,
+}
+
+/// Distance of two bodies along a motion. The picture marks their nearest points while they are near.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BodyPair {
+    /// Names of both.
+    pub name: String,
+    /// Minimum distance, m.
+    pub clearance_m: f64,
+    /// Distance below which they are near, m.
+    pub near_m: f64,
+    /// Distance at each sample, m.
+    pub distance_m: Vec<f64>,
+    /// Nearest points at each sample, m; used while they are near.
+    pub points_m: Vec<[[f64; 3]; 2]>,
 }
 
 /// A robot in three dimensions: turn, zoom, colours by what is known of each body, motions to play. Without scripts or
@@ -203,6 +220,17 @@ struct MotionData<'a> {
     q: Vec<Vec<Option<f64>>>,
     ghost: Vec<Vec<Option<f64>>>,
     gauges: Vec<GaugeData<'a>>,
+    pairs: Vec<PairData<'a>>,
+}
+
+#[derive(Serialize)]
+struct PairData<'a> {
+    name: &'a str,
+    clearance: f64,
+    near: f64,
+    distance: Vec<Option<f64>>,
+    /// Coordinates of both points by sample; null while the bodies are not near.
+    points: Vec<Vec<Option<f64>>>,
 }
 
 #[derive(Serialize)]
@@ -272,6 +300,10 @@ impl Scene {
                     length(&format!("{}: samples", gauge.name), row.len(), motion.times_s.len())?;
                 }
             }
+            for pair in &motion.pairs {
+                length(&format!("{}: distances", pair.name), pair.distance_m.len(), motion.times_s.len())?;
+                length(&format!("{}: points", pair.name), pair.points_m.len(), motion.times_s.len())?;
+            }
         }
         Ok(())
     }
@@ -320,6 +352,26 @@ impl SceneMotion {
                 .iter()
                 .map(|own| GaugeData { name: &own.name, values: gauge(own), limits: &own.limits })
                 .collect(),
+            pairs: self.pairs.iter().map(BodyPair::data).collect(),
+        }
+    }
+}
+
+impl BodyPair {
+    fn data(&self) -> PairData<'_> {
+        let coordinate = |end: usize, axis: usize| -> Vec<f64> {
+            let samples = self.distance_m.iter().zip(&self.points_m);
+            samples
+                .map(|(distance, points)| if *distance < self.near_m { points[end][axis] } else { f64::NAN })
+                .collect()
+        };
+        let points: Vec<Vec<f64>> = (0..6).map(|place| coordinate(place / 3, place % 3)).collect();
+        PairData {
+            name: &self.name,
+            clearance: self.clearance_m,
+            near: self.near_m,
+            distance: row(&self.distance_m, 4),
+            points: listed(&points, 4),
         }
     }
 }

@@ -4,8 +4,8 @@ use super::{Context, json, known_in, message_of, result_file};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::{
-    Figure, IterationsFile, PrintStyle, ResultFile, RunOptions, refuse_overwriting, study_inputs, validation_traces,
-    write_atomically,
+    Figure, FigureForm, IterationsFile, PrintStyle, ResultFile, RunOptions, refuse_overwriting, study_inputs,
+    validation_traces,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -21,8 +21,8 @@ pub(crate) struct Options {
     /// The figure.
     #[arg(long, value_enum, value_name = "FIGURE")]
     figure: Kind,
-    /// The file; its ending selects the form: .svg (picture), .csv (data of the picture), .tex or .md (table). May be
-    /// repeated.
+    /// The file; its ending selects the form: .svg, .pdf or .png (picture), .csv (data of the picture), .tex or .md
+    /// (table). May be repeated.
     #[arg(long, required = true, value_name = "FILE")]
     out: Vec<PathBuf>,
     /// The study with the logs for `residuals`: its logs with the role "validate", or all logs if none has this role.
@@ -37,6 +37,9 @@ pub(crate) struct Options {
     /// Size of the text in the picture, points.
     #[arg(long, value_name = "PT", default_value_t = PrintStyle::default().font_pt)]
     font_pt: f64,
+    /// Resolution of a PNG, pixels per inch.
+    #[arg(long, value_name = "DPI", default_value_t = PrintStyle::default().dpi)]
+    dpi: f64,
     #[command(flatten)]
     programs: ProgramOptions,
 }
@@ -53,45 +56,6 @@ enum Kind {
     Convergence,
 }
 
-/// Form of a file.
-#[derive(Clone, Copy)]
-enum Form {
-    Svg,
-    Csv,
-    Latex,
-    Markdown,
-}
-
-impl Form {
-    fn of(path: &Path) -> Result<Self, String> {
-        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
-        match &*ending {
-            "svg" => Ok(Self::Svg),
-            "csv" => Ok(Self::Csv),
-            "tex" => Ok(Self::Latex),
-            "md" => Ok(Self::Markdown),
-            "pdf" | "png" => {
-                let svg = path.with_extension("svg");
-                let (svg, path) = (svg.display(), path.display());
-                Err(format!(
-                    "{path}: Dynident does not write .{ending}; write --out {svg} and convert it with \
-                     `rsvg-convert -f {ending} -o {path} {svg}` or `inkscape {svg} --export-filename={path}`"
-                ))
-            }
-            _ => Err(format!("{}: give a file that ends in .svg, .csv, .tex or .md", path.display())),
-        }
-    }
-
-    fn text(self, figure: &Figure, style: &PrintStyle) -> Result<String, String> {
-        match self {
-            Self::Svg => figure.svg(style).map_err(|error| format!("--width-mm, --font-pt: {error}")),
-            Self::Csv => Ok(figure.csv()),
-            Self::Latex => figure.latex().map_err(message_of),
-            Self::Markdown => figure.markdown().map_err(message_of),
-        }
-    }
-}
-
 /// Output of `plot --json`.
 #[derive(Serialize)]
 struct PlotFile {
@@ -101,18 +65,15 @@ struct PlotFile {
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let forms = options.out.iter().map(|path| Form::of(path)).collect::<Result<Vec<_>, _>>()?;
+    options.out.iter().try_for_each(|path| FigureForm::of(path).map(drop)).map_err(message_of)?;
     let input = match options.figure {
         Kind::Convergence => in_folder(&options.result, ITERATIONS),
         Kind::Residuals | Kind::Parameters | Kind::Friction => result_file(&options.result),
     };
     refuse_overwriting(&options.out, core::slice::from_ref(&input)).map_err(message_of)?;
     let figure = figure(options, &input, context)?;
-    let style = PrintStyle { width_mm: options.width_mm, font_pt: options.font_pt };
-    let texts = forms.iter().map(|form| form.text(&figure, &style)).collect::<Result<Vec<_>, _>>()?;
-    for (path, text) in options.out.iter().zip(&texts) {
-        write_atomically(path, text.as_bytes()).map_err(message_of)?;
-    }
+    let style = PrintStyle { width_mm: options.width_mm, font_pt: options.font_pt, dpi: options.dpi };
+    figure.write(&options.out, &style).map_err(message_of)?;
     if context.json {
         terminal::print_document(&json(&PlotFile { schema: "dynident/plot/1", files: options.out.clone() })?)?;
     } else if !context.quiet {

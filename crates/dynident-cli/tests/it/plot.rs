@@ -92,6 +92,30 @@ fn a_result_has_figures_data_and_tables() {
 }
 
 #[test]
+fn pdf_and_png_have_the_size_of_the_svg() {
+    let folder = identified();
+    let at = folder.path();
+    let files = ["--out", "f.pdf", "--out", "f.png", "--out", "f.svg", "--dpi", "200", "--width-mm", "120"];
+    let ran = plot(at, &[&["r", "--figure", "friction"], &files[..]].concat());
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let svg = std::fs::read_to_string(at.join("f.svg")).unwrap();
+    let root = Document::parse(&svg).unwrap().root_element().attribute("height").unwrap().to_owned();
+    let sides_mm = [120.0, root.trim_end_matches("mm").parse::<f64>().unwrap()];
+    // The header of a PNG: eight bytes of signature, eight of the chunk, width and height.
+    let png = std::fs::read(at.join("f.png")).unwrap();
+    let pixels = [16, 20].map(|place| f64::from(u32::from_be_bytes(png[place..place + 4].try_into().unwrap())));
+    let pdf = String::from_utf8_lossy(&std::fs::read(at.join("f.pdf")).unwrap()).into_owned();
+    let page = pdf.split_once("/MediaBox [").unwrap().1.split(']').next().unwrap();
+    let points: Vec<f64> = page.split(' ').map(|side| side.parse().unwrap()).collect();
+    for (axis, side_mm) in sides_mm.into_iter().enumerate() {
+        // The SVG rounds its height to 0.1 mm.
+        assert!((pixels[axis] - side_mm / 25.4 * 200.0).abs() <= 1.0, "{pixels:?} {sides_mm:?}");
+        assert!((points[2 + axis] - side_mm / 25.4 * 72.0).abs() < 0.2, "{points:?} {sides_mm:?}");
+    }
+    assert!(pdf.contains("/ToUnicode") && pdf.contains("DejaVuSansCondensed"), "{pdf}");
+}
+
+#[test]
 fn an_iteration_has_a_convergence_figure() {
     let folder = tempfile::tempdir().unwrap();
     let study = repository("examples/iterate_paper_2r.toml").display().to_string();
@@ -118,14 +142,14 @@ fn what_cannot_be_plotted_is_refused_with_the_fix() {
     let folder = identified();
     let at = folder.path();
     for (arguments, reason) in [
-        (&["r", "--figure", "parameters", "--out", "f.pdf"][..], "rsvg-convert -f pdf -o f.pdf f.svg"),
-        (&["r", "--figure", "parameters", "--out", "f.bmp"], ".svg, .csv, .tex or .md"),
+        (&["r", "--figure", "parameters", "--out", "f.bmp"][..], ".svg, .pdf, .png, .csv, .tex or .md"),
+        (&["r", "--figure", "parameters", "--dpi", "5", "--out", "f.png"], "30 to 2400 dpi"),
         (&["r", "--figure", "residuals", "--out", "f.svg"], "--study STUDY.toml"),
         (&["r", "--figure", "friction", "--study", "s.toml", "--out", "f.svg"], "omit it"),
         (&["r", "--figure", "convergence", "--out", "f.svg"], "iterations.json"),
         (&["r", "--figure", "parameters", "--width-mm", "5", "--out", "f.svg"], "5 mm"),
         (&["r", "--figure", "parameters", "--font-pt", "nan", "--out", "f.svg"], "pt"),
-        (&["r", "--figure", "parameters", "--out", "r/result.json"], ".svg, .csv"),
+        (&["r", "--figure", "parameters", "--out", "r/result.json"], ".svg, .pdf"),
         (&["r", "--figure", "residuals", "--study", "s.toml", "--out", "log.csv"], "input"),
     ] {
         let ran = plot(at, arguments);

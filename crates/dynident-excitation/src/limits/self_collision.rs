@@ -83,7 +83,7 @@ impl Term for SelfCollisionLimits {
                 if weight == 0.0 {
                     continue;
                 }
-                let SolidDistance { surface_m, points, direction, slope } =
+                let SolidDistance { surface_m, points, direction, slope, .. } =
                     self.apart(pair, inputs, sample, &mut Vec::new());
                 if surface_m >= pair.clearance_m + MAX_RELATIVE_EXCESS * pair.size_m {
                     continue;

@@ -34,6 +34,8 @@ pub(crate) struct SolidDistance {
     pub surface_m: f64,
     /// Points of the two links that determine the change of the distance.
     pub points: [Vec3; 2],
+    /// Distance of the surface of each link from its point, m.
+    pub radii_m: [f64; 2],
     /// Unit vector from the second point to the first.
     pub direction: Vec3,
     /// Derivative of `surface_m` with respect to the distance of the points: 1, except for overlapping hulls.
@@ -129,6 +131,7 @@ pub(crate) fn solid_distance(
             let found = if balls.surface_m > beyond {
                 balls
             } else {
+                let radii_m = [a.radius_m, b.radius_m];
                 let radii = a.radius_m + b.radius_m;
                 let hulls =
                     [Placed { corners: &a.corners, at: first_at }, Placed { corners: &b.corners, at: second_at }];
@@ -137,12 +140,13 @@ pub(crate) fn solid_distance(
                     SolidDistance {
                         surface_m: hull.distance_m - radii,
                         points: hull.points,
+                        radii_m,
                         direction: hull.direction,
                         slope: 1.0,
                     }
                 } else {
                     let inside = CENTRE_DISTANCE_WEIGHT * balls.surface_m.min(0.0);
-                    SolidDistance { surface_m: inside - radii, slope: CENTRE_DISTANCE_WEIGHT, ..balls }
+                    SolidDistance { surface_m: inside - radii, radii_m, slope: CENTRE_DISTANCE_WEIGHT, ..balls }
                 }
             };
             if found.surface_m > beyond {
@@ -162,5 +166,11 @@ fn by_balls(first: Vec3, first_reach: f64, second: Vec3, second_reach: f64) -> S
     let apart = first - second;
     let length = apart.norm();
     let direction = if length > 0.0 { apart.scale(1.0 / length) } else { Vec3([0.0, 0.0, 1.0]) };
-    SolidDistance { surface_m: length - first_reach - second_reach, points: [first, second], direction, slope: 1.0 }
+    SolidDistance {
+        surface_m: length - first_reach - second_reach,
+        points: [first, second],
+        radii_m: [first_reach, second_reach],
+        direction,
+        slope: 1.0,
+    }
 }

@@ -155,6 +155,10 @@
       return part;
     });
 
+    // Marks of the nearest points of two bodies and of the line between them, which other bodies do not hide.
+    const above = new OGL.Program(gl, { vertex, fragment, uniforms: uniforms(), cullFace: false, transparent: true, depthTest: false, depthWrite: false });
+    const marks = Array.from({ length: Math.max(0, ...data.motions.map((motion) => motion.pairs.length)) }, () => [0, 1, 2].map(() => add(unit, above, { colour: palette[1] })));
+
     const pose = (mesh, [rotation, origin]) => {
       const [a, b, c] = rotation;
       mesh.matrix.set(a[0], b[0], c[0], 0, a[1], b[1], c[1], 0, a[2], b[2], c[2], 0, origin[0], origin[1], origin[2], 1);
@@ -236,6 +240,25 @@
       });
     };
 
+    // Along the line a rod (an ellipsoid of the length), at its ends balls.
+    const mark = (meshes, ends, colour) => {
+      meshes.forEach((mesh) => { mesh.visible = ends != null; mesh.look.colour = colour; });
+      if (!ends) return;
+      const along = ends[1].map((x, a) => (x - ends[0][a]) / 2);
+      const [thin, length] = [0.003 * size, Math.hypot(...along)];
+      const unit = along.map((x) => x / (length || 1));
+      // A ball of the thickness, stretched along the line.
+      const stretched = [0, 1, 2].map((row) => [0, 1, 2].map((column) => (row === column ? thin : 0) + (Math.max(length, thin) - thin) * unit[row] * unit[column]));
+      pose(meshes[0], [stretched, ends[0].map((x, a) => x + along[a])]);
+      ends.forEach((end, k) => pose(meshes[k + 1], [[[2.2 * thin, 0, 0], [0, 2.2 * thin, 0], [0, 0, 2.2 * thin]], end]));
+    };
+    const markPairs = (motion, time) => marks.forEach((meshes, k) => {
+      const pair = motion.pairs[k];
+      const places = pair ? sample(pair.points, motion, time) : [null];
+      const ends = places.includes(null) ? null : [places.slice(0, 3), places.slice(3)];
+      mark(meshes, ends, ends && sample([pair.distance], motion, time)[0] < pair.clearance ? [0.85, 0.1, 0.1] : palette[1]);
+    });
+
     // Colours.
     const list = element("ul", { className: "bodies" });
     const buttons = data.bodies.map((body, k) => {
@@ -277,7 +300,8 @@
         return [swatch, `${text}\u2003`];
       }));
       if (state.ellipsoids) legend.append("ellipsoids: solids of uniform density with the mass distribution of each body, identified (blue) and described (orange)\u2003");
-      if (state.ghost) legend.append("pale arm: desired motion");
+      if (state.ghost) legend.append("pale arm: desired motion\u2003");
+      if (motion?.pairs.length) legend.append(`rods: nearest points of links within ${short(Math.max(...motion.pairs.map((pair) => pair.near)))} m (red: below the minimum distance)`);
       draw();
     };
     let choosing = false;
@@ -313,10 +337,12 @@
         const found = state.ghost ? poses(data, sample(motion.ghost, motion, state.time)) : null;
         parts.forEach(({ ghost }, k) => { if (ghost) { ghost.visible = !!found; if (found) pose(ghost, found[k]); } });
       }
-      meters.forEach(({ meter, row, limits, text }) => {
+      markPairs(motion, state.time);
+      meters.forEach(({ meter, row, limits, near, text }) => {
         const [value] = sample([row], motion, state.time);
         meter.value = value ?? 0;
         text.textContent = short(value);
+        if (near != null) meter.classList.toggle("near", value < near);
         if (limits) meter.classList.toggle("near", value != null && Math.max((value - limits[1]) / (limits[1] - limits[0]), (limits[0] - value) / (limits[1] - limits[0])) > -0.025);
       });
       if (data.colourings[state.colouring]?.gauge != null) paint();
@@ -345,7 +371,16 @@
         }
         return row;
       });
-      gauges.replaceChildren(element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows)));
+      const table = (top, body) => element("table", {}, element("thead", {}, top), element("tbody", {}, ...body));
+      gauges.replaceChildren(table(head, rows));
+      if (!motion.pairs.length) return;
+      const pairs = motion.pairs.map((pair) => {
+        const meter = element("meter", { min: 0, max: Math.max(...pair.distance, pair.near), ariaLabel: `distance of ${pair.name}` });
+        const text = element("span", {});
+        meters.push({ meter, row: pair.distance, near: pair.near, text });
+        return element("tr", {}, element("td", {}, pair.name), element("td", { className: "number" }, meter, " ", text), element("td", { className: "number" }, short(pair.clearance)));
+      });
+      gauges.append(table(element("tr", {}, ...["links", "distance, m", "at least, m"].map((text) => element("th", {}, text))), pairs));
     };
     let last;
     const step = (now) => {

@@ -1,7 +1,7 @@
 //! The complete page: no content becomes markup or script, and there is no network access.
 use dynident_report::{
-    BarPlot, Cell, Colouring, ConvergencePlot, Diagram, Gauge, Heading, HeatMap, KeyFigures, LinePlot, Report, Scene,
-    SceneBody, SceneMotion, Surface, Table, Text, Tone,
+    BarPlot, BodyPair, Cell, Colouring, ConvergencePlot, Diagram, Gauge, Heading, HeatMap, KeyFigures, LinePlot,
+    Report, Scene, SceneBody, SceneMotion, Surface, Table, Text, Tone,
 };
 
 /// Ends every context of a page: element, attribute, script, comment.
@@ -37,6 +37,13 @@ fn scene_of(text: &str) -> Scene {
         times_s: vec![0.0, 1.0],
         q: vec![vec![0.0, 1.0]],
         gauges: vec![gauge],
+        pairs: vec![BodyPair {
+            name: text.to_owned(),
+            clearance_m: 0.1,
+            near_m: 0.3,
+            distance_m: vec![0.2, 0.4],
+            points_m: vec![[[0.0; 3]; 2]; 2],
+        }],
         ..SceneMotion::default()
     };
     let classes = vec![(text.to_owned(), 0)];

@@ -1,6 +1,6 @@
 //! Codes of errors: the names under which the page "Messages" of the book lists them.
 
-use super::{Error, FactorsError, NewStudyError, ResultFileError, StudyError, StudyFileError};
+use super::{Error, FactorsError, FigureError, NewStudyError, ResultFileError, StudyError, StudyFileError};
 use core::error::Error as StdError;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
@@ -48,6 +48,7 @@ const CODES: &[CodeOf] = &[
     of::<ExpressionProblem>,
     of::<FactorsError>,
     of::<FamilyError>,
+    of::<FigureError>,
     of::<FileError>,
     of::<FilterError>,
     of::<FormatError>,

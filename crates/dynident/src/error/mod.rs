@@ -2,10 +2,12 @@
 
 mod code;
 mod factors;
+mod figure;
 mod new_study;
 
 pub use code::error_code;
 pub use factors::FactorsError;
+pub use figure::FigureError;
 pub use new_study::{NewStudyError, RecognisedFile};
 
 use dynident_export::ExportError;
@@ -64,6 +66,9 @@ pub enum Error {
     /// A report that could not be built.
     #[error("report.html: {0}; this is a bug in Dynident: please report it")]
     Report(#[from] dynident_report::ReportError),
+    /// A figure that cannot be written.
+    #[error("{0}")]
+    Figure(#[from] FigureError),
     /// A result that does not belong to the study.
     #[error("{}: {message}", path.display())]
     Result {

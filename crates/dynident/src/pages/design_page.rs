@@ -6,13 +6,20 @@ use crate::error::Error;
 use crate::result::{DesignFile, ParameterForecast};
 use dynident_estimation::HALF_WIDTH_95;
 use dynident_excitation::Motion;
-use dynident_excitation::limits::{JointLimit, Limits};
+use dynident_excitation::limits::{JointLimit, LimitError, Limits, PairDistance, arm_length_m};
+use dynident_model::Model;
 use dynident_report::{
-    Cell, Gauge, Heading, KeyFigures, LinePlot, Report, Scene, SceneMotion, Table, Text, Tone, short,
+    BodyPair, Cell, Gauge, Heading, KeyFigures, LinePlot, Report, Scene, SceneMotion, Table, Text, Tone, short,
 };
 
 /// Largest number of samples of the played motion; the picture interpolates.
 const MAX_SAMPLES: usize = 1500;
+
+/// Number of pairs of links whose distance is shown.
+const MAX_PAIRS: usize = 5;
+
+/// Distance above the minimum one within which two links are near, as a share of the arm's length.
+const NEAR_SHARE: f64 = 0.1;
 
 /// Share of a limit above which it is marked as nearly reached, %.
 const NEARLY_REACHED_PERCENT: f64 = 95.0;
@@ -22,6 +29,8 @@ pub(crate) struct SampledDesign<'a> {
     pub(crate) times_s: &'a [f64],
     pub(crate) motion: &'a Motion,
     pub(crate) torque: Option<&'a [f64]>,
+    /// Those of [`closest_pairs`].
+    pub(crate) pairs: &'a [PairDistance],
 }
 
 /// The page of a design: verdict, the robot that plays the motion with its limits, used limits, forecast of the error
@@ -52,6 +61,9 @@ pub(crate) fn design_page(
     page.add(forecast(d));
     page.add(Heading::new("Motion"));
     curves(&mut page, d, limits, sampled);
+    if !sampled.pairs.is_empty() {
+        page.add(distances(sampled));
+    }
     Ok(page.html()?)
 }
 
@@ -96,10 +108,37 @@ fn key_figures(d: &DesignFile) -> KeyFigures {
         .figure("duration", format!("{} s", short(d.duration_s, 4)), "")
 }
 
+/// Every how many samples of a motion are in the picture.
+fn step_of(motion: &Motion) -> usize {
+    motion.samples.div_ceil(MAX_SAMPLES).max(1)
+}
+
+/// The pairs of links that come closest to their minimum distance, the closest first.
+///
+/// # Errors
+/// Invalid limits.
+pub(crate) fn closest_pairs(limits: &Limits, model: &Model, motion: &Motion) -> Result<Vec<PairDistance>, LimitError> {
+    let Some(limit) = &limits.self_collision else { return Ok(Vec::new()) };
+    let mut pairs = limit.distances(model, motion, step_of(motion))?;
+    pairs.sort_by(|a, b| (a.smallest_m() - a.clearance_m).total_cmp(&(b.smallest_m() - b.clearance_m)));
+    pairs.truncate(MAX_PAIRS);
+    Ok(pairs)
+}
+
+fn body_pair(pair: &PairDistance, robot: &RobotAppearance) -> BodyPair {
+    BodyPair {
+        name: pair.links.join(" and "),
+        clearance_m: pair.clearance_m,
+        near_m: pair.clearance_m + NEAR_SHARE * arm_length_m(robot.model()),
+        distance_m: pair.distance_m.clone(),
+        points_m: pair.points_m.clone(),
+    }
+}
+
 fn scene(d: &DesignFile, limits: &Limits, robot: &RobotAppearance, sampled: &SampledDesign<'_>) -> Scene {
     let mut scene = robot.scene("The motion");
     let motion = sampled.motion;
-    let step = motion.samples.div_ceil(MAX_SAMPLES).max(1);
+    let step = step_of(motion);
     let kept = |values: &[f64]| values.iter().copied().step_by(step).collect::<Vec<f64>>();
     let of_joints =
         |values: &[f64]| (0..motion.joints).map(|joint| kept(&values[motion.of(joint)])).collect::<Vec<_>>();
@@ -126,8 +165,9 @@ fn scene(d: &DesignFile, limits: &Limits, robot: &RobotAppearance, sampled: &Sam
         name: "design".into(),
         times_s: kept(sampled.times_s),
         q: of_joints(&motion.q),
-        ghost: Vec::new(),
         gauges,
+        pairs: sampled.pairs.iter().map(|pair| body_pair(pair, robot)).collect(),
+        ..SceneMotion::default()
     }];
     scene.floor_m = limits.floor.as_ref().map(|floor| floor.height_m);
     scene.column_m = limits.column.as_ref().map(|column| [column.axis_xy_m[0], column.axis_xy_m[1], column.radius_m]);
@@ -135,6 +175,22 @@ fn scene(d: &DesignFile, limits: &Limits, robot: &RobotAppearance, sampled: &Sam
     scene.boxes_m = limits.boxes.iter().map(|own| [open(own.x_m), open(own.y_m), open(own.z_m)]).collect();
     scene.words = format!("the arm of {} joints at the start of the motion", d.joints.len());
     scene
+}
+
+/// Distances of the closest links over time.
+fn distances(sampled: &SampledDesign<'_>) -> LinePlot {
+    let pairs = sampled.pairs;
+    let times_s: Vec<f64> = sampled.times_s.iter().copied().step_by(step_of(sampled.motion)).collect();
+    let samples = times_s.len();
+    let mut clearances: Vec<f64> = pairs.iter().map(|pair| pair.clearance_m).collect();
+    clearances.sort_by(f64::total_cmp);
+    clearances.dedup();
+    let plot = LinePlot::new("Distances of links", "t, s", "distance, m", times_s)
+        .note("the pairs of links that come closest, between their surfaces");
+    let plot = pairs.iter().fold(plot, |plot, pair| plot.line(pair.links.join(" and "), pair.distance_m.clone()));
+    clearances.into_iter().fold(plot, |plot, clearance| {
+        plot.dashed(format!("at least {} m", short(clearance, 3)), vec![clearance; samples])
+    })
 }
 
 fn limit_table(d: &DesignFile) -> Table {
@@ -181,7 +237,7 @@ fn forecast(d: &DesignFile) -> Table {
 }
 
 fn curves(page: &mut Report, d: &DesignFile, limits: &Limits, sampled: &SampledDesign<'_>) {
-    let SampledDesign { times_s, motion, torque } = *sampled;
+    let SampledDesign { times_s, motion, torque, .. } = *sampled;
     let none = JointLimit::default();
     for (joint, name) in d.joints.iter().enumerate() {
         let limit = limits.of(name).unwrap_or(&none);

@@ -82,6 +82,7 @@ fn played(trace: &RunTrace, all: &[RunTrace]) -> Option<SceneMotion> {
         q: each(&measured),
         ghost: each(&trace.desired),
         gauges,
+        pairs: Vec::new(),
     })
 }
 

@@ -32,10 +32,14 @@ impl RobotAppearance {
         Ok(stored.map(|stored| Self::new(stored.model(), path)))
     }
 
+    pub(super) fn model(&self) -> &Model {
+        &self.model
+    }
+
     /// Bodies with the collision shapes of the description, in the neutral posture: every joint at zero, or as close to
     /// zero as its limits allow. A body without a readable shape is drawn as capsules from joint to joint. The first
     /// body is the base.
-    pub(crate) fn scene(&self, title: impl Into<String>) -> Scene {
+    pub fn scene(&self, title: impl Into<String>) -> Scene {
         let model = &self.model;
         let posture = neutral_posture(model);
         let base =
@@ -77,7 +81,7 @@ impl RobotAppearance {
     }
 
     /// Places the bodies of the still picture at the scene's posture.
-    pub(crate) fn place(&self, scene: &mut Scene) {
+    pub fn place(&self, scene: &mut Scene) {
         let mut workspace = Workspace::new(&self.model);
         let placements = body_placements(&self.model, &mut workspace, &scene.posture);
         for (body, placement) in scene.bodies.iter_mut().skip(1).zip(placements) {

@@ -158,10 +158,10 @@ fn motion(trace: &LogTrace) -> SceneMotion {
         name: format!("{} ({role})", trace.log),
         times_s: trace.motion.times_s.clone(),
         q: trace.motion.q.clone(),
-        ghost: Vec::new(),
         gauges: vec![
             Gauge { name: "torque, Nm (N)".into(), values: measured.clone(), limits: vec![None; measured.len()] },
             Gauge { name: "torque error, Nm (N)".into(), values: errors, limits: measured.iter().map(rms).collect() },
         ],
+        ..SceneMotion::default()
     }
 }

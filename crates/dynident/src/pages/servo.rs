@@ -117,7 +117,7 @@ fn played(log: &ServoMotion) -> SceneMotion {
         times_s: log.times_s.clone(),
         q: log.simulated.clone(),
         ghost: log.measured.clone(),
-        gauges: Vec::new(),
+        ..SceneMotion::default()
     }
 }
 

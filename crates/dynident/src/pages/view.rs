@@ -71,7 +71,7 @@ fn played(motion: &ViewedMotion, model: &Model) -> SceneMotion {
             limits: limits.map(|limits| limits.velocity.map(|speed| [-speed, speed])).collect(),
         },
     ];
-    SceneMotion { name: motion.name.clone(), times_s, q, ghost: Vec::new(), gauges }
+    SceneMotion { name: motion.name.clone(), times_s, q, gauges, ..SceneMotion::default() }
 }
 
 fn joints(model: &Model) -> Table {

@@ -7,7 +7,7 @@ use super::search::SearchResult;
 use super::setup::{DesignSetup, MotionInformation};
 use crate::error::Error;
 use crate::pages::design as pictures;
-use crate::pages::design_page::{SampledDesign, design_page};
+use crate::pages::design_page::{SampledDesign, closest_pairs, design_page};
 use crate::pages::robot::RobotAppearance;
 use crate::result::{DESIGN_SCHEMA, DesignFile, Provenance, WindowedFile};
 use crate::study::{FamilyChoice, StudyRobot};
@@ -211,7 +211,9 @@ impl DesignOutcome {
         let (times_s, motion) = self.sampled(self.plot_rate_hz());
         let robot = RobotAppearance::new(self.robot.model(), &self.robot.robot.path);
         let torque = self.torque_nm(&motion);
-        let sampled = SampledDesign { times_s: &times_s, motion: &motion, torque: torque.as_deref() };
+        let in_limits = Error::section(&self.robot.robot.path, "design.limits");
+        let pairs = closest_pairs(&self.limits, self.robot.model(), &motion).map_err(in_limits)?;
+        let sampled = SampledDesign { times_s: &times_s, motion: &motion, torque: torque.as_deref(), pairs: &pairs };
         design_page(&self.file, &self.limits, &robot, &sampled)
     }
 

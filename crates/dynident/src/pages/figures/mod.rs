@@ -2,13 +2,18 @@
 
 mod convergence;
 mod data;
+mod form;
 mod friction;
 mod parameters;
 mod residuals;
 
-use crate::error::Error;
+pub use form::FigureForm;
+
+use crate::error::{Error, FigureError};
+use crate::output::write_atomically;
 use data::Data;
-use dynident_report::{PrintFigure, PrintPanel, PrintStyle, ReportError, Table};
+use dynident_report::{PrintFigure, PrintPanel, PrintStyle, Table};
+use std::path::PathBuf;
 
 /// A figure of a result or an iteration: picture, data, table.
 #[derive(Clone, Debug)]
@@ -26,30 +31,34 @@ impl Figure {
     /// The picture as SVG.
     ///
     /// # Errors
-    /// [`ReportError::PrintSize`] for a size without room for the plots.
-    pub fn svg(&self, style: &PrintStyle) -> Result<String, ReportError> {
-        self.picture.svg(style)
+    /// A size without room for the plots.
+    pub fn svg(&self, style: &PrintStyle) -> Result<String, FigureError> {
+        Ok(self.picture.svg(style)?)
     }
 
-    /// Every drawn number as CSV, with the shortest text that gives the same number. An empty cell is a missing value.
-    pub fn csv(&self) -> String {
-        self.data.csv()
-    }
-
-    /// The table as LaTeX, with the rules of the package booktabs.
+    /// Contents of a file of the figure.
     ///
     /// # Errors
-    /// [`Error::Report`], which indicates a bug.
-    pub fn latex(&self) -> Result<String, Error> {
-        Ok(self.table.latex()?)
+    /// [`FigureError::Report`]: a size without room for the plots, an invalid resolution, characters without glyphs.
+    pub fn contents(&self, form: FigureForm, style: &PrintStyle) -> Result<Vec<u8>, FigureError> {
+        Ok(match form {
+            FigureForm::Svg => self.svg(style)?.into_bytes(),
+            FigureForm::Pdf => self.picture.pdf(style)?,
+            FigureForm::Png => self.picture.png(style)?,
+            FigureForm::Csv => self.data.csv().into_bytes(),
+            FigureForm::Latex => self.table.latex()?.into_bytes(),
+            FigureForm::Markdown => self.table.markdown()?.into_bytes(),
+        })
     }
 
-    /// The table as Markdown.
+    /// Writes files in the forms of their endings: all of them, or none if one cannot be drawn.
     ///
     /// # Errors
-    /// [`Error::Report`], which indicates a bug.
-    pub fn markdown(&self) -> Result<String, Error> {
-        Ok(self.table.markdown()?)
+    /// As [`Figure::contents`] and [`FigureForm::of`]; a file that cannot be written.
+    pub fn write(&self, files: &[PathBuf], style: &PrintStyle) -> Result<(), Error> {
+        let contents = files.iter().map(|path| self.contents(FigureForm::of(path)?, style));
+        let contents = contents.collect::<Result<Vec<_>, _>>()?;
+        files.iter().zip(&contents).try_for_each(|(path, contents)| write_atomically(path, contents))
     }
 }
 

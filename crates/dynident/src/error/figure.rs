@@ -1,0 +1,18 @@
+use dynident_report::ReportError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// A figure that cannot be written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum FigureError {
+    /// A file name with an unknown ending.
+    #[error("{}: give a file that ends in .svg, .pdf, .png, .csv, .tex or .md", path.display())]
+    Ending {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A figure that cannot be drawn.
+    #[error("{0}")]
+    Report(#[from] ReportError),
+}
