@@ -29,6 +29,21 @@ pub struct ControlledRun {
     end: Option<RunEnd>,
 }
 
+/// Why a function ended its run early.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FunctionStop {
+    /// The robot stopped, for example by a protective stop. The run counts if it has begun.
+    Robot {
+        /// The reason.
+        reason: String,
+    },
+    /// The function failed, for example the driver of the robot. The run does not count; the next call repeats it.
+    Function {
+        /// The reason.
+        reason: String,
+    },
+}
+
 #[derive(Debug)]
 enum RunEnd {
     Interrupted,
@@ -122,6 +137,18 @@ impl ControlledRun {
         Some(&self.tau)
     }
 
+    /// Why the last call of [`torque`](Self::torque) returned `None`, in words; `None` while the run continues.
+    pub fn end_reason(&self) -> Option<String> {
+        match &self.end {
+            Some(RunEnd::Interrupted) => Some("a stop was requested".to_owned()),
+            Some(RunEnd::Breach(breach)) => Some(format!("out of the envelope: {breach}")),
+            Some(RunEnd::Oscillation(oscillation)) => Some(oscillation.to_string()),
+            Some(RunEnd::Fault(fault)) => Some(fault.to_string()),
+            None if self.record.samples >= self.reference.samples() => Some("all samples were requested".to_owned()),
+            None => None,
+        }
+    }
+
     /// The part of a sample, and the sample at which the time of this part is zero.
     fn part_of(&self, sample: usize) -> (RunPart, usize) {
         match self.parts {
@@ -171,7 +198,7 @@ impl ControlledRun {
         }
     }
 
-    fn ended(self, result: Result<(), String>) -> RobotRun {
+    fn ended(self, result: Result<(), FunctionStop>) -> RobotRun {
         let (end_s, duration_s) = (self.record.times_s.last().copied().unwrap_or(0.0), self.reference.duration_s());
         let is_whole = self.record.samples == self.reference.samples();
         let record = self.recorded(RunPart::Motion);
@@ -186,7 +213,11 @@ impl ControlledRun {
                 RobotStatus::Oscillated { oscillation, stopping: Stopping::Confirmed }
             }
             (Some(RunEnd::Fault(fault)), _) => RobotStatus::Failed { fault, stopping: None },
-            (None, Err(reason)) => RobotStatus::Stopped { reason },
+            (None, Err(FunctionStop::Robot { reason })) => RobotStatus::Stopped { reason },
+            (None, Err(FunctionStop::Function { reason })) => {
+                let fault = RobotFault::Function { sample: self.record.samples, reason };
+                RobotStatus::Failed { fault, stopping: None }
+            }
             (None, Ok(())) if is_whole => RobotStatus::Done,
             (None, Ok(())) => {
                 RobotStatus::Failed { fault: RobotFault::Short { end_s, duration_s, part }, stopping: None }
@@ -198,7 +229,7 @@ impl ControlledRun {
 
 /// A robot that is a function of this process. The function receives the controlled run, moves the robot to the first
 /// sample of the reference, requests and applies a torque at every sample, and returns after the last sample. If it
-/// returns an error, the run is stopped with that reason.
+/// returns an error, the run ends with that reason ([`FunctionStop`]).
 pub struct FunctionRobot<F> {
     joints: Vec<String>,
     function: F,
@@ -206,7 +237,7 @@ pub struct FunctionRobot<F> {
 
 impl<F> FunctionRobot<F>
 where
-    F: FnMut(ControlledRun) -> (ControlledRun, Result<(), String>),
+    F: FnMut(ControlledRun) -> (ControlledRun, Result<(), FunctionStop>),
 {
     /// Creates a robot with these joints, in the model's order. The function returns the run with its outcome, so that
     /// the run can be passed to another language meanwhile.
@@ -223,7 +254,7 @@ impl<F> core::fmt::Debug for FunctionRobot<F> {
 
 impl<F> Robot for FunctionRobot<F>
 where
-    F: FnMut(ControlledRun) -> (ControlledRun, Result<(), String>),
+    F: FnMut(ControlledRun) -> (ControlledRun, Result<(), FunctionStop>),
 {
     fn name(&self) -> &'static str {
         "function"

@@ -30,7 +30,7 @@ pub use envelope::{Envelope, EnvelopeSettings};
 pub(crate) use envelope::{TRACKING_M, TRACKING_RAD};
 pub use folder::{FolderRobot, FolderSettings};
 pub use folder_forms::FolderForm;
-pub use function::{ControlledRun, FunctionRobot};
+pub use function::{ControlledRun, FunctionRobot, FunctionStop};
 pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
 pub use log_mistakes::{ExaminedLog, LogMistake, LogMistakeSettings, examine_log};
 pub use log_table::{LogTableError, read_log_table};
@@ -446,6 +446,14 @@ pub enum RobotFault {
     Torque {
         /// The sample, from 0.
         sample: usize,
+    },
+    /// The function of a robot failed.
+    #[error("the function of the robot failed at sample {sample}: {reason}")]
+    Function {
+        /// The sample, from 0.
+        sample: usize,
+        /// The reason.
+        reason: String,
     },
     /// A file that cannot be written or read.
     #[error("{}: {reason}", path.display())]

@@ -3,10 +3,12 @@
 mod code;
 mod factors;
 mod new_study;
+mod place;
 
 pub use code::error_code;
 pub use factors::FactorsError;
 pub use new_study::{NewStudyError, RecognisedFile};
+pub use place::{ErrorPlace, place_in_log, place_in_robot};
 
 use dynident_export::ExportError;
 use dynident_identification::IdentificationError;
