@@ -22,12 +22,18 @@ pub struct ControlledRun {
     tau: Vec<f64>,
     /// Samples before the motion and in the motion, if the run has paths from and to home.
     parts: Option<[usize; 2]>,
-    /// Record of the whole run, by the robot's clock.
+    /// Time of the first sample by the robot's clock, s.
+    first_s: Option<f64>,
+    /// Record of the whole run, by the robot's clock from its first sample.
     record: Record,
     /// The newest sample, for the check of the envelope.
     now: Record,
     end: Option<RunEnd>,
 }
+
+/// Longest step between two samples, periods. A longer one is a clock in another unit: milliseconds are a thousand
+/// times too long.
+const MAX_STEP_PERIODS: f64 = 500.0;
 
 /// Why a function ended its run early.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,6 +71,7 @@ impl ControlledRun {
             stop: request.stop.cloned(),
             target: ReferenceSample::new(joints.len()),
             tau: vec![0.0; joints.len()],
+            first_s: None,
             record: empty_record(joints, reference.rate_hz()),
             now: Record {
                 samples: 1,
@@ -102,6 +109,8 @@ impl ControlledRun {
         if self.end.is_some() || sample >= self.reference.samples() {
             return None;
         }
+        // The robot's clock may begin at any time.
+        let time_s = time_s - *self.first_s.get_or_insert(time_s);
         if let Err(end) = self.check_sample(sample, time_s, q, dq) {
             self.end = Some(end);
             return None;
@@ -193,6 +202,10 @@ impl ControlledRun {
         }
         match self.record.times_s.last() {
             _ if !time_s.is_finite() => Err(RunEnd::Fault(RobotFault::NotANumber { sample, what: "t_s".to_owned() })),
+            Some(&before_s) if (time_s - before_s) * self.reference.rate_hz() > MAX_STEP_PERIODS => {
+                let (step_s, period_s) = (time_s - before_s, 1.0 / self.reference.rate_hz());
+                Err(RunEnd::Fault(RobotFault::Clock { sample, step_s, period_s }))
+            }
             Some(&before_s) if time_s <= before_s => Err(RunEnd::Fault(RobotFault::Time { sample, time_s, before_s })),
             _ => Ok(()),
         }

@@ -447,6 +447,18 @@ pub enum RobotFault {
         /// The sample, from 0.
         sample: usize,
     },
+    /// A step of the time stamps that is far too long.
+    #[error(
+        "sample {sample} of the robot: its time is {step_s} s after the previous one, but the period is {period_s} s: give the time in seconds"
+    )]
+    Clock {
+        /// The sample, from 0.
+        sample: usize,
+        /// The step, s.
+        step_s: f64,
+        /// The period, s.
+        period_s: f64,
+    },
     /// The function of a robot failed.
     #[error("the function of the robot failed at sample {sample}: {reason}")]
     Function {

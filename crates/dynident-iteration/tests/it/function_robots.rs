@@ -95,6 +95,8 @@ fn what_it_does_wrong_is_named() {
     assert!(matches!(fault(&[(0.0, &[0.0, f64::NAN])]), RobotFault::NotANumber { .. }));
     assert!(matches!(fault(&[(f64::INFINITY, still)]), RobotFault::NotANumber { .. }));
     assert!(matches!(fault(&[(0.1, still), (0.1, still)]), RobotFault::Time { sample: 1, .. }));
+    // Milliseconds in place of seconds.
+    assert!(matches!(fault(&[(0.0, still), (2.0, still)]), RobotFault::Clock { sample: 1, .. }));
     let reason = "the cable is out".to_owned();
     let (found, _) = run(false, None, |_| Err(FunctionStop::Robot { reason: reason.clone() }));
     assert_eq!(found.status, RobotStatus::Stopped { reason: reason.clone() });
