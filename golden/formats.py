@@ -16,6 +16,7 @@ import struct
 
 import h5py
 import numpy as np
+import pandas
 import pyarrow as pa
 import pyarrow.feather
 import pyarrow.parquet as pq
@@ -26,6 +27,9 @@ import cbor2
 import mcap
 from mcap.writer import CompressionType
 from mcap.writer import Writer as RawWriter
+from google.protobuf import descriptor_pb2, duration_pb2, message_factory, timestamp_pb2
+from google.protobuf.descriptor_pool import DescriptorPool
+from mcap_protobuf.writer import Writer as ProtobufWriter
 from mcap_ros1.writer import Writer as Ros1Writer
 from mcap_ros2.writer import Writer as Ros2Writer
 from rosbags.rosbag1 import Writer as BagWriter
@@ -520,6 +524,90 @@ def ros1_bags(out):
     }
 
 
+def protobuf_classes():
+    """Classes of messages in proto3, as protoc generates them: an arm, and messages of it in a second file."""
+    Field = descriptor_pb2.FieldDescriptorProto
+    kinds = {name[5:].lower(): number for name, number in Field.Type.items()}
+
+    def fields(message, *descriptions):
+        for number, (name, kind, *options) in enumerate(descriptions, 1):
+            own = message.field.add(name=name, number=number, label=Field.LABEL_REPEATED if "repeated" in options else Field.LABEL_OPTIONAL)
+            if kind.startswith("."):
+                own.type, own.type_name = (Field.TYPE_ENUM if "enum" in options else Field.TYPE_MESSAGE), kind
+            else:
+                own.type = kinds[kind]
+            if "unpacked" in options:
+                own.options.packed = False
+            if "optional" in options:
+                own.proto3_optional, own.oneof_index = True, len(message.oneof_decl)
+                message.oneof_decl.add(name=f"_{name}")
+
+    pool = DescriptorPool()
+    for module in (timestamp_pb2, duration_pb2):
+        pool.AddSerializedFile(module.DESCRIPTOR.serialized_pb)
+    parts = descriptor_pb2.FileDescriptorProto(name="parts.proto", package="own", syntax="proto3")
+    fields(parts.message_type.add(name="Joint"), ("name", "string"), ("position", "double"), ("velocity", "double"), ("effort", "float"))
+    mode = parts.enum_type.add(name="Mode")
+    for number, name in enumerate(["IDLE", "RUN", "STOP"]):
+        mode.value.add(name=name, number=number)
+    arm = descriptor_pb2.FileDescriptorProto(name="arm.proto", package="own", syntax="proto3")
+    arm.dependency.extend(["parts.proto", "google/protobuf/timestamp.proto", "google/protobuf/duration.proto"])
+    message = arm.message_type.add(name="Arm")
+    inner = message.nested_type.add(name="Inner")
+    fields(inner, ("joint_names", "string", "repeated"), ("tau", "double", "repeated"), ("raw", "sint32", "repeated", "unpacked"))
+    entry = message.nested_type.add(name="TemperatureEntry")
+    entry.options.map_entry = True
+    fields(entry, ("key", "string"), ("value", "double"))
+    fields(
+        message,
+        ("timestamp", ".google.protobuf.Timestamp"), ("joints", ".own.Joint", "repeated"), ("inner", ".own.Arm.Inner"),
+        ("temperature", ".own.Arm.TemperatureEntry", "repeated"), ("maybe", "double", "optional"), ("step", "int32"), ("zigzag", "sint64"),
+        ("moving", "bool"), ("mode", ".own.Mode", "enum"), ("big", "fixed64"), ("small", "sfixed32"), ("waited", ".google.protobuf.Duration"),
+        ("note", "string"), ("image", "bytes"), ("rest", "double"),
+    )
+    pool.Add(parts)
+    pool.Add(arm)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName("own.Arm"))
+
+
+def protobuf_file(out):
+    """MCAP with messages in Protobuf, as Foxglove and others write them."""
+    Arm = protobuf_classes()
+    buffer = io.BytesIO()
+    writer = ProtobufWriter(buffer, compression=CompressionType.ZSTD)
+    for i in range(ROWS):
+        order = [0, 1] if i % 3 else [1, 0]
+        # Zeros are not on the wire.
+        message = Arm(
+            joints=[{"name": JOINTS[j], "position": Q[j, i], "velocity": 0.0 if i % 5 == 0 else DQ[j, i], "effort": F32[j, i]} for j in order],
+            inner={"joint_names": [JOINTS[j] for j in order], "tau": [TAU[j, i] for j in order], "raw": [-i, i]},
+            temperature={JOINTS[j]: 20.0 + TAU[j, i] for j in order}, step=-i, zigzag=-(2**40) + i, moving=i % 2 == 1, mode=i % 3, big=2**52 + i,
+            small=-i, note="a" * (i % 4), image=bytes(i),
+        )
+        message.timestamp.FromNanoseconds(STAMPS[i])
+        message.waited.FromNanoseconds(1_500_000_000)
+        if i % 7 != 3:
+            message.maybe = 0.0 if i % 2 else 0.5
+        writer.write_message("/arm", message, log_time=LOGGED[i], publish_time=LOGGED[i])
+    writer.finish()
+    (out / "protobuf.mcap").write_bytes(buffer.getvalue())
+    still = np.arange(ROWS) % 5 == 0
+    of_joint = lambda j: {
+        f"/arm.joints[{JOINTS[j]}].position": Q[j], f"/arm.joints[{JOINTS[j]}].velocity": np.where(still, 0.0, DQ[j]),
+        f"/arm.joints[{JOINTS[j]}].effort": F32[j], f"/arm.inner.tau[{JOINTS[j]}]": TAU[j], f"/arm.temperature[{JOINTS[j]}]": 20.0 + TAU[j],
+        f"/arm.inner.raw[{JOINTS[j]}]": np.where((np.arange(ROWS) % 3 > 0) == (j == 0), -1, 1) * np.arange(ROWS),
+    }
+    step = np.arange(ROWS)
+    return {
+        "protobuf.mcap": {
+            "/arm.log_time": seconds(LOGGED), "/arm.timestamp": seconds(STAMPS), **of_joint(0), **of_joint(1),
+            "/arm.maybe": np.where(step % 7 == 3, np.nan, np.where(step % 2, 0.0, 0.5)), "/arm.step": -step, "/arm.zigzag": -(2.0**40) + step,
+            "/arm.moving": step % 2, "/arm.mode": step % 3, "/arm.big": 2.0**52 + step, "/arm.small": -step, "/arm.waited": np.full(ROWS, 1.5),
+            "/arm.rest": np.zeros(ROWS),
+        }
+    }
+
+
 def packed_parts(out):
     """rosbag2 folders whose parts are compressed as whole files: SQLite and MCAP."""
     packer = zstandard.ZstdCompressor(level=19)
@@ -606,6 +694,17 @@ def matlab_4(out):
     )
     columns = {"t": T, "q[0]": Q[0], "q[1]": Q[1], "tau[0]": TAU[0], "tau[1]": TAU[1]}
     return {"v4.mat": columns, "v4_big_endian.mat": {"q[0]": F32[0], "q[1]": F32[1], "ticks": np.arange(ROWS) - 5, "t": T}}
+
+
+def text_arrays(out):
+    """Text on its side (pandas), and text with one value on each line (NumPy, SciPy in Matrix Market)."""
+    matrix = np.column_stack([T, Q.T, TAU.T])
+    columns = {"t_s": T, "q1": Q[0], "q2": Q[1], "tau1": TAU[0], "tau2": TAU[1]}
+    pandas.DataFrame(columns).T.to_csv(out / "sideways.csv", header=False)
+    np.savetxt(out / "value_list.txt", matrix.ravel(), fmt="%.17g", header=f"shape: {matrix.shape}")
+    scipy.io.mmwrite(out / "matrix_market.mtx", matrix, precision=17)
+    indexed = {str(k): matrix[:, k] for k in range(5)}
+    return {"sideways.csv": columns, "value_list.txt": dict(indexed), "matrix_market.mtx": dict(indexed)}
 
 
 def text_encodings(out):
@@ -865,10 +964,10 @@ def main():
     out = parser.parse_args().out / "formats"
     out.mkdir(parents=True, exist_ok=True)
     files = {}
-    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, packed_parts, ros1_bags, ulog_file, octave_file, matlab_4, text_encodings, parquet_files, arrow_files, lerobot_files, diadem_files, matlab_files, hdf5_files]:
+    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, packed_parts, ros1_bags, protobuf_file, ulog_file, octave_file, matlab_4, text_arrays, text_encodings, parquet_files, arrow_files, lerobot_files, diadem_files, matlab_files, hdf5_files]:
         files |= make(out)
-    versions = {module.__name__: module.__version__ for module in [h5py, mcap, np, pa, scipy, zstandard]}
-    versions |= {name: importlib.metadata.version(name) for name in ["cbor2", "mcap-ros1-support", "pyulog", "rosbags"]}
+    versions = {module.__name__: module.__version__ for module in [h5py, mcap, np, pa, pandas, scipy, zstandard]}
+    versions |= {name: importlib.metadata.version(name) for name in ["cbor2", "mcap-protobuf-support", "mcap-ros1-support", "protobuf", "pyulog", "rosbags"]}
     files = {name: dict(columns) for name, columns in files.items()}
     write(out / "values.json", {"seed": SEED, "versions": versions, **pooled(files)})
 

@@ -1,14 +1,15 @@
 """Robot dynamic identification: estimates a dynamic model with error bars from a robot description and logs.
 
 >>> import dynident
->>> arm = dynident.Robot.load("arm.urdf")                               # doctest: +SKIP
->>> log = dynident.Log.from_arrays(t, q, tau)                           # doctest: +SKIP
->>> model = dynident.identify(arm, [log.fraction(0.0, 0.65), log.fraction(0.7, 1.0).validating()])  # doctest: +SKIP
->>> tau = model.predict(q, dq, ddq)                                     # doctest: +SKIP
+>>> given = dynident.example()                      # for your arm: Robot.load("arm.urdf"), Log.from_arrays(t, q, tau)
+>>> model = dynident.identify(given.robot, given.logs)
+>>> model.ok, model.predict(given.logs[1].q).shape
+(True, (..., 6))
 """
 
 from . import fleet
 from ._describe import Inspection, NewStudy, inspect, new
+from ._example import Example, example
 from ._functions import FunctionWarning
 from ._iterate import Iteration, iterate
 from ._jobs import (
@@ -25,7 +26,7 @@ from ._jobs import (
     validate,
 )
 from ._log import Log
-from ._model import Model
+from ._model import Model, Residuals
 from ._native import (
     Error,
     EstimatorRows,
@@ -49,6 +50,7 @@ __all__ = [
     "Design",
     "Error",
     "EstimatorRows",
+    "Example",
     "Factors",
     "FunctionWarning",
     "Inspection",
@@ -58,6 +60,7 @@ __all__ = [
     "Model",
     "NewStudy",
     "ProblemWarning",
+    "Residuals",
     "ResultError",
     "Robot",
     "RobotError",
@@ -73,6 +76,7 @@ __all__ = [
     "__version__",
     "check",
     "design",
+    "example",
     "fleet",
     "identify",
     "identify_servos",

@@ -16,7 +16,12 @@ from ._progress import Progress
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """Contents of a robot description and the problems found in it."""
+    """Contents of a robot description and the problems found in it, the result of ``inspect``.
+
+    >>> import dynident
+    >>> dynident.inspect(dynident.example().robot)
+    Inspection('ur10', ok, ... findings)
+    """
 
     result: dict[str, Any]
     """``dynident inspect --json`` as a dictionary."""
@@ -50,6 +55,10 @@ class Inspection:
         """Whether no problem was found."""
         return not self.slips and all(entry["level"] != "problem" for entry in self.audit)
 
+    def __repr__(self) -> str:
+        count = len(self.audit) + len(self.slips)
+        return f"Inspection({self.result['name']!r}, {'ok' if self.ok else 'problems'}, {count} findings)"
+
     def __str__(self) -> str:
         lines = [f"{entry['level']}: {entry['where']}: {entry['what']}" for entry in self.audit]
         lines += [f"slip: {', '.join(slip['links'])}: {slip['what']}" for slip in self.slips]
@@ -77,7 +86,12 @@ def inspect(
 
 @dataclass(frozen=True, eq=False)
 class NewStudy:
-    """A study generated from a robot description and recordings."""
+    """A study generated from a robot description and recordings, the result of ``new``.
+
+    >>> import dynident
+    >>> dynident.new("robots/ur10.urdf", "examples/ur10_simulated/train.csv")
+    NewStudy('study.toml', ... lines, 0 to check)
+    """
 
     result: dict[str, Any]
     """``dynident new --json`` as a dictionary."""
@@ -105,6 +119,10 @@ class NewStudy:
     def study(self) -> Study:
         """Reads the study."""
         return Study.parse(self.text, self.path, allow_command=self.allow_command)
+
+    def __repr__(self) -> str:
+        lines = len(self.text.splitlines())
+        return f"NewStudy({fspath(self.path)!r}, {lines} lines, {len(self.unsure)} to check)"
 
     def __str__(self) -> str:
         return self.text

@@ -10,7 +10,12 @@ DIFFERENTIATOR_KEYS = ("context_samples", "minimum_samples", "smooth")
 
 
 class FunctionWarning(UserWarning):
-    """A part of the study is a Python function: slow, and not included in files."""
+    """A part of the study is a Python function: slow, and not included in files.
+
+    >>> import dynident, warnings
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", dynident.FunctionWarning)  # in an experiment
+    """
 
 
 class Functions:

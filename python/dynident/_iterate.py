@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import json
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
@@ -10,8 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from . import _native, _picture
+from ._jobs import ProblemWarning, _watched
 from ._model import Model
 from ._native import ResultError, Robot, Run, Study
+from ._page import Page, problem, table
+from ._progress import Progress
 from ._study import study as make_study
 
 RobotFunction = Callable[[Run], object]
@@ -20,7 +25,14 @@ RobotFunction = Callable[[Run], object]
 
 @dataclass(frozen=True, eq=False)
 class Iteration:
-    """Result of an iteration."""
+    """Result of an iteration, see ``iterate``.
+
+    >>> import dynident, tempfile
+    >>> study = "examples/iterate_paper_2r.toml"
+    >>> found = dynident.iterate(study, tempfile.mkdtemp())
+    >>> found.ok, found.status
+    (True, 'converged')
+    """
 
     result: dict[str, Any]
     """``iterations.json`` as a dictionary: every run with its tracking error, estimate and verdict."""
@@ -52,12 +64,58 @@ class Iteration:
         place = self.folder / "iterations.json"
         return _picture.Picture(_native._plot_convergence(place, _picture.files(out), width_mm, font_pt, dpi))
 
+    @property
+    def status(self) -> str:
+        """``converged``, ``settled`` (no further change, but unmet conditions), ``runs-used-up``, ``refused``, ``waiting``
+        or ``interrupted``; ``result["reason"]`` explains it.
+        """
+        return str(self.result["status"])
+
+    @property
+    def problems(self) -> list[str]:
+        """Why the model must not be used without a check; empty if the iteration has converged."""
+        if self.converged:
+            return []
+        reason = str(self.result["reason"])
+        unmet = [f"{one['message']}: {one['remedy']}" for one in self.result.get("unmet", [])]
+        return ["; ".join([f"the iteration has not converged ({self.status}): {reason}", *unmet])]
+
+    @property
+    def ok(self) -> bool:
+        """Whether the iteration has converged."""
+        return not self.problems
+
+    @property
+    def report(self) -> Page:
+        """The report page, ``report.html``."""
+        place = self.folder / "report.html"
+        return Page(place.read_text(encoding="utf-8") if place.is_file() else "")
+
     def model(self) -> Model:
-        """The identified model. Raises ``ResultError`` if no model was identified."""
+        """The identified model; its ``problems`` include those of the iteration. Raises ``ResultError`` if no model was
+        identified.
+        """
         if not (self.folder / "result.json").is_file():
             reason = self.result.get("no_result") or self.result.get("reason") or self.result["status"]
             raise ResultError(f"{self.folder}: no model was found: {reason}")
-        return Model.load(self.folder, self.study)
+        found = Model.load(self.folder, self.study)
+        return found._with_problems(self.problems)
+
+    def _errors(self) -> list[str]:
+        return [f"{max(run['max_tracking_error_rad'], default=0.0):.3g}" for run in self.runs]
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [str(run["run"]), error, "yes" if run["accepted"] else f"no: {run.get('reason') or ''}"]
+            for run, error in zip(self.runs, self._errors(), strict=True)
+        ]
+        parts = [f"<b>{html.escape(str(self.result['name']))}</b>: {html.escape(self.status)}, {len(self.runs)} runs"]
+        parts += [problem(text) for text in self.problems]
+        parts.append(table(["run", "largest tracking error, rad (m)", "accepted"], rows))
+        return "".join(parts)
+
+    def __repr__(self) -> str:
+        return f"Iteration({self.status}, {len(self.runs)} runs, largest tracking errors {', '.join(self._errors())})"
 
 
 def iterate(
@@ -69,6 +127,7 @@ def iterate(
     allow_command: bool = False,
     threads: int | None = None,
     heard: Callable[[int, float], object] | None = None,
+    progress: bool | Progress | None = None,
     **sections: Any,
 ) -> Iteration:
     """Runs a robot repeatedly, each time with the newly identified model, until tracking error and parameters converge.
@@ -80,7 +139,16 @@ def iterate(
     function as robot needs confirmed gains or ``iteration={"bandwidth_hz": 2.0, ...}``, like every external robot.
 
     Ctrl-C stops the robot and keeps the recorded samples. An exception of the function ends the iteration and is raised
-    again.
+    again; its run does not count, and the next call repeats it. If the robot itself stopped (a protective stop), raise
+    ``StopRun("reason")``: such a run counts once it has begun, and its controller is treated as rejected.
+
+    An iteration that does not converge issues a ``ProblemWarning``, ``Iteration.ok`` is False, and the problem is also
+    listed by the model. ``progress`` as in ``identify``.
+
+    >>> import dynident, tempfile
+    >>> found = dynident.iterate("examples/iterate_paper_2r.toml", tempfile.mkdtemp())
+    >>> found.converged, found.model().ok
+    (True, True)
     """
     if isinstance(study, Study):
         whole = study
@@ -90,5 +158,12 @@ def iterate(
         whole = Study.load(fspath(study), allow_command=allow_command)
     if sections and not isinstance(study, Robot):
         raise TypeError(f"{', '.join(sections)}: a Study already contains its sections: omit these arguments")
-    text = _native._iterate(whole, fspath(out), robot, resume, allow_command, threads, heard)
-    return Iteration(json.loads(text), Path(out), whole)
+    place = fspath(out)
+    text = _watched(
+        progress,
+        lambda hear: _native._iterate(whole, place, robot, resume, allow_command, threads, heard, hear),
+    )
+    found = Iteration(json.loads(text), Path(out), whole)
+    for one in found.problems:
+        warnings.warn(one, ProblemWarning, stacklevel=2)
+    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import warnings
 from collections.abc import Callable, Iterable
@@ -16,6 +17,7 @@ from . import _native
 from ._log import Log
 from ._model import Model
 from ._native import Robot, Study, StudyError
+from ._page import problem, table
 from ._progress import Line, Progress, is_watched
 from ._servo import ServoModel
 from ._study import study as make_study
@@ -26,7 +28,12 @@ Fitted = TypeVar("Fitted", Model, ServoModel)
 
 
 class ProblemWarning(UserWarning):
-    """A problem of a result. Read it before loading the model into a robot."""
+    """A problem of a result. Read it before loading the model into a robot.
+
+    >>> import dynident, warnings
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", dynident.ProblemWarning)  # stops a script at a problem
+    """
 
 
 def _study_of(
@@ -82,6 +89,12 @@ def identify(
 
     Logs with commands in place of torque need ``identify_servos``.
 
+    >>> import dynident
+    >>> given = dynident.example()
+    >>> model = dynident.identify(given.robot, given.logs)
+    >>> model.ok, model.validation_error_percent["test"] < 3.0
+    (True, True)
+
     Raises ``StudyError``, ``RobotError`` or ``LogError`` with the file, the position and the fix. Ctrl-C interrupts the
     fit.
     """
@@ -106,6 +119,12 @@ def identify_servos(
     The logs have ``command`` in place of ``tau``: ``Log.from_arrays(t, q, command=c)``. Settings are the keys of
     ``[drive.servo]``: ``drive={"servo": {"fit": {"alike": True}}}``. The result is bit-identical to that of ``dynident
     identify`` for the same study. For the other arguments, warnings and errors, see ``identify``.
+
+    >>> import dynident
+    >>> given = dynident.example()
+    >>> dynident.identify_servos(given.robot, given.logs)
+    Traceback (most recent call last):
+    dynident.StudyError: identify_servos needs logs with commands and without torque: ...
     """
     whole = _study_of(study, logs, sections, allow_command)
     if not whole._fits_commands:
@@ -128,6 +147,11 @@ def check(
 ) -> Check:
     """Tests whether study, robot and logs are consistent: units, signs, joint order, mounting, clock and more. Run it
     before you trust a fit. Each finding names the key to change. For the arguments, see ``identify``.
+
+    >>> import dynident
+    >>> given = dynident.example()
+    >>> print(dynident.check(given.robot, given.logs))
+    no mistake found in study, robot and logs...
     """
     whole = _study_of(study, logs, sections, allow_command)
     return Check(json.loads(_watched(progress, lambda hear: _native._check(whole, threads, hear))))
@@ -142,6 +166,13 @@ def validate(
 ) -> dict[str, Any]:
     """Tests an identified model on logs (or the logs of a study) that were not used for the fit. By default these are
     the held-out logs of its study. Returns ``dynident validate --json`` as a dictionary, with the error of every joint.
+
+    >>> import dynident
+    >>> given = dynident.example()
+    >>> model = dynident.identify(given.robot, given.logs)
+    >>> tested = dynident.validate(model, given.logs[1])
+    >>> [log["log"] for log in tested["validation"]]
+    ['test']
     """
     if logs is None:
         whole = model.study
@@ -154,7 +185,13 @@ def validate(
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """Result of ``check``."""
+    """Result of ``check``.
+
+    >>> import dynident
+    >>> given = dynident.example()
+    >>> dynident.check(given.robot, given.logs)
+    Check(ok, 0 findings)
+    """
 
     result: dict[str, Any]
     """``dynident check --json`` as a dictionary."""
@@ -175,14 +212,36 @@ class Check:
             write = "; ".join(change["line"] for change in finding["write"])
             return f"{finding['level']}: {finding['what']}: {finding['evidence']}" + (f" Write: {write}" if write else "")
 
+        return "\n".join(map(line, self.findings)) or self._nothing()
+
+    def _nothing(self) -> str:
         unexplained = self.result["check"].get("unexplained_percent")
         shares = "" if unexplained is None else f" ({unexplained:.1f} % of all torque is unexplained)"
-        return "\n".join(map(line, self.findings)) or f"no mistake found in study, robot and logs{shares}"
+        return f"no mistake found in study, robot and logs{shares}"
+
+    def _repr_html_(self) -> str:
+        if not self.findings:
+            return html.escape(self._nothing())
+        rows = [
+            [one["level"], one["what"], one["evidence"], "; ".join(change["line"] for change in one["write"])]
+            for one in self.findings
+        ]
+        return table(["level", "finding", "evidence", "write"], rows)
+
+    def __repr__(self) -> str:
+        return f"Check({'ok' if self.ok else 'problems'}, {len(self.findings)} findings)"
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A designed motion, ready to record."""
+    """A designed motion, ready to record.
+
+    >>> import dynident
+    >>> arm = dynident.Robot.load("robots/planar2r.urdf")
+    >>> limits = [{"joint": name, "position": [-1.5, 1.5], "speed": 2.0} for name in arm.joint_names]
+    >>> dynident.design(arm, design={"duration_s": 5.0, "limits": {"joints": limits}})
+    Design(2 joints, ... samples in 5.0 s, within all limits)
+    """
 
     result: dict[str, Any]
     """``design.json`` as a dictionary."""
@@ -207,6 +266,12 @@ class Design:
     def _repr_svg_(self) -> str:
         return self.svg
 
+    def __repr__(self) -> str:
+        samples, joints = self.q.shape
+        seconds = self.time_s[-1] - self.time_s[0] if samples else 0.0
+        verdict = "within all limits" if self.feasible else "violates limits"
+        return f"Design({joints} joints, {samples} samples in {seconds:.1f} s, {verdict})"
+
 
 def design(
     study: Study | Robot | str | PathLike[str],
@@ -214,19 +279,36 @@ def design(
     rate_hz: float | None = None,
     allow_command: bool = False,
     threads: int | None = None,
+    progress: bool | Progress | None = None,
     **sections: Any,
 ) -> Design:
     """Computes an optimal excitation trajectory within all limits. ``study`` is a ``Study``, the path of one, or a
-    robot with sections (``design={...}``). ``rate_hz`` is the sample rate of the arrays.
+    robot with sections (``design={...}``). ``rate_hz`` is the sample rate of the arrays. ``progress`` as in
+    ``identify``; a callable receives ``(round of the search, evaluations, None)``.
+
+    >>> import dynident
+    >>> arm = dynident.Robot.load("robots/planar2r.urdf")
+    >>> limits = [{"joint": name, "position": [-1.5, 1.5], "speed": 2.0} for name in arm.joint_names]
+    >>> motion = dynident.design(arm, rate_hz=100.0, design={"duration_s": 5.0, "limits": {"joints": limits}})
+    >>> motion.feasible, motion.q.shape
+    (True, (501, 2))
     """
     whole = _study_of(study, None, sections, allow_command)
-    text, csv, svg, time_s, (q, dq, ddq) = _native._design(whole, rate_hz, threads)
+    text, csv, svg, time_s, (q, dq, ddq) = _watched(
+        progress, lambda hear: _native._design(whole, rate_hz, threads, hear)
+    )
     return Design(json.loads(text), csv, svg, time_s, q, dq, ddq)
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """One run of a simulated robot."""
+    """One run of a simulated robot.
+
+    >>> import dynident
+    >>> run = dynident.simulate("examples/iterate_paper_2r.toml")
+    >>> run.q.shape == run.tau.shape, run.log()
+    (True, Log('simulated', ... samples, identify))
+    """
 
     truth: dict[str, Any]
     """``truth.json`` as a dictionary: the true values."""
@@ -240,8 +322,17 @@ class Simulation:
     """Measured torques, Nm (N), shape ``(samples, n)``."""
 
     def log(self, name: str = "simulated", role: Any = "identify") -> Log:
-        """The samples as a log."""
+        """The samples as a log.
+
+        >>> import dynident
+        >>> dynident.simulate("examples/iterate_paper_2r.toml").log(role="validate").role
+        'validate'
+        """
         return Log.from_arrays(self.time_s, self.q, self.tau, name=name, role=role)
+
+    def __repr__(self) -> str:
+        samples, joints = self.q.shape
+        return f"Simulation({joints} joints, {samples} samples, {'done' if self.truth['done'] else 'stopped early'})"
 
 
 def simulate(
@@ -253,6 +344,10 @@ def simulate(
 ) -> Simulation:
     """Simulates the robot of a study (``[simulation]``) on its trajectory (``[iteration] trajectory``, or ``[design]``)
     with its ``[controller]``.
+
+    >>> import dynident
+    >>> dynident.simulate("examples/iterate_paper_2r.toml").truth["done"]
+    True
     """
     whole = _study_of(study, None, sections, allow_command)
     truth, csv = _native._simulate(whole, threads)
@@ -267,6 +362,12 @@ def simulate(
 
 
 def log_contents(file: str | PathLike[str]) -> dict[str, Any]:
-    """Format of a recording, and its channels with rates and ranges."""
+    """Format of a recording, and its channels with rates and ranges.
+
+    >>> import dynident
+    >>> found = dynident.log_contents("examples/ur10_simulated/train.csv")
+    >>> found["format"], found["channels"][0]["name"]
+    ('text', 't_s')
+    """
     found: dict[str, Any] = json.loads(_native._log_contents(fspath(file)))
     return found

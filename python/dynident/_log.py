@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from . import _native
 from ._native import LogError
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 Role = Literal["identify", "validate"]
 Channel = str | Sequence[str | int] | Mapping[str, Any]
@@ -24,7 +28,14 @@ class Log:
     """One recording: samples in memory or a file, with the meaning of its columns and its role.
 
     Create it with ``Log.from_arrays``, ``Log.from_pandas`` or ``Log.read``. Joints are in the robot's order unless the
-    robot was loaded with ``joints``. The file is not read until a job needs it.
+    robot was loaded with ``joints``. The file is not read until a job needs it; arrays are copied.
+
+    >>> import dynident
+    >>> log = dynident.example().logs[0]
+    >>> log
+    Log('train', 1251 samples, identify)
+    >>> log.q.shape, log.tau.shape, float(log.time_s[-1])
+    ((1251, 6), (1251, 6), 20.0)
     """
 
     name: str
@@ -80,7 +91,7 @@ class Log:
         if time_s is None:
             channels["rate_hz"] = rate_hz
         else:
-            columns["t_s"] = np.asarray(time_s, dtype=np.float64).reshape(-1)
+            columns["t_s"] = np.array(time_s, dtype=np.float64).reshape(-1)
             channels["time"] = {"column": "t_s"}
         groups = [
             ("position", "q", q),
@@ -93,7 +104,8 @@ class Log:
         for key, symbol, values in groups:
             if values is None:
                 continue
-            table = np.asarray(values, dtype=np.float64)
+            # A copy, so that later changes of the caller's arrays change no log.
+            table = np.array(values, dtype=np.float64, order="F")
             if table.ndim == 1:
                 table = table[:, None]
             if table.ndim != 2:
@@ -122,26 +134,29 @@ class Log:
         """Creates a log from a data frame. ``position`` and ``torque`` name its columns: a list, a pattern such as
         ``"q{1..6}"``, or a mapping with units as in ``[format]``: ``{"columns": "q{1..6}_deg", "unit": "deg"}``.
 
-        ``time`` names the column with seconds, or is ``{"column": "t", "unit": "ms"}``. Without it the index is the
-        time if it is numeric or a date; otherwise give ``rate_hz``. Further keyword arguments are keys of ``[format]``,
-        such as ``command="target{1..6}"`` in place of ``torque``.
+        ``time`` names the column with seconds, dates or durations, or is ``{"column": "t", "unit": "ms"}``. Without it the
+        index is the time if it contains dates, durations or decimal numbers (seconds). For an index of whole numbers give
+        its unit, ``time={"unit": "ms"}``; for a plain row number give ``rate_hz``. Further keyword arguments are keys of
+        ``[format]``, such as ``command="target{1..6}"`` in place of ``torque``.
+
+        >>> import numpy as np, pandas as pd, dynident
+        >>> t = pd.date_range("2026-01-05", periods=500, freq="5ms", tz="UTC")
+        >>> table = pd.DataFrame({"q1": np.sin(np.arange(500) / 50), "tau1": 1.0}, index=t)
+        >>> log = dynident.Log.from_pandas(table, "q{1..1}", "tau{1..1}")
+        >>> log.time_s[:3]
+        array([0.   , 0.005, 0.01 ])
         """
+        from ._tables import columns_of, index_s
+
+        time_unit = None
+        if isinstance(time, Mapping) and "column" not in time and "file" not in time:
+            time_unit, time = dict(time), None
         channels = _channels(position, torque, time, format)
-        columns: dict[str, npt.NDArray[np.float64]] = {}
-        for column in table.columns:
-            values = table[column]
-            if values.dtype.kind in "fiub":
-                columns[str(column)] = np.ascontiguousarray(values.to_numpy(dtype=np.float64, na_value=np.nan))
-        if "time" not in channels and "rate_hz" not in channels:
-            index = table.index.to_numpy()
-            if index.dtype.kind == "M":
-                seconds = (index - index[0]) / np.timedelta64(1, "s")
-            elif index.dtype.kind == "f":
-                seconds = index
-            else:
-                raise LogError(f"{name}: give time (the column with seconds) or rate_hz")
-            columns["index_s"] = np.asarray(seconds, dtype=np.float64)
-            channels["time"] = {"column": "index_s"}
+        wanted = [name for value in channels.values() if isinstance(value, Mapping) for name in _stated_names(value)]
+        columns = columns_of(table, name, wanted, channels.get("time"))
+        if time_unit is not None or ("time" not in channels and "rate_hz" not in channels):
+            columns["index_s"] = index_s(table, name, has_unit=time_unit is not None)
+            channels["time"] = {**(time_unit or {}), "column": "index_s"}
         return cls(name=name, format=channels, role=role, payload=payload, columns=columns)
 
     @classmethod
@@ -160,6 +175,11 @@ class Log:
         """Creates a log from a file in any supported format (CSV, Parquet, MCAP, rosbag2, MAT, HDF5, npy, ...). The
         content determines the format; ``dynident.log_contents(file)`` lists the channels. Columns as in
         ``from_pandas``.
+
+        >>> import dynident
+        >>> log = dynident.Log.read("examples/ur10_simulated/train.csv", "q{1..6}_rad", "tau{1..6}_Nm", time="t_s")
+        >>> log.q.shape
+        (2501, 6)
         """
         path = fspath(file)
         stem = path.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
@@ -171,16 +191,91 @@ class Log:
         """Number of samples in memory; None for a file."""
         return None if self.columns is None else len(next(iter(self.columns.values())))
 
+    @cached_property
+    def _arrays(self) -> tuple[npt.NDArray[np.float64], list[npt.NDArray[np.float64] | None]]:
+        return _native._log_arrays(json.dumps(self._section(), default=list), self._samples())
+
+    @property
+    def time_s(self) -> npt.NDArray[np.float64]:
+        """Times of the selected samples, s, shape ``(samples,)``. A file is read once."""
+        return self._arrays[0]
+
+    @property
+    def q(self) -> npt.NDArray[np.float64]:
+        """Positions in the order of the columns, rad (m), shape ``(samples, n)``, after unit, scale and offset."""
+        return self._quantity(0, "positions")
+
+    @property
+    def tau(self) -> npt.NDArray[np.float64]:
+        """Torques, Nm (N), shape ``(samples, n)``. Raises ``LogError`` for a log without torque."""
+        return self._quantity(1, "torques")
+
+    @property
+    def dq(self) -> npt.NDArray[np.float64]:
+        """Recorded velocities, rad/s (m/s), shape ``(samples, n)``. Raises ``LogError`` for a log without velocities."""
+        return self._quantity(2, "recorded velocities")
+
+    @property
+    def command(self) -> npt.NDArray[np.float64]:
+        """Commanded positions, rad (m), shape ``(samples, n)``. Raises ``LogError`` for a log without commands."""
+        return self._quantity(3, "commands")
+
+    def _quantity(self, place: int, what: str) -> npt.NDArray[np.float64]:
+        found = self._arrays[1][place]
+        if found is None:
+            raise LogError(f"{self.name}: the log has no {what}")
+        return found
+
+    def in_memory(self) -> Log:
+        """The same log with its samples in memory, in SI, so that the file is not needed any more.
+
+        >>> import dynident
+        >>> log = dynident.Log.read("examples/ur10_simulated/train.csv", "q{1..6}_rad", "tau{1..6}_Nm", time="t_s")
+        >>> log.in_memory()
+        Log('train', 2501 samples, identify)
+        """
+        time_s, (q, tau, dq, command) = self._arrays
+        assert q is not None
+        return Log.from_arrays(
+            time_s, q, tau, command=command, dq=dq, name=self.name, role=self.role, payload=self.payload
+        )
+
+    def plot(self) -> Figure:
+        """Plots positions and torques (or commands) of every joint over time. Needs matplotlib.
+
+        >>> import dynident
+        >>> len(dynident.example().logs[0].plot().axes)
+        12
+        """
+        from ._plots import recording
+
+        return recording(self)
+
     def validating(self) -> Log:
-        """The same log with the role ``validate``."""
+        """The same log with the role ``validate``.
+
+        >>> import dynident
+        >>> dynident.example().logs[0].validating()
+        Log('train', 1251 samples, validate)
+        """
         return replace(self, role="validate")
 
     def rows(self, first: int, end: int) -> Log:
-        """The rows from ``first`` up to but excluding ``end``, 0-based."""
+        """The rows from ``first`` up to but excluding ``end``, 0-based.
+
+        >>> import dynident
+        >>> dynident.example().logs[0].rows(0, 500).q.shape
+        (500, 6)
+        """
         return replace(self, part={**self._other_parts(), "rows": [first, end]}, name=f"{self.name} [{first}:{end}]")
 
     def fraction(self, begin: float, end: float) -> Log:
-        """The rows between two fractions of the log, such as ``log.fraction(0.0, 0.65)``."""
+        """The rows between two fractions of the log.
+
+        >>> import dynident
+        >>> dynident.example().logs[0].fraction(0.0, 0.65).name
+        'train [0 % .. 65 %]'
+        """
         return replace(
             self,
             part={**self._other_parts(), "fraction": [begin, end]},
@@ -211,6 +306,29 @@ class Log:
     def __repr__(self) -> str:
         where = self.file if self.columns is None else f"{self.samples} samples"
         return f"Log({self.name!r}, {where}, {self.role})"
+
+
+def _stated_names(group: Mapping[str, Any]) -> list[str]:
+    """Names of columns in a group of channels, without patterns."""
+    columns = group.get("columns", group.get("column", []))
+    names = [columns] if isinstance(columns, str) else columns if isinstance(columns, (list, tuple)) else []
+    return [name for name in names if isinstance(name, str) and "{" not in name]
+
+
+def with_different_names(logs: Iterable[Log]) -> list[Log]:
+    """The logs; a name that several have gets a number, because results list logs by name."""
+    logs = list(logs)
+    taken = {log.name for log in logs}
+    found: list[Log] = []
+    known: set[str] = set()
+    for log in logs:
+        name, count = log.name, 1
+        while name in known or (count > 1 and name in taken):
+            count += 1
+            name = f"{log.name} ({count})"
+        known.add(name)
+        found.append(log if name == log.name else replace(log, name=name))
+    return found
 
 
 def _channels(

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._native import ResultError, _write_files
+from ._page import Page
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,7 +24,12 @@ URDF = "identified.urdf"
 
 @dataclass(frozen=True)
 class ServoValue:
-    """A value of a drive or of a body, with its error bars."""
+    """A value of a drive or of a body, with its error bars.
+
+    >>> from dynident import ServoValue
+    >>> ServoValue(8.2, 1.1, 0.2, 9.0, True, "Nm/rad").determined
+    True
+    """
 
     value: float
     """The value, in ``unit``."""
@@ -41,7 +47,12 @@ class ServoValue:
 
 @dataclass(frozen=True)
 class ServoScale:
-    """The common factor of all torques, inertias and masses, which positions do not contain."""
+    """The common factor of all torques, inertias and masses, which positions do not contain.
+
+    >>> from dynident import ServoScale
+    >>> ServoScale(False, 0.6, 40.0, "the total mass of the description").determined
+    False
+    """
 
     determined: bool
     """Whether the logs determine it, with a known payload."""
@@ -56,12 +67,17 @@ class ServoScale:
 class ServoModel:
     """Drives and bodies of a robot without torque sensors, the result of ``identify_servos``.
 
+    >>> import dynident
+    >>> dynident.ServoModel.load("missing")
+    Traceback (most recent call last):
+    FileNotFoundError: ...
+
     ``result`` has the complete contents of ``result.json``.
     """
 
     def __init__(self, json_text: str, report: str, mjcf: str | None, urdf: str | None) -> None:
         self._json, self._mjcf, self._urdf = json_text, mjcf, urdf
-        self.report = report
+        self.report = Page(report)
         """The report, one HTML page."""
 
     @classmethod

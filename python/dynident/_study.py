@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ._functions import Functions, FunctionWarning
-from ._log import Log
+from ._log import Log, with_different_names
 from ._native import Robot, Study
 
 
@@ -27,6 +27,7 @@ def study(
 ) -> Study:
     """Builds a study from a robot and its logs.
 
+    Logs of the same name get numbers, ``log (2)``, because results list logs by name.
     ``allow_command`` permits the program ``xacro`` to expand a robot file with macros, see ``Robot.load``.
     ``friction`` is ``"auto"`` (selected from the data, the default) or ``"stated"`` (the terms of ``drive``).
     ``estimator`` is a method's name or the keys of ``[estimator]``. Further keyword arguments are sections of a study
@@ -57,7 +58,7 @@ def study(
     ([], True)
     """
     robot = robot if isinstance(robot, Robot) else Robot.load(robot, allow_command=allow_command)
-    logs = [logs] if isinstance(logs, Log) else list(logs)
+    logs = with_different_names([logs] if isinstance(logs, Log) else logs)
     section: dict[str, Any] = {"file": fspath(robot.path), **json.loads(robot._settings)}
     drive = dict(sections.pop("drive", {}))
     if friction is not None:
@@ -81,8 +82,14 @@ def study(
 
 
 def with_logs(own: Study, logs: Log | Iterable[Log]) -> Study:
-    """The study with these logs in place of the existing ones."""
-    logs = [logs] if isinstance(logs, Log) else list(logs)
+    """The study with these logs in place of the existing ones.
+
+    >>> import dynident
+    >>> given = dynident.example()
+    >>> dynident.with_logs(given.study, given.logs[:1]).log_names
+    ['train']
+    """
+    logs = with_different_names([logs] if isinstance(logs, Log) else logs)
     content = json.loads(own.to_json())
     content["log"] = [log._section() for log in logs]
     return own._with_sections(_json(content), [log._samples() for log in logs])

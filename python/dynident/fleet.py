@@ -1,15 +1,15 @@
 """Many logs and robots: reduces logs to factors on each machine, merges the factors and compares the robots.
 
->>> from dynident import fleet                                                              # doctest: +SKIP
->>> factors = fleet.merged(reduce_one, paths, on="ray")                                     # doctest: +SKIP
->>> models = fleet.identify_each(factors, on="ray")                                         # doctest: +SKIP
->>> fleet.spread(models).unlike                                                             # doctest: +SKIP
-['arm-17']
+>>> from dynident import fleet
+>>> factors = fleet.merged(lambda name: fleet.reduce(arm, logs[name], arm=name, **stated), logs)     # on="ray" on a cluster
+>>> list(fleet.identify_each(factors))
+['left', 'right']
 """
 
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from . import _native
 from ._jobs import _study_of, _warned, _watched
 from ._log import Log
 from ._model import Model
-from ._native import Factors, Robot, Study
+from ._native import Error, Factors, Robot, Study
 from ._progress import Progress
 
 if TYPE_CHECKING:
@@ -35,6 +35,10 @@ if TYPE_CHECKING:
 __all__ = [
     "Drift",
     "Factors",
+    "Failed",
+    "FleetWarning",
+    "LostWorkers",
+    "ReducedLog",
     "Spread",
     "by_arm",
     "drift",
@@ -58,7 +62,12 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class ReducedLog:
-    """A log that was reduced to factors."""
+    """A log that was reduced to factors.
+
+    >>> from dynident import fleet
+    >>> [log.name for log in fleet.logs(factors)]
+    ['one', 'two']
+    """
 
     name: str
     """Name of the log."""
@@ -93,6 +102,11 @@ def reduce(
     seconds since 1970) identify the log. ``segments`` is the number of segments per log: error bars from few logs need
     many segments, with hundreds of logs one is enough. For other arguments, see ``dynident.identify``. The default is
     one thread, because a fleet job uses one worker per processor.
+
+    >>> from dynident import fleet
+    >>> one = fleet.reduce(arm, logs["left"], arm="left", **stated)
+    >>> len(one)
+    1
     """
     whole = _study_of(study, logs, sections, allow_command)
     seconds = _seconds(recorded_at)
@@ -110,12 +124,21 @@ def merge(parts: Iterable[Factors]) -> Factors:
     """Merges factors. The result is bit-identical for any order of the logs, and duplicate logs are ignored.
 
     Raises ``ResultError`` if the factors belong to different robots or settings.
+
+    >>> from dynident import fleet
+    >>> len(fleet.merge([factors, factors]))
+    2
     """
     return Factors.merged(list(parts))
 
 
 def save(factors: Factors, path: str | PathLike[str]) -> None:
-    """Writes factors to a file atomically."""
+    """Writes factors to a file atomically.
+
+    >>> import tempfile
+    >>> from dynident import fleet
+    >>> fleet.save(factors, tempfile.mkdtemp() + "/week.factors")
+    """
     place = Path(path)
     beside = place.with_name(place.name + ".part")
     beside.write_bytes(factors.to_bytes())
@@ -123,12 +146,25 @@ def save(factors: Factors, path: str | PathLike[str]) -> None:
 
 
 def load(path: str | PathLike[str]) -> Factors:
-    """Reads factors. Raises ``ResultError`` if the file was changed or is damaged."""
+    """Reads factors. Raises ``ResultError`` if the file was changed or is damaged.
+
+    >>> import tempfile
+    >>> from dynident import fleet
+    >>> path = tempfile.mkdtemp() + "/week.factors"
+    >>> fleet.save(factors, path)
+    >>> fleet.load(path).to_bytes() == factors.to_bytes()
+    True
+    """
     return Factors.from_bytes(Path(path).read_bytes())
 
 
 def logs(factors: Factors) -> list[ReducedLog]:
-    """The logs in the factors, sorted by robot, time and name."""
+    """The logs in the factors, sorted by robot, time and name.
+
+    >>> from dynident import fleet
+    >>> [(log.name, log.arm) for log in fleet.logs(factors)]
+    [('one', 'left'), ('two', 'right')]
+    """
 
     def when(seconds: float | None) -> datetime | None:
         return None if seconds is None else datetime.fromtimestamp(seconds, timezone.utc)
@@ -137,7 +173,12 @@ def logs(factors: Factors) -> list[ReducedLog]:
 
 
 def by_arm(factors: Factors) -> dict[str, Factors]:
-    """Splits factors by robot; logs without a robot are under ``""``."""
+    """Splits factors by robot; logs without a robot are under ``""``.
+
+    >>> from dynident import fleet
+    >>> list(fleet.by_arm(factors))
+    ['left', 'right']
+    """
     places: dict[str, list[int]] = {}
     for place, (_, arm, *_) in enumerate(factors._logs):
         places.setdefault(arm or "", []).append(place)
@@ -146,6 +187,10 @@ def by_arm(factors: Factors) -> dict[str, Factors]:
 
 def windows(factors: Factors, days: float = 7.0) -> dict[datetime, Factors]:
     """Splits factors into successive time windows, keyed by the mean time of the logs. Logs without a time are omitted.
+
+    >>> from dynident import fleet
+    >>> [at.day for at in fleet.windows(factors, days=7)]
+    [5, 12]
     """
     if not days > 0.0:
         raise ValueError(f"days = {days}: give a positive length")
@@ -168,6 +213,11 @@ def identify(
 ) -> Model:
     """Identifies one model from all logs of ``factors``, as ``dynident.identify`` does with stated cut-off, friction
     and lag. Results that need samples are missing: delays, torque over time and held-out errors (see ``errors``).
+
+    >>> from dynident import fleet
+    >>> model = fleet.identify(factors, warn=False)
+    >>> len(model.names)
+    8
     """
     model = Model(_watched(progress, lambda hear: _native._identify_factors(factors, threads, hear)))
     return _warned(model) if warn else model
@@ -176,6 +226,11 @@ def identify(
 def errors(factors: Factors, model: Model) -> dict[str, float | None]:
     """Computes the relative torque error ``100 ‖τ - Wθ‖ / ‖τ‖`` of a model with the estimates θ for each log, in %. The
     value is exact and uses only factors. Use logs that were not used for the fit to validate the model.
+
+    >>> from dynident import fleet
+    >>> left, right = fleet.by_arm(factors).values()
+    >>> fleet.errors(right, fleet.identify(left, warn=False))["two"] < 1.0
+    True
     """
     found = _native._factors_errors(factors, model._native)
     return {name: error for (name, *_), error in zip(factors._logs, found, strict=True)}
@@ -185,82 +240,223 @@ def _identify_quietly(factors: Factors) -> Model:
     return identify(factors, threads=1, progress=False, warn=False)
 
 
-def identify_each(factors: Factors, *, on: object = None) -> dict[str, Model]:
-    """Identifies one model per robot. For ``on``, see ``each``. Problems of a model are listed in its ``problems``."""
+def identify_each(factors: Factors, *, on: object = None, **options: Any) -> dict[str, Model]:
+    """Identifies one model per robot. For ``on`` and ``options``, see ``each``. Problems of a model are listed in its
+    ``problems``. With ``skip=True`` robots that failed are missing.
+
+    >>> from dynident import fleet
+    >>> factors = fleet.merge(fleet.reduce(arm, log, arm=name, **stated) for name, log in logs.items())
+    >>> list(fleet.identify_each(factors))
+    ['left', 'right']
+    """
     arms = by_arm(factors)
-    return dict(zip(arms, each(_identify_quietly, arms.values(), on=on), strict=True))
+    found = each(_identify_quietly, arms.values(), on=on, **options)
+    return {arm: model for arm, model in zip(arms, found, strict=True) if isinstance(model, Model)}
 
 
-def each(function: Callable[[Item], Found], items: Iterable[Item], *, on: object = None) -> list[Found]:
+class FleetWarning(UserWarning):
+    """Items of a fleet were skipped.
+
+    >>> import warnings
+    >>> from dynident import fleet
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", fleet.FleetWarning)
+    ...     fleet.each(int, ["1", "one"], skip=True)
+    [1, Failed('one', ValueError: invalid literal for int() with base 10: 'one')]
+    """
+
+
+class LostWorkers(Error):
+    """An item stopped its worker in every attempt.
+
+    >>> from dynident import fleet
+    >>> raise fleet.LostWorkers("item 3 stopped its worker 4 times")
+    Traceback (most recent call last):
+    dynident.fleet.LostWorkers: item 3 stopped its worker 4 times
+    """
+
+
+@dataclass(frozen=True, eq=False)
+class Failed:
+    """An item without a result, in the place of the result; see ``each`` with ``skip=True``.
+
+    >>> from dynident import fleet
+    >>> fleet.Failed("log 3", "its worker was lost 4 times")
+    Failed('log 3', its worker was lost 4 times)
+    """
+
+    item: object
+    """The item."""
+    reason: str
+    """Why it has no result."""
+
+    def __repr__(self) -> str:
+        item = repr(self.item)
+        return f"Failed({item if len(item) <= 80 else item[:77] + '...'}, {self.reason})"
+
+
+def each(
+    function: Callable[[Item], Found],
+    items: Iterable[Item],
+    *,
+    on: object = None,
+    retries: int = 3,
+    skip: bool = False,
+    progress: bool | Progress | None = False,
+    resources: Mapping[str, Any] | None = None,
+) -> list[Any]:
     """Computes ``[function(item) for item in items]`` in that order, on other processes and machines.
 
     ``on`` is None (sequential, in this process), ``"ray"`` or ``"dask"`` (the connected cluster, or one on this
     machine), a ``dask.distributed.Client``, or a ``concurrent.futures`` executor. Ray and Dask replace lost workers and
-    repeat their items; the results do not change, because every job is deterministic. An exception of ``function`` is
-    raised here without a retry. Items may be logs, seeds of ``design``, studies of ``simulate`` or whole iterations.
+    repeat their items; the results do not change, because every job is deterministic. Items may be logs, seeds of
+    ``design``, studies of ``simulate`` or whole iterations.
+
+    An item that stops its worker (a crash, too little memory) is repeated ``retries`` times and then raises
+    ``LostWorkers``. An exception of ``function`` is raised here without a retry. With ``skip`` both give a ``Failed`` in
+    the place of the result, and a ``FleetWarning``. A process pool of ``concurrent.futures`` does not replace workers:
+    after a crash all items that are not finished fail. ``progress`` is a display, or a callable that receives
+    ``("items", done, all)``. ``resources`` are those of the engine for one item: ``{"num_cpus": 2}`` for Ray,
+    ``{"GPU": 1}`` for Dask.
+
+    >>> from dynident import fleet
+    >>> fleet.each(abs, [-1, 2, -3])
+    [1, 2, 3]
     """
+    if retries < 0:
+        raise ValueError(f"retries = {retries}: give 0 or more")
     todo = list(items)
-    if on is None:
-        return [function(item) for item in todo]
-    if on == "ray":
-        return _on_ray(function, todo)
-    if isinstance(on, Executor):
-        return list(on.map(function, todo))
-    return _on_dask(function, todo, None if on == "dask" else on)
+
+    def run(hear: Progress | None) -> list[Any]:
+        done = _Done(todo, hear, skip, retries)
+        if on is None:
+            for place, item in enumerate(todo):
+                done.take(place, partial(function, item))
+        elif on == "ray":
+            _on_ray(function, todo, done, resources or {})
+        elif isinstance(on, Executor):
+            _on_executor(function, todo, done, on)
+        else:
+            _on_dask(function, todo, done, None if on == "dask" else on, resources or {})
+        return done.found
+
+    return _watched(progress, run)
+
+
+class _Done:
+    """Results in the order of the items."""
+
+    def __init__(self, items: Sequence[object], hear: Progress | None, skip: bool, retries: int) -> None:
+        self.items, self.hear, self.skip, self.retries = items, hear, skip, retries
+        self.found: list[Any] = [None] * len(items)
+        self.count = 0
+
+    def take(self, place: int, result: Callable[[], object], lost: tuple[type[BaseException], ...] = ()) -> None:
+        """Stores the result of an item. ``lost`` are the exceptions of the engine for a lost worker."""
+        try:
+            self.found[place] = result()
+        except lost as error:
+            kind = type(error).__name__
+            reason = f"its worker was lost in {self.retries + 1} attempt(s) ({kind})"
+            if not self.skip:
+                raise LostWorkers(
+                    f"item {place}, {Failed(self.items[place], reason)!r}: test it alone, or leave it out with skip=True"
+                ) from error
+            self._failed(place, reason)
+        except Exception as error:
+            if not self.skip:
+                raise
+            self._failed(place, f"{type(error).__name__}: {error}")
+        self.count += 1
+        if self.hear is not None:
+            self.hear("items", self.count, len(self.items))
+
+    def _failed(self, place: int, reason: str) -> None:
+        self.found[place] = failed = Failed(self.items[place], reason)
+        warnings.warn(f"item {place} was skipped: {failed!r}", FleetWarning, stacklevel=2)
 
 
 def merged(
-    function: Callable[[Item], Factors], items: Iterable[Item], *, on: object = None, batch: int = 16
+    function: Callable[[Item], Factors], items: Iterable[Item], *, on: object = None, batch: int = 16, **options: Any
 ) -> Factors:
     """Computes ``merge(each(function, items, on=on))``. A worker takes ``batch`` items at a time and merges their
     factors. This sends fewer and larger messages, for logs that are reduced in a few milliseconds. If a worker is lost,
-    its whole batch is repeated.
+    its whole batch is repeated. ``options`` are those of ``each``; with ``skip=True`` the items of a failed batch are
+    repeated one by one, so that only failing items are left out.
+
+    >>> from dynident import fleet
+    >>> factors = fleet.merged(lambda name: fleet.reduce(arm, logs[name], arm=name, **stated), logs, batch=2)
+    >>> len(factors)
+    2
     """
     if batch < 1:
         raise ValueError(f"batch = {batch}: give at least 1")
     todo = list(items)
     parts = [todo[begin : begin + batch] for begin in range(0, len(todo), batch)]
-    return merge(each(partial(_merged_here, function), parts, on=on))
+    with warnings.catch_warnings():
+        # A failed batch is not yet a failed item.
+        if batch > 1:
+            warnings.simplefilter("ignore", FleetWarning)
+        found = each(partial(_merged_here, function), parts, on=on, **options)
+    good = [one for one in found if not isinstance(one, Failed)]
+    again = [item for part, one in zip(parts, found, strict=True) if isinstance(one, Failed) for item in part]
+    if again and batch > 1:
+        good += [one for one in each(function, again, on=on, **options) if not isinstance(one, Failed)]
+    return merge(good)
 
 
 def _merged_here(function: Callable[[Item], Factors], items: Sequence[Item]) -> Factors:
     return merge([function(item) for item in items])
 
 
-def _on_ray(function: Callable[[Item], Found], items: Sequence[Item]) -> list[Found]:
+def _on_executor(function: Callable[[Item], Found], items: Sequence[Item], done: _Done, executor: Executor) -> None:
+    from concurrent.futures import BrokenExecutor
+
+    futures = [executor.submit(function, item) for item in items]
+    done.retries = 0
+    for place, future in enumerate(futures):
+        done.take(place, future.result, (BrokenExecutor,))
+
+
+def _on_ray(
+    function: Callable[[Item], Found], items: Sequence[Item], done: _Done, resources: Mapping[str, Any]
+) -> None:
     import ray
 
     if not ray.is_initialized():
         ray.init(include_dashboard=False, log_to_driver=False)
+
     def run(item: Item) -> Found:
         return function(item)
 
-    # Tasks of lost workers are retried without limit; exceptions of the function are not retried.
-    task = ray.remote(max_retries=-1, retry_exceptions=False)(run)
+    # Tasks of lost workers are retried; exceptions of the function are not retried.
+    task = ray.remote(**{"max_retries": done.retries, "retry_exceptions": False, **resources})(run)
     most = max(2, 4 * int(ray.cluster_resources().get("CPU", 1)))
-    found: list[Any] = [None] * len(items)
     running: dict[Any, int] = {}
     for place, item in enumerate(items):
         if len(running) >= most:
-            _collect(running, found)
+            _collect(running, done)
         running[task.remote(item)] = place
     while running:
-        _collect(running, found)
-    return found
+        _collect(running, done)
 
 
-def _collect(running: dict[Any, int], found: list[Any]) -> None:
+def _collect(running: dict[Any, int], done: _Done) -> None:
     """Waits for one task. Only a few tasks run at once, so that few results are stored until the last task ends."""
     import ray
+    from ray.exceptions import NodeDiedError, OutOfMemoryError, WorkerCrashedError
 
-    done, _ = ray.wait(list(running))
-    for reference in done:
-        found[running.pop(reference)] = ray.get(reference)
+    finished, _ = ray.wait(list(running))
+    for reference in finished:
+        lost = (WorkerCrashedError, OutOfMemoryError, NodeDiedError)
+        done.take(running.pop(reference), partial(ray.get, reference), lost)
 
 
-def _on_dask(function: Callable[[Item], Found], items: Sequence[Item], client: Any) -> list[Found]:
-    import dask
-    from distributed import Client, default_client
+def _on_dask(
+    function: Callable[[Item], Found], items: Sequence[Item], done: _Done, client: Any, resources: Mapping[str, Any]
+) -> None:
+    from distributed import Client, as_completed, default_client
+    from distributed.scheduler import KilledWorker
 
     own = None
     if client is None:
@@ -268,18 +464,41 @@ def _on_dask(function: Callable[[Item], Found], items: Sequence[Item], client: A
             client = default_client()
         except ValueError:
             client = own = Client(processes=True, dashboard_address=None)
+
+    def allow(failures: int, dask_scheduler: Any = None) -> int:
+        before, dask_scheduler.allowed_failures = dask_scheduler.allowed_failures, failures
+        return int(before)
+
+    # A lost worker does not mean that all of its items failed, so the scheduler repeats items often. An item that is
+    # still lost is repeated alone, which shows whether it stops its workers.
+    before = client.run_on_scheduler(allow, max(done.retries, 20))
+    further = {"resources": dict(resources)} if resources else {}
     try:
-        # A lost worker does not mean that its item failed.
-        with dask.config.set({"distributed.scheduler.allowed-failures": 1000}):
-            return list(client.gather(client.map(function, items, pure=False)))
+        futures = client.map(function, items, pure=False, **further)
+        places = {future.key: place for place, future in enumerate(futures)}
+        suspicious = []
+        for future in as_completed(futures):
+            if isinstance(future.exception(), KilledWorker):
+                suspicious.append(places[future.key])
+            else:
+                done.take(places[future.key], future.result)
+        client.run_on_scheduler(allow, done.retries)
+        for place in sorted(suspicious):
+            done.take(place, client.submit(function, items[place], pure=False, **further).result, (KilledWorker,))
     finally:
+        client.run_on_scheduler(allow, before)
         if own is not None:
             own.close()
 
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """Differences between the robots of a fleet."""
+    """Differences between the robots of a fleet.
+
+    >>> from dynident import fleet
+    >>> fleet.spread(models).unlike
+    []
+    """
 
     names: list[str]
     """The base parameters."""
@@ -288,6 +507,9 @@ class Spread:
     estimation error), ``tail`` and ``differs``. For each robot ``deviation`` (of every parameter, in standard
     deviations expected for a robot like the others), ``worst``, ``tail`` and ``is_unlike``.
     """
+
+    def __repr__(self) -> str:
+        return f"Spread({len(self.result['members'])} robots, unlike: {', '.join(self.unlike) or 'none'})"
 
     @property
     def unlike(self) -> list[str]:
@@ -315,12 +537,20 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """Changes of the parameters of one robot over time."""
+    """Changes of the parameters of one robot over time.
+
+    >>> from dynident import fleet
+    >>> fleet.drift(weeks).drifting
+    []
+    """
 
     names: list[str]
     """The base parameters."""
     result: list[dict[str, Any] | None]
     """For each parameter ``slope`` (per day), ``slope_std``, ``half_width_95``, ``scatter``, ``tail``, ``drifts``."""
+
+    def __repr__(self) -> str:
+        return f"Drift(drifting: {', '.join(self.drifting) or 'none'})"
 
     @property
     def drifting(self) -> list[str]:
@@ -344,6 +574,11 @@ def spread(models: Mapping[str, Model], *, false_alarm: float = 0.01) -> Spread:
     """Compares the models of at least three robots. Finds parameters that differ by more than their error bars, and
     outlier robots. ``false_alarm`` is the probability that any robot, or any parameter, of identical robots is
     reported. Equations and sources: ``dynident-estimation``, ``fleet``.
+
+    >>> from dynident import fleet
+    >>> found = fleet.spread(models)
+    >>> found.unlike, found.differing
+    ([], [])
     """
     names, values, std = _table(models)
     found = json.loads(_native._spread([str(name) for name in models], values, std, false_alarm))
@@ -353,6 +588,10 @@ def spread(models: Mapping[str, Model], *, false_alarm: float = 0.01) -> Spread:
 def drift(models: Mapping[datetime, Model], *, false_alarm: float = 0.01) -> Drift:
     """Fits a line over time to each parameter of one robot, from at least three models (see ``windows``), and finds
     parameters that change. ``false_alarm`` is the probability that any parameter of an unchanged robot is reported.
+
+    >>> from dynident import fleet
+    >>> fleet.drift(weeks, false_alarm=0.01).drifting
+    []
     """
     names, values, std = _table(models)
     days = [(_seconds(at) or 0.0) / 86_400.0 for at in models]

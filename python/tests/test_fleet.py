@@ -201,3 +201,78 @@ def test_dask_gives_the_same_bytes_though_workers_are_killed(tmp_path: Path) -> 
         tasks = [(seed, str(tmp_path)) for seed in range(9)]
         assert fleet.each(reduced_by_a_worker_that_is_killed, tasks, on=client) == here
     assert len(list(tmp_path.iterdir())) == 3
+
+
+def poisoned(task: tuple[int, str]) -> int:
+    """Item 2 kills its worker in every attempt; item 3 raises."""
+    number, folder = task
+    if number == 2:
+        mark = Path(folder) / f"attempt {len(list(Path(folder).iterdir()))}"
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    if number == 3:
+        raise ValueError("no log here")
+    return 10 * number
+
+
+def test_exceptions_are_raised_or_skipped() -> None:
+    with pytest.raises(ValueError, match="invalid literal"):
+        fleet.each(int, ["1", "x", "2"])
+    heard: list[tuple[str, int, int | None]] = []
+    with pytest.warns(fleet.FleetWarning, match="item 1 was skipped"):
+        found = fleet.each(int, ["1", "x", "2"], skip=True, progress=lambda *now: heard.append(now))
+    assert (found[0], found[2]) == (1, 2)
+    assert isinstance(found[1], fleet.Failed) and found[1].item == "x"
+    assert heard == [("items", 1, 3), ("items", 2, 3), ("items", 3, 3)]
+    with pytest.raises(ValueError, match="give 0 or more"):
+        fleet.each(int, [], retries=-1)
+
+
+def reduced_unless_odd(seed: int) -> dynident.Factors:
+    if seed == 3:
+        raise ValueError("a broken log")
+    return reduced(seed)
+
+
+def test_only_failing_items_of_a_batch_are_skipped(some: list[dynident.Factors]) -> None:
+    expected = fleet.merge([one for seed, one in enumerate(some) if seed != 3]).to_bytes()
+    with pytest.warns(fleet.FleetWarning) as heard:
+        assert fleet.merged(reduced_unless_odd, range(6), batch=4, skip=True).to_bytes() == expected
+    assert len(heard) == 1 and "a broken log" in str(heard[0].message)
+
+
+@pytest.mark.parametrize("engine", ["ray", "dask"])
+def test_a_poisoned_item_is_repeated_a_stated_number_of_times(engine: str, tmp_path: Path) -> None:
+    pytest.importorskip("ray" if engine == "ray" else "distributed")
+    if engine == "ray":
+        import ray
+
+        path = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+        ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, runtime_env={"env_vars": {"PYTHONPATH": path}})
+        on: object = "ray"
+    else:
+        from distributed import Client
+
+        on = Client(n_workers=2, threads_per_worker=1, dashboard_address=None)
+        on.run(__import__("sys").path.insert, 0, str(Path(__file__).parent))
+    tasks = [(number, str(tmp_path)) for number in range(5)]
+    try:
+        with pytest.warns(fleet.FleetWarning):
+            found = fleet.each(poisoned, tasks, on=on, retries=1, skip=True)
+        assert [one for one in found if not isinstance(one, fleet.Failed)] == [0, 10, 40]
+        assert "its worker was lost in 2 attempt(s)" in found[2].reason
+        assert "no log here" in found[3].reason
+        attempts = len(list(tmp_path.iterdir()))
+        assert attempts == 2 if engine == "ray" else attempts > 1
+        with pytest.raises(fleet.LostWorkers, match="item 0, Failed.*leave it out with skip=True"):
+            fleet.each(poisoned, [(2, str(tmp_path))], on=on, retries=0)
+    finally:
+        if engine == "ray":
+            ray.shutdown()
+        else:
+            on.close()
+
+
+def test_a_broken_pool_names_the_items(tmp_path: Path) -> None:
+    with concurrent.futures.ProcessPoolExecutor(1) as pool, pytest.raises(fleet.LostWorkers, match="item 0"):
+        fleet.each(poisoned, [(2, str(tmp_path))], on=pool)

@@ -274,3 +274,163 @@ def test_noise_of_positions_is_no_other_robot(root: Path, monkeypatch: pytest.Mo
         for seed in (1, 2, 3):
             model = with_dynident.identify_arm(arm, arm_tutorial.record("train", noise_rad, seed))
             assert not [problem for problem in model.problems if "description" in problem], (noise_rad, seed)
+
+
+def test_logs_with_the_same_name_are_all_listed(planar: dynident.Robot, planar_logs: list[dynident.Log]) -> None:
+    logs = []
+    for seed in range(3):
+        t, q, dq, ddq = motion(2, seed=seed)
+        tau = planar.inverse_dynamics(q, dq, ddq) + dq * [0.8, 0.4] + 0.02 * np.random.default_rng(seed).standard_normal(q.shape)
+        logs.append(dynident.Log.from_arrays(t, q, tau, role="identify" if seed == 0 else "validate"))
+    found = dynident.identify(planar, logs, drive=DRIVE, friction="stated")
+    assert list(found.validation_error_percent) == ["log (2)", "log (3)"]
+    assert found.study.log_names == ["log", "log (2)", "log (3)"]
+    assert dynident.with_logs(found.study, logs[1:]).log_names == ["log", "log (2)"]
+
+
+def test_a_log_is_a_copy(planar_logs: list[dynident.Log]) -> None:
+    t, q, _, _ = motion(2, seconds=1.0)
+    log = dynident.Log.from_arrays(t, q, q)
+    before = q.copy()
+    q[:] = 0.0
+    t += 1.0
+    np.testing.assert_array_equal(log.q, before)
+    assert log.time_s[0] == 0.0
+    assert log.fraction(0.5, 1.0).q.shape == (100, 2)
+    with pytest.raises(dynident.LogError, match="no commands"):
+        _ = log.command
+
+
+def test_arrays_of_a_log_are_in_si(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("t_ms,a,b,i1,i2\n0,180,0,1,2\n5,90,1,3,4\n")
+    log = dynident.Log.read(
+        file,
+        {"columns": ["a", "b"], "unit": "deg"},
+        {"columns": "i{1..2}", "unit": "A", "scale": 10.0},
+        time={"column": "t_ms", "unit": "ms"},
+    )
+    np.testing.assert_allclose(log.q, np.radians([[180, 0], [90, 1]]))
+    np.testing.assert_array_equal(log.tau, [[10, 20], [30, 40]])
+    np.testing.assert_allclose(log.time_s, [0.0, 0.005])
+    file.write_text("t_ms,a,b,i1,i2\n0,180,0,1,2\n5,90,oops,3,4\n")
+    broken = dynident.Log.read(file, ["a", "b"], ["i1", "i2"], time="t_ms")
+    with pytest.raises(dynident.LogError) as raised:
+        _ = broken.q
+    assert (raised.value.path, raised.value.line) == (file, 3)
+
+
+def test_errors_of_logs_have_a_place(planar: dynident.Robot, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("t,q1,q2,tau1,tau2\n0,0,0,0,0\n0.1,0,x,0,0\n")
+    log = dynident.Log.read(file, "q{1..2}", "tau{1..2}", time="t")
+    with pytest.raises(dynident.LogError, match="`x` is not a number") as raised:
+        dynident.identify(planar, log)
+    assert (raised.value.path, raised.value.line) == (file, 3)
+    with pytest.raises(dynident.StudyError) as study:
+        dynident.identify(planar, dynident.Log.read(tmp_path / "gone.csv", "q{1..2}", "tau{1..2}", time="t"))
+    assert study.value.path == tmp_path / "gone.csv"
+
+
+def test_frames_with_any_usual_index(planar: dynident.Robot, planar_logs: list[dynident.Log]) -> None:
+    pd = pytest.importorskip("pandas")
+    columns = dict(planar_logs[0].columns or {})
+    t = columns.pop("t_s")
+    table = pd.DataFrame(columns)
+    seconds = pd.to_timedelta(t, unit="s")
+    dates = pd.Timestamp("2026-01-05 10:00") + seconds
+    named = {"position": "q{1..2}", "torque": "tau{1..2}"}
+    indexes = {
+        "seconds": t,
+        "dates": dates,
+        "dates with a zone": dates.tz_localize("Europe/Berlin"),
+        "durations": seconds,
+    }
+    for name, index in indexes.items():
+        log = dynident.Log.from_pandas(table.set_index(pd.Index(index)), **named)
+        np.testing.assert_allclose(log.time_s, t, atol=1e-8, err_msg=name)
+    counts = table.set_index(pd.Index(np.round(t * 1000).astype(np.int64)))
+    np.testing.assert_allclose(dynident.Log.from_pandas(counts, **named, time={"unit": "ms"}).time_s, t, atol=1e-9)
+    for column in (dates, dates.tz_localize("UTC"), seconds, t):
+        log = dynident.Log.from_pandas(table.assign(when=column), **named, time="when")
+        np.testing.assert_allclose(log.time_s, t, atol=1e-8)
+    nullable = table.convert_dtypes().set_index(pd.Index(t))
+    np.testing.assert_array_equal(dynident.Log.from_pandas(nullable, **named).q, planar_logs[0].q)
+    refused = [
+        (table, {}, "whole numbers: give its unit"),
+        (counts, {}, "whole numbers: give its unit"),
+        (table.set_index(pd.Index(dates.astype(str))), {}, "pandas.to_datetime"),
+        (table.assign(when=dates.astype(str)), {"time": "when"}, "`when` has the type .* pandas.to_datetime"),
+        (table.assign(q1="x").set_index(pd.Index(t)), {"position": ["q1", "q2"]}, "`q1` has the type .* pandas.to_numeric"),
+        (pd.concat([table, table["q1"]], axis=1), {"time": "q2"}, "two columns are named `q1`"),
+        (table.assign(when=dates), {"time": {"column": "when", "unit": "ms"}}, "omit unit"),
+        (table.set_index([pd.Index(t), pd.Index(t)]), {}, "several levels"),
+    ]
+    for frame, further, words in refused:
+        with pytest.raises(dynident.LogError, match=words):
+            dynident.Log.from_pandas(frame, **{**named, **further})
+
+
+def test_values_fit_on_a_screen(model: dynident.Model, planar: dynident.Robot, planar_logs: list[dynident.Log]) -> None:
+    checked = dynident.check(planar, planar_logs, drive=DRIVE, friction="stated")
+    simulated = dynident.simulate(planar, design={"duration_s": 2.0}, simulation={"rate_hz": 500.0})
+    for value in (checked, simulated, dynident.inspect(planar), planar_logs[0], model, model.residuals()["run 2"], model.report):
+        assert len(repr(value)) < 200, repr(value)[:400]
+    assert model.report._repr_html_().startswith("<iframe srcdoc=") and "<html" in model.report
+    assert "no mistake" in checked._repr_html_()
+
+
+def test_a_saved_model_needs_no_study(model: dynident.Model, root: Path, tmp_path: Path) -> None:
+    model.save(tmp_path / "saved")
+    again = dynident.Model.load(tmp_path / "saved")
+    assert again.result == model.result
+    _, q, dq, ddq = motion(2, seed=5)
+    np.testing.assert_array_equal(again.predict(q, dq, ddq), model.predict(q, dq, ddq))
+    # A result of the command, with its study next to it.
+    for name in ("study.toml", "ur10.urdf", "train.csv", "test.csv"):
+        assert not (tmp_path / name).exists()
+    given = dynident.example(tmp_path / "example")
+    study = tmp_path / "example" / "study.toml"
+    out = tmp_path / "example" / "result"
+    assert dynident._native._command(["dynident", "identify", str(study), "--out", str(out), "--quiet"]) == 0
+    found = dynident.Model.load(out)
+    assert found.joint_names == given.robot.joint_names
+    study.write_text(study.read_text() + "\n# changed\n")
+    with pytest.raises(dynident.StudyError, match="or was changed: give it"):
+        dynident.Model.load(out)
+
+
+def test_model_dynamics_are_inverse_to_each_other(model: dynident.Model) -> None:
+    _, q, dq, ddq = motion(2, seed=6, seconds=0.5)
+    tau = model.predict(q, dq, ddq)
+    np.testing.assert_allclose(model.forward_dynamics(q, dq, tau), ddq, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(model.mass_matrix(q), model.robot().mass_matrix(q), rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(tau, model.predict_with_band(q, dq, ddq)[0])
+
+
+def test_residuals_are_those_of_the_log(model: dynident.Model, planar_logs: list[dynident.Log]) -> None:
+    pytest.importorskip("pandas")
+    found = model.residuals()
+    assert list(found) == ["run 2"]
+    one = found["run 2"]
+    # The noise of 0.02 Nm is white, so the filter of the fit leaves less of it; without a model several Nm remain.
+    assert 0.001 < np.sqrt(np.nanmean(one.residual**2)) < 0.02
+    assert np.sqrt(np.nanmean(one.measured**2)) > 1.0
+    assert set(model.residuals(planar_logs[0].validating())) == {"run 1"}
+    bodies = model.to_pandas("bodies")
+    np.testing.assert_array_equal(bodies.to_numpy(), np.array(list(model.bodies.values())))
+    assert model.to_pandas("friction").loc["joint1", "fv"] == model.friction["joint1"]["fv1"]
+
+
+def test_many_threads_are_not_started(planar: dynident.Robot, planar_logs: list[dynident.Log], model: dynident.Model) -> None:
+    begin = time.monotonic()
+    found = dynident.identify(planar, planar_logs, drive=DRIVE, friction="stated", threads=10_000)
+    np.testing.assert_array_equal(found.values, model.values)
+    # 10,000 threads took minutes.
+    assert time.monotonic() - begin < 30.0
+
+
+def test_figures_are_shown_in_notebooks(model: dynident.Model, planar_logs: list[dynident.Log]) -> None:
+    pytest.importorskip("matplotlib")
+    for figure in (model.plot_parameters(), planar_logs[0].plot()):
+        assert figure._repr_png_()[:4] == b"\x89PNG"

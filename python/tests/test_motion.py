@@ -175,3 +175,98 @@ def test_ctrl_c_stops_a_robot_that_is_a_function(root: Path, tmp_path: Path) -> 
     assert child.returncode == 0
     # The recorded samples are kept, with the reason of the stop.
     assert json.loads((tmp_path / "iterations.json").read_text())["status"] == "interrupted"
+
+
+def test_failed_starts_do_not_use_up_runs(planar: dynident.Robot, tmp_path: Path) -> None:
+    """The driver is not ready three times, with `max_runs = 4` and one failure in the middle of run 2."""
+    arm = Arm(planar)
+    calls: list[int] = []
+
+    def robot(run: dynident.Run) -> None:
+        calls.append(run.number)
+        if len(calls) <= 3:
+            raise ConnectionError("the driver is not ready")
+        if len(calls) == 5:
+            for sample in range(100):
+                run.torque(sample / run.rate_hz, run.q[sample], run.dq[sample])
+            raise TimeoutError("a packet is lost")
+        arm(run)
+
+    found = None
+    for _ in range(8):
+        try:
+            found = dynident.iterate(planar, tmp_path, robot=robot, **SECTIONS)
+            break
+        except (ConnectionError, TimeoutError):
+            state = json.loads((tmp_path / "iterations.json").read_text())
+            assert state["status"] == "refused"
+            assert len(state["runs"]) == (0 if len(calls) <= 3 else 1)
+    assert found is not None
+    assert calls[:6] == [1, 1, 1, 1, 2, 2]
+    # The model of run 1 is used in run 2, although its first attempt failed.
+    assert found.runs[1]["controller"] == found.runs[-1]["controller"] != found.runs[0]["controller"]
+    assert found.ok, found.problems
+
+
+def test_wrong_time_stamps_and_shapes_do_not_use_up_runs(planar: dynident.Robot, tmp_path: Path) -> None:
+    for step_s, words in [(0.0, "time 0 s comes after 0 s"), (1000 / 250.0, "give the time in seconds")] * 2:
+
+        def clock(run: dynident.Run, step_s: float = step_s) -> None:
+            run.torque(7.0, run.q[0], run.dq[0])
+            run.torque(7.0 + step_s, run.q[0], run.dq[0])
+
+        with pytest.warns(dynident.ProblemWarning, match=words):
+            found = dynident.iterate(planar, tmp_path, robot=clock, **SECTIONS)
+        assert found.status == "refused" and found.runs == [] and not found.ok
+
+    def one_joint(run: dynident.Run) -> None:
+        run.torque(0.0, [0.0], [0.0])
+
+    with pytest.raises(ValueError, match="last axis needs 2 entries"):
+        dynident.iterate(planar, tmp_path, robot=one_joint, **SECTIONS)
+    assert dynident.iterate(planar, tmp_path, robot=Arm(planar), **SECTIONS).ok
+
+
+def test_torques_are_given_for_lists_and_single_precision(planar: dynident.Robot, tmp_path: Path) -> None:
+    class Lists(Arm):
+        def __call__(self, run: dynident.Run) -> None:
+            run_torque = run.torque
+            tau = run_torque(0.0, run.q[0].tolist(), run.dq[0].astype(np.float32))
+            assert tau.shape == (2,)
+            raise dynident.StopRun("enough")
+
+    with pytest.warns(dynident.ProblemWarning, match="enough"):
+        found = dynident.iterate(planar, tmp_path, robot=Lists(planar), **{**SECTIONS, "iteration": {**ITERATION, "max_runs": 1}})
+    # The robot has moved and stopped, so this run counts.
+    assert len(found.runs) == 1 and "enough" in found.runs[0]["outcome"]
+
+
+def test_a_stopped_iteration_is_a_problem_of_its_model(planar: dynident.Robot, tmp_path: Path) -> None:
+    arm = Arm(planar)
+
+    def robot(run: dynident.Run) -> None:
+        if run.number == 1:
+            return arm(run)
+        # A model-based controller that leaves the envelope.
+        for sample in range(run.samples):
+            run.torque(sample / run.rate_hz, run.q[0] + 0.01 * sample, run.dq[0])
+
+    with pytest.warns(dynident.ProblemWarning, match="has not converged"):
+        found = dynident.iterate(planar, tmp_path, robot=robot, **{**SECTIONS, "iteration": {**ITERATION, "max_runs": 2}})
+    model = found.model()
+    assert not found.ok and not model.ok
+    assert "has not converged" in model.problems[-1]
+    assert "has not converged" in found._repr_html_() and "PROBLEM" in model.summary()
+    assert len(repr(found)) < 300
+
+
+def test_progress_of_design_and_iteration(planar: dynident.Robot, tmp_path: Path) -> None:
+    heard: list[tuple[str, int, int | None]] = []
+    design = dynident.design(planar, design=DESIGN, progress=lambda *now: heard.append(now))
+    assert any(stage.startswith("design") for stage, _, _ in heard)
+    assert len(repr(design)) < 200
+    heard.clear()
+    # The function of the robot gives time to the display.
+    arm = Arm(planar)
+    dynident.iterate(planar, tmp_path, robot=arm, progress=lambda *now: heard.append(now), **SECTIONS)
+    assert heard

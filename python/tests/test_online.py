@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from conftest import motion
@@ -105,3 +107,70 @@ def test_friction_that_grows_is_drift(model: dynident.Model, planar: dynident.Ro
     found = [alarm for alarm in watch.update(q, tau, dq, ddq) if alarm["kind"] == "drift"]
     assert found
     assert found[0]["parameter"] == "fv2"
+
+
+def test_lost_samples_and_stalls_raise_no_alarm(model: dynident.Model, planar: dynident.Robot) -> None:
+    """Ten minutes of work with lost samples, pauses of three and forty samples, and jitter of the stamps."""
+    rng = np.random.default_rng(5)
+    watch = model.online(rate_hz=RATE_HZ)
+    q, _, _, tau = work(planar, seed=20, seconds=60.0)
+    watch.calibrate(q, tau, time_s=np.arange(len(q)) / RATE_HZ)
+    watch.restart()
+    q, _, _, tau = work(planar, seed=21, seconds=600.0)
+    t = np.arange(len(q)) / RATE_HZ
+    keep = rng.random(len(q)) > 0.002
+    for begin in rng.integers(0, len(q) - 50, 40):
+        keep[begin : begin + rng.choice([3, 5, 40])] = False
+    stamps = t + rng.uniform(-0.1, 0.1, len(t)) / RATE_HZ
+    assert 0.9 < keep.mean() < 0.995
+    assert watch.update(q[keep], tau[keep], time_s=stamps[keep]) == []
+
+    # Without time stamps the same samples look like collisions.
+    blind = model.online(rate_hz=RATE_HZ)
+    blind.calibrate(*work(planar, seed=20, seconds=60.0)[::3])
+    assert blind.update(q[keep], tau[keep])
+
+    # Real contacts are still found, with their time.
+    pushed = tau.copy()
+    pushed[t >= 300.0, 1] += 0.3
+    watch.restart()
+    first = watch.update(q[keep], pushed[keep], time_s=stamps[keep])[0]
+    assert first["kind"] == "collision"
+    assert abs(first["time_s"] - 300.0) < 0.05
+
+
+def test_time_stamps_must_increase(model: dynident.Model) -> None:
+    watch = model.online(rate_hz=RATE_HZ)
+    zero = np.zeros(2)
+    watch.update(zero, zero, time_s=1.0)
+    for wrong in (1.0, 0.5, np.nan):
+        with pytest.raises(dynident.Error, match="ascending order"):
+            watch.update(zero, zero, time_s=wrong)
+    with pytest.raises(dynident.Error, match="give time_s always or never"):
+        watch.update(zero, zero)
+    with pytest.raises(ValueError, match="3 values for 1 samples"):
+        watch.update(zero, zero, time_s=[1.1, 1.2, 1.3])
+    watch.restart()
+    watch.update(zero, zero, time_s=0.1)
+
+
+@pytest.mark.parametrize("with_times", [False, True])
+def test_a_pickled_watch_continues_bit_by_bit(model: dynident.Model, planar: dynident.Robot, with_times: bool) -> None:
+    watch = model.online(rate_hz=RATE_HZ, forgetting_s=1.0)
+    q, _, _, tau = work(planar, seed=9, seconds=60.0)
+    t = np.arange(len(q)) / RATE_HZ
+
+    def times(part: slice) -> dict[str, np.ndarray]:
+        return {"time_s": t[part]} if with_times else {}
+
+    watch.calibrate(q[:6000], tau[:6000], **times(slice(0, 6000)))
+    tau[8000:, 1] += 0.5
+    watch.update(q[6000:8100], tau[6000:8100], **times(slice(6000, 8100)))
+    again = pickle.loads(pickle.dumps(watch))
+    assert repr(again) == repr(watch)
+    rest = slice(8100, None)
+    assert again.update(q[rest], tau[rest], **times(rest)) == watch.update(q[rest], tau[rest], **times(rest))
+    assert again.alarms == watch.alarms and watch.alarms
+    for name in ("values", "covariance", "residuals_nm", "thresholds_nm"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(watch, name))
+    assert again.drift == watch.drift and again.contact == watch.contact

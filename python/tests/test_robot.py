@@ -176,3 +176,66 @@ def test_a_regressor_is_written_where_it_is_wanted(ur10: dynident.Robot) -> None
     out.flags.writeable = False
     with pytest.raises(ValueError, match="out"):
         ur10.regressor(q, dq, ddq, out=out)
+
+
+def test_kinematics_are_those_of_the_differences(ur10: dynident.Robot) -> None:
+    assert ur10.dof == ur10.n == 6
+    assert ur10.link_names[-1] in ur10.link_names
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-2.0, 2.0, (20, 6))
+    for link in ("wrist_1_link", ur10.link_names[-1]):
+        point = np.array([0.1, -0.2, 0.3])
+        poses = ur10.forward_kinematics(q, link)
+        np.testing.assert_allclose(poses[:, 3], np.tile([0.0, 0.0, 0.0, 1.0], (20, 1)))
+        rotation = poses[:, :3, :3]
+        np.testing.assert_allclose(rotation @ rotation.transpose(0, 2, 1), np.tile(np.eye(3), (20, 1, 1)), atol=1e-12)
+        found = ur10.jacobian(q, link, point)
+        step = 1e-6
+        for joint in range(6):
+            ends = [ur10.forward_kinematics(q + sign * step * np.eye(6)[joint], link) for sign in (1, -1)]
+            places = [end[:, :3, :3] @ point + end[:, :3, 3] for end in ends]
+            # The error of central differences is some 1e-12 / 1e-6.
+            np.testing.assert_allclose(found[:, :3, joint], (places[0] - places[1]) / (2 * step), atol=1e-8)
+            spin = (ends[0][:, :3, :3] - ends[1][:, :3, :3]) / (2 * step) @ rotation.transpose(0, 2, 1)
+            omega = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=-1)
+            np.testing.assert_allclose(found[:, 3:, joint], omega, atol=1e-8)
+    assert (ur10.jacobian(q[0], ur10.link_names[0]) == 0.0).all()
+    with pytest.raises(dynident.RobotError, match="no link `hand`: give one of"):
+        ur10.forward_kinematics(q, "hand")
+
+
+def test_kinematics_are_those_of_pinocchio(root: Path) -> None:
+    pinocchio = pytest.importorskip("pinocchio")
+    path = str(root / "robots" / "ur10.urdf")
+    robot, model = dynident.Robot.load(path), pinocchio.buildModelFromUrdf(path)
+    data = model.createData()
+    q = np.random.default_rng(1).uniform(-2.0, 2.0, 6)
+    pinocchio.framesForwardKinematics(model, data, q)
+    pinocchio.computeJointJacobians(model, data, q)
+    for link in robot.link_names:
+        frame = model.getFrameId(link)
+        np.testing.assert_allclose(robot.forward_kinematics(q, link), data.oMf[frame].homogeneous, atol=1e-12)
+        expected = pinocchio.getFrameJacobian(model, data, frame, pinocchio.LOCAL_WORLD_ALIGNED)
+        np.testing.assert_allclose(robot.jacobian(q, link), expected, atol=1e-12)
+
+
+def test_limits_are_those_of_the_description(ur10: dynident.Robot) -> None:
+    assert set(ur10.limits) == {"lower", "upper", "velocity", "effort"}
+    assert ur10.limits["upper"][0] == pytest.approx(2 * np.pi, abs=1e-3)
+    text = """<robot name="arm"><link name="base"/><link name="rod"><inertial><mass value="1"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="j" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 0 1"/></joint></robot>"""
+    limits = dynident.Robot.from_urdf(text).limits
+    assert [limits[key][0] for key in ("lower", "upper", "velocity", "effort")] == [-np.inf, np.inf, np.inf, np.inf]
+
+
+def test_errors_of_descriptions_have_a_place(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text('<robot name="arm">\n<link name="base"/>\n<joint name="j" type="what"/></robot>')
+    with pytest.raises(dynident.RobotError) as raised:
+        dynident.Robot.load(path)
+    assert raised.value.path == path
+    assert raised.value.line == 3 and raised.value.column >= 1
+    with pytest.raises(dynident.Error) as raised:
+        dynident.Robot.load(tmp_path / "missing.urdf")
+    assert raised.value.path == tmp_path / "missing.urdf"

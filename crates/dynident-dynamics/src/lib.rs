@@ -14,7 +14,7 @@
 //! | torques and mass matrix over a custom scalar | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
 //! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; several samples: [`inverse_dynamics_derivative_matrices`] | analytic, in one frame |
 //! | derivatives of the acceleration by q, q̇, τ | [`forward_dynamics_derivatives`] | from those of the torque, with `M = LᵀL` along the tree |
-//! | poses of the bodies | [`body_placements`] | forward kinematics |
+//! | poses of the bodies, Jacobian of a point | [`body_placements`], [`point_jacobian`] | forward kinematics |
 //! | torque regressor, all ten parameters of each body | [`torque_regressor`] | linear in the parameters |
 //! | regressor of selected columns, several samples | [`regressor_panels()`] with a [`PanelLayout`]; derivatives: [`regressor_panels_adjoint`] | |
 //! | base parameters | [`BaseParameters`]; cross-check: [`numerical_rank`] | from the robot's structure |
@@ -91,7 +91,7 @@ pub use gravity::{gravity_torque, gravity_torque_derivative};
 pub use independent_columns::{IndependentColumns, independent_columns};
 pub use inverse_dynamics::{inverse_dynamics, inverse_dynamics_batch};
 pub use joint_matrices::JointMatrices;
-pub use kinematics::body_placements;
+pub use kinematics::{PointJacobian, body_placements, point_jacobian};
 pub use mass_matrix::{mass_matrices, mass_matrix};
 pub use motion_equation::mass_matrix_and_bias;
 pub use over_scalar::{inverse_dynamics_over, mass_matrix_over};

@@ -30,6 +30,16 @@ impl TermHistory {
         self.temperature_c.extend_from_slice(temperature_c);
     }
 
+    /// The memory of each column of the layout, for storage; empty before a term with memory occurred.
+    pub fn memories(&self) -> &[HysteresisState] {
+        &self.memories
+    }
+
+    /// Continues from stored [`memories`](Self::memories).
+    pub fn set_memories(&mut self, memories: Vec<HysteresisState>) {
+        self.memories = memories;
+    }
+
     /// Clears the memory: the next block starts a recording.
     pub fn restart(&mut self) {
         self.memories.iter_mut().for_each(HysteresisState::restart);

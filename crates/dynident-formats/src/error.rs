@@ -67,6 +67,17 @@ pub enum FileError {
 }
 
 impl FileError {
+    /// The file.
+    pub fn file(&self) -> &Path {
+        match self {
+            Self::Io { file, .. }
+            | Self::OtherFormat { file, .. }
+            | Self::NotBuilt { file, .. }
+            | Self::Broken { file, .. }
+            | Self::NoColumns { file, .. } => file,
+        }
+    }
+
     pub(crate) fn broken(
         file: &Path,
         format: FileFormat,

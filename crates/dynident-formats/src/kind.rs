@@ -6,6 +6,10 @@
 pub enum FileFormat {
     /// Text; its table is parsed by the caller.
     Text,
+    /// Text with one line for each quantity.
+    SidewaysText,
+    /// Text with one value on each line and the shape of the array in its header.
+    ValueList,
     /// Text compressed by gzip.
     GzipText,
     /// Text compressed by Zstandard.
@@ -51,6 +55,8 @@ impl FileFormat {
     pub fn name(self) -> &'static str {
         match self {
             Self::Text => "text",
+            Self::SidewaysText => "text on its side",
+            Self::ValueList => "list of values",
             Self::GzipText => "gzip",
             Self::ZstdText => "Zstandard",
             Self::JsonLines => "JSON lines",

@@ -4,6 +4,8 @@
 //! | format | columns | feature |
 //! | --- | --- | --- |
 //! | text, also in UTF-16, or compressed by gzip or Zstandard | parsed by the caller: [`Contents::Text`] | `gzip`, `zstd` |
+//! | text on its side: one line for each quantity; text with one value on each line and a shape | names of the lines;
+//! columns of the matrix | |
 //! | NumPy `.npy`, `.npz` | fields of a structured array, columns of a matrix, arrays of one length | `.npz`: `gzip` |
 //! | JSON, one object per line or one document | numbers by their path: `arm.q[0]` | `json` |
 //! | MCAP, rosbag2, ROS 1 bag, ULog | numbers of messages by topic and path: `/joint_states.position[elbow]` | `bags` |
@@ -81,11 +83,16 @@ mod packed;
 mod parquet;
 #[cfg(feature = "parquet")]
 mod parquet_pages;
+#[cfg(feature = "bags")]
+mod protobuf;
 mod recognition;
 #[cfg(feature = "bags")]
 mod ros;
 mod sage;
+mod sideways;
 mod table;
+mod text_number;
+mod value_list;
 mod zip;
 
 pub use dynident_files::SeenFiles;
@@ -161,8 +168,20 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
     let head = recognition::head(&mut reader).map_err(refused)?;
     let format = recognition::recognised(path, &head)?;
     let contents = match format {
-        // The recognition of files never returns the folder format.
-        FileFormat::Text | FileFormat::Sage => Contents::Text(line_ends::plain(reader, &head)),
+        FileFormat::ValueList => Contents::Table(value_list::open(path, &head, reader, budget)?),
+        FileFormat::Text | FileFormat::SidewaysText if sideways::may_begin(&head) => {
+            let Some(table) = sideways::open(path, reader, budget, sideways::Layout::Recognised)? else {
+                // A usual table whose rows begin with a text.
+                let mut reader = BufReader::with_capacity(1 << 18, dynident_files::open(path).map_err(refused)?);
+                let head = recognition::head(&mut reader).map_err(refused)?;
+                return Ok(Opened { format, contents: Contents::Text(line_ends::plain(reader, &head)) });
+            };
+            return Ok(Opened { format: FileFormat::SidewaysText, contents: Contents::Table(table) });
+        }
+        // The recognition of files never returns the formats of folders and of text on its side.
+        FileFormat::Text | FileFormat::SidewaysText | FileFormat::Sage => {
+            Contents::Text(line_ends::plain(reader, &head))
+        }
         FileFormat::GzipText | FileFormat::ZstdText => {
             let unpacked = packed::unpacked(path, format, reader)?;
             let mut reader = BufReader::with_capacity(1 << 18, unpacked);
@@ -198,6 +217,23 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
         FileFormat::Hdf5 => Contents::Table(hdf5::open(path, budget)?),
     };
     Ok(Opened { format, contents })
+}
+
+/// Opens a text table on its side, with one line for each quantity and one value for each sample. Lines need no names.
+///
+/// # Errors
+/// As [`open`], and lines of different length.
+pub fn open_transposed(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError> {
+    let refused = |source| FileError::Io { file: path.to_owned(), source };
+    let file = dynident_files::open(path).map_err(refused)?;
+    let budget = Budget::new(limits, file.metadata().map_err(refused)?.len());
+    let mut reader = BufReader::with_capacity(1 << 18, file);
+    let head = recognition::head(&mut reader).map_err(refused)?;
+    let text = BufReader::new(line_ends::plain(reader, &head));
+    let fix = "write one line for each quantity";
+    let table = sideways::open(path, text, budget, sideways::Layout::Stated)?
+        .ok_or_else(|| FileError::no_columns(path, FileFormat::SidewaysText, "no lines", fix))?;
+    Ok(Opened { format: FileFormat::SidewaysText, contents: Contents::Table(table) })
 }
 
 #[cfg(feature = "json")]

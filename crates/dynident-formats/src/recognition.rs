@@ -6,6 +6,7 @@ use crate::error::FileError;
 use crate::kind::FileFormat;
 use crate::mat4;
 use crate::octave;
+use crate::value_list;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -147,6 +148,9 @@ pub(crate) fn recognised(path: &Path, head: &[u8]) -> Result<FileFormat, FileErr
     }
     if is_json_document(head) {
         return Ok(FileFormat::Json);
+    }
+    if value_list::begins(head) {
+        return Ok(FileFormat::ValueList);
     }
     Ok(FileFormat::Text)
 }

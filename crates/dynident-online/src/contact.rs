@@ -1,6 +1,7 @@
 //! Detection of contact from the residuals of the model.
 
 use crate::error::{OnlineError, check, check_positive};
+use serde::{Deserialize, Serialize};
 
 /// Settings of contact detection.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +46,7 @@ pub struct Residuals {
 }
 
 /// Time scale at which a contact was detected.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TimeScale {
     /// Short time constant.
     Collision,
@@ -54,7 +55,7 @@ pub enum TimeScale {
 }
 
 /// A residual beyond its threshold.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// The joint.
     pub joint: usize,
@@ -83,6 +84,14 @@ pub struct Contact {
 pub struct ContactMonitor {
     settings: ContactSettings,
     /// Level and threshold of each joint, by time scale.
+    levels: Vec<[f64; 2]>,
+    thresholds: Vec<[f64; 2]>,
+    means: Vec<[f64; 2]>,
+}
+
+/// State of a [`ContactMonitor`], for storage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContactState {
     levels: Vec<[f64; 2]>,
     thresholds: Vec<[f64; 2]>,
     means: Vec<[f64; 2]>,
@@ -195,6 +204,26 @@ impl ContactMonitor {
             }
         }
         Ok(strongest)
+    }
+
+    /// The state, for storage.
+    pub fn state(&self) -> ContactState {
+        let Self { levels, thresholds, means, .. } = self;
+        ContactState { levels: levels.clone(), thresholds: thresholds.clone(), means: means.clone() }
+    }
+
+    /// Continues from a stored state.
+    ///
+    /// # Errors
+    /// A state of other joints, or values that are not finite.
+    pub fn restore(&mut self, state: ContactState) -> Result<(), OnlineError> {
+        let ContactState { levels, thresholds, means } = state;
+        for (what, values) in [("stored levels", &levels), ("stored thresholds", &thresholds), ("stored means", &means)]
+        {
+            check(what, values.as_flattened(), 2 * self.means.len())?;
+        }
+        (self.levels, self.thresholds, self.means) = (levels, thresholds, means);
+        Ok(())
     }
 
     /// Resets the means: the next sample starts a new motion.

@@ -1,6 +1,8 @@
 //! Velocities and accelerations from a stream of positions.
 
 use crate::error::{OnlineError, check, check_positive};
+use nalgebra::{Matrix4, Vector4};
+use serde::{Deserialize, Serialize};
 
 /// Local polynomials through the latest samples: position, velocity and acceleration in the middle of a window,
 /// together with the torques measured there.
@@ -14,16 +16,32 @@ use crate::error::{OnlineError, check, check_positive};
 /// ```
 ///
 ///  (Savitzky and Golay, Analytical Chemistry 36 (1964) 1627; here by discrete orthogonal polynomials up to degree 3).
+///
+/// With time stamps ([`add_at`](Self::add_at)) the cubic is fitted at the stamps, so that lost samples cause no error.
+/// A window that is longer than [`MAX_WINDOW_RATIO`](Self::MAX_WINDOW_RATIO) of its usual length gives no result.
 #[derive(Clone, Debug)]
 pub struct DelayedDerivatives {
     joints: usize,
     half: usize,
+    rate_hz: f64,
     /// Weights of position, velocity and acceleration over the window, oldest first.
     weights: [Vec<f64>; 3],
     /// Ring buffer of positions and torques: sample `s` starts at `(s % window) * 2 * joints`.
     ring: Vec<f64>,
+    /// Time of each sample in the ring, in periods.
+    times: Vec<f64>,
     seen: usize,
     now: DelayedSample,
+    /// Weights for uneven samples.
+    uneven: [Vec<f64>; 3],
+}
+
+/// State of [`DelayedDerivatives`], for storage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DerivativesState {
+    ring: Vec<f64>,
+    times: Vec<f64>,
+    seen: usize,
 }
 
 /// A sample in the middle of the window, with one entry per joint.
@@ -40,6 +58,12 @@ pub struct DelayedSample {
 }
 
 impl DelayedDerivatives {
+    /// Longest window that gives a result, divided by the usual length. The error of the cubic grows with the fourth
+    /// power of the length.
+    pub const MAX_WINDOW_RATIO: f64 = 1.5;
+    /// Largest distance of a step from a whole number of periods that is treated as jitter of the stamps.
+    const JITTER_PERIODS: f64 = 0.25;
+
     /// Derivatives for a number of joints, sampled at `rate_hz`, over windows of `2 half + 1` samples; `half` is at
     /// least 2.
     ///
@@ -55,8 +79,11 @@ impl DelayedDerivatives {
         Ok(Self {
             joints,
             half,
+            rate_hz,
             weights: weights(half, rate_hz),
             ring: vec![0.0; (2 * half + 1) * 2 * joints],
+            times: vec![0.0; 2 * half + 1],
+            uneven: core::array::from_fn(|_| vec![0.0; 2 * half + 1]),
             seen: 0,
             now: DelayedSample { q: zeros(), dq: zeros(), ddq: zeros(), tau: zeros() },
         })
@@ -67,23 +94,60 @@ impl DelayedDerivatives {
         self.half
     }
 
-    /// Adds the latest positions and torques; returns the sample in the middle of the window once it is full.
+    /// Adds the latest positions and torques; returns the sample in the middle of the window once it is full. The
+    /// sample follows the previous one by one period.
     ///
     /// # Errors
     /// A vector of a different length, or a value that is not finite; the state is then unchanged.
     pub fn add(&mut self, q: &[f64], tau: &[f64]) -> Result<Option<&DelayedSample>, OnlineError> {
+        self.add_after(1.0, q, tau)
+    }
+
+    /// As [`add`](Self::add), for a sample that was measured `step_s` after the previous one, s. A step close to a
+    /// whole number of periods is rounded to it. Returns `None` while a longer pause is in the window.
+    ///
+    /// # Errors
+    /// As [`add`](Self::add), and a step that is not positive.
+    pub fn add_at(&mut self, step_s: f64, q: &[f64], tau: &[f64]) -> Result<Option<&DelayedSample>, OnlineError> {
+        check_positive("step of the time stamps", &[step_s])?;
+        let periods = step_s * self.rate_hz;
+        let whole = periods.round().max(1.0);
+        self.add_after(if (periods - whole).abs() <= Self::JITTER_PERIODS { whole } else { periods }, q, tau)
+    }
+
+    fn add_after(&mut self, periods: f64, q: &[f64], tau: &[f64]) -> Result<Option<&DelayedSample>, OnlineError> {
         check("q", q, self.joints)?;
         check("tau", tau, self.joints)?;
         let (joints, window) = (self.joints, 2 * self.half + 1);
         let at = self.seen % window * 2 * joints;
         self.ring[at..at + joints].copy_from_slice(q);
         self.ring[at + joints..at + 2 * joints].copy_from_slice(tau);
+        let before = if self.seen == 0 { 0.0 } else { self.times[(self.seen - 1) % window] };
+        self.times[self.seen % window] = if self.seen == 0 { 0.0 } else { before + periods };
         self.seen += 1;
         if self.seen < window {
             return Ok(None);
         }
+        let time = |back: usize| self.times[(self.seen + back) % window];
+        let (length, usual) = (time(window - 1) - time(0), (window - 1) as f64);
+        if length > Self::MAX_WINDOW_RATIO * usual {
+            return Ok(None);
+        }
+        // Also uneven steps may have this length.
+        let is_even = (1..window).all(|back| time(back) - time(back - 1) == 1.0);
+        if !is_even {
+            let middle = time(self.half);
+            for (back, place) in self.uneven[0].iter_mut().enumerate() {
+                *place = (self.times[(self.seen + back) % window] - middle) / self.half as f64;
+            }
+            // Samples that do not determine a cubic, such as several at almost one time, give no result.
+            if !uneven_weights(&mut self.uneven, self.half, self.rate_hz) {
+                return Ok(None);
+            }
+        }
+        let weights = if is_even { &self.weights } else { &self.uneven };
         let DelayedSample { q, dq, ddq, tau } = &mut self.now;
-        for (out, weights) in [q, dq, ddq].into_iter().zip(&self.weights) {
+        for (out, weights) in [q, dq, ddq].into_iter().zip(weights) {
             out.fill(0.0);
             for (back, weight) in weights.iter().enumerate() {
                 let at = (self.seen + back) % window * 2 * joints;
@@ -95,6 +159,23 @@ impl DelayedDerivatives {
         let middle = (self.seen + self.half) % window * 2 * joints;
         tau.copy_from_slice(&self.ring[middle + joints..middle + 2 * joints]);
         Ok(Some(&self.now))
+    }
+
+    /// The state, for storage.
+    pub fn state(&self) -> DerivativesState {
+        DerivativesState { ring: self.ring.clone(), times: self.times.clone(), seen: self.seen }
+    }
+
+    /// Continues from a stored state.
+    ///
+    /// # Errors
+    /// A state of other joints or of another window.
+    pub fn restore(&mut self, state: DerivativesState) -> Result<(), OnlineError> {
+        check("stored samples", &state.ring, self.ring.len())?;
+        check("stored times", &state.times, self.times.len())?;
+        let DerivativesState { ring, times, seen } = state;
+        (self.ring, self.times, self.seen) = (ring, times, seen);
+        Ok(())
     }
 
     /// Removes all samples: the next sample starts a new recording.
@@ -116,4 +197,96 @@ fn weights(half: usize, rate_hz: f64) -> [Vec<f64>; 3] {
         places.iter().map(|i| rate_hz * (s6 * i - s4 * i.powi(3)) / odd).collect(),
         places.iter().map(|i| 2.0 * rate_hz * rate_hz * (s0 * i * i - s2) / even).collect(),
     ]
+}
+
+/// Weights of the least-squares cubic at the places in `weights[0]`, divided by `half`, in place: value, slope and
+/// curvature at zero. Returns false if the places do not determine a cubic.
+fn uneven_weights(weights: &mut [Vec<f64>; 3], half: usize, rate_hz: f64) -> bool {
+    let mut sums = [0.0; 7];
+    for place in &weights[0] {
+        let mut power = 1.0;
+        for sum in &mut sums {
+            *sum += power;
+            power *= place;
+        }
+    }
+    let normal = Matrix4::from_fn(|row, column| sums[row + column]);
+    let Some(inverse) = normal.cholesky().map(|lower| lower.inverse()) else { return false };
+    if inverse.diagonal().iter().any(|entry| !(0.0..1e6).contains(entry)) {
+        return false;
+    }
+    let [values, slopes, curvatures] = weights;
+    let per_s = rate_hz / half as f64;
+    for ((value, slope), curvature) in values.iter_mut().zip(slopes).zip(curvatures) {
+        let place = *value;
+        let powers = Vector4::new(1.0, place, place * place, place * place * place);
+        *value = inverse.row(0).transpose().dot(&powers);
+        *slope = per_s * inverse.row(1).transpose().dot(&powers);
+        *curvature = 2.0 * per_s * per_s * inverse.row(2).transpose().dot(&powers);
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cubic of each joint and its derivatives.
+    fn cubic(t: f64) -> ([f64; 2], [f64; 2], [f64; 2]) {
+        let of = |c: [f64; 4]| {
+            let q = c[0] + t * (c[1] + t * (c[2] + t * c[3]));
+            (q, c[1] + t * (2.0 * c[2] + t * 3.0 * c[3]), 2.0 * c[2] + 6.0 * c[3] * t)
+        };
+        let (a, b) = (of([0.3, -1.0, 2.0, 0.5]), of([-1.0, 0.2, -0.4, 3.0]));
+        ([a.0, b.0], [a.1, b.1], [a.2, b.2])
+    }
+
+    #[test]
+    fn lost_samples_do_not_change_the_derivatives_of_a_cubic() {
+        let (rate_hz, half) = (125.0, 10);
+        let mut window = DelayedDerivatives::new(2, rate_hz, half).unwrap();
+        let mut stamps: Vec<f64> = (0..200).map(|k| f64::from(k) / rate_hz).collect();
+        // One lost sample, three lost samples, a late one and its early successor, and a pause of 0.4 s.
+        stamps.remove(40);
+        stamps.drain(80..83);
+        stamps[120] += 0.5 / rate_hz;
+        stamps.iter_mut().skip(150).for_each(|stamp| *stamp += 0.4);
+        let (mut last, mut results, mut silent) = (-1.0 / rate_hz, 0, 0);
+        for (place, &stamp) in stamps.iter().enumerate() {
+            let (q, _, _) = cubic(stamp);
+            let found = window.add_at(stamp - last, &q, &[0.0, place as f64]).unwrap();
+            last = stamp;
+            let Some(found) = found else {
+                silent += usize::from(place >= 2 * half);
+                continue;
+            };
+            results += 1;
+            let middle = stamps[place - half];
+            assert_eq!(found.tau[1], (place - half) as f64);
+            let (q, dq, ddq) = cubic(middle);
+            for joint in 0..2 {
+                // Rounding of the weights, which divide by the square of the period.
+                assert!((found.q[joint] - q[joint]).abs() < 1e-11, "{place}");
+                assert!((found.dq[joint] - dq[joint]).abs() < 1e-9, "{place}");
+                assert!((found.ddq[joint] - ddq[joint]).abs() < 1e-7, "{place}: {:?} {ddq:?}", found.ddq);
+            }
+        }
+        // The pause is in the window of 20 samples.
+        assert_eq!((results, silent), (stamps.len() - 20 - 20, 20));
+    }
+
+    #[test]
+    fn jitter_of_the_stamps_is_ignored() {
+        let (mut even, mut jittered) =
+            (DelayedDerivatives::new(1, 500.0, 5).unwrap(), DelayedDerivatives::new(1, 500.0, 5).unwrap());
+        for sample in 0..40 {
+            let q = [(0.05 * f64::from(sample)).sin()];
+            let step_s = (1.0 + 0.2 * f64::from(sample % 3 - 1)) / 500.0;
+            let expected = even.add(&q, &[1.0]).unwrap().cloned();
+            assert_eq!(jittered.add_at(step_s, &q, &[1.0]).unwrap().cloned(), expected);
+        }
+        for step_s in [0.0, -0.1, f64::NAN] {
+            assert!(even.add_at(step_s, &[0.0], &[0.0]).is_err());
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use crate::error::{OnlineError, check, check_positive};
 use crate::estimator::{OnlineEstimator, StartingPoint};
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// Settings of drift detection.
@@ -59,7 +60,7 @@ impl DriftSettings {
 }
 
 /// Result of a check.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriftAlarm {
     /// Distance between estimate and reference in the metric of both covariances, divided by its mean without drift.
     pub statistic: f64,
@@ -100,6 +101,21 @@ impl DriftMonitor {
         check("values of the reference", &reference.values, columns)?;
         check("covariance of the reference", reference.covariance.as_slice(), columns * columns)?;
         Ok(Self { settings, reference, learned: Vec::new() })
+    }
+
+    /// The statistics of the learned checks, for storage.
+    pub fn statistics(&self) -> &[f64] {
+        &self.learned
+    }
+
+    /// Continues from stored [`statistics`](Self::statistics).
+    ///
+    /// # Errors
+    /// Statistics that are not positive.
+    pub fn restore(&mut self, statistics: Vec<f64>) -> Result<(), OnlineError> {
+        check_positive("a stored statistic", &statistics)?;
+        self.learned = statistics;
+        Ok(())
     }
 
     /// Number of learned checks.

@@ -6,8 +6,9 @@ use dynident_estimation::consistent::PhysicalFit;
 use dynident_estimation::{LinearProblem, RecursiveFactor, SegmentSettings, SegmentedFactor, TriangularFactor};
 use dynident_identification::RegressorModel;
 use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
-use dynident_model::terms::JointMotion;
+use dynident_model::terms::{HysteresisState, JointMotion};
 use nalgebra::{Cholesky, DMatrix};
+use serde::{Deserialize, Serialize};
 
 /// Weight above which all rows are rescaled, to prevent an overflow of its square.
 const MAX_GROWTH: f64 = 1e30;
@@ -76,6 +77,17 @@ pub struct OnlineEstimator {
     workspace: Workspace,
     history: TermHistory,
     panels: Panels,
+}
+
+/// State of an [`OnlineEstimator`], for storage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EstimatorState {
+    /// Entries of the factor, and its samples.
+    factor: Vec<f64>,
+    factor_samples: usize,
+    growth: f64,
+    samples: u64,
+    memories: Vec<HysteresisState>,
 }
 
 impl OnlineEstimator {
@@ -153,6 +165,35 @@ impl OnlineEstimator {
         let motion = JointMotion { samples: 1, q, dq, ddq };
         let (model, layout) = (self.model.model(), self.model.layout());
         regressor_panels_of_sample(model, &mut self.workspace, layout, &motion, &mut self.history, &mut self.panels);
+    }
+
+    /// The state, for storage.
+    pub fn state(&self) -> EstimatorState {
+        EstimatorState {
+            factor: self.factor.entries(),
+            factor_samples: self.factor.samples(),
+            growth: self.growth,
+            samples: self.samples,
+            memories: self.history.memories().to_vec(),
+        }
+    }
+
+    /// Continues from a stored state of an estimator with the same model and settings.
+    ///
+    /// # Errors
+    /// A state of another model, or values that are not finite.
+    pub fn restore(&mut self, state: EstimatorState) -> Result<(), OnlineError> {
+        let EstimatorState { factor, factor_samples, growth, samples, memories } = state;
+        check("stored factor", &factor, factor.len())?;
+        check_positive("stored growth", &[growth])?;
+        let known = self.history.memories().len();
+        if memories.len() != known {
+            return Err(OnlineError::Length { what: "stored memories", expected: known, found: memories.len() });
+        }
+        self.factor.restore(&factor, factor_samples)?;
+        self.history.set_memories(memories);
+        (self.growth, self.samples) = (growth, samples);
+        Ok(())
     }
 
     /// The next sample starts a new motion: friction with memory is reset.

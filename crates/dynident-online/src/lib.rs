@@ -21,9 +21,9 @@ mod error;
 mod estimator;
 mod watch;
 
-pub use contact::{Contact, ContactMonitor, ContactSettings, Residuals, TimeScale};
-pub use derivatives::{DelayedDerivatives, DelayedSample};
+pub use contact::{Contact, ContactMonitor, ContactSettings, ContactState, Residuals, TimeScale};
+pub use derivatives::{DelayedDerivatives, DelayedSample, DerivativesState};
 pub use drift::{DriftAlarm, DriftMonitor, DriftSettings};
 pub use error::OnlineError;
-pub use estimator::{OnlineEstimator, OnlineSettings, StartingPoint};
-pub use watch::{Watch, WatchSettings};
+pub use estimator::{EstimatorState, OnlineEstimator, OnlineSettings, StartingPoint};
+pub use watch::{Watch, WatchSettings, WatchState};

@@ -1,11 +1,12 @@
 //! Complete monitoring of one robot, from measurements to alarms.
 
-use crate::contact::{Contact, ContactMonitor, ContactSettings, Residuals};
-use crate::derivatives::{DelayedDerivatives, DelayedSample};
+use crate::contact::{Contact, ContactMonitor, ContactSettings, ContactState, Residuals};
+use crate::derivatives::{DelayedDerivatives, DelayedSample, DerivativesState};
 use crate::drift::{DriftAlarm, DriftMonitor, DriftSettings};
-use crate::error::{OnlineError, check_positive};
-use crate::estimator::{OnlineEstimator, OnlineSettings, StartingPoint};
+use crate::error::{OnlineError, check, check_positive};
+use crate::estimator::{EstimatorState, OnlineEstimator, OnlineSettings, StartingPoint};
 use dynident_identification::RegressorModel;
+use serde::{Deserialize, Serialize};
 
 /// Settings of the monitoring.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,6 +87,17 @@ pub struct Watch {
     residuals: Vec<f64>,
 }
 
+/// State of a [`Watch`], for storage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WatchState {
+    estimator: EstimatorState,
+    contact: ContactState,
+    drift: Vec<f64>,
+    derivatives: DerivativesState,
+    next_check: u64,
+    residuals: Vec<f64>,
+}
+
 impl Watch {
     /// Monitoring with a model: `reference` is the estimate of its base parameters with covariance, `std_nm` the
     /// standard deviation of each joint's residual. Contact thresholds are those of [`ContactMonitor::from_band`] until
@@ -161,6 +173,52 @@ impl Watch {
         let Self { derivatives, estimator, reference, residuals, contact, .. } = self;
         let Some(DelayedSample { q, dq, ddq, tau }) = derivatives.add(q, tau)? else { return Ok(None) };
         add_sample(estimator, reference, residuals, contact, [q, dq, ddq, tau])
+    }
+
+    /// As [`add_measured`](Self::add_measured), for a sample that was measured `step_s` after the previous one by the
+    /// robot's clock, s, so that lost samples are not a contact. After a long pause there is no result until its
+    /// samples have left the window, and friction with memory is reset.
+    ///
+    /// # Errors
+    /// As [`add`](Self::add), and a step that is not positive.
+    pub fn add_measured_at(&mut self, step_s: f64, q: &[f64], tau: &[f64]) -> Result<Option<Contact>, OnlineError> {
+        let Self { derivatives, estimator, reference, residuals, contact, contact_settings, .. } = self;
+        let pause = step_s * contact_settings.rate_hz > derivatives.delay_samples() as f64;
+        let found = derivatives.add_at(step_s, q, tau)?;
+        if pause {
+            estimator.restart();
+        }
+        let Some(DelayedSample { q, dq, ddq, tau }) = found else { return Ok(None) };
+        add_sample(estimator, reference, residuals, contact, [q, dq, ddq, tau])
+    }
+
+    /// The state, for storage: [`restore`](Self::restore) continues from it with the same results, bit by bit.
+    pub fn state(&self) -> WatchState {
+        WatchState {
+            estimator: self.estimator.state(),
+            contact: self.contact.state(),
+            drift: self.drift.as_ref().map(|drift| drift.statistics().to_vec()).unwrap_or_default(),
+            derivatives: self.derivatives.state(),
+            next_check: self.next_check,
+            residuals: self.residuals.clone(),
+        }
+    }
+
+    /// Continues from a stored state of a watch with the same model and settings.
+    ///
+    /// # Errors
+    /// A state of another model or other settings.
+    pub fn restore(&mut self, state: WatchState) -> Result<(), OnlineError> {
+        let WatchState { estimator, contact, drift, derivatives, next_check, residuals } = state;
+        check("stored residuals", &residuals, self.residuals.len())?;
+        self.estimator.restore(estimator)?;
+        self.contact.restore(contact)?;
+        self.derivatives.restore(derivatives)?;
+        if let Some(own) = &mut self.drift {
+            own.restore(drift)?;
+        }
+        (self.next_check, self.residuals) = (next_check, residuals);
+        Ok(())
     }
 
     /// Whether [`check_drift`](Self::check_drift) is due.

@@ -44,6 +44,19 @@ impl<'py> Samples<'py> {
         }
     }
 
+    /// The values of an array-like object with `count` entries, in any shape.
+    pub(crate) fn values(object: &Bound<'py, PyAny>, name: &str, count: usize) -> PyResult<Vec<f64>> {
+        let settings = PyDict::new(object.py());
+        settings.set_item("dtype", "float64")?;
+        let made = object.py().import("numpy")?.call_method("asarray", (object,), Some(&settings))?;
+        let made = made.call_method1("reshape", (-1,))?;
+        let values: Vec<f64> = made.extract()?;
+        if values.len() == count {
+            return Ok(values);
+        }
+        Err(PyValueError::new_err(format!("{name} has {} values for {count} samples: give one for each", values.len())))
+    }
+
     /// Checks that the leading axes equal those of another array.
     pub(crate) fn like(self, other: &Self, name: &str) -> PyResult<Self> {
         if self.lead == other.lead {
@@ -55,6 +68,14 @@ impl<'py> Samples<'py> {
 
     pub(crate) fn lead(&self) -> &[usize] {
         &self.lead
+    }
+
+    /// The values of one sample.
+    pub(crate) fn one(&self, name: &str) -> PyResult<Cow<'_, [f64]>> {
+        if self.lead.is_empty() {
+            return Ok(self.numbers());
+        }
+        Err(PyValueError::new_err(format!("{name} has {} samples: give one", self.count())))
     }
 
     pub(crate) fn count(&self) -> usize {

@@ -287,6 +287,11 @@ impl MotionFunction for Trajectory {
 /// They are the triangular factors of all rows of the logs, one block per joint: for every ``theta`` the sum of squares
 /// ``‖tau - W theta‖²`` and the gradient ``Wᵀ (tau - W theta)`` of a joint's block equal those of all its samples.
 /// Columns that the logs do not excite are omitted.
+///
+/// >>> import numpy as np
+/// >>> def ridge(rows):
+/// ...     W, tau = rows.W, rows.tau
+/// ...     return np.linalg.solve(W.T @ W + 1e-6 * np.eye(W.shape[1]), W.T @ tau)
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct EstimatorRows(Rows);
 

@@ -17,6 +17,11 @@ use std::path::Path;
 ///
 /// Created by ``dynident.fleet.reduce``, combined by ``merged``, identified by ``dynident.fleet.identify``. The bytes
 /// are those of the file: versioned, with a hash at the end.
+///
+/// >>> import dynident
+/// >>> dynident.Factors.from_bytes(b"damaged")
+/// Traceback (most recent call last):
+/// dynident.ResultError: ...
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct Factors(dynident::Factors);
 

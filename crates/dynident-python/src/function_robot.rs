@@ -1,10 +1,10 @@
 //! A robot that is a Python function.
 
-use crate::arrays::{array, sample_major};
+use crate::arrays::{Samples, array, sample_major};
 use crate::errors::StopRun;
 use dynident::iteration::Robot;
-use dynident::iteration::robot::{ControlledRun, FunctionRobot};
-use numpy::{PyArrayDyn, PyReadonlyArray1};
+use dynident::iteration::robot::{ControlledRun, FunctionRobot, FunctionStop};
+use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex};
 
@@ -30,6 +30,12 @@ impl Raised {
 ///
 /// The function moves its robot to ``q[0]``. At every sample it calls ``torque`` with the measured state and applies
 /// the result; it returns after the last sample. It runs at ``rate_hz``.
+///
+/// >>> def robot(run):
+/// ...     driver.move_to(run.q[0])
+/// ...     for sample in range(run.samples):
+/// ...         time_s, q, dq = driver.state()
+/// ...         driver.apply(run.torque(time_s, q, dq))
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct Run {
     /// Borrowed while the function runs.
@@ -93,20 +99,28 @@ impl Run {
     }
 
     /// Drive torques for the next sample, Nm (N), shape ``(n,)``, given the measured state at ``time_s`` by the robot's
-    /// clock. Raises ``StopRun`` if the robot has to be stopped at once: do not catch it, or stop and return.
+    /// clock: ``q``, rad (m), and ``dq``, rad/s (m/s), as arrays or lists of n numbers. Raises ``StopRun`` with the
+    /// reason if the robot has to be stopped at once: do not catch it, or stop and return.
     fn torque<'py>(
         &self,
         py: Python<'py>,
         time_s: f64,
-        q: PyReadonlyArray1<'py, f64>,
-        dq: PyReadonlyArray1<'py, f64>,
+        q: &Bound<'py, PyAny>,
+        dq: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
-        let numbers = |values: &PyReadonlyArray1<'py, f64>| -> Vec<f64> { values.as_array().iter().copied().collect() };
-        let (q, dq) = (numbers(&q), numbers(&dq));
-        let over = || StopRun::new_err("the run is over: stop the robot");
-        let mut run = self.controlled.lock().map_err(|_| over())?;
-        let tau = run.as_mut().and_then(|run| run.torque(time_s, &q, &dq)).ok_or_else(over)?;
-        array(py, &[tau.len()], &[], tau.to_vec())
+        let numbers = |values: &Bound<'py, PyAny>, name: &str| -> PyResult<Vec<f64>> {
+            Ok(Samples::of(values, name, self.joints.len())?.one(name)?.to_vec())
+        };
+        let (q, dq) = (numbers(q, "q")?, numbers(dq, "dq")?);
+        let over = |reason: Option<String>| {
+            let reason = reason.unwrap_or_else(|| "the run is over".to_owned());
+            StopRun::new_err(format!("{reason}: stop the robot"))
+        };
+        let mut run = self.controlled.lock().map_err(|_| over(None))?;
+        let Some(run) = run.as_mut() else { return Err(over(None)) };
+        let tau = run.torque(time_s, &q, &dq).map(<[f64]>::to_vec);
+        let tau = tau.ok_or_else(|| over(run.end_reason()))?;
+        array(py, &[tau.len()], &[], tau)
     }
 
     fn __repr__(&self) -> String {
@@ -138,11 +152,15 @@ pub(crate) fn robot_of(function: &Arc<Py<PyAny>>, joints: &[String], raised: &Ra
             let run = run.unwrap_or_else(|| panic!("the borrowed run is returned"));
             let result = match outcome {
                 Ok(_) => Ok(()),
-                Err(error) if error.is_instance_of::<StopRun>(py) => Ok(()),
+                // Raised by `torque`, or by the function because the robot has stopped.
+                Err(error) if error.is_instance_of::<StopRun>(py) => {
+                    let reason = error.value(py).to_string();
+                    if run.end_reason().is_some() { Ok(()) } else { Err(FunctionStop::Robot { reason }) }
+                }
                 Err(error) => {
-                    let message = error.to_string();
+                    let reason = error.to_string();
                     raised.keep(Err(error));
-                    Err(message)
+                    Err(FunctionStop::Function { reason })
                 }
             };
             (run, result)

@@ -6,16 +6,19 @@ use crate::function_robot::{Raised, robot_of};
 use crate::jobs::{Watch, run, run_to_its_stop, threads as threads_or_all};
 use crate::model::{FittedModel, RESULT};
 use crate::robot::{Robot, described};
-use crate::study::Study;
+use crate::study::{Samples as StudySamples, Study, memory_log};
 use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{ExportError, Sampled, trajectory_csv};
+use dynident::identification::examination::{JointTrace, LogTrace};
 use dynident::iteration::{RobotRun, RunRecord, StopSignal};
+use dynident::recording::{LogReader, RawBlock, RecordingError};
 use dynident::result::StudyChange;
+use dynident::study::{LogSection, StudyLogSource};
 use dynident::{
     CorrectedDescription, Error, InspectSettings, IterationWatch, NewStudy, OutputSet, ProgramPermission, RunOptions,
     XacroSettings, check, design_study, identify, identify_servos, inspect_robot, iterate_study, iterate_with_robot,
-    log_contents, mended_robot, new_study, simulate_study, validate_result,
+    log_contents, mended_robot, new_study, simulate_study, validate_result, validation_traces,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -105,19 +108,53 @@ pub(crate) fn _validate(
     })
 }
 
+/// Torque of a log over time: its name, the rate, whether later rows are left out, measured and predicted torque.
+type TracedLog<'py> = (String, f64, bool, Array<'py>, Array<'py>);
+
+/// Measured and predicted torque over time of the logs that `_validate` uses, filtered as for its errors.
+#[pyfunction]
+#[pyo3(signature = (model, study, threads=None, progress=None))]
+pub(crate) fn _residuals<'py>(
+    model: &Bound<'py, FittedModel>,
+    study: &Bound<'py, Study>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Vec<TracedLog<'py>>> {
+    let result = model.get().result().clone();
+    let traces = of_study(study, threads, progress, move |study, path, options, _| {
+        validation_traces(&result, Path::new(RESULT), &study, &path, options)
+    })?;
+    let rows = |log: &LogTrace, of: fn(&JointTrace) -> &[f64]| {
+        let samples = log.joints.iter().map(|joint| of(joint).len()).min().unwrap_or(0);
+        let numbers: Vec<f64> =
+            (0..samples).flat_map(|row| log.joints.iter().map(move |joint| of(joint)[row])).collect();
+        array(study.py(), &[samples], &[log.joints.len()], numbers)
+    };
+    let one = |log: LogTrace| {
+        let measured = rows(&log, |joint| &joint.measured_nm)?;
+        let predicted = rows(&log, |joint| &joint.predicted_nm)?;
+        Ok((log.log, log.rate_hz, log.cut, measured, predicted))
+    };
+    traces.into_iter().map(one).collect()
+}
+
 /// A designed motion: JSON, the trajectory as CSV, its figure as SVG, the times, and position, velocity and
 /// acceleration.
 type Designed<'py> = (String, String, String, Array<'py>, [Array<'py>; 3]);
 
 #[pyfunction]
-#[pyo3(signature = (study, rate_hz=None, threads=None))]
+#[pyo3(signature = (study, rate_hz=None, threads=None, progress=None))]
 pub(crate) fn _design<'py>(
     study: &Bound<'py, Study>,
     rate_hz: Option<f64>,
     threads: Option<usize>,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Designed<'py>> {
-    let (file, csv, svg, times_s, motion) = of_study(study, threads, None, move |study, path, options, watch| {
-        let outcome = design_study(&study, &path, options, |_| unless(watch.is_cancelled()))?;
+    let (file, csv, svg, times_s, motion) = of_study(study, threads, progress, move |study, path, options, watch| {
+        let outcome = design_study(&study, &path, options, |now| {
+            watch.show(&format!("design: {}", now.round), now.evaluations);
+            unless(watch.is_cancelled())
+        })?;
         let (times_s, motion) = outcome.sampled(rate_hz.unwrap_or(outcome.file.rate_hz));
         let cannot = |error: ExportError| Error::Result { path: path.clone(), message: error.to_string() };
         let sampled = Sampled { joints: &outcome.file.joints, times_s: &times_s, motion: &motion };
@@ -143,7 +180,7 @@ pub(crate) fn _simulate(study: &Bound<'_, Study>, threads: Option<usize>) -> PyR
 /// Iterates with a study's robot, or with a function instead of it, into the folder `out`: JSON. `heard` is called
 /// after every run with its number and its largest tracking error, rad (m).
 #[pyfunction]
-#[pyo3(signature = (study, out, robot=None, resume=false, allow_command=false, threads=None, heard=None))]
+#[pyo3(signature = (study, out, robot=None, resume=false, allow_command=false, threads=None, heard=None, progress=None))]
 #[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub(crate) fn _iterate(
     py: Python<'_>,
@@ -154,15 +191,20 @@ pub(crate) fn _iterate(
     allow_command: bool,
     threads: Option<usize>,
     heard: Option<Py<PyAny>>,
+    progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<String> {
     let (study, path) = study.get().owned();
     let threads = threads_or_all(threads);
     let (stop, raised) = (StopSignal::default(), Raised::default());
     let (asked, kept) = (stop.clone(), raised.clone());
-    let found = run_to_its_stop(py, threads, &stop, move |watch| {
+    let found = run_to_its_stop(py, threads, progress, &stop, move |watch| {
         let options = RunOptions { data: None, threads, progress: watch };
-        let design = |_: &DesignProgress| unless(asked.is_requested());
+        let design = |now: &DesignProgress| {
+            watch.show(&format!("design: {}", now.round), now.evaluations);
+            unless(asked.is_requested())
+        };
         let mut made = |record: &RunRecord, _: &[RobotRun]| {
+            watch.show(&format!("after run {}", record.run), record.run as u64);
             if let Some(heard) = &heard {
                 kept.keep(Python::attach(|py| {
                     heard
@@ -236,6 +278,59 @@ pub(crate) fn _new(
     run(py, threads, progress, move |watch| {
         json(&new_study(&request, &RunOptions { data: None, threads, progress: watch })?)
     })
+}
+
+/// Times, positions, torques, velocities and commands of a log in SI: `section` is its `[[log]]` as JSON, `joints` are
+/// the names of the robot's joints. Quantities that the log does not have are None; without time stamps the times are
+/// those of the stated rate.
+#[pyfunction]
+#[pyo3(signature = (section, samples, joints=None))]
+pub(crate) fn _log_arrays<'py>(
+    py: Python<'py>,
+    section: &str,
+    samples: Option<(String, StudySamples<'_>)>,
+    joints: Option<Vec<String>>,
+) -> PyResult<(Array<'py>, [Option<Array<'py>>; 4])> {
+    let wrong = |error: &dyn core::fmt::Display| errors::LogError::new_err(error.to_string());
+    let section: LogSection = serde_json::from_str(section).map_err(|error| wrong(&error))?;
+    let Some(format) = section.format_or(None) else { return Err(wrong(&"the log has no format")) };
+    let joints = match joints {
+        Some(joints) => joints,
+        None => {
+            let columns = format.position.column_list("position").map_err(|error| wrong(&error))?;
+            (1..=format.position.matrix.as_ref().map_or(columns.len(), Vec::len))
+                .map(|k| format!("joint {k}"))
+                .collect()
+        }
+    };
+    let source = match samples {
+        Some((label, table)) => StudyLogSource::Memory(memory_log(py, &label, table)?),
+        None => StudyLogSource::File(section.file),
+    };
+    let log = source.log(format, &joints);
+    let read = || -> Result<_, RecordingError> {
+        let (mut times_s, mut all): (Vec<f64>, [Vec<Vec<f64>>; 4]) = Default::default();
+        let mut reader = LogReader::open(&log)?;
+        let mut block = RawBlock::default();
+        while reader.next_block(&mut block)? {
+            times_s.extend_from_slice(&block.time_s);
+            for (all, own) in all.iter_mut().zip([&block.q, &block.tau, &block.dq, &block.command]) {
+                all.resize(own.len(), Vec::new());
+                all.iter_mut().zip(own).for_each(|(all, own)| all.extend_from_slice(own));
+            }
+        }
+        Ok((times_s, all))
+    };
+    let (times_s, all) = py.detach(read).map_err(|error| errors::log(py, &error))?;
+    let rows = |columns: Vec<Vec<f64>>| {
+        let (samples, joints) = (times_s.len(), columns.len());
+        (joints > 0)
+            .then(|| array(py, &[samples], &[joints], sample_major(&columns.concat(), samples, joints)))
+            .transpose()
+    };
+    let [q, tau, dq, command] = all;
+    let found = [rows(q)?, rows(tau)?, rows(dq)?, rows(command)?];
+    Ok((array(py, &[times_s.len()], &[], times_s)?, found))
 }
 
 /// Content of a recording: JSON.

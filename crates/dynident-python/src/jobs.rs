@@ -32,6 +32,16 @@ impl Watch {
         self.cancelled.load(Ordering::Relaxed)
     }
 
+    /// Shows a stage with an unknown total; `done` grows.
+    pub(crate) fn show(&self, stage: &str, done: u64) {
+        if let Ok(mut current) = self.stage.lock()
+            && current.as_ref().is_none_or(|(known, _)| known != stage)
+        {
+            *current = Some((stage.to_owned(), None));
+        }
+        self.done.store(done, Ordering::Relaxed);
+    }
+
     fn unwind_if_cancelled(&self) {
         if self.is_cancelled() {
             resume_unwind(Box::new(Cancelled));
@@ -61,8 +71,12 @@ impl Progress for Watch {
     }
 }
 
+/// Threads per processor beyond which more threads only cost time; results do not depend on their number.
+const MAX_THREADS_PER_PROCESSOR: usize = 4;
+
 pub(crate) fn threads(asked: Option<usize>) -> usize {
-    asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).max(1)
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    asked.unwrap_or(processors).clamp(1, MAX_THREADS_PER_PROCESSOR * processors)
 }
 
 /// Calls `job` on this thread. After Ctrl-C the function that it receives returns true, and the interruption is raised
@@ -89,10 +103,11 @@ pub(crate) fn interruptible<T, E: Into<Error>>(
 pub(crate) fn run_to_its_stop<T: Send + 'static>(
     py: Python<'_>,
     threads: usize,
+    progress: Option<&Bound<'_, PyAny>>,
     stop: &StopSignal,
     work: impl FnOnce(&Watch) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
-    waited_for(py, threads, None, Some(stop), work)
+    waited_for(py, threads, progress, Some(stop), work)
 }
 
 /// Runs `work` on a separate thread, with a pool of `threads` threads, while this one checks for Ctrl-C and calls

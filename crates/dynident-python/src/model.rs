@@ -5,11 +5,10 @@ use crate::callables::{Callables, guarded};
 use crate::errors;
 use crate::jobs;
 use crate::study::Study;
-use crate::watch::OnlineWatch;
+use crate::watch::{OnlineSettings, OnlineWatch};
 use dynident::export::{ControllerBrand, Target};
 use dynident::identification::examination::LogTrace;
 use dynident::model::terms::JointMotion;
-use dynident::online::WatchSettings;
 use dynident::{
     Error, Figure, IdentificationOutcome, IterationsFile, PrintStyle, ResultFile, RobotAppearance, RunOptions,
     TorquePredictor, export_payload_of, export_result, export_simulator_of, identification_report, validation_traces,
@@ -95,6 +94,18 @@ impl FittedModel {
         &self.result
     }
 
+    /// Creates an online monitor of the robot.
+    pub(crate) fn watched(
+        &self,
+        py: Python<'_>,
+        model: &Bound<'_, Self>,
+        settings: OnlineSettings,
+    ) -> PyResult<OnlineWatch> {
+        let watch = self.predictor(py)?.watch(&settings.of_watch());
+        let watch = watch.map_err(|error| errors::Error::new_err(error.to_string()))?;
+        Ok(OnlineWatch::new(watch, model.clone().unbind(), self.joint_names(), settings))
+    }
+
     fn predictor(&self, py: Python<'_>) -> PyResult<&TorquePredictor> {
         if self.predictor.get().is_none() {
             // Python functions may be called, so the interpreter lock is released.
@@ -177,6 +188,26 @@ impl FittedModel {
         self.result.joints.iter().map(|joint| joint.name.clone()).collect()
     }
 
+    /// Torque along a motion, shape ``(..., n)``.
+    #[pyo3(signature = (q, dq=None, ddq=None))]
+    fn torque<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        dq: Option<&Bound<'py, PyAny>>,
+        ddq: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        let predictor = self.predictor(py)?;
+        let dof = predictor.dof();
+        let motion = Motion::of(dof, q, dq, ddq)?;
+        let samples = motion.count();
+        let tau = motion.compute(py, 0, |numbers| {
+            let [q, dq, ddq] = numbers.map(|rows| joint_major(rows, samples, dof));
+            guarded(|| predictor.torque(&JointMotion { samples, q: &q, dq: &dq, ddq: &ddq }))
+        })?;
+        array(py, motion.lead(), &[dof], sample_major(&tau, samples, dof))
+    }
+
     /// Torque along a motion and half the width of its 95 % band, both of shape ``(..., n)``.
     #[pyo3(signature = (q, dq=None, ddq=None))]
     fn predict<'py>(
@@ -202,8 +233,7 @@ impl FittedModel {
     #[pyo3(signature = (rate_hz, forgetting_s=None, correlation_s=None, collision_s=None, payload_s=None, contact_alarms_per_hour=None, drift_alarms_per_hour=None, half_window=None))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn online(
-        &self,
-        py: Python<'_>,
+        slf: &Bound<'_, Self>,
         rate_hz: f64,
         forgetting_s: Option<f64>,
         correlation_s: Option<f64>,
@@ -213,18 +243,17 @@ impl FittedModel {
         drift_alarms_per_hour: Option<f64>,
         half_window: Option<usize>,
     ) -> PyResult<OnlineWatch> {
-        let mut settings = WatchSettings::new(rate_hz);
-        settings.half_life_s = forgetting_s;
-        let set = |value: &mut f64, given: Option<f64>| *value = given.unwrap_or(*value);
-        set(&mut settings.correlation_s, correlation_s);
-        set(&mut settings.contact.collision_s, collision_s);
-        set(&mut settings.contact.payload_s, payload_s);
-        set(&mut settings.contact.false_alarms_per_hour, contact_alarms_per_hour);
-        set(&mut settings.drift_alarms_per_hour, drift_alarms_per_hour);
-        settings.half_window = half_window.unwrap_or(settings.half_window);
-        let watch = self.predictor(py)?.watch(&settings);
-        let watch = watch.map_err(|error| errors::Error::new_err(error.to_string()))?;
-        Ok(OnlineWatch::new(watch, self.joint_names(), &settings))
+        let settings = OnlineSettings {
+            rate_hz,
+            forgetting_s,
+            correlation_s,
+            collision_s,
+            payload_s,
+            contact_alarms_per_hour,
+            drift_alarms_per_hour,
+            half_window,
+        };
+        slf.get().watched(slf.py(), slf, settings)
     }
 
     /// Exports the model in the format `target`: its text, and notes.

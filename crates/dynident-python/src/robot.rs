@@ -5,12 +5,13 @@ use crate::assembled::{assembled, json_of};
 use crate::callables::Callables;
 use crate::errors;
 use crate::jobs::interruptible;
+use crate::kinematics::{self, POSE_VALUES};
 use dynident::dynamics::{
     BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, Workspace, all_columns,
     forward_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, mass_matrix, regressor_panels,
 };
 use dynident::model::terms::JointMotion;
-use dynident::model::{DescriptionFormat, Model, Robot as Description, read_robot};
+use dynident::model::{DescriptionFormat, JointLimits, Model, Robot as Description, read_robot};
 use dynident::{Folders, LoadSettings, ProgramPermission, StudyRobot, XacroSettings, load_robot};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -36,6 +37,16 @@ type Matrices<'py> = (Array<'py>, Array<'py>, Array<'py>);
 ///
 /// Vectors over joints follow ``joint_names``; SI units, rad. All methods take one posture, shape ``(n,)``, or any
 /// number of them, shape ``(..., n)``, and return the same leading axes.
+///
+/// >>> import dynident, numpy as np
+/// >>> arm = dynident.Robot.load("robots/ur10.urdf")
+/// >>> arm.dof, arm.joint_names[0], arm.limits["upper"].shape
+/// (6, 'shoulder_pan_joint', (6,))
+/// >>> q = np.zeros((100, 6))
+/// >>> arm.inverse_dynamics(q, q, q).shape, arm.mass_matrix(q[0]).shape
+/// ((100, 6), (6, 6))
+/// >>> arm.forward_kinematics(q, "wrist_3_link").shape, arm.jacobian(q[0]).shape
+/// ((100, 4, 4), (6, 6))
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct Robot {
     description: Description,
@@ -69,7 +80,7 @@ impl Robot {
         let settings = settings.map_or_else(|| Ok("{}".to_owned()), |settings| json_of(py, settings))?;
         let text = source.to_string_lossy();
         let description = if is_text(&text) {
-            of_text(&text, wanted, name)?
+            of_text(py, &text, wanted, name)?
         } else {
             of_format(described(py, source, xacro_settings(source, &settings)?, false)?, wanted)?
         };
@@ -180,15 +191,16 @@ fn xacro_settings(path: &Path, settings: &str) -> PyResult<XacroSettings> {
 }
 
 /// Reads the text of a robot description of the format `wanted`.
-fn of_text(text: &str, wanted: DescriptionFormat, name: &str) -> PyResult<Description> {
-    of_format(read_robot(text.to_owned(), Path::new(name)).map_err(errors::robot)?, wanted)
+fn of_text(py: Python<'_>, text: &str, wanted: DescriptionFormat, name: &str) -> PyResult<Description> {
+    of_format(read_robot(text.to_owned(), Path::new(name)).map_err(|error| errors::robot(py, &error))?, wanted)
 }
 
 fn of_format(found: Description, wanted: DescriptionFormat) -> PyResult<Description> {
     if found.format == wanted {
         Ok(found)
     } else {
-        Err(errors::robot(format!("{}: is {:?}, not {wanted:?}: use Robot.load", found.path.display(), found.format)))
+        let (path, format) = (found.path.display(), found.format);
+        Err(errors::not_this_format(format!("{path}: is {format:?}, not {wanted:?}: use Robot.load")))
     }
 }
 
@@ -256,7 +268,7 @@ impl Robot {
     /// The inverse of ``__reduce__``.
     #[staticmethod]
     fn _restore(py: Python<'_>, text: String, path: PathBuf, settings: String) -> PyResult<Self> {
-        Self::with_settings(py, read_robot(text, &path).map_err(errors::robot)?, settings)
+        Self::with_settings(py, read_robot(text, &path).map_err(|error| errors::robot(py, &error))?, settings)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, PathBuf, String))> {
@@ -301,10 +313,74 @@ impl Robot {
         self.model.bodies().iter().map(|body| body.name().to_owned()).collect()
     }
 
-    /// Degrees of freedom.
+    /// Degrees of freedom; the same as ``dof``.
     #[getter]
     fn n(&self) -> usize {
         self.model.dof()
+    }
+
+    /// Degrees of freedom.
+    #[getter]
+    fn dof(&self) -> usize {
+        self.model.dof()
+    }
+
+    /// Names of all links, those of the base first. Several links may belong to one body.
+    #[getter]
+    fn link_names(&self) -> Vec<String> {
+        kinematics::link_names(&self.model)
+    }
+
+    /// Limits of the joints in the robot description, each of shape ``(n,)``: ``lower`` and ``upper``, rad (m),
+    /// ``velocity``, rad/s (m/s), and ``effort``, Nm (N). Infinite if the description states none.
+    #[getter]
+    fn limits<'py>(&self, py: Python<'py>) -> PyResult<BTreeMap<&'static str, Array<'py>>> {
+        let of = |value: fn(&JointLimits) -> Option<f64>, none: f64| {
+            let values = self.model.joints().iter().map(|joint| value(&joint.limits).unwrap_or(none)).collect();
+            array(py, &[self.model.dof()], &[], values)
+        };
+        Ok(BTreeMap::from([
+            ("lower", of(|limits| limits.lower, f64::NEG_INFINITY)?),
+            ("upper", of(|limits| limits.upper, f64::INFINITY)?),
+            ("velocity", of(|limits| limits.velocity, f64::INFINITY)?),
+            ("effort", of(|limits| limits.effort, f64::INFINITY)?),
+        ]))
+    }
+
+    /// Pose of a link in the base frame as homogeneous matrices, shape ``(..., 4, 4)``, for positions ``(..., n)``. By
+    /// default the last link of ``link_names``.
+    #[pyo3(signature = (q, link=None))]
+    fn forward_kinematics<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        link: Option<&str>,
+    ) -> PyResult<Array<'py>> {
+        let (dof, link) = (self.model.dof(), kinematics::link(&self.model, link)?);
+        Motion::of(dof, q, None, None)?.fill(py, &[4, 4], |[q, ..], out| {
+            self.for_each(out, POSE_VALUES, |workspace, row, out| {
+                kinematics::pose(&self.model, workspace, &link, &q[row * dof..(row + 1) * dof], out);
+            });
+        })
+    }
+
+    /// Jacobian of a point of a link in the base frame, shape ``(..., 6, n)``: rows 0 to 2 give the linear velocity of
+    /// the point, rows 3 to 5 the angular velocity of the link, for ``dq``. ``point`` is in the frame of the link, m;
+    /// by default its origin. By default the last link of ``link_names``.
+    #[pyo3(signature = (q, link=None, point=[0.0; 3]))]
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        link: Option<&str>,
+        point: [f64; 3],
+    ) -> PyResult<Array<'py>> {
+        let (dof, link) = (self.model.dof(), kinematics::link(&self.model, link)?);
+        Motion::of(dof, q, None, None)?.fill(py, &[6, dof], |[q, ..], out| {
+            self.for_each(out, 6 * dof, |workspace, row, out| {
+                kinematics::jacobian(&self.model, workspace, (&link, point), &q[row * dof..(row + 1) * dof], out);
+            });
+        })
     }
 
     /// Ten inertial parameters of each body in its frame, shape ``(bodies, 10)``: ``m, mx, my, mz, Ixx, Ixy, Ixz, Iyy,

@@ -15,13 +15,17 @@ use pyo3::types::{PyDict, PyTuple};
 use std::path::{Path, PathBuf};
 
 /// Samples of one log: names of the columns, and the columns.
-type Samples<'py> = (Vec<String>, Vec<PyReadonlyArray1<'py, f64>>);
+pub(crate) type Samples<'py> = (Vec<String>, Vec<PyReadonlyArray1<'py, f64>>);
 
 type Columns<'py> = (Vec<String>, Vec<Bound<'py, PyArrayDyn<f64>>>);
 
 /// A study: robot, drives, logs and settings, as ``[robot]``, ``[drive]``, ``[[log]]`` and so on of a study file.
 ///
 /// Read with ``Study.load(path)`` or ``Study.parse(text)``, or created from objects with ``dynident.study(...)``.
+///
+/// >>> import dynident
+/// >>> dynident.Study.load("examples/ur10_simulated.toml").log_names
+/// ['train', 'test']
 #[pyclass(frozen, module = "dynident")]
 #[allow(clippy::struct_field_names, reason = "the wrapped study")]
 pub(crate) struct Study {
@@ -82,7 +86,7 @@ impl Study {
     ) -> PyResult<Self> {
         let description = robot.map(|robot| robot.get().description().clone());
         let callables = Callables::of(functions);
-        let study = assembled(py, sections, &path, description, tables(samples)?, &callables)?;
+        let study = assembled(py, sections, &path, description, tables(py, samples)?, &callables)?;
         Ok(Self { study, path, callables })
     }
 
@@ -97,9 +101,10 @@ impl Study {
         samples: Vec<Option<(String, Samples<'_>)>>,
         functions: Option<Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let robot = description.map(|(text, path)| read_robot(text, &path)).transpose().map_err(errors::robot)?;
+        let robot = description.map(|(text, path)| read_robot(text, &path)).transpose();
+        let robot = robot.map_err(|error| errors::robot(py, &error))?;
         let callables = Callables::of(functions);
-        Ok(Self { study: assembled(py, sections, &path, robot, tables(samples)?, &callables)?, path, callables })
+        Ok(Self { study: assembled(py, sections, &path, robot, tables(py, samples)?, &callables)?, path, callables })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
@@ -141,7 +146,7 @@ impl Study {
         samples: Vec<Option<(String, Samples<'_>)>>,
     ) -> PyResult<Self> {
         let robot = self.study.robot.description.as_deref().cloned();
-        let study = assembled(py, sections, &self.path, robot, tables(samples)?, &self.callables)?;
+        let study = assembled(py, sections, &self.path, robot, tables(py, samples)?, &self.callables)?;
         Ok(Self { study, path: self.path.clone(), callables: self.callables.clone() })
     }
 
@@ -179,12 +184,12 @@ impl Study {
     }
 }
 
-fn tables(samples: Vec<Option<(String, Samples<'_>)>>) -> PyResult<Vec<Option<MemoryLog>>> {
-    samples.into_iter().map(|table| table.map(|(label, table)| memory_log(&label, table)).transpose()).collect()
+fn tables(py: Python<'_>, samples: Vec<Option<(String, Samples<'_>)>>) -> PyResult<Vec<Option<MemoryLog>>> {
+    samples.into_iter().map(|table| table.map(|(label, table)| memory_log(py, &label, table)).transpose()).collect()
 }
 
 /// A table of columns. Each is copied once, because a job runs in parallel to the owner of the arrays.
-fn memory_log(label: &str, (names, columns): Samples<'_>) -> PyResult<MemoryLog> {
+pub(crate) fn memory_log(py: Python<'_>, label: &str, (names, columns): Samples<'_>) -> PyResult<MemoryLog> {
     let columns = columns
         .iter()
         .map(|column| match column.as_slice() {
@@ -192,7 +197,7 @@ fn memory_log(label: &str, (names, columns): Samples<'_>) -> PyResult<MemoryLog>
             Err(_) => column.as_array().iter().copied().collect(),
         })
         .collect();
-    MemoryLog::columns(label, Some(names), columns).map_err(errors::log)
+    MemoryLog::columns(label, Some(names), columns).map_err(|error| errors::log(py, &error))
 }
 
 fn columns<'py>(py: Python<'py>, table: &MemoryLog) -> PyResult<(String, Columns<'py>)> {

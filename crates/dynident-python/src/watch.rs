@@ -3,12 +3,15 @@
 use crate::arrays::{Samples, array};
 use crate::callables::guarded;
 use crate::errors::Error;
+use crate::model::FittedModel;
 use dynident::identification::consistent::ConsistencySettings;
 use dynident::model::terms::TorqueTerm;
-use dynident::online::{Contact, DriftAlarm, OnlineError, Residuals, TimeScale, Watch, WatchSettings};
+use dynident::online::{Contact, DriftAlarm, OnlineError, Residuals, TimeScale, Watch, WatchSettings, WatchState};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
@@ -20,44 +23,137 @@ fn raised(error: OnlineError) -> PyErr {
 /// Online monitor of a robot, created by ``Model.online``.
 ///
 /// ``update`` takes one sample or an array of samples; detected events are in ``alarms``. Without velocities and
-/// accelerations these are computed from the positions, and results are delayed by ``delay_s``.
+/// accelerations these are computed from the positions, and results are delayed by ``delay_s``. Give ``time_s`` if
+/// samples may be lost: otherwise a lost sample looks like a jump of the acceleration. A pickled monitor continues
+/// with the same results.
+///
+/// >>> import dynident
+/// >>> given = dynident.example()
+/// >>> model = dynident.identify(given.robot, given.logs)
+/// >>> watch, test = model.online(rate_hz=125.0), given.logs[1]
+/// >>> for t, q, tau in zip(test.time_s, test.q, test.tau):
+/// ...     for alarm in watch.update(q, tau, time_s=t):
+/// ...         print(alarm["kind"])
+/// >>> watch.contact is None
+/// True
 #[pyclass(frozen, module = "dynident", name = "Watch")]
 pub(crate) struct OnlineWatch {
     own: Mutex<Watched>,
+    model: Py<FittedModel>,
+    settings: OnlineSettings,
     joints: Vec<String>,
     parameters: Vec<String>,
-    rate_hz: f64,
+}
+
+/// The settings of ``Model.online``; missing ones have their defaults.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct OnlineSettings {
+    pub(crate) rate_hz: f64,
+    pub(crate) forgetting_s: Option<f64>,
+    pub(crate) correlation_s: Option<f64>,
+    pub(crate) collision_s: Option<f64>,
+    pub(crate) payload_s: Option<f64>,
+    pub(crate) contact_alarms_per_hour: Option<f64>,
+    pub(crate) drift_alarms_per_hour: Option<f64>,
+    pub(crate) half_window: Option<usize>,
+}
+
+impl OnlineSettings {
+    pub(crate) fn of_watch(&self) -> WatchSettings {
+        let mut settings = WatchSettings::new(self.rate_hz);
+        settings.half_life_s = self.forgetting_s;
+        let set = |value: &mut f64, given: Option<f64>| *value = given.unwrap_or(*value);
+        set(&mut settings.correlation_s, self.correlation_s);
+        set(&mut settings.contact.collision_s, self.collision_s);
+        set(&mut settings.contact.payload_s, self.payload_s);
+        set(&mut settings.contact.false_alarms_per_hour, self.contact_alarms_per_hour);
+        set(&mut settings.drift_alarms_per_hour, self.drift_alarms_per_hour);
+        settings.half_window = self.half_window.unwrap_or(settings.half_window);
+        settings
+    }
+}
+
+/// A monitor in storage.
+#[derive(Serialize, Deserialize)]
+struct StoredWatch {
+    settings: OnlineSettings,
+    watch: WatchState,
+    progress: Progress,
 }
 
 struct Watched {
     watch: Watch,
-    /// Whether the samples include derivatives; `None` before the first sample.
-    with_derivatives: Option<bool>,
+    progress: Progress,
+}
+
+/// What the samples contain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Given {
+    derivatives: bool,
+    times: bool,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Progress {
+    /// `None` before the first sample.
+    given: Option<Given>,
     samples: u64,
+    /// The newest time stamps, as many as the results are delayed, and the newest one.
+    times_s: VecDeque<f64>,
     now: Option<Contact>,
     drift: Option<DriftAlarm>,
     alarms: Vec<Alarm>,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Alarm {
     time_s: f64,
     what: What,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 enum What {
     Contact(Contact),
     Drift(DriftAlarm),
 }
 
+/// Samples of a call: positions, torques, and what else is given.
+struct Arrays<'a, 'py> {
+    measured: [&'a Bound<'py, PyAny>; 2],
+    derivatives: Option<[&'a Bound<'py, PyAny>; 2]>,
+    times_s: Option<&'a Bound<'py, PyAny>>,
+}
+
+impl<'a, 'py> Arrays<'a, 'py> {
+    fn of(
+        [q, tau]: [&'a Bound<'py, PyAny>; 2],
+        [dq, ddq]: [Option<&'a Bound<'py, PyAny>>; 2],
+        times_s: Option<&'a Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        let derivatives = match (dq, ddq) {
+            (Some(dq), Some(ddq)) => Some([dq, ddq]),
+            (None, None) => None,
+            _ => return Err(Error::new_err("dq and ddq: give both or none")),
+        };
+        Ok(Self { measured: [q, tau], derivatives, times_s })
+    }
+}
+
+/// A processed sample.
+struct Seen {
+    /// Whether it gave a result; there is none before the first window is full, and during a pause.
+    has_result: bool,
+    contact: Option<Contact>,
+    /// Time of the result, s.
+    time_s: f64,
+}
+
 impl OnlineWatch {
     /// Creates a monitor with the names for its alarms.
-    pub(crate) fn new(watch: Watch, joints: Vec<String>, settings: &WatchSettings) -> Self {
+    pub(crate) fn new(watch: Watch, model: Py<FittedModel>, joints: Vec<String>, settings: OnlineSettings) -> Self {
         let parameters = watch.estimator().model().base().expressions();
-        let rate_hz = settings.contact.rate_hz;
-        let own = Watched { watch, with_derivatives: None, samples: 0, now: None, drift: None, alarms: Vec::new() };
-        Self { own: Mutex::new(own), joints, parameters, rate_hz }
+        let own = Mutex::new(Watched { watch, progress: Progress::default() });
+        Self { own, model, settings, joints, parameters }
     }
 
     fn own(&self) -> MutexGuard<'_, Watched> {
@@ -68,37 +164,65 @@ impl OnlineWatch {
     fn run(
         &self,
         py: Python<'_>,
-        arrays: [&Bound<'_, PyAny>; 2],
-        derivatives: Option<[&Bound<'_, PyAny>; 2]>,
-        mut look: impl FnMut(&mut Watched, Option<Contact>) -> Result<(), OnlineError> + Send,
+        arrays: &Arrays<'_, '_>,
+        mut look: impl FnMut(&mut Watched, Seen) -> Result<(), OnlineError> + Send,
     ) -> PyResult<()> {
         let dof = self.joints.len();
-        let q = Samples::of(arrays[0], "q", dof)?;
-        let tau = Samples::of(arrays[1], "tau", dof)?.like(&q, "tau")?;
-        let derivatives = match derivatives {
+        let q = Samples::of(arrays.measured[0], "q", dof)?;
+        let tau = Samples::of(arrays.measured[1], "tau", dof)?.like(&q, "tau")?;
+        let derivatives = match arrays.derivatives {
             Some([dq, ddq]) => {
                 Some([Samples::of(dq, "dq", dof)?.like(&q, "dq")?, Samples::of(ddq, "ddq", dof)?.like(&q, "ddq")?])
             }
             None => None,
         };
+        let times_s = arrays.times_s.map(|times| Samples::values(times, "time_s", q.count())).transpose()?;
         let (q, tau) = (q.numbers(), tau.numbers());
         let derivatives = derivatives.as_ref().map(|both| both.each_ref().map(Samples::numbers));
         let (q, tau): (&[f64], &[f64]) = (&q, &tau);
         let derivatives = derivatives.as_ref().map(|[dq, ddq]| (&**dq, &**ddq));
+        let rate_hz = self.settings.rate_hz;
         let work = move || {
             let mut own = self.own();
-            if *own.with_derivatives.get_or_insert(derivatives.is_some()) != derivatives.is_some() {
+            let given = Given { derivatives: derivatives.is_some(), times: times_s.is_some() };
+            let known = *own.progress.given.get_or_insert(given);
+            if known.derivatives != given.derivatives {
                 return Err(Mixed::Derivatives);
             }
-            for at in (0..q.len()).step_by(dof.max(1)) {
+            if known.times != given.times {
+                return Err(Mixed::Times);
+            }
+            let delay = if given.derivatives { 0 } else { own.watch.delay_samples() };
+            for (sample, at) in (0..q.len()).step_by(dof.max(1)).enumerate() {
                 let row = at..at + dof;
                 let (q, tau) = (&q[row.clone()], &tau[row.clone()]);
+                let (before, last_s) = (own.watch.estimator().samples(), own.progress.times_s.back().copied());
+                let stamp_s = times_s.as_ref().map(|times| times[sample]);
+                let step_s = match (stamp_s, last_s) {
+                    (Some(time_s), _) if !time_s.is_finite() => return Err(Mixed::Time { time_s, last_s }),
+                    (Some(time_s), Some(last)) if time_s <= last => return Err(Mixed::Time { time_s, last_s }),
+                    (Some(time_s), Some(last)) => time_s - last,
+                    _ => 1.0 / rate_hz,
+                };
                 let contact = match derivatives {
                     Some((dq, ddq)) => own.watch.add(q, &dq[row.clone()], &ddq[row], tau)?,
+                    None if stamp_s.is_some() => own.watch.add_measured_at(step_s, q, tau)?,
                     None => own.watch.add_measured(q, tau)?,
                 };
-                own.samples += 1;
-                look(&mut own, contact)?;
+                let has_result = own.watch.estimator().samples() > before;
+                let progress = &mut own.progress;
+                progress.samples += 1;
+                let time_s = match stamp_s {
+                    Some(time_s) => {
+                        progress.times_s.push_back(time_s);
+                        if progress.times_s.len() > delay + 1 {
+                            progress.times_s.pop_front();
+                        }
+                        progress.times_s[0]
+                    }
+                    None => (progress.samples - 1).saturating_sub(delay as u64) as f64 / rate_hz,
+                };
+                look(&mut own, Seen { has_result, contact, time_s })?;
             }
             Ok(())
         };
@@ -107,6 +231,15 @@ impl OnlineWatch {
                 "inconsistent samples: only some have velocities and accelerations; give \
                  them always or never",
             ),
+            Mixed::Times => {
+                Error::new_err("inconsistent samples: only some have time stamps; give time_s always or never")
+            }
+            Mixed::Time { time_s, last_s } => {
+                let last = last_s.map_or_else(String::new, |last| format!(" after {last} s"));
+                let fix = "give the times of measurement by the robot's clock, in ascending order; call restart() before \
+                           a new recording";
+                Error::new_err(format!("time_s: {time_s} s{last}: {fix}"))
+            }
             Mixed::Online(error) => raised(error),
         })
     }
@@ -142,6 +275,8 @@ impl OnlineWatch {
 
 enum Mixed {
     Derivatives,
+    Times,
+    Time { time_s: f64, last_s: Option<f64> },
     Online(OnlineError),
 }
 
@@ -154,7 +289,10 @@ impl From<OnlineError> for Mixed {
 #[pymethods]
 impl OnlineWatch {
     /// Adds a sample, ``(n,)``, or samples in the order of time, ``(..., n)``; returns the alarms that began in them.
-    #[pyo3(signature = (q, tau, dq=None, ddq=None))]
+    /// ``time_s`` are the times of measurement by the robot's clock, one per sample: lost samples and pauses then raise
+    /// no alarm, and alarms have these times. After a pause of more than half a window there are no results until the
+    /// window is full again.
+    #[pyo3(signature = (q, tau, dq=None, ddq=None, *, time_s=None))]
     fn update<'py>(
         &self,
         py: Python<'py>,
@@ -162,39 +300,37 @@ impl OnlineWatch {
         tau: &Bound<'py, PyAny>,
         dq: Option<&Bound<'py, PyAny>>,
         ddq: Option<&Bound<'py, PyAny>>,
+        time_s: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let derivatives = match (dq, ddq) {
-            (Some(dq), Some(ddq)) => Some([dq, ddq]),
-            (None, None) => None,
-            _ => return Err(Error::new_err("dq and ddq: give both or none")),
-        };
-        let before = self.own().alarms.len();
-        let rate_hz = self.rate_hz;
-        self.run(py, [q, tau], derivatives, |own, contact| {
-            let delay = if own.with_derivatives == Some(true) { 0 } else { own.watch.delay_samples() as u64 };
-            let time_s = (own.samples - 1).saturating_sub(delay) as f64 / rate_hz;
-            if let Some(contact) = contact
-                && own.now.is_none_or(|now| (now.look, now.joint) != (contact.look, contact.joint))
-            {
-                own.alarms.push(Alarm { time_s, what: What::Contact(contact) });
+        let before = self.own().progress.alarms.len();
+        self.run(py, &Arrays::of([q, tau], [dq, ddq], time_s)?, |own, seen| {
+            if !seen.has_result {
+                return Ok(());
             }
-            own.now = contact;
+            let progress = &mut own.progress;
+            let Seen { contact, time_s, .. } = seen;
+            if let Some(contact) = contact
+                && progress.now.is_none_or(|now| (now.look, now.joint) != (contact.look, contact.joint))
+            {
+                progress.alarms.push(Alarm { time_s, what: What::Contact(contact) });
+            }
+            progress.now = contact;
             if own.watch.drift_is_due()
                 && let Some(drift) = own.watch.check_drift()?
             {
-                if drift.is_raised() && !own.drift.is_some_and(|last| last.is_raised()) {
-                    own.alarms.push(Alarm { time_s, what: What::Drift(drift) });
+                if drift.is_raised() && !progress.drift.is_some_and(|last| last.is_raised()) {
+                    progress.alarms.push(Alarm { time_s, what: What::Drift(drift) });
                 }
-                own.drift = Some(drift);
+                progress.drift = Some(drift);
             }
             Ok(())
         })?;
-        self.own().alarms[before..].iter().map(|alarm| self.described(py, alarm)).collect()
+        self.own().progress.alarms[before..].iter().map(|alarm| self.described(py, alarm)).collect()
     }
 
     /// Determines the contact thresholds from motion without contact, at least ten times as long as the longest time
-    /// constant: shapes ``(samples, n)``. The samples are also used for the estimate.
-    #[pyo3(signature = (q, tau, dq=None, ddq=None))]
+    /// constant: shapes ``(samples, n)``. The samples are also used for the estimate. ``time_s`` as in ``update``.
+    #[pyo3(signature = (q, tau, dq=None, ddq=None, *, time_s=None))]
     fn calibrate(
         &self,
         py: Python<'_>,
@@ -202,16 +338,11 @@ impl OnlineWatch {
         tau: &Bound<'_, PyAny>,
         dq: Option<&Bound<'_, PyAny>>,
         ddq: Option<&Bound<'_, PyAny>>,
+        time_s: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let derivatives = match (dq, ddq) {
-            (Some(dq), Some(ddq)) => Some([dq, ddq]),
-            (None, None) => None,
-            _ => return Err(Error::new_err("dq and ddq: give both or none")),
-        };
         let mut residuals = Residuals { joints: vec![Vec::new(); self.joints.len()] };
-        self.run(py, [q, tau], derivatives, |own, _| {
-            // There are no residuals before the first window is full.
-            if own.watch.estimator().samples() > 0 {
+        self.run(py, &Arrays::of([q, tau], [dq, ddq], time_s)?, |own, seen| {
+            if seen.has_result {
                 for (all, residual) in residuals.joints.iter_mut().zip(own.watch.residuals_nm()) {
                     all.push(*residual);
                 }
@@ -220,28 +351,54 @@ impl OnlineWatch {
         })?;
         let mut own = self.own();
         own.watch.calibrate(&residuals).map_err(raised)?;
-        own.now = None;
+        own.progress.now = None;
         Ok(())
     }
 
-    /// Begins a new motion with the next sample.
+    /// Begins a new motion with the next sample, which may have any time stamp.
     fn restart(&self) {
         let mut own = self.own();
         own.watch.restart();
-        own.now = None;
+        own.progress.now = None;
+        own.progress.times_s.clear();
+    }
+
+    /// The inverse of ``__reduce__``.
+    #[staticmethod]
+    fn _restore(py: Python<'_>, model: Bound<'_, FittedModel>, state: &str) -> PyResult<Self> {
+        let wrong = |error: &dyn core::fmt::Display| Error::new_err(format!("a stored monitor: {error}"));
+        let StoredWatch { settings, watch, progress } = serde_json::from_str(state).map_err(|error| wrong(&error))?;
+        let made = model.get().watched(py, &model, settings)?;
+        {
+            let mut own = made.own();
+            own.watch.restore(watch).map_err(|error| wrong(&error))?;
+            own.progress = progress;
+        }
+        Ok(made)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Py<FittedModel>, String))> {
+        let (py, own) = (slf.py(), slf.get());
+        let stored = {
+            let watched = own.own();
+            let progress = watched.progress.clone();
+            StoredWatch { settings: own.settings.clone(), watch: watched.watch.state(), progress }
+        };
+        let state = serde_json::to_string(&stored).map_err(|error| Error::new_err(error.to_string()))?;
+        Ok((slf.get_type().getattr("_restore")?, (own.model.clone_ref(py), state)))
     }
 
     /// All alarms, with the begin of each: dictionaries with ``time_s`` and ``kind``.
     #[getter]
     fn alarms<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let alarms = self.own().alarms.clone();
+        let alarms = self.own().progress.alarms.clone();
         alarms.iter().map(|alarm| self.described(py, alarm)).collect()
     }
 
     /// The current contact, or None.
     #[getter]
     fn contact<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(contact) = self.own().now else { return Ok(None) };
+        let Some(contact) = self.own().progress.now else { return Ok(None) };
         let found = PyDict::new(py);
         self.contact_into(&found, contact)?;
         Ok(Some(found))
@@ -250,7 +407,7 @@ impl OnlineWatch {
     /// The last drift check, or None before the first.
     #[getter]
     fn drift<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(drift) = self.own().drift else { return Ok(None) };
+        let Some(drift) = self.own().progress.drift else { return Ok(None) };
         let found = PyDict::new(py);
         self.drift_into(&found, drift)?;
         Ok(Some(found))
@@ -314,13 +471,13 @@ impl OnlineWatch {
     /// Number of samples.
     #[getter]
     fn samples(&self) -> u64 {
-        self.own().samples
+        self.own().progress.samples
     }
 
     /// Delay of the results if derivatives are computed from positions, s.
     #[getter]
     fn delay_s(&self) -> f64 {
-        self.own().watch.delay_samples() as f64 / self.rate_hz
+        self.own().watch.delay_samples() as f64 / self.settings.rate_hz
     }
 
     fn __repr__(&self) -> String {
@@ -328,9 +485,9 @@ impl OnlineWatch {
         format!(
             "Watch({} joints at {} Hz, {} samples, {} alarms)",
             self.joints.len(),
-            self.rate_hz,
-            own.samples,
-            own.alarms.len()
+            self.settings.rate_hz,
+            own.progress.samples,
+            own.progress.alarms.len()
         )
     }
 }

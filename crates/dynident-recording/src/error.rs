@@ -277,6 +277,45 @@ pub enum RecordingError {
     },
 }
 
+impl RecordingError {
+    /// The file and the 1-based line of the error, as far as they are known. Samples in memory have no file.
+    pub fn place(&self) -> (Option<PathBuf>, Option<u64>) {
+        let of_place = |place: &LogPlace| match place {
+            LogPlace::Line { log, line } => (Some(PathBuf::from(log)), Some(*line)),
+            LogPlace::Row { log, .. } | LogPlace::Whole { log } => (of_label(log), None),
+        };
+        match self {
+            Self::Io { file, .. } | Self::Changed { file } | Self::Reference { file, .. } => (Some(file.clone()), None),
+            Self::Binary { file, line }
+            | Self::CarriageReturns { file, line }
+            | Self::LineTooLong { file, line, .. } => (Some(file.clone()), Some(*line)),
+            Self::File(error) => (Some(error.file().to_owned()), None),
+            Self::NoRows { place }
+            | Self::DuplicateColumn { place, .. }
+            | Self::UnknownColumn { place, .. }
+            | Self::RaggedRow { place, .. }
+            | Self::NotANumber { place, .. }
+            | Self::Missing { place, .. } => of_place(place),
+            Self::Overflow { log, .. }
+            | Self::UnequalFiles { log, .. }
+            | Self::ForeignFile { log, .. }
+            | Self::NoFolder { log, .. }
+            | Self::Samples { log, .. }
+            | Self::EmptySelection { log, .. }
+            | Self::NoRate { log, .. }
+            | Self::NotFollowed { log, .. }
+            | Self::Unordered { log, .. }
+            | Self::TooShort { log, .. } => (of_label(log), None),
+            Self::Format(_) | Self::Filter(_) => (None, None),
+        }
+    }
+}
+
+/// The file of a log; `None` if its label is a name of samples in memory.
+fn of_label(label: &str) -> Option<PathBuf> {
+    Some(PathBuf::from(label)).filter(|path| path.exists())
+}
+
 fn no_rows(place: &LogPlace) -> String {
     match place {
         LogPlace::Line { log, line } => format!("{log}: no data rows after line {line}"),

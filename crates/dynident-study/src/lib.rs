@@ -412,17 +412,7 @@ impl Study {
     /// # Panics
     /// If there is no such log; `parse` has checked that every log has a format.
     pub fn format_of(&self, index: usize) -> LogFormat {
-        let log = &self.log[index];
-        let mut format = log.format.clone().or_else(|| self.format.clone()).expect("checked when the study was read");
-        if log.rows.is_some() || log.fraction.is_some() || log.time_range_s.is_some() {
-            (format.rows, format.fraction, format.time_range_s) = (log.rows, log.fraction, log.time_range_s);
-        }
-        if log.part.is_some() {
-            format.part.clone_from(&log.part);
-        }
-        format.drop_rows.extend_from_slice(&log.drop_rows);
-        format.drop_time_s.extend_from_slice(&log.drop_time_s);
-        format
+        self.log[index].format_or(self.format.as_ref()).expect("checked when the study was read")
     }
 
     /// Name of log number `index`: the stated name, or that of its file with its range, which distinguishes parts of

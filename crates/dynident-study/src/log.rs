@@ -53,6 +53,20 @@ pub struct LogSection {
 }
 
 impl LogSection {
+    /// The format of this log with its range: its own, or that of the study; `None` if neither is given.
+    pub fn format_or(&self, of_study: Option<&LogFormat>) -> Option<LogFormat> {
+        let mut format = self.format.as_ref().or(of_study)?.clone();
+        if self.rows.is_some() || self.fraction.is_some() || self.time_range_s.is_some() {
+            (format.rows, format.fraction, format.time_range_s) = (self.rows, self.fraction, self.time_range_s);
+        }
+        if self.part.is_some() {
+            format.part.clone_from(&self.part);
+        }
+        format.drop_rows.extend_from_slice(&self.drop_rows);
+        format.drop_time_s.extend_from_slice(&self.drop_time_s);
+        Some(format)
+    }
+
     pub(crate) fn validate(&self) -> Result<(), StudyError> {
         if let Some(reference) = &self.reference {
             reference.validate().map_err(StudyError::at("reference"))?;

@@ -75,7 +75,10 @@ pub use dynident_identification::{Progress, Role, Silent};
 pub use dynident_report::{PrintStyle, ReportError};
 pub use dynident_system::{ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
 pub use dynident_text::shortened_message;
-pub use error::{Error, FactorsError, FigureError, NewStudyError, RecognisedFile, error_code};
+pub use error::{
+    Error, ErrorPlace, FactorsError, FigureError, NewStudyError, RecognisedFile, error_code, place_in_log,
+    place_in_robot,
+};
 pub use factors::{FactorLog, Factors, seconds_of};
 pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::{CheckSettings, check, check_with};

@@ -24,7 +24,7 @@ pub(crate) struct Target {
 }
 
 /// All targets.
-pub(crate) const TARGETS: [Target; 23] = [
+pub(crate) const TARGETS: [Target; 24] = [
     Target { name: "urdf", repetitions: 10, new: parsers::urdf },
     Target { name: "mjcf", repetitions: 10, new: parsers::mjcf },
     Target { name: "sdf", repetitions: 20, new: parsers::sdf },
@@ -34,6 +34,7 @@ pub(crate) const TARGETS: [Target; 23] = [
     Target { name: "expression", repetitions: 100, new: parsers::expression },
     Target { name: "log", repetitions: 10, new: parsers::log },
     Target { name: "packed_text", repetitions: 4, new: formats::any },
+    Target { name: "text_arrays", repetitions: 10, new: formats::any },
     Target { name: "numpy", repetitions: 10, new: formats::any },
     Target { name: "bags", repetitions: 4, new: formats::any },
     Target { name: "parquet", repetitions: 4, new: formats::any },

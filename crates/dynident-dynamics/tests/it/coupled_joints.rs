@@ -5,11 +5,13 @@ use crate::golden::{close, numbers, text};
 use dynident_dynamics::{
     BaseParameterSettings, BaseParameters, BatchWorkspace, Column, MotionGradient, PanelLayout, Panels, Workspace,
     body_placements, forward_dynamics, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives,
-    mass_matrix, numerical_rank, regressor_panels, regressor_panels_adjoint,
+    mass_matrix, numerical_rank, point_jacobian, regressor_panels, regressor_panels_adjoint,
 };
 use dynident_model::sample::Random;
 use dynident_model::terms::{DriveChoice, JointMotion, terms_per_joint};
-use dynident_model::{Body, InertialParameters, Joint, LoopClosure, LoopError, Model, Transform, load_robot, loops};
+use dynident_model::{
+    Body, InertialParameters, Joint, LoopClosure, LoopError, Model, Transform, Vec3, load_robot, loops,
+};
 use dynident_testing::repository;
 use serde_json::Value;
 
@@ -342,6 +344,37 @@ fn torque_and_regressor_derivatives_equal_differences() {
             down[which][place] -= step;
             let slope = (cost(&up) - cost(&down)) / (2.0 * step);
             assert!((slope - found).abs() < 1e-6 * (1.0 + slope.abs()), "{which} {place}: {found} against {slope}");
+        }
+    }
+}
+
+/// The Jacobian of a point equals the differences of its poses, also if joints follow others.
+#[test]
+fn jacobians_are_differences_of_poses() {
+    const STEP: f64 = 1e-6;
+    for path in ["golden/coupled/followers.urdf", "robots/ur10.urdf"] {
+        let model = load_robot(repository(path)).unwrap().model;
+        let mut workspace = Workspace::new(&model);
+        let q: Vec<f64> = (0..model.dof()).map(|joint| 0.3 + 0.2 * joint as f64).collect();
+        let point = Vec3([0.1, -0.2, 0.3]);
+        for body in 0..model.body_count() {
+            let found = point_jacobian(&model, &mut workspace, &q, body, point);
+            let pose = body_placements(&model, &mut workspace, &q)[body];
+            for joint in 0..model.dof() {
+                let mut at = |step: f64| {
+                    let mut moved = q.clone();
+                    moved[joint] += step;
+                    body_placements(&model, &mut workspace, &moved)[body]
+                };
+                let (plus, minus) = (at(STEP), at(-STEP));
+                let slope = (plus.point(point) - minus.point(point)).scale(0.5 / STEP);
+                // Ṙ Rᵀ is the matrix of the cross product with ω.
+                let spin = (plus.rotation - minus.rotation).scale(0.5 / STEP).mul_mat(&pose.rotation.transpose()).0;
+                let omega = [spin[2][1], spin[0][2], spin[1][0]];
+                // The error of central differences is some 1e-16 / 1e-6.
+                close(1e-8, &found.linear[joint].0, &slope.0, path);
+                close(1e-8, &found.angular[joint].0, &omega, path);
+            }
         }
     }
 }

@@ -199,6 +199,32 @@ impl RecursiveFactor {
         })
     }
 
+    /// The entries of R and its torque, row by row from the diagonal, for storage.
+    pub fn entries(&self) -> Vec<f64> {
+        (0..=self.columns)
+            .flat_map(|row| (row..=self.columns).map(move |column| (row, column)))
+            .map(|(row, column)| self.at(row, column))
+            .collect()
+    }
+
+    /// Continues from stored [`entries`](Self::entries) of this number of samples, bit by bit.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] if the number of entries differs.
+    pub fn restore(&mut self, entries: &[f64], samples: usize) -> Result<(), EstimationError> {
+        let size = self.columns + 1;
+        crate::error::expect("stored entries", size * (size + 1) / 2, entries.len())?;
+        let mut entries = entries.iter();
+        for row in 0..size {
+            let start = row_line(row, line_count(self.columns)) - row / CHUNK_ROWS;
+            for (column, entry) in (row..size).zip(entries.by_ref()) {
+                self.triangle[start + column / CHUNK_ROWS].0[column % CHUNK_ROWS] = *entry;
+            }
+        }
+        self.samples = samples;
+        Ok(())
+    }
+
     /// Replaces the content by the factor of rows before the first sample.
     ///
     /// # Errors

@@ -17,11 +17,19 @@ use std::path::{Path, PathBuf};
 const MAX_RECORD_BYTES: usize = 1 << 28;
 const RECORD_HEAD_BYTES: usize = 9;
 
+/// A schema: name of the message type, encoding and text (or bytes) of its definition.
+#[derive(Clone, Debug, Default)]
+struct Schema {
+    kind: String,
+    encoding: String,
+    data: Vec<u8>,
+}
+
 pub(super) struct McapFile {
     path: PathBuf,
     file: File,
     reader: LinearReader,
-    schemas: HashMap<u16, (String, String, String)>,
+    schemas: HashMap<u16, Schema>,
     channels: HashMap<u16, Channel>,
     /// The current chunk, decompressed, and the position of its next record.
     chunk: Vec<u8>,
@@ -112,8 +120,8 @@ impl McapFile {
     fn take(&mut self, record: Record, message: &mut Vec<u8>) -> Result<Option<(usize, i64)>, FileError> {
         match record {
             Record::Schema { header, data } => {
-                let text = String::from_utf8_lossy(&data).into_owned();
-                self.schemas.insert(header.id, (header.name, header.encoding, text));
+                let schema = Schema { kind: header.name, encoding: header.encoding, data: data.into_owned() };
+                self.schemas.insert(header.id, schema);
             }
             Record::Channel(channel) => self.add_channel(&channel),
             Record::Message { header, data } => {
@@ -130,13 +138,14 @@ impl McapFile {
     }
 
     fn add_channel(&mut self, channel: &mcap::records::Channel) {
-        let none = (String::new(), String::new(), String::new());
-        let (kind, schema_encoding, text) = self.schemas.get(&channel.schema_id).cloned().unwrap_or(none);
-        let encoding = match (channel.message_encoding.as_str(), schema_encoding.as_str()) {
-            ("cdr", "ros2msg") => Encoding::Cdr(vec![text]),
-            ("ros1", "ros1msg") => Encoding::Ros1(text),
+        let Schema { kind, encoding, data } = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+        let text = |data: &[u8]| String::from_utf8_lossy(data).into_owned();
+        let encoding = match (channel.message_encoding.as_str(), encoding.as_str()) {
+            ("cdr", "ros2msg") => Encoding::Cdr(vec![text(&data)]),
+            ("ros1", "ros1msg") => Encoding::Ros1(text(&data)),
             ("json", _) => Encoding::Json,
             ("cbor", _) => Encoding::Cbor,
+            ("protobuf", "protobuf") => Encoding::Protobuf(data),
             (encoding, schema) => Encoding::Other(format!("{encoding} with a schema in {schema}")),
         };
         self.channels.insert(channel.id, Channel { topic: channel.topic.clone(), kind, encoding });

@@ -11,6 +11,8 @@ pub(super) enum Encoding {
     Ros1(String),
     Json,
     Cbor,
+    /// Protocol Buffers, with a serialised `FileDescriptorSet`.
+    Protobuf(Vec<u8>),
     Other(String),
 }
 

@@ -270,7 +270,7 @@ impl Table for BagTable {
         let by_log_time = topics.first().is_some_and(|(_, columns)| columns.contains(&0));
         self.plan = Plan {
             places: slots.into_iter().map(|(at, slot)| begins[at] + slot).collect(),
-            by_stamp: !by_log_time && topics.iter().all(|(topic, _)| self.topics[*topic].stamped),
+            by_stamp: !by_log_time && topics.iter().all(|(topic, _)| self.topics[*topic].stamp_column().is_some()),
             joined: Joined::new(topics.len().saturating_sub(1)),
             ended: false,
             topics,

@@ -4,18 +4,43 @@ use super::part::{Channel, Encoding};
 use crate::arrays::MAX_COLUMNS;
 use crate::cbor;
 use crate::json_numbers::flattened_message;
+use crate::protobuf::ProtobufDecoder;
 use crate::ros::{Decoder, Definition, Layout, Leaves};
 use serde_json::Value;
 use std::collections::HashMap;
 
-const STAMP: &str = "header.stamp";
+/// Paths of the time stamp of a message, the preferred one first.
+const ROS_STAMPS: &[&str] = &["header.stamp"];
+const PROTOBUF_STAMPS: &[&str] = &["header.stamp", "header.timestamp", "timestamp", "stamp", "time"];
 
 #[derive(Debug)]
 enum Reader {
     /// Possible definitions of the messages; the first one that fits is kept.
-    Binary(Vec<Decoder>),
+    Binary(Vec<Binary>),
     /// Messages that name their numbers.
     Named(fn(&[u8]) -> Result<Value, String>),
+}
+
+#[derive(Debug)]
+enum Binary {
+    Ros(Decoder),
+    Protobuf(ProtobufDecoder),
+}
+
+impl Binary {
+    fn read(&self, message: &[u8], named: bool, leaves: &mut Leaves) -> Result<(), String> {
+        match self {
+            Self::Ros(decoder) => decoder.read(message, named, leaves),
+            Self::Protobuf(decoder) => decoder.read(message, named, leaves),
+        }
+    }
+
+    fn stamps(&self) -> &'static [&'static str] {
+        match self {
+            Self::Ros(_) => ROS_STAMPS,
+            Self::Protobuf(_) => PROTOBUF_STAMPS,
+        }
+    }
 }
 
 fn json(message: &[u8]) -> Result<Value, String> {
@@ -36,8 +61,8 @@ pub(super) struct Topic {
     column_of_leaf: Vec<Option<usize>>,
     /// First value of each column of time stamps, ns.
     origins_ns: HashMap<usize, i64>,
-    /// Whether its messages have nonzero stamps.
-    pub(super) stamped: bool,
+    /// Preference and column of the time stamp, if its messages have nonzero ones.
+    stamp: Option<(usize, usize)>,
     pub(super) messages: u64,
 }
 
@@ -59,11 +84,18 @@ impl Topic {
             Encoding::Json => Reader::Named(json),
             Encoding::Cbor => Reader::Named(cbor::value),
             Encoding::Ros1(text) => {
-                Reader::Binary(vec![Decoder::new(Definition::parse(&channel.kind, text)?, Layout::Ros1)])
+                let definition = Definition::parse(&channel.kind, text)?;
+                Reader::Binary(vec![Binary::Ros(Decoder::new(definition, Layout::Ros1))])
+            }
+            Encoding::Protobuf(schema) => {
+                Reader::Binary(vec![Binary::Protobuf(ProtobufDecoder::new(&channel.kind, schema)?)])
             }
             Encoding::Other(what) => return Err(format!("its messages are {what}")),
             Encoding::Cdr(texts) => {
-                let decoder = |text: &String| Ok(Decoder::new(Definition::parse(&channel.kind, text)?, Layout::Cdr));
+                let decoder = |text: &String| {
+                    let definition = Definition::parse(&channel.kind, text)?;
+                    Ok(Binary::Ros(Decoder::new(definition, Layout::Cdr)))
+                };
                 Reader::Binary(texts.iter().map(decoder).collect::<Result<_, String>>()?)
             }
         };
@@ -78,7 +110,7 @@ impl Topic {
             shape: Vec::new(),
             column_of_leaf: Vec::new(),
             origins_ns: HashMap::new(),
-            stamped: false,
+            stamp: None,
             messages: 0,
         })
     }
@@ -116,19 +148,24 @@ impl Topic {
                 self.columns.push(name);
             }
         }
-        if let Reader::Binary(_) = self.reader {
+        if let Reader::Binary(decoders) = &self.reader {
+            let known = decoders.first().map_or(ROS_STAMPS, Binary::stamps);
             for (leaf, stamp) in &self.leaves.stamps_ns {
-                if let Some(column) = self.column_of.get(&self.leaves.paths[*leaf]) {
-                    self.origins_ns.entry(*column).or_insert(*stamp);
-                    self.stamped |= self.leaves.paths[*leaf] == STAMP && *stamp != 0;
+                let path = &self.leaves.paths[*leaf];
+                let Some(&column) = self.column_of.get(path) else { continue };
+                self.origins_ns.entry(column).or_insert(*stamp);
+                if let Some(preference) = known.iter().position(|known| known == path).filter(|_| *stamp != 0) {
+                    let own = (preference, column);
+                    self.stamp = Some(self.stamp.map_or(own, |stamp| stamp.min(own)));
                 }
             }
         }
         Ok(())
     }
 
+    /// Column of the time stamp, if its messages have nonzero ones.
     pub(super) fn stamp_column(&self) -> Option<usize> {
-        self.column_of.get(STAMP).copied().filter(|_| self.stamped)
+        self.stamp.map(|(_, column)| column)
     }
 
     /// Reads a message into `sample`.
@@ -164,11 +201,11 @@ impl Topic {
                         sample.values[*column] = *value;
                     }
                 }
-                let stamp_column = self.column_of.get(STAMP);
+                let stamp_column = self.stamp.map(|(_, column)| column);
                 for (leaf, stamp) in &self.leaves.stamps_ns {
                     if let Some(column) = self.column_of_leaf[*leaf] {
                         sample.values[column] = seconds(*stamp, self.origins_ns.get(&column));
-                        if stamp_column == Some(&column) {
+                        if stamp_column == Some(column) {
                             sample.stamp_ns = Some(*stamp);
                         }
                     }

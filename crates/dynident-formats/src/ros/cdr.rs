@@ -6,8 +6,8 @@ use super::names_entries;
 use crate::bytes::Bytes;
 
 /// Maximum length of an array that becomes columns; longer ones are images, point clouds or maps.
-const MAX_ARRAY_COLUMNS: usize = 1024;
-const MAX_LEAVES: usize = 1 << 14;
+pub(crate) const MAX_ARRAY_COLUMNS: usize = 1024;
+pub(crate) const MAX_LEAVES: usize = 1 << 14;
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Leaves {
@@ -18,6 +18,15 @@ pub(crate) struct Leaves {
     pub(crate) shape: Vec<u8>,
     /// Path of each leaf, if requested.
     pub(crate) paths: Vec<String>,
+}
+
+impl Leaves {
+    pub(crate) fn clear(&mut self) {
+        self.values.clear();
+        self.stamps_ns.clear();
+        self.shape.clear();
+        self.paths.clear();
+    }
 }
 
 /// Serialisation of messages.
@@ -54,10 +63,7 @@ impl Decoder {
     /// # Errors
     /// The problem of the message.
     pub(crate) fn read(&self, message: &[u8], named: bool, leaves: &mut Leaves) -> Result<(), String> {
-        leaves.values.clear();
-        leaves.stamps_ns.clear();
-        leaves.shape.clear();
-        leaves.paths.clear();
+        leaves.clear();
         let (body, big_endian, widest) = match self.layout {
             Layout::Ros1 => (message, false, 1),
             Layout::Cdr => {

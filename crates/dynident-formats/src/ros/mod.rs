@@ -5,7 +5,7 @@ mod cdr;
 mod definition;
 
 pub(crate) use built_in::definitions_of;
-pub(crate) use cdr::{Decoder, Layout, Leaves};
+pub(crate) use cdr::{Decoder, Layout, Leaves, MAX_ARRAY_COLUMNS, MAX_LEAVES};
 pub(crate) use definition::Definition;
 
 /// Whether a text field contains the names of the entries of other arrays.

@@ -32,7 +32,7 @@ fn all(path: &Path) -> Result<(Vec<u64>, bool), FileError> {
 fn flipped_bytes_never_give_other_numbers() {
     let scratch = tempfile::tempdir().unwrap();
     let path = scratch.path().join("damaged.log");
-    for file in ["stored.npz", "packed.npz", "table.csv.gz", "plain.mcap"] {
+    for file in ["stored.npz", "packed.npz", "table.csv.gz", "plain.mcap", "protobuf.mcap"] {
         let whole = std::fs::read(folder().join(file)).unwrap();
         std::fs::write(&path, &whole).unwrap();
         let (expected, _) = all(&path).unwrap();

@@ -121,10 +121,14 @@ fn formats_are_detected_from_the_content() {
     for (file, format) in [
         ("table.csv.gz", FileFormat::GzipText),
         ("table.csv.zst", FileFormat::ZstdText),
+        ("sideways.csv", FileFormat::SidewaysText),
+        ("value_list.txt", FileFormat::ValueList),
+        ("matrix_market.mtx", FileFormat::ValueList),
         ("rows.jsonl", FileFormat::JsonLines),
         ("matrix.npy", FileFormat::Npy),
         ("packed.npz", FileFormat::Npz),
         ("zstd.mcap", FileFormat::Mcap),
+        ("protobuf.mcap", FileFormat::Mcap),
         ("jazzy.db3", FileFormat::Rosbag2),
         ("zstd.parquet", FileFormat::Parquet),
         ("lerobot_v2/data/chunk-000/episode_000001.parquet", FileFormat::Parquet),
@@ -146,6 +150,15 @@ fn formats_are_detected_from_the_content() {
         let files = files(&path).unwrap();
         assert!(files.len() == 3 && files[0].ends_with("meta/info.json"), "{files:?}");
     }
+}
+
+/// Messages with time stamps in Protobuf have their clock, as those of ROS with a header.
+#[test]
+fn the_time_stamp_of_protobuf_is_the_clock() {
+    let Contents::Table(table) = open(&folder().join("protobuf.mcap")).unwrap().contents else { panic!() };
+    let [group] = &table.groups()[..] else { panic!() };
+    assert_eq!(table.names().unwrap()[group.time.unwrap()], "/arm.timestamp");
+    assert!(table.notes().is_empty(), "{:?}", table.notes());
 }
 
 #[test]

@@ -210,7 +210,7 @@ pub(crate) fn verdict(
 
 /// A model from a wrong torque log must not be loaded into a controller.
 fn wrong_torque(record: &RunRecord, cause: &TorqueCause) -> String {
-    format!("run {}: {cause}; {}, then restart with --fresh", record.run, cause.remedy())
+    format!("run {}: {cause}; {}, then restart with --fresh (in Python resume=False)", record.run, cause.remedy())
 }
 
 fn failed(record: &RunRecord) -> String {

@@ -22,11 +22,32 @@ pub struct ControlledRun {
     tau: Vec<f64>,
     /// Samples before the motion and in the motion, if the run has paths from and to home.
     parts: Option<[usize; 2]>,
-    /// Record of the whole run, by the robot's clock.
+    /// Time of the first sample by the robot's clock, s.
+    first_s: Option<f64>,
+    /// Record of the whole run, by the robot's clock from its first sample.
     record: Record,
     /// The newest sample, for the check of the envelope.
     now: Record,
     end: Option<RunEnd>,
+}
+
+/// Longest step between two samples, periods. A longer one is a clock in another unit: milliseconds are a thousand
+/// times too long.
+const MAX_STEP_PERIODS: f64 = 500.0;
+
+/// Why a function ended its run early.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FunctionStop {
+    /// The robot stopped, for example by a protective stop. The run counts if it has begun.
+    Robot {
+        /// The reason.
+        reason: String,
+    },
+    /// The function failed, for example the driver of the robot. The run does not count; the next call repeats it.
+    Function {
+        /// The reason.
+        reason: String,
+    },
 }
 
 #[derive(Debug)]
@@ -50,6 +71,7 @@ impl ControlledRun {
             stop: request.stop.cloned(),
             target: ReferenceSample::new(joints.len()),
             tau: vec![0.0; joints.len()],
+            first_s: None,
             record: empty_record(joints, reference.rate_hz()),
             now: Record {
                 samples: 1,
@@ -87,6 +109,8 @@ impl ControlledRun {
         if self.end.is_some() || sample >= self.reference.samples() {
             return None;
         }
+        // The robot's clock may begin at any time.
+        let time_s = time_s - *self.first_s.get_or_insert(time_s);
         if let Err(end) = self.check_sample(sample, time_s, q, dq) {
             self.end = Some(end);
             return None;
@@ -120,6 +144,18 @@ impl ControlledRun {
             return None;
         }
         Some(&self.tau)
+    }
+
+    /// Why the last call of [`torque`](Self::torque) returned `None`, in words; `None` while the run continues.
+    pub fn end_reason(&self) -> Option<String> {
+        match &self.end {
+            Some(RunEnd::Interrupted) => Some("a stop was requested".to_owned()),
+            Some(RunEnd::Breach(breach)) => Some(format!("out of the envelope: {breach}")),
+            Some(RunEnd::Oscillation(oscillation)) => Some(oscillation.to_string()),
+            Some(RunEnd::Fault(fault)) => Some(fault.to_string()),
+            None if self.record.samples >= self.reference.samples() => Some("all samples were requested".to_owned()),
+            None => None,
+        }
     }
 
     /// The part of a sample, and the sample at which the time of this part is zero.
@@ -166,12 +202,16 @@ impl ControlledRun {
         }
         match self.record.times_s.last() {
             _ if !time_s.is_finite() => Err(RunEnd::Fault(RobotFault::NotANumber { sample, what: "t_s".to_owned() })),
+            Some(&before_s) if (time_s - before_s) * self.reference.rate_hz() > MAX_STEP_PERIODS => {
+                let (step_s, period_s) = (time_s - before_s, 1.0 / self.reference.rate_hz());
+                Err(RunEnd::Fault(RobotFault::Clock { sample, step_s, period_s }))
+            }
             Some(&before_s) if time_s <= before_s => Err(RunEnd::Fault(RobotFault::Time { sample, time_s, before_s })),
             _ => Ok(()),
         }
     }
 
-    fn ended(self, result: Result<(), String>) -> RobotRun {
+    fn ended(self, result: Result<(), FunctionStop>) -> RobotRun {
         let (end_s, duration_s) = (self.record.times_s.last().copied().unwrap_or(0.0), self.reference.duration_s());
         let is_whole = self.record.samples == self.reference.samples();
         let record = self.recorded(RunPart::Motion);
@@ -186,7 +226,11 @@ impl ControlledRun {
                 RobotStatus::Oscillated { oscillation, stopping: Stopping::Confirmed }
             }
             (Some(RunEnd::Fault(fault)), _) => RobotStatus::Failed { fault, stopping: None },
-            (None, Err(reason)) => RobotStatus::Stopped { reason },
+            (None, Err(FunctionStop::Robot { reason })) => RobotStatus::Stopped { reason },
+            (None, Err(FunctionStop::Function { reason })) => {
+                let fault = RobotFault::Function { sample: self.record.samples, reason };
+                RobotStatus::Failed { fault, stopping: None }
+            }
             (None, Ok(())) if is_whole => RobotStatus::Done,
             (None, Ok(())) => {
                 RobotStatus::Failed { fault: RobotFault::Short { end_s, duration_s, part }, stopping: None }
@@ -198,7 +242,7 @@ impl ControlledRun {
 
 /// A robot that is a function of this process. The function receives the controlled run, moves the robot to the first
 /// sample of the reference, requests and applies a torque at every sample, and returns after the last sample. If it
-/// returns an error, the run is stopped with that reason.
+/// returns an error, the run ends with that reason ([`FunctionStop`]).
 pub struct FunctionRobot<F> {
     joints: Vec<String>,
     function: F,
@@ -206,7 +250,7 @@ pub struct FunctionRobot<F> {
 
 impl<F> FunctionRobot<F>
 where
-    F: FnMut(ControlledRun) -> (ControlledRun, Result<(), String>),
+    F: FnMut(ControlledRun) -> (ControlledRun, Result<(), FunctionStop>),
 {
     /// Creates a robot with these joints, in the model's order. The function returns the run with its outcome, so that
     /// the run can be passed to another language meanwhile.
@@ -223,7 +267,7 @@ impl<F> core::fmt::Debug for FunctionRobot<F> {
 
 impl<F> Robot for FunctionRobot<F>
 where
-    F: FnMut(ControlledRun) -> (ControlledRun, Result<(), String>),
+    F: FnMut(ControlledRun) -> (ControlledRun, Result<(), FunctionStop>),
 {
     fn name(&self) -> &'static str {
         "function"

@@ -30,7 +30,7 @@ pub use envelope::{Envelope, EnvelopeSettings};
 pub(crate) use envelope::{TRACKING_M, TRACKING_RAD};
 pub use folder::{FolderRobot, FolderSettings};
 pub use folder_forms::FolderForm;
-pub use function::{ControlledRun, FunctionRobot};
+pub use function::{ControlledRun, FunctionRobot, FunctionStop};
 pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
 pub use log_mistakes::{ExaminedLog, LogMistake, LogMistakeSettings, examine_log};
 pub use log_table::{LogTableError, read_log_table};
@@ -446,6 +446,26 @@ pub enum RobotFault {
     Torque {
         /// The sample, from 0.
         sample: usize,
+    },
+    /// A step of the time stamps that is far too long.
+    #[error(
+        "sample {sample} of the robot: its time is {step_s} s after the previous one, but the period is {period_s} s: give the time in seconds"
+    )]
+    Clock {
+        /// The sample, from 0.
+        sample: usize,
+        /// The step, s.
+        step_s: f64,
+        /// The period, s.
+        period_s: f64,
+    },
+    /// The function of a robot failed.
+    #[error("the function of the robot failed at sample {sample}: {reason}")]
+    Function {
+        /// The sample, from 0.
+        sample: usize,
+        /// The reason.
+        reason: String,
     },
     /// A file that cannot be written or read.
     #[error("{}: {reason}", path.display())]

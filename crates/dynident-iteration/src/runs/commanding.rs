@@ -128,14 +128,19 @@ impl Iteration {
         if observed {
             supervisor.ended(&robot_run);
         }
+        let has_begun =
+            robot_run.record.samples > 0 || robot_run.ways.as_ref().is_some_and(|ways| ways.approach.samples > 0);
+        let cut_short = |robot_run: RobotRun| {
+            let how = format!("run {}: {}", plan.run, robot_run.status);
+            MotionOutcome::CutShort(Some(robot_run), CutShort::Failed(how))
+        };
         Ok(match &robot_run.status {
             RobotStatus::Waiting { .. } => {
                 MotionOutcome::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() })
             }
-            RobotStatus::Failed { .. } => {
-                let how = format!("run {}: {}", plan.run, robot_run.status);
-                MotionOutcome::CutShort(Some(robot_run), CutShort::Failed(how))
-            }
+            RobotStatus::Failed { .. } => cut_short(robot_run),
+            // A robot that did not move shows nothing about its controller.
+            RobotStatus::Stopped { .. } if !has_begun => cut_short(robot_run),
             RobotStatus::Interrupted { .. } => {
                 let how = robot_run.status.to_string();
                 MotionOutcome::CutShort(Some(robot_run), CutShort::Interrupted(how))

@@ -1,10 +1,10 @@
 //! A robot that is a function: the simulator's run through it, and a verdict for each of its failures.
 
 use crate::robots::{joints, model, pd, reference};
-use dynident_iteration::robot::{ControlledRun, EnvelopeSettings, FunctionRobot};
+use dynident_iteration::robot::{ControlledRun, EnvelopeSettings, FunctionRobot, FunctionStop};
 use dynident_iteration::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, StopSignal};
 
-type Outcome = Result<(), String>;
+type Outcome = Result<(), FunctionStop>;
 
 fn run(
     envelope: bool,
@@ -95,6 +95,34 @@ fn what_it_does_wrong_is_named() {
     assert!(matches!(fault(&[(0.0, &[0.0, f64::NAN])]), RobotFault::NotANumber { .. }));
     assert!(matches!(fault(&[(f64::INFINITY, still)]), RobotFault::NotANumber { .. }));
     assert!(matches!(fault(&[(0.1, still), (0.1, still)]), RobotFault::Time { sample: 1, .. }));
-    let (found, _) = run(false, None, |_| Err("the cable is out".to_owned()));
-    assert_eq!(found.status, RobotStatus::Stopped { reason: "the cable is out".to_owned() });
+    // Milliseconds in place of seconds.
+    assert!(matches!(fault(&[(0.0, still), (2.0, still)]), RobotFault::Clock { sample: 1, .. }));
+    let reason = "the cable is out".to_owned();
+    let (found, _) = run(false, None, |_| Err(FunctionStop::Robot { reason: reason.clone() }));
+    assert_eq!(found.status, RobotStatus::Stopped { reason: reason.clone() });
+    let (found, _) = run(false, None, |run| {
+        standing(run, 3);
+        Err(FunctionStop::Function { reason: reason.clone() })
+    });
+    assert_eq!(found.status, RobotStatus::Failed { fault: RobotFault::Function { sample: 3, reason }, stopping: None });
+}
+
+#[test]
+fn the_end_of_a_run_has_a_reason() {
+    run(true, None, |run| {
+        assert_eq!(run.end_reason(), None);
+        standing(run, 201);
+        assert!(run.end_reason().unwrap().contains("all samples"));
+        Ok(())
+    });
+    run(true, None, |run| {
+        run.torque(0.0, &[2.0, 0.3], &[0.0, 0.0]);
+        assert!(run.end_reason().unwrap().contains("out of the envelope"));
+        Ok(())
+    });
+    run(false, None, |run| {
+        run.torque(0.0, &[-0.4], &[0.0, 0.0]);
+        assert!(run.end_reason().unwrap().contains("q has 1 entries for 2 joints"));
+        Ok(())
+    });
 }

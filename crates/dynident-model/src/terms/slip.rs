@@ -26,7 +26,7 @@ pub struct MaxwellSlip {
 }
 
 /// State of a term before a block of samples; [`Default`] is the start of a recording.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HysteresisState {
     last: Option<[f64; 2]>,
 }

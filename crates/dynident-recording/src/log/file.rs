@@ -8,7 +8,7 @@ use super::text::TextTable;
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 use dynident_files::SeenFiles;
-use dynident_formats::{Contents, FileError, FileFormat, SAGE_FILES, Table};
+use dynident_formats::{Contents, FileError, FileFormat, ReadLimits, SAGE_FILES, Table};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -22,6 +22,7 @@ pub struct FileLog {
     path: PathBuf,
     header: Header,
     delimiter: Option<char>,
+    transposed: bool,
     part: Option<String>,
     seen: Arc<SeenFiles>,
 }
@@ -34,6 +35,7 @@ impl FileLog {
             path: path.to_owned(),
             header: format.header,
             delimiter: format.delimiter,
+            transposed: format.transposed,
             part: format.part.clone(),
             seen: Arc::default(),
         }
@@ -41,7 +43,14 @@ impl FileLog {
 
     /// The file at `path`; header and delimiter of a text file are detected.
     pub fn described_by_itself(path: &Path) -> Self {
-        Self { path: path.to_owned(), header: Header::Auto, delimiter: None, part: None, seen: Arc::default() }
+        Self {
+            path: path.to_owned(),
+            header: Header::Auto,
+            delimiter: None,
+            transposed: false,
+            part: None,
+            seen: Arc::default(),
+        }
     }
 
     /// Opens the file for one pass over its rows; also returns its format.
@@ -55,7 +64,10 @@ impl FileLog {
                 return Err(RecordingError::Changed { file });
             }
         }
-        let opened = dynident_formats::open(&self.path)?;
+        let opened = match self.transposed {
+            true => dynident_formats::open_transposed(&self.path, &ReadLimits::default())?,
+            false => dynident_formats::open(&self.path)?,
+        };
         let table: Box<dyn LogTable> = match opened.contents {
             Contents::Text(_) if opened.format == FileFormat::Sage => Box::new(SageTable::open(&self.path)?),
             Contents::Text(text) => Box::new(TextTable::open(&self.path, text, self.header, self.delimiter)?),

@@ -123,6 +123,11 @@ fn max_difference_s() -> f64 {
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "the shape that serde wants")]
+fn is_false(value: &bool) -> bool {
+    !*value
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the shape that serde wants")]
 fn is_default_difference(value: &f64) -> bool {
     *value == max_difference_s()
 }
@@ -189,6 +194,10 @@ pub struct LogFormat {
     /// `","`, `";"`, `"\t"` or `" "` (any number of spaces); detected from the first line by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delimiter: Option<char>,
+    /// Whether a text has one line for each quantity and one value for each sample. Columns are then lines. Lines with
+    /// names are recognised without this key. Default false.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub transposed: bool,
     /// The recording in a file with several: an episode, `"data.demo_3"`. Names of columns follow this name. The whole
     /// file by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -272,6 +281,7 @@ impl LogFormat {
         Self {
             header: Header::default(),
             delimiter: None,
+            transposed: false,
             part: None,
             time: Some(time),
             rate_hz: None,

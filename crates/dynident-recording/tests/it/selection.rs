@@ -121,3 +121,27 @@ fn a_part_of_a_file_is_a_log() {
     let message = of_part("third").unwrap_err();
     assert!(message.contains("`part`") && message.contains("`third`"), "{message}");
 }
+
+#[test]
+fn lines_are_columns_of_a_table_on_its_side() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("side.csv");
+    // Six samples of three lines without names, then of lines with names.
+    std::fs::write(&path, "0,0.5,1,1.5,2,2.5\n10,11,12,13,14,15\n20,21,22,23,24,25\n").unwrap();
+    let format = "time.column = 0\nposition.columns = [2, 1]\ntorque.columns = [1, 2]\ntransposed = true\n";
+    let found = read(&path, format).unwrap();
+    assert_eq!(found.time_s, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]);
+    assert_eq!((found.q[0][5], found.q[1][0], found.tau[0][1]), (25.0, 10.0, 11.0));
+    let values = |first: u32| (0..9).map(|k| (first + k).to_string()).collect::<Vec<_>>().join(";");
+    let named = |name: &str, first: u32| format!("{name};{}\n", values(first));
+    let lines = [named("t", 0), named("pos[elbow]", 10), named("pos[shoulder]", 20)].concat();
+    std::fs::write(&path, lines + &named("tau[elbow]", 30) + &named("tau[shoulder]", 40)).unwrap();
+    let found = read(&path, BY_NAME).unwrap();
+    assert_eq!((found.time_s.len(), found.q[0][0], found.q[1][8], found.tau[0][0]), (9, 10.0, 28.0, 30.0));
+    // Ranges and rules apply as for other tables.
+    let found = read(&path, &format!("{BY_NAME}rows = [2, 5]\n")).unwrap();
+    assert_eq!((found.row, &found.tau[1][..]), (vec![2, 3, 4], &[42.0, 43.0, 44.0][..]));
+    std::fs::write(&path, "0,1\n2,3,4\n5,6\n").unwrap();
+    let message = read(&path, format).unwrap_err();
+    assert!(message.contains("line 2: 3 values, the lines before it have 2"), "{message}");
+}

@@ -44,7 +44,7 @@ pub enum StudyFileError {
         source: Box<StudyError>,
     },
     /// A file that is in none of the study's folders.
-    #[error("{} is in none of the study's folders (tried {}); correct its path in the study, or give its folder with --data{}",
+    #[error("{} is in none of the study's folders (tried {}); correct its path in the study, or name its folder there with `data` (or with --data of the command){}",
         file.display(), list(tried), source_of_data.as_ref().map_or(String::new(), |s| format!(". The recordings are public: {s}")))]
     Missing {
         /// The file.

@@ -4,11 +4,13 @@ mod code;
 mod factors;
 mod figure;
 mod new_study;
+mod place;
 
 pub use code::error_code;
 pub use factors::FactorsError;
 pub use figure::FigureError;
 pub use new_study::{NewStudyError, RecognisedFile};
+pub use place::{ErrorPlace, place_in_log, place_in_robot};
 
 use dynident_export::ExportError;
 use dynident_identification::IdentificationError;
