@@ -1,6 +1,6 @@
 //! The place of an error: file, line and column.
 
-use super::Error;
+use super::{Error, FigureError};
 use dynident_identification::{IdentificationError, LogError};
 use dynident_model::ReadError;
 use dynident_recording::RecordingError;
@@ -88,9 +88,12 @@ impl Error {
             | Self::Export { path, .. }
             | Self::Output { path, .. } => ErrorPlace::file(path),
             Self::Overwrite { output, .. } => ErrorPlace::file(output),
-            Self::ResultFile(_) | Self::Report(_) | Self::NewStudy(_) | Self::Interrupted { .. } => {
-                ErrorPlace::default()
-            }
+            Self::Figure(FigureError::Ending { path }) => ErrorPlace::file(path),
+            Self::Figure(FigureError::Report(_))
+            | Self::ResultFile(_)
+            | Self::Report(_)
+            | Self::NewStudy(_)
+            | Self::Interrupted { .. } => ErrorPlace::default(),
         }
     }
 
