@@ -109,7 +109,7 @@ type Quantity = Result<(Option<String>, Vec<f64>), String>;
 fn quantity(line: &[u8], delimiter: u8, budget: &mut Budget) -> Result<Quantity, String> {
     // A delimiter at the end has no value after it.
     let line = line.strip_suffix(&[delimiter]).unwrap_or(line);
-    let count = line.iter().filter(|byte| **byte == delimiter).count() + 1;
+    let count = line.split(|byte| *byte == delimiter).count();
     budget.take((count as u64).checked_mul(8))?;
     let is_blank = delimiter == b' ';
     let mut fields =
@@ -151,7 +151,10 @@ mod tests {
     use super::*;
     use crate::limits::ReadLimits;
 
-    fn read(text: &str, layout: Layout) -> Result<Option<(Option<Vec<String>>, Vec<Vec<f64>>)>, String> {
+    /// Names and rows.
+    type Read = (Option<Vec<String>>, Vec<Vec<f64>>);
+
+    fn read(text: &str, layout: Layout) -> Result<Option<Read>, String> {
         let budget = Budget::new(&ReadLimits::default(), text.len() as u64);
         let found = open(Path::new("log.csv"), text.as_bytes(), budget, layout).map_err(|error| error.to_string())?;
         Ok(found.map(|mut table| {
@@ -164,18 +167,18 @@ mod tests {
 
     #[test]
     fn lines_with_names_are_columns() {
-        let text = "# a comment\nt;0;0,5;1;1,5;2;2,5;3;3,5\n\"q1\";1;2;;4;5;6;7;8;\n";
+        let text = "# a comment\nt;0;0,5;1;1,5;2;2,5;3;3,5;4\n\"q1\";1;2;;4;5;6;7;8;9;\n";
         assert!(may_begin(text.as_bytes()));
         let (names, rows) = read(text, Layout::Recognised).unwrap().unwrap();
         assert_eq!(names.unwrap(), ["t", "q1"]);
-        assert!(rows.len() == 8 && rows[1] == [0.5, 2.0] && rows[2][1].is_nan() && rows[7] == [3.5, 8.0], "{rows:?}");
+        assert!(rows.len() == 9 && rows[1] == [0.5, 2.0] && rows[2][1].is_nan() && rows[8] == [4.0, 9.0], "{rows:?}");
     }
 
     #[test]
     fn usual_tables_are_not_recognised() {
         let labelled = "RUN,1,2,3,4,5,6,7,8,9\nRUN,1,2,3,4,5,6,7,8,9\n";
         assert!(may_begin(labelled.as_bytes()) && read(labelled, Layout::Recognised).unwrap().is_none());
-        let short: String = ('a'..='m').map(|name| format!("{name},1,2,3,4,5,6,7,8,9\n")).collect();
+        let short = ('a'..='m').map(|name| format!("{name},1,2,3,4,5,6,7,8,9")).collect::<Vec<_>>().join("\n");
         assert!(read(&short, Layout::Recognised).unwrap().is_none());
         for head in [
             "t,q1,q2\n0,1,2\n",

@@ -294,14 +294,11 @@ pub(crate) fn _log_arrays<'py>(
     let wrong = |error: &dyn core::fmt::Display| errors::LogError::new_err(error.to_string());
     let section: LogSection = serde_json::from_str(section).map_err(|error| wrong(&error))?;
     let Some(format) = section.format_or(None) else { return Err(wrong(&"the log has no format")) };
-    let joints = match joints {
-        Some(joints) => joints,
-        None => {
-            let columns = format.position.column_list("position").map_err(|error| wrong(&error))?;
-            (1..=format.position.matrix.as_ref().map_or(columns.len(), Vec::len))
-                .map(|k| format!("joint {k}"))
-                .collect()
-        }
+    let joints = if let Some(joints) = joints {
+        joints
+    } else {
+        let columns = format.position.column_list("position").map_err(|error| wrong(&error))?;
+        (1..=format.position.matrix.as_ref().map_or(columns.len(), Vec::len)).map(|k| format!("joint {k}")).collect()
     };
     let source = match samples {
         Some((label, table)) => StudyLogSource::Memory(memory_log(py, &label, table)?),

@@ -2,6 +2,7 @@
 //! speed: logs, tables, figures.
 
 #![allow(clippy::needless_pass_by_value, reason = "arguments come from Python by value")]
+#![allow(clippy::doc_link_with_quotes, reason = "examples in Python")]
 
 mod arrays;
 mod assembled;

@@ -103,7 +103,7 @@ impl FittedModel {
     ) -> PyResult<OnlineWatch> {
         let watch = self.predictor(py)?.watch(&settings.of_watch());
         let watch = watch.map_err(|error| errors::Error::new_err(error.to_string()))?;
-        Ok(OnlineWatch::new(watch, model.clone().unbind(), self.joint_names(), settings))
+        Ok(OnlineWatch::new(watch, model.clone().into_any().unbind(), self.joint_names(), settings))
     }
 
     fn predictor(&self, py: Python<'_>) -> PyResult<&TorquePredictor> {

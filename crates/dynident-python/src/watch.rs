@@ -3,7 +3,6 @@
 use crate::arrays::{Samples, array};
 use crate::callables::guarded;
 use crate::errors::Error;
-use crate::model::FittedModel;
 use dynident::identification::consistent::ConsistencySettings;
 use dynident::model::terms::TorqueTerm;
 use dynident::online::{Contact, DriftAlarm, OnlineError, Residuals, TimeScale, Watch, WatchSettings, WatchState};
@@ -15,6 +14,9 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+
+/// A function, and the model and state as its arguments.
+type Reduced<'py> = (Bound<'py, PyAny>, (Py<PyAny>, String));
 
 fn raised(error: OnlineError) -> PyErr {
     Error::new_err(error.to_string())
@@ -39,7 +41,8 @@ fn raised(error: OnlineError) -> PyErr {
 #[pyclass(frozen, module = "dynident", name = "Watch")]
 pub(crate) struct OnlineWatch {
     own: Mutex<Watched>,
-    model: Py<FittedModel>,
+    /// The model that made the monitor.
+    model: Py<PyAny>,
     settings: OnlineSettings,
     joints: Vec<String>,
     parameters: Vec<String>,
@@ -59,6 +62,23 @@ pub(crate) struct OnlineSettings {
 }
 
 impl OnlineSettings {
+    /// The arguments of ``online`` in their order.
+    #[allow(clippy::type_complexity, reason = "the signature of Python")]
+    fn arguments(
+        &self,
+    ) -> (f64, Option<f64>, Option<f64>, Option<f64>, Option<f64>, Option<f64>, Option<f64>, Option<usize>) {
+        (
+            self.rate_hz,
+            self.forgetting_s,
+            self.correlation_s,
+            self.collision_s,
+            self.payload_s,
+            self.contact_alarms_per_hour,
+            self.drift_alarms_per_hour,
+            self.half_window,
+        )
+    }
+
     pub(crate) fn of_watch(&self) -> WatchSettings {
         let mut settings = WatchSettings::new(self.rate_hz);
         settings.half_life_s = self.forgetting_s;
@@ -150,7 +170,7 @@ struct Seen {
 
 impl OnlineWatch {
     /// Creates a monitor with the names for its alarms.
-    pub(crate) fn new(watch: Watch, model: Py<FittedModel>, joints: Vec<String>, settings: OnlineSettings) -> Self {
+    pub(crate) fn new(watch: Watch, model: Py<PyAny>, joints: Vec<String>, settings: OnlineSettings) -> Self {
         let parameters = watch.estimator().model().base().expressions();
         let own = Mutex::new(Watched { watch, progress: Progress::default() });
         Self { own, model, settings, joints, parameters }
@@ -365,19 +385,19 @@ impl OnlineWatch {
 
     /// The inverse of ``__reduce__``.
     #[staticmethod]
-    fn _restore(py: Python<'_>, model: Bound<'_, FittedModel>, state: &str) -> PyResult<Self> {
+    fn _restore<'py>(model: &Bound<'py, PyAny>, state: &str) -> PyResult<Bound<'py, Self>> {
         let wrong = |error: &dyn core::fmt::Display| Error::new_err(format!("a stored monitor: {error}"));
         let StoredWatch { settings, watch, progress } = serde_json::from_str(state).map_err(|error| wrong(&error))?;
-        let made = model.get().watched(py, &model, settings)?;
+        let made = model.call_method1("online", settings.arguments())?.cast_into::<Self>()?;
         {
-            let mut own = made.own();
+            let mut own = made.get().own();
             own.watch.restore(watch).map_err(|error| wrong(&error))?;
             own.progress = progress;
         }
         Ok(made)
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Py<FittedModel>, String))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
         let (py, own) = (slf.py(), slf.get());
         let stored = {
             let watched = own.own();

@@ -101,7 +101,9 @@ impl Pass<'_, '_> {
                 && names_entries(&field.name)
                 && texts.len() <= MAX_ARRAY_COLUMNS
             {
-                texts.iter().for_each(|text| self.shape_text(text));
+                for text in texts {
+                    self.shape_text(text);
+                }
                 if found.is_empty() {
                     found = texts;
                 }
@@ -202,7 +204,9 @@ impl Pass<'_, '_> {
                 return parts.iter().try_for_each(|part| self.entry(own, [key, value], part, depth));
             }
             if let Some(names) = names_of(own, parts)? {
-                names.iter().for_each(|name| self.shape_text(name));
+                for name in &names {
+                    self.shape_text(name);
+                }
                 return parts.iter().enumerate().try_for_each(|(at, part)| {
                     self.within(&label(&names, at), |pass| pass.part(kind, part, &[], depth))
                 });
@@ -306,12 +310,14 @@ fn number(kind: FieldKind, value: WireValue<'_>) -> Option<f64> {
     Some(match (kind, value) {
         (FieldKind::Double, WireValue::Fixed64(bits)) => f64::from_bits(bits),
         (FieldKind::Float, WireValue::Fixed32(bits)) => f64::from(f32::from_bits(bits)),
-        (FieldKind::Signed, WireValue::Varint(value)) => value as i64 as f64,
-        (FieldKind::Unsigned, WireValue::Varint(value)) => value as f64,
+        (FieldKind::Signed, WireValue::Varint(value)) | (FieldKind::SignedFixed64, WireValue::Fixed64(value)) => {
+            value as i64 as f64
+        }
+        (FieldKind::Unsigned, WireValue::Varint(value)) | (FieldKind::Fixed64, WireValue::Fixed64(value)) => {
+            value as f64
+        }
         (FieldKind::Zigzag, WireValue::Varint(value)) => ((value >> 1) as i64 ^ -((value & 1) as i64)) as f64,
         (FieldKind::Bool, WireValue::Varint(value)) => f64::from(u8::from(value != 0)),
-        (FieldKind::Fixed64, WireValue::Fixed64(value)) => value as f64,
-        (FieldKind::SignedFixed64, WireValue::Fixed64(value)) => value as i64 as f64,
         (FieldKind::Fixed32, WireValue::Fixed32(value)) => f64::from(value),
         (FieldKind::SignedFixed32, WireValue::Fixed32(value)) => f64::from(value as i32),
         _ => return None,
@@ -413,7 +419,7 @@ mod tests {
         refused(&decoder, &many, "fields");
         let mut leaves = Leaves::default();
         // Longer lists are images or clouds, and have no columns.
-        decoder.read(&bytes(3, &[0; 4 * 5000]), true, &mut leaves).unwrap();
+        decoder.read(&bytes(3, &vec![0; 4 * 5000]), true, &mut leaves).unwrap();
         assert_eq!(leaves.paths, ["x"]);
         for message in [&b"\x12\xff\xff\xff\xff\x7f"[..], b"\x09\0\0", b"\x1a\x03\0\0\0", b"\x13", b"\xff"] {
             assert!(decoder.read(message, true, &mut leaves).is_err(), "{message:?}");

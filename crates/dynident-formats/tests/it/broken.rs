@@ -89,7 +89,7 @@ fn files_with_altered_bytes_are_read_or_refused() {
 fn truncated_recordings_are_read_up_to_the_end() {
     let scratch = tempfile::tempdir().unwrap();
     let path = scratch.path().join("crash.log");
-    for file in ["zstd.mcap", "protobuf.mcap", "plain.bag", "flight.ulg"] {
+    for file in ["zstd.mcap", "plain.bag", "flight.ulg"] {
         let whole = std::fs::read(folder().join(file)).unwrap();
         std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
         let Contents::Table(mut table) = open(&path).unwrap().contents else { panic!() };

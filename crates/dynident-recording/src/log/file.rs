@@ -64,9 +64,10 @@ impl FileLog {
                 return Err(RecordingError::Changed { file });
             }
         }
-        let opened = match self.transposed {
-            true => dynident_formats::open_transposed(&self.path, &ReadLimits::default())?,
-            false => dynident_formats::open(&self.path)?,
+        let opened = if self.transposed {
+            dynident_formats::open_transposed(&self.path, &ReadLimits::default())?
+        } else {
+            dynident_formats::open(&self.path)?
         };
         let table: Box<dyn LogTable> = match opened.contents {
             Contents::Text(_) if opened.format == FileFormat::Sage => Box::new(SageTable::open(&self.path)?),

@@ -86,9 +86,9 @@ impl Error {
             | Self::Result { path, .. }
             | Self::Factors { path, .. }
             | Self::Export { path, .. }
-            | Self::Output { path, .. } => ErrorPlace::file(path),
+            | Self::Output { path, .. }
+            | Self::Figure(FigureError::Ending { path }) => ErrorPlace::file(path),
             Self::Overwrite { output, .. } => ErrorPlace::file(output),
-            Self::Figure(FigureError::Ending { path }) => ErrorPlace::file(path),
             Self::Figure(FigureError::Report(_))
             | Self::ResultFile(_)
             | Self::Report(_)

@@ -7,6 +7,7 @@ pub(crate) mod design;
 mod differences;
 pub(crate) mod evaluate;
 pub(crate) mod export;
+mod figure_files;
 pub(crate) mod identify;
 pub(crate) mod inspect;
 pub(crate) mod iterate;

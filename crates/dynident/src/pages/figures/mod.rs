@@ -9,11 +9,9 @@ mod residuals;
 
 pub use form::FigureForm;
 
-use crate::error::{Error, FigureError};
-use crate::output::write_atomically;
+use crate::error::FigureError;
 use data::Data;
 use dynident_report::{PrintFigure, PrintPanel, PrintStyle, Table};
-use std::path::PathBuf;
 
 /// A figure of a result or an iteration: picture, data, table.
 #[derive(Clone, Debug)]
@@ -49,16 +47,6 @@ impl Figure {
             FigureForm::Latex => self.table.latex()?.into_bytes(),
             FigureForm::Markdown => self.table.markdown()?.into_bytes(),
         })
-    }
-
-    /// Writes files in the forms of their endings: all of them, or none if one cannot be drawn.
-    ///
-    /// # Errors
-    /// As [`Figure::contents`] and [`FigureForm::of`]; a file that cannot be written.
-    pub fn write(&self, files: &[PathBuf], style: &PrintStyle) -> Result<(), Error> {
-        let contents = files.iter().map(|path| self.contents(FigureForm::of(path)?, style));
-        let contents = contents.collect::<Result<Vec<_>, _>>()?;
-        files.iter().zip(&contents).try_for_each(|(path, contents)| write_atomically(path, contents))
     }
 }
 
