@@ -1,6 +1,7 @@
 //! The drive of one joint: a position controller, a motor and a gear with friction.
 
-/// Drive of one joint, in SI units at the joint. With the delayed set point `r`, measured position `q` and velocity `v`:
+/// Drive of one joint, in SI units at the joint. With the delayed set point `r`, measured position `q` and velocity
+/// `v`:
 ///
 /// ```text
 /// set point r    follows the command with limited acceleration and speed (`profile.rs`)

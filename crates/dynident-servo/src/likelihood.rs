@@ -2,8 +2,8 @@
 //!
 //! A contact, a push or an effect that the drive's law does not have makes single periods much worse than others. In
 //! period `p` with `n_p` samples, `N_p = n_p / c` of them independent, errors are normally distributed with variance
-//! `σ² λ_p`, and `1/λ_p` has a gamma distribution with mean 1 and `ν` degrees of freedom. Without `λ_p`, minus twice the
-//! logarithm of the density is
+//! `σ² λ_p`, and `1/λ_p` has a gamma distribution with mean 1 and `ν` degrees of freedom. Without `λ_p`, minus twice
+//! the logarithm of the density is
 //!
 //! ```text
 //! Σ_p (ν + N_p) ln(1 + S_p / (c ν σ²)) + N_p ln σ²        S_p = Σ (e² + floor²)        w_p = (ν + N_p) / (ν + S_p / (c σ²))

@@ -1,7 +1,7 @@
 //! Set points that follow a command with limited acceleration and speed.
 //!
-//! Many servos do not use a command directly: a profile generator moves their set point to it in the shortest time, with
-//! an acceleration and a speed from two registers (Feetech "acceleration" and "goal speed", Dynamixel "profile
+//! Many servos do not use a command directly: a profile generator moves their set point to it in the shortest time,
+//! with an acceleration and a speed from two registers (Feetech "acceleration" and "goal speed", Dynamixel "profile
 //! acceleration" and "profile velocity"). For steps this adds a time that grows with the root of the step, and above
 //! a frequency that depends on the amplitude the phase falls by almost 90 degrees.
 //!

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! for the moving joints; a resting joint has `S_x = 0`. `A + slopes` is the matrix that solved the step. `C_q` and
-//! `C_v` contain the derivatives of the torques of bodies, drives and contacts by the state, with constant `A`. They are
-//! computed once for all coordinates.
+//! `C_v` contain the derivatives of the torques of bodies, drives and contacts by the state, with constant `A`. They
+//! are computed once for all coordinates.
 
 use crate::floor::Floor;
 use crate::parameters::VariedRobot;
@@ -98,8 +98,8 @@ impl Sensitivity {
         dispatch_single(level, Solve { sensitivity: self, solver, step });
     }
 
-    /// Subtracts the derivatives of the bodies' torque `τ(q + (1 - w) h v, v, a)` with constant acceleration, and of the
-    /// friction by the load `τ(q + (1 - w) h v, v, 0)`.
+    /// Subtracts the derivatives of the bodies' torque `τ(q + (1 - w) h v, v, a)` with constant acceleration, and of
+    /// the friction by the load `τ(q + (1 - w) h v, v, 0)`.
     fn add_bodies(&mut self, varied: &VariedRobot, (model, workspace): (&Model, &mut Workspace), step: &StepState) {
         let dof = step.q.len();
         for ((by_load, drive), (mode, load)) in

@@ -18,10 +18,10 @@ pub struct ServoSettings {
     /// Length of the periods that error bars treat as independent, s. Default 2: errors of the model of an SO-101 last
     /// up to 1 s.
     pub period_s: f64,
-    /// Degrees of freedom of the variance of the errors in a period. Default 30: a period with ten times the usual error
-    /// has about 3 % of the weight of others, so a contact or an effect that the model does not have hardly changes the
-    /// fit. With 4 to 10, fits of an SO-101 ignore a joint in a whole log; with 30, its values from the first quarter of
-    /// each training log are those of the whole logs. Large values give all periods the same variance.
+    /// Degrees of freedom of the variance of the errors in a period. Default 30: a period with ten times the usual
+    /// error has about 3 % of the weight of others, so a contact or an effect that the model does not have hardly
+    /// changes the fit. With 4 to 10, fits of an SO-101 ignore a joint in a whole log; with 30, its values from the
+    /// first quarter of each training log are those of the whole logs. Large values give all periods the same variance.
     pub period_freedom: f64,
     /// Least standard deviation of a measured position, rad (m). Default 0.00044: an encoder with 4,096 counts.
     pub least_error: f64,

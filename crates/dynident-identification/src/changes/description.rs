@@ -35,10 +35,10 @@ impl Spread {
 }
 
 /// Sizes of differences of all bodies: rounding of a description, tolerances of manufacturing, wrong densities, and
-/// descriptions that are only rough. A common factor may be large while the shape is exact: otherwise single bodies would
-/// explain densities that are wrong in every body. Neighbouring sizes of large differences have a ratio of 1.7, less than
-/// the uncertainty of a deviation that seven bodies determine: with a ratio of 3, bars were too narrow or too wide for
-/// the sizes between.
+/// descriptions that are only rough. A common factor may be large while the shape is exact: otherwise single bodies
+/// would explain densities that are wrong in every body. Neighbouring sizes of large differences have a ratio of 1.7,
+/// less than the uncertainty of a deviation that seven bodies determine: with a ratio of 3, bars were too narrow or too
+/// wide for the sizes between.
 pub const SPREADS: [Spread; 22] = [
     Spread { shape: 0.003, scale: 0.003 },
     Spread { shape: 0.003, scale: 0.01 },

@@ -111,8 +111,8 @@ fn body_directions(body: &[f64; 10], thicker: f64) -> Vec<[f64; 10]> {
         .collect()
 }
 
-/// Derivative of the ten parameters by a factor on the distance of the centre of mass from the origin, with constant mass
-/// and inertia about it. The parameters are quadratic in this factor, so a central difference is exact.
+/// Derivative of the ten parameters by a factor on the distance of the centre of mass from the origin, with constant
+/// mass and inertia about it. The parameters are quadratic in this factor, so a central difference is exact.
 fn along_link(body: &[f64; 10]) -> [f64; 10] {
     let own = InertialParameters(*body);
     let (Some(centre), Some(inertia)) = (own.com_m(), own.inertia_at_com()) else { return [0.0; 10] };
