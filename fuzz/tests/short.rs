@@ -9,7 +9,7 @@ fn a_few_hundred_inputs_of_each_target_do_no_harm() {
     let found = tempfile::tempdir().unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_dynident-fuzz"))
         // One thread: with several, the speed of the threads would determine which inputs are run.
-        .args(["--executions", "4000", "--seconds", "60", "--seed", "8", "--threads", "1", "--found"])
+        .args(["--executions", "8000", "--seconds", "60", "--seed", "8", "--threads", "1", "--found"])
         .arg(found.path())
         .output()
         .unwrap();

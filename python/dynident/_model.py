@@ -50,7 +50,7 @@ class Residuals:
     """
 
     time_s: Array
-    """Times from the begin of the log, s, shape ``(rows,)``."""
+    """Times, s after the first row of the log, shape ``(rows,)``. Rows at the ends are left out by the filter."""
     measured: Array
     """Measured torque, Nm (N), shape ``(rows, n)``; NaN where the log has a gap."""
     predicted: Array
@@ -294,8 +294,8 @@ class Model:
 
         whole = self.study if logs is None else logs if isinstance(logs, Study) else with_logs(self.study, logs)
         return {
-            name: Residuals(np.arange(len(measured)) / rate_hz, measured, predicted, not cut)
-            for name, rate_hz, cut, measured, predicted in _residuals(self._native, whole, threads)
+            name: Residuals(time_s, measured, predicted, not cut)
+            for name, time_s, cut, measured, predicted in _residuals(self._native, whole, threads)
         }
 
     def predict_with_band(

@@ -108,8 +108,8 @@ pub(crate) fn _validate(
     })
 }
 
-/// Torque of a log over time: its name, the rate, whether later rows are left out, measured and predicted torque.
-type TracedLog<'py> = (String, f64, bool, Array<'py>, Array<'py>);
+/// Torque of a log over time: its name, the times in s, whether later rows are left out, measured and predicted torque.
+type TracedLog<'py> = (String, Array<'py>, bool, Array<'py>, Array<'py>);
 
 /// Measured and predicted torque over time of the logs that `_validate` uses, filtered as for its errors.
 #[pyfunction]
@@ -131,9 +131,10 @@ pub(crate) fn _residuals<'py>(
         array(study.py(), &[samples], &[log.joints.len()], numbers)
     };
     let one = |log: LogTrace| {
+        let times = array(study.py(), &[log.time_s.len()], &[], log.time_s.clone())?;
         let measured = rows(&log, |joint| &joint.measured_nm)?;
         let predicted = rows(&log, |joint| &joint.predicted_nm)?;
-        Ok((log.log, log.rate_hz, log.cut, measured, predicted))
+        Ok((log.log, times, log.cut, measured, predicted))
     };
     traces.into_iter().map(one).collect()
 }

@@ -40,6 +40,8 @@ pub struct LogTrace {
     pub role: Role,
     /// Rate of the rows, Hz.
     pub rate_hz: f64,
+    /// Time of each row, s after the first data row of the file. Rows at the ends of a segment are missing.
+    pub time_s: Vec<f64>,
     /// Whether later rows of the log are left out.
     pub cut: bool,
     /// Torque of each joint, in the model's order.
@@ -57,6 +59,8 @@ pub(crate) struct TraceConsumer<'a> {
     theta: &'a [f64],
     trace: LogTrace,
     segment: Option<usize>,
+    /// For each segment its first row, and the time of that row in s.
+    starts: Vec<(usize, f64)>,
     buffer: Vec<f64>,
 }
 
@@ -65,12 +69,12 @@ impl<'a> TraceConsumer<'a> {
         let dof = model.model().dof();
         let (joints, motion) = (vec![JointTrace::default(); dof], MotionTrace::new(dof));
         let trace = LogTrace { joints, motion, ..LogTrace::default() };
-        Self { model, theta, trace, segment: None, buffer: Vec::new() }
+        Self { model, theta, trace, segment: None, starts: Vec::new(), buffer: Vec::new() }
     }
 
     pub(crate) fn raw(&mut self, samples: &RawSamples<'_>) {
         self.trace.motion.add(self.model, self.theta, samples, &mut self.buffer);
-        if *self.segment.get_or_insert(samples.segment) != samples.segment {
+        if self.segment != Some(samples.segment) {
             self.segment = Some(samples.segment);
             for JointTrace { measured_nm, predicted_nm } in &mut self.trace.joints {
                 if measured_nm.last().is_some_and(|value| !value.is_nan()) {
@@ -78,6 +82,8 @@ impl<'a> TraceConsumer<'a> {
                     predicted_nm.push(f64::NAN);
                 }
             }
+            let first = self.trace.joints.first().map_or(0, |joint| joint.measured_nm.len());
+            self.starts.push((first, samples.first_time_s + samples.reach as f64 / samples.rate_hz));
         }
     }
 
@@ -96,6 +102,12 @@ impl<'a> TraceConsumer<'a> {
     }
 
     pub(crate) fn finished(self, log: String, role: Role, rate_hz: f64) -> LogTrace {
-        LogTrace { log, role, rate_hz, ..self.trace }
+        let rows = self.trace.joints.iter().map(|joint| joint.measured_nm.len()).min().unwrap_or(0);
+        let mut time_s = Vec::with_capacity(rows);
+        for (place, &(first, start_s)) in self.starts.iter().enumerate() {
+            let end = self.starts.get(place + 1).map_or(rows, |next| next.0).min(rows);
+            time_s.extend((first..end).map(|row| start_s + (row - first) as f64 / rate_hz));
+        }
+        LogTrace { log, role, rate_hz, time_s, ..self.trace }
     }
 }

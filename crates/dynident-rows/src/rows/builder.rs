@@ -131,7 +131,7 @@ impl<'a> RowBuilder<'a> {
 
 impl PanelFilter<'_> {
     pub(super) fn take(&mut self, samples: &SamplePanels, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
-        let raw = samples.as_raw();
+        let raw = samples.as_raw(self.filters.reach());
         if raw.segment != self.segment {
             self.segment = raw.segment;
             self.filters.restart();

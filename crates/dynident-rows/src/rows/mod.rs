@@ -62,6 +62,10 @@ pub struct RawSamples<'a> {
     pub segment: usize,
     /// Sample rate, hertz.
     pub rate_hz: f64,
+    /// Time of the first sample, s after the first data row of the log.
+    pub first_time_s: f64,
+    /// Samples on each side of a row that the filter uses: the first row of a segment is at this sample.
+    pub reach: usize,
     /// Regressor with the logged torque, smoothed if `smooth_torque` is set.
     pub panels: &'a Panels,
     /// Positions, velocities and accelerations, joint after joint in the order of the model.

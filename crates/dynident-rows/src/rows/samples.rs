@@ -46,15 +46,19 @@ pub(super) struct SamplePanels {
     motion: [Vec<f64>; 3],
     segment: usize,
     rate_hz: f64,
+    first_time_s: f64,
     set_aside: Vec<Vec<bool>>,
     settled: Range<usize>,
 }
 
 impl SamplePanels {
-    pub(super) fn as_raw(&self) -> RawSamples<'_> {
+    /// The samples before a filter with this reach.
+    pub(super) fn as_raw(&self, reach: usize) -> RawSamples<'_> {
         RawSamples {
             segment: self.segment,
             rate_hz: self.rate_hz,
+            first_time_s: self.first_time_s,
+            reach,
             panels: &self.panels,
             motion: &self.motion,
             set_aside: &self.set_aside,
@@ -168,6 +172,7 @@ impl<'a> PanelMaker<'a> {
             out.set_aside.extend(of_joints);
         }
         (out.segment, out.rate_hz, out.settled) = (block.segment, block.rate_hz, settled);
+        out.first_time_s = block.first_time_s + from as f64 / block.rate_hz;
         self.samples += samples as u64;
         from + samples
     }

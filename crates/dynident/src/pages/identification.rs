@@ -139,13 +139,12 @@ fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace], is_consist
         let part = if trace.cut || trace.role == Role::Identify { "; the first samples" } else { "" };
         let is_written = trace.role == Role::Validate && is_consistent;
         let predicted_by = if is_written { "predicted" } else { "predicted by the unconstrained estimate" };
-        let rows = trace.joints.iter().map(|joint| joint.measured_nm.len()).min().unwrap_or(0);
-        let time: Vec<f64> = (0..rows).map(|row| row as f64 / trace.rate_hz).collect();
+        let (time, rows) = (&trace.time_s, trace.time_s.len());
         for (name, joint) in joints.iter().zip(&trace.joints) {
             let (measured, predicted) = (joint.measured_nm[..rows].to_vec(), joint.predicted_nm[..rows].to_vec());
             page.add(
                 LinePlot::new(format!("{name}: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
-                    .note(format!("filtered, {} Hz{part}; gaps of the log are removed", short(trace.rate_hz, 4)))
+                    .note(format!("filtered, {} Hz{part}", short(trace.rate_hz, 4)))
                     .of_joint(name)
                     .broad(predicted_by, predicted)
                     .line("measured", measured)

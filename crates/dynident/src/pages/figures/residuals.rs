@@ -13,9 +13,8 @@ impl Figure {
         let mut panels = Vec::new();
         for trace in traces {
             for (name, joint) in r.robot.joints.iter().zip(&trace.joints) {
-                let rows = joint.measured_nm.len().min(joint.predicted_nm.len());
+                let (time, rows) = (&trace.time_s, trace.time_s.len());
                 let (measured, predicted) = (&joint.measured_nm[..rows], &joint.predicted_nm[..rows]);
-                let time: Vec<f64> = (0..rows).map(|row| row as f64 / trace.rate_hz).collect();
                 for row in (0..rows).filter(|row| measured[*row].is_finite()) {
                     let difference = measured[row] - predicted[row];
                     let numbers = [time[row], measured[row], predicted[row], difference].map(Into::into);
@@ -23,7 +22,7 @@ impl Figure {
                     data.add(texts.into_iter().chain(numbers).collect::<Vec<_>>());
                 }
                 let title = if traces.len() > 1 { format!("{name}: {}", trace.log) } else { name.clone() };
-                let plot = LinePlot::new(title, "t, s", "torque, Nm (N)", time)
+                let plot = LinePlot::new(title, "t, s", "torque, Nm (N)", time.clone())
                     .broad("predicted", predicted.to_vec())
                     .line("measured", measured.to_vec())
                     .difference("measured minus predicted", 1, 0);
