@@ -1,4 +1,5 @@
-//! JSON documents: a list of objects, one per sample, or an object of lists, one per quantity.
+//! JSON documents: a list of objects, one per sample, an object that contains such a list, or an object of lists, one
+//! per quantity.
 
 use crate::arrays::{Array, ArrayTable};
 use crate::error::FileError;
@@ -45,7 +46,10 @@ pub(crate) fn table(value: &Value) -> Option<ArrayTable> {
         Value::Array(rows) => arrays.extend(columns(rows)?),
         Value::Object(entries) => match split_frame(entries) {
             Some(columns) => arrays.extend(columns),
-            None => lists(entries, &mut String::new(), &mut arrays),
+            None => {
+                lists(entries, &mut String::new(), &mut arrays);
+                without_common_object(&mut arrays);
+            }
         },
         _ => return None,
     }
@@ -100,12 +104,16 @@ fn split_frame(entries: &Map<String, Value>) -> Option<Vec<Array>> {
     columns.map(|columns| columns.into_iter().filter(|column| column.values.iter().any(|x| x.is_finite())).collect())
 }
 
-/// Adds the lists of numbers, and of lists of numbers, in an object, named by their path.
+/// Adds the lists of numbers, of lists of numbers, and of objects with numbers in an object, named by their path.
 fn lists(entries: &Map<String, Value>, path: &mut String, found: &mut Vec<Array>) {
     let length = path.len();
     for (name, value) in entries {
         let _ = if length == 0 { write!(path, "{name}") } else { write!(path, ".{name}") };
         match value {
+            Value::Array(items) if items.first().is_some_and(Value::is_object) => {
+                let own = columns(items).unwrap_or_default().into_iter();
+                found.extend(own.map(|array| Array { name: format!("{path}.{}", array.name), ..array }));
+            }
             Value::Array(items) => found.extend(list(path, items)),
             Value::Object(inner) => match by_row(inner) {
                 Some(values) => found.push(vector(path.clone(), values)),
@@ -114,6 +122,16 @@ fn lists(entries: &Map<String, Value>, path: &mut String, found: &mut Vec<Array>
             _ => {}
         }
         path.truncate(length);
+    }
+}
+
+/// Removes the name of an object or list that contains all columns.
+fn without_common_object(arrays: &mut [Array]) {
+    let object = |array: &Array| Some(array.name.split_once('.')?.0.to_owned());
+    if let Some(common) = arrays.first().and_then(object)
+        && arrays.iter().all(|array| object(array).as_ref() == Some(&common))
+    {
+        arrays.iter_mut().for_each(|array| drop(array.name.drain(..=common.len())));
     }
 }
 
@@ -186,6 +204,15 @@ mod tests {
         let (names, rows) = rows(r#"[{"t": 0}, {"t": 1, "q": 5}, {"t": 2, "q": null}]"#);
         assert_eq!(names, ["t", "q"]);
         assert!(rows[0][1].is_nan() && rows[1][1] == 5.0 && rows[2][1].is_nan());
+    }
+
+    #[test]
+    fn rows_may_be_one_entry_of_a_document() {
+        // A bench of servos writes its constants next to the rows.
+        let text = r#"{"mass": 0.5, "motor": "demo", "entries": [{"t": 0, "q": 1, "on": true}, {"t": 1, "q": 2, "on": true}]}"#;
+        let (names, rows) = rows(text);
+        assert_eq!(names, ["t", "q", "on"]);
+        assert_eq!(rows, [[0.0, 1.0, 1.0], [1.0, 2.0, 1.0]]);
     }
 
     #[test]

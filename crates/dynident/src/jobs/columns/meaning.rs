@@ -103,7 +103,7 @@ const COMPUTED: [&str; 20] = [
     "reconstructed",
 ];
 /// Quantities that are not the total position or torque of a joint: errors, parts of a torque, and others.
-const OTHERS: [&str; 24] = [
+const OTHERS: [&str; 29] = [
     "ext",
     "external",
     "error",
@@ -128,6 +128,11 @@ const OTHERS: [&str; 24] = [
     "temp",
     "dynamics",
     "damping",
+    "enable",
+    "enabled",
+    "status",
+    "mode",
+    "constant",
 ];
 /// Suffixes of the parts of a torque, `tau_g`; letters that may be joints or axes in other names.
 const PARTS_OF_TORQUE: [&str; 1] = ["g"];
