@@ -46,6 +46,8 @@ class Log:
     """Whether the log is used for the fit or for validation."""
     payload: str | None = None
     """Name of the payload during the recording."""
+    servo_gain: float | Sequence[float] | None = None
+    """Position gain of the servos relative to ``stiffness``, of all joints or of each."""
     file: str | None = None
     """The file; None for samples in memory."""
     columns: Mapping[str, npt.NDArray[np.float64]] | None = None
@@ -68,6 +70,7 @@ class Log:
         name: str = "log",
         role: Role = "identify",
         payload: str | None = None,
+        servo_gain: float | Sequence[float] | None = None,
         **format: Any,
     ) -> Log:
         """Creates a log from arrays in SI units: ``q`` and ``tau`` of shape ``(samples, n)``, rad and Nm (m and N).
@@ -116,7 +119,7 @@ class Log:
         for key, value in format.items():
             own = channels.get(key)
             channels[key] = {**own, **value} if isinstance(own, dict) and isinstance(value, Mapping) else value
-        return cls(name=name, format=channels, role=role, payload=payload, columns=columns)
+        return cls(name=name, format=channels, role=role, payload=payload, servo_gain=servo_gain, columns=columns)
 
     @classmethod
     def from_pandas(
@@ -129,6 +132,7 @@ class Log:
         name: str = "log",
         role: Role = "identify",
         payload: str | None = None,
+        servo_gain: float | Sequence[float] | None = None,
         **format: Any,
     ) -> Log:
         """Creates a log from a data frame. ``position`` and ``torque`` name its columns: a list, a pattern such as
@@ -157,7 +161,7 @@ class Log:
         if time_unit is not None or ("time" not in channels and "rate_hz" not in channels):
             columns["index_s"] = index_s(table, name, has_unit=time_unit is not None)
             channels["time"] = {**(time_unit or {}), "column": "index_s"}
-        return cls(name=name, format=channels, role=role, payload=payload, columns=columns)
+        return cls(name=name, format=channels, role=role, payload=payload, servo_gain=servo_gain, columns=columns)
 
     @classmethod
     def read(
@@ -170,6 +174,7 @@ class Log:
         name: str | None = None,
         role: Role = "identify",
         payload: str | None = None,
+        servo_gain: float | Sequence[float] | None = None,
         **format: Any,
     ) -> Log:
         """Creates a log from a file in any supported format (CSV, Parquet, MCAP, rosbag2, MAT, HDF5, npy, ...). The
@@ -184,7 +189,7 @@ class Log:
         path = fspath(file)
         stem = path.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
         channels = _channels(position, torque, time, format)
-        return cls(name=name or stem, format=channels, role=role, payload=payload, file=path)
+        return cls(name=name or stem, format=channels, role=role, payload=payload, servo_gain=servo_gain, file=path)
 
     @property
     def samples(self) -> int | None:
@@ -236,9 +241,8 @@ class Log:
         """
         time_s, (q, tau, dq, command) = self._arrays
         assert q is not None
-        return Log.from_arrays(
-            time_s, q, tau, command=command, dq=dq, name=self.name, role=self.role, payload=self.payload
-        )
+        log = Log.from_arrays(time_s, q, tau, command=command, dq=dq, name=self.name, role=self.role)
+        return replace(log, payload=self.payload, servo_gain=self.servo_gain)
 
     def plot(self) -> Figure:
         """Plots positions and torques (or commands) of every joint over time. Needs matplotlib.
@@ -296,6 +300,9 @@ class Log:
         }
         if self.payload is not None:
             section["payload"] = self.payload
+        if self.servo_gain is not None:
+            gain = self.servo_gain
+            section["servo_gain"] = list(gain) if isinstance(gain, Sequence) else gain
         return section
 
     def _samples(self) -> tuple[str, tuple[list[str], list[npt.NDArray[np.float64]]]] | None:

@@ -74,6 +74,12 @@ pub enum RunFault {
     /// Columns of different length.
     #[error("columns of different length: give each stamp a command and a position of each joint")]
     Lengths,
+    /// A wrong number of relative gains, or negative ones.
+    #[error("servo_gain needs one number that is not negative, or {joints} of them, one for each joint")]
+    Gains {
+        /// Joints of the robot.
+        joints: usize,
+    },
     /// Too few samples.
     #[error("{found} samples: give at least {least}")]
     Samples {

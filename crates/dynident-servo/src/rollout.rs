@@ -174,9 +174,11 @@ impl<'a> Rollout<'a> {
             let command = commands[joint].during(from - drive.delay_s, to - drive.delay_s);
             step.commands[joint] = command;
             step.at_rest[joint] = (-(step.v[joint] / drive.stribeck_speed).powi(2)).exp();
+            let stiffness = self.run.gain(joint) * drive.stiffness;
             step.laws.joints[joint] = JointLaw {
-                pull: drive.stiffness * (command.mean - step.q[joint] - weight * known * h * step.v[joint]),
-                slope: drive.stiffness * h * weight * weight,
+                stiffness,
+                pull: stiffness * (command.mean - step.q[joint] - weight * known * h * step.v[joint]),
+                slope: stiffness * h * weight * weight,
                 limit: drive.torque_limit,
                 damping: drive.damping * weight,
                 friction: drive.coulomb

@@ -23,6 +23,9 @@ pub struct Run {
     pub positions: Vec<Vec<f64>>,
     /// Known loads during the run: body, and inertial parameters in its frame.
     pub payloads: Vec<(usize, InertialParameters)>,
+    /// Position gain of each joint in this run, relative to the stiffness of its drive: firmware with another gain, or
+    /// 0 with the controller off. Empty if all are 1.
+    pub gains: Vec<f64>,
 }
 
 impl Run {
@@ -31,6 +34,11 @@ impl Run {
     /// numbers.
     pub fn validate(&self, joints: usize) -> Result<(), ServoError> {
         self.fault(joints).map_or(Ok(()), |fault| Err(ServoError::Run { run: self.name.clone(), fault }))
+    }
+
+    /// Position gain of a joint, relative to the stiffness of its drive.
+    pub(crate) fn gain(&self, joint: usize) -> f64 {
+        self.gains.get(joint).copied().unwrap_or(1.0)
     }
 
     /// Measured position of a joint at a time, interpolated, and its mean velocity over the samples nearby.
@@ -54,6 +62,10 @@ impl Run {
         }
         if columns().any(|column| column.len() != samples) {
             return Some(RunFault::Lengths);
+        }
+        let is_gain = |gain: &f64| *gain >= 0.0 && gain.is_finite();
+        if !(self.gains.is_empty() || self.gains.len() == joints && self.gains.iter().all(is_gain)) {
+            return Some(RunFault::Gains { joints });
         }
         if samples < LEAST_SAMPLES {
             return Some(RunFault::Samples { found: samples, least: LEAST_SAMPLES });

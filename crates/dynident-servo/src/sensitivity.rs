@@ -154,29 +154,27 @@ impl Sensitivity {
         let (columns, robot, dof) = (self.columns, &varied.robot, step.q.len());
         let (weight, known) = (step.end_weight, 1.0 - step.end_weight);
         for (joint, drive) in robot.drives.iter().enumerate() {
-            let mode = step.laws.modes[joint];
+            let (mode, law) = (step.laws.modes[joint], &step.laws.joints[joint]);
             let own = joint * dof + joint;
             if mode.clip == Clip::Inside {
-                self.of_q[own] -= drive.stiffness;
-                self.of_v[own] -= drive.stiffness * weight * known * step.h;
+                self.of_q[own] -= law.stiffness;
+                self.of_v[own] -= law.stiffness * weight * known * step.h;
             }
             let by_v = drive.stribeck * step.at_rest[joint] * -2.0 * step.v[joint] / drive.stribeck_speed.powi(2);
             self.of_v[own] -= drive.damping * known + mode.motion.sign() * by_v;
         }
         for effect in varied.effects.iter().filter(|effect| effect.quantity != Quantity::FloorHeight) {
             let joint = effect.index;
-            let (mode, drive) = (step.laws.modes[joint], &robot.drives[joint]);
+            let (mode, law, drive) = (step.laws.modes[joint], &step.laws.joints[joint], &robot.drives[joint]);
             let (x, sign, command) = (step.x[joint], mode.motion.sign(), &step.commands[joint]);
             let inside = mode.clip == Clip::Inside;
             let torque = match effect.quantity {
-                Quantity::Stiffness if inside => {
-                    step.laws.joints[joint].pull / drive.stiffness - step.h * weight * weight * x
-                }
-                Quantity::Delay if inside => -drive.stiffness * command.rate,
+                Quantity::Stiffness if inside => (law.pull - law.slope * x) / drive.stiffness,
+                Quantity::Delay if inside => -law.stiffness * command.rate,
                 Quantity::ProfileAcceleration if inside => {
-                    drive.stiffness * command.by_log[0] / drive.profile_acceleration
+                    law.stiffness * command.by_log[0] / drive.profile_acceleration
                 }
-                Quantity::ProfileSpeed if inside => drive.stiffness * command.by_log[1] / drive.profile_speed,
+                Quantity::ProfileSpeed if inside => law.stiffness * command.by_log[1] / drive.profile_speed,
                 Quantity::Damping => -step.mean[joint],
                 Quantity::Armature => -self.acceleration[joint],
                 Quantity::Coulomb => -sign,

@@ -126,8 +126,8 @@ fn mean_inertias(model: &Model, runs: &[Run]) -> Vec<f64> {
 fn median_distance(runs: &[Run], joint: usize) -> f64 {
     let mut distances: Vec<f64> = runs
         .iter()
-        .flat_map(|run| run.commands[joint].iter().zip(&run.positions[joint]))
-        .map(|(command, position)| (command - position).abs())
+        .flat_map(|run| run.commands[joint].iter().zip(&run.positions[joint]).map(|pair| (run.gain(joint), pair)))
+        .map(|(gain, (command, position))| gain * (command - position).abs())
         .collect();
     distances.sort_by(f64::total_cmp);
     distances[distances.len() / 2].max(1e-5)
@@ -196,7 +196,7 @@ fn response(runs: &[Run], joint: usize) -> Response {
 fn response_error(run: &Run, joint: usize, response: Response) -> f64 {
     let (commands, positions) = (&run.commands[joint], &run.positions[joint]);
     let Response { frequency, ratio, delay_s } = response;
-    let stiffness = frequency * frequency;
+    let stiffness = run.gain(joint) * frequency * frequency;
     let (mut x, mut v) = (positions[0], 0.0);
     let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
     let mut command = HeldCommand::held(&run.times_s, commands);

@@ -15,6 +15,8 @@
 /// The torque of one joint as a function of the velocity at the end of the step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct JointLaw {
+    /// Position gain in this run.
+    pub(crate) stiffness: f64,
     /// Torque of the position controller at zero velocity.
     pub(crate) pull: f64,
     /// Its decrease per velocity: stiffness × time step.

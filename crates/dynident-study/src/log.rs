@@ -1,6 +1,7 @@
 //! `[[log]]`: one recording, or a part of one.
 
 use super::arrays::exactly;
+use super::servo::PerJoint;
 use crate::error::StudyError;
 use dynident_identification::Role;
 use dynident_recording::{LogFormat, MemoryLog, ReferenceSettings};
@@ -35,6 +36,10 @@ pub struct LogSection {
     /// Name of the `[[payload]]` carried during the recording; no payload by default.
     #[serde(default)]
     pub payload: Option<String>,
+    /// Position gain of the servos in this log, relative to `stiffness` of `[drive.servo]`: one number or one per joint.
+    /// For logs with several gains in the firmware; 0 with the position controller off. 1 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub servo_gain: Option<PerJoint>,
     /// Overrides `rows` of the format.
     #[serde(default, deserialize_with = "exactly")]
     pub rows: Option<[u64; 2]>,
@@ -53,6 +58,15 @@ pub struct LogSection {
 }
 
 impl LogSection {
+    /// Relative position gain of each of this number of joints; empty if the log states none.
+    pub fn servo_gains(&self, joints: usize) -> Vec<f64> {
+        match &self.servo_gain {
+            None => Vec::new(),
+            Some(PerJoint::Same(gain)) => vec![*gain; joints],
+            Some(PerJoint::Each(gains)) => gains.clone(),
+        }
+    }
+
     /// The format of this log with its range: its own, or that of the study; `None` if neither is given.
     pub fn format_or(&self, of_study: Option<&LogFormat>) -> Option<LogFormat> {
         let mut format = self.format.as_ref().or(of_study)?.clone();

@@ -46,6 +46,7 @@ fn run_of(start: &[f64], commands: &[Vec<f64>], rate_hz: f64) -> Run {
         commands: commands.to_vec(),
         positions: start.iter().map(|q| vec![*q; samples]).collect(),
         payloads: Vec::new(),
+        gains: Vec::new(),
     }
 }
 

@@ -62,6 +62,7 @@ fn the_forecast_is_that_of_a_fit() {
         positions: found.positions.clone(),
         commands: found.commands.clone(),
         payloads: Vec::new(),
+        gains: Vec::new(),
     };
     let positions = simulate(&robot, &run, fit.step_s).unwrap().unwrap();
     run.positions = positions.iter().map(|q| q.iter().map(|q| (q / COUNT).round() * COUNT).collect()).collect();

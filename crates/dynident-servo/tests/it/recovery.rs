@@ -17,7 +17,14 @@ fn commands(seed: f64) -> Run {
         if t < 18.0 { sines } else { steps - 0.4 }
     };
     let commands: Vec<Vec<f64>> = [0.0, 1.0].map(|joint| times_s.iter().map(|&t| motion(joint, t)).collect()).into();
-    Run { name: format!("run {seed}"), positions: commands.clone(), commands, times_s, payloads: Vec::new() }
+    Run {
+        name: format!("run {seed}"),
+        positions: commands.clone(),
+        commands,
+        times_s,
+        payloads: Vec::new(),
+        gains: Vec::new(),
+    }
 }
 
 /// The run with the counts of an encoder.
@@ -89,6 +96,28 @@ fn the_scale_is_open_without_a_payload_and_found_with_one() {
         assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
     }
     assert!(found.covariance[(stiffness, stiffness)].sqrt() < 0.03);
+}
+
+/// The firmware of some logs has half of the gain, and a payload measures the scale.
+#[test]
+fn logs_with_another_gain_belong_to_the_same_drives() {
+    let truth = arm();
+    let settings = ServoSettings::default();
+    let with = |seed: f64, gain: f64, mass: f64| {
+        let load = InertialParameters::from_centre_of_mass(mass, Vec3([0.5, 0.0, 0.0]), &Mat3::IDENTITY.scale(0.01));
+        let run = Run { gains: vec![gain; 2], payloads: vec![(1, load)], ..commands(seed) };
+        measured(&truth, run, settings.step_s)
+    };
+    let runs = [with(0.0, 1.0, 1.0), with(1.0, 0.5, 1.0), with(3.0, 0.5, 4.0)];
+    let (robot, found, _) = fitted(&runs, &settings);
+    for error in &found.errors {
+        assert!(*error < 0.5 * COUNT, "{:?} {:?}", found.errors, robot.drives);
+    }
+    for (found, drive) in robot.drives.iter().zip(&truth.drives) {
+        for (found, true_value) in [(found.stiffness, drive.stiffness), (found.damping, drive.damping)] {
+            assert!((found / true_value - 1.0).abs() < 0.03, "{found} {true_value}");
+        }
+    }
 }
 
 /// Servos that follow steps with a profile, one with a smaller torque limit.

@@ -5,7 +5,14 @@ use dynident_servo::{Run, RunFault, ServoError, ServoSettings};
 fn run() -> Run {
     let times_s: Vec<f64> = (0..30).map(|k| 0.02 * f64::from(k)).collect();
     let still = vec![vec![0.0; times_s.len()]];
-    Run { name: "log".into(), commands: still.clone(), positions: still, times_s, payloads: Vec::new() }
+    Run {
+        name: "log".into(),
+        commands: still.clone(),
+        positions: still,
+        times_s,
+        payloads: Vec::new(),
+        gains: Vec::new(),
+    }
 }
 
 fn fault(change: impl Fn(&mut Run)) -> RunFault {

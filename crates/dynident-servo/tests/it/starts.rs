@@ -39,7 +39,14 @@ fn recording(robot: &ServoRobot, step_s: f64) -> Run {
         if t < 12.0 { 0.8 * (1.3 * t).sin() + 0.3 * (6.1 * t).sin() } else { 0.5 * ((0.7 * t).floor() % 3.0) - 0.4 }
     };
     let commands: Vec<Vec<f64>> = vec![times_s.iter().map(|&t| command(t)).collect()];
-    let mut run = Run { name: "run".into(), positions: commands.clone(), commands, times_s, payloads: Vec::new() };
+    let mut run = Run {
+        name: "run".into(),
+        positions: commands.clone(),
+        commands,
+        times_s,
+        payloads: Vec::new(),
+        gains: Vec::new(),
+    };
     let positions = simulate(robot, &run, step_s).unwrap().unwrap();
     run.positions = positions.into_iter().map(|q| q.iter().map(|q| (q / COUNT).round() * COUNT).collect()).collect();
     run

@@ -30,7 +30,14 @@ fn write_log(path: &Path, phase: f64) {
     let times_s: Vec<f64> = (0..750).map(|k| 0.02 * f64::from(k)).collect();
     let command = |joint: f64, t: f64| 0.5 * ((1.3 + 0.4 * joint) * t + phase).sin() + 0.2 * (4.1 * t + joint).sin();
     let commands: Vec<Vec<f64>> = [0.0, 1.0].map(|joint| times_s.iter().map(|&t| command(joint, t)).collect()).into();
-    let run = Run { name: "log".into(), positions: commands.clone(), commands, times_s, payloads: Vec::new() };
+    let run = Run {
+        name: "log".into(),
+        positions: commands.clone(),
+        commands,
+        times_s,
+        payloads: Vec::new(),
+        gains: Vec::new(),
+    };
     let positions = simulate(&robot, &run, 0.0025).unwrap().unwrap();
     let mut text = "t,q1,q2,c1,c2\n".to_owned();
     for (sample, time) in run.times_s.iter().enumerate() {

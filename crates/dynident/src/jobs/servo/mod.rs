@@ -131,6 +131,7 @@ fn run_of(study: StudyFile<'_>, index: usize, motion: &CommandedMotion, model: &
         positions: places.iter().map(|&at| column(&motion.positions, at)).collect(),
         commands,
         payloads: Vec::new(),
+        gains: study.log[index].servo_gains(model.dof()),
     }
 }
 
