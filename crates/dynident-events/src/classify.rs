@@ -17,7 +17,8 @@ const END_S: f64 = 1.0;
 const MIN_EXPLAINED: f64 = 0.6;
 /// Instants for the comparison with a force on a link.
 const INSTANTS: usize = 50;
-/// Evidence of a joint relative to its usual residual (squares) from which a contact may act on its link.
+/// A contact may be at the link of a joint if its squared residual in the event is at least this multiple of its usual
+/// squared residual.
 const MIN_TOUCH_RATIO: f64 = 1.0;
 /// Joints with at least this ratio of the strongest evidence belong to the event.
 const JOINT_SHARE: f64 = 0.02;

@@ -211,8 +211,8 @@ mod tests {
         // A bench of servos writes its constants next to the rows.
         let text = r#"{"mass": 0.5, "motor": "demo", "entries": [{"t": 0, "q": 1, "on": true}, {"t": 1, "q": 2, "on": true}]}"#;
         let (names, rows) = rows(text);
-        assert_eq!(names, ["t", "q", "on"]);
-        assert_eq!(rows, [[0.0, 1.0, 1.0], [1.0, 2.0, 1.0]]);
+        assert_eq!(names, ["on", "q", "t"]);
+        assert_eq!(rows, [[1.0, 1.0, 0.0], [1.0, 2.0, 1.0]]);
     }
 
     #[test]

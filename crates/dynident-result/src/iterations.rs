@@ -54,8 +54,8 @@ pub struct IterationsFile {
     /// Largest tracking error (mean over the joints) of the first accepted run divided by that of the last; null for
     /// fewer than two runs.
     pub tracking_improvement: Option<f64>,
-    /// Root mean square parameter error of the last accepted run alone, relative to the Cramér-Rao bound; for simulated
-    /// robots with torque noise.
+    /// Error of the parameters that the last accepted run alone gives, relative to the Cramér-Rao bound (ratio of root
+    /// mean squares). Only for simulated robots with torque noise, because both need the truth.
     pub error_over_bound: Option<f64>,
     /// Cramér-Rao bound of every parameter for one run of the first motion: white torque noise of the simulated sensors
     /// at every recorded sample, exact positions.

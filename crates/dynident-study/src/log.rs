@@ -36,8 +36,8 @@ pub struct LogSection {
     /// Name of the `[[payload]]` carried during the recording; no payload by default.
     #[serde(default)]
     pub payload: Option<String>,
-    /// Position gain of the servos in this log, relative to `stiffness` of `[drive.servo]`: one number or one per joint.
-    /// For logs with several gains in the firmware; 0 with the position controller off. 1 by default.
+    /// Position gain of the servos in this log, relative to `stiffness` of `[drive.servo]`: one number or one of each
+    /// joint. For logs with several gains in the firmware; 0 with the position controller off. 1 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub servo_gain: Option<PerJoint>,
     /// Overrides `rows` of the format.

@@ -43,7 +43,7 @@ struct ConstantsPass {
 }
 
 impl ConstantsPass {
-    /// The step of the constants with the covariance of the reported error bars.
+    /// The Gauss-Newton step of the friction constants, and its covariance, from which their error bars are computed.
     fn step(
         &self,
         passes: &TrainingPasses<'_>,

@@ -83,8 +83,8 @@ fn twin_of_best(fitted: &[Explained], at: &CorrectedStudy, consistency: &Consist
     if is_known { None } else { twin.explained(consistency).ok() }
 }
 
-/// The best torque gain of each joint that has a gain among the candidates. With a gain that is only nearer, the error
-/// of this joint would still spoil the other joints.
+/// The best torque factor of each joint for which a factor is among the tried corrections. All joints get the best one
+/// at once: a factor that is only nearly right leaves an error at this joint, which disturbs the fit of the others.
 fn gains_of_torques(at: &CorrectedStudy, motion: &SharedMotion, tried: &[Bounded]) -> Vec<Mistake> {
     let free_score = |mistake: &Mistake| at.without(mistake).free_score(motion);
     let mut nearest: Vec<Option<(f64, &Mistake)>> = vec![None; at.robot.dof()];

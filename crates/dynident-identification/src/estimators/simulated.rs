@@ -260,7 +260,8 @@ fn log_sum(sigma: &[f64]) -> f64 {
     sigma.iter().map(|sigma| sigma.ln()).sum()
 }
 
-/// Iterates from one start; the residuals update the noise of the joints, which weights their rows.
+/// The fit from one start, with steps until it settles. After each step the residuals of a joint give its noise, and
+/// the rows of the joint are weighted with it.
 fn settled(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,

@@ -57,7 +57,8 @@ pub(crate) fn known_loads(columns: &LoadColumns, training: &[usize]) -> Result<V
     Ok(known)
 }
 
-/// Estimates gains and parameters together; `rows` contain the logged torque including the `known` payloads.
+/// Estimates the torque per logged unit of each drive together with the dynamic parameters. The logged torque in `rows`
+/// includes that of the `known` payloads, which give the scale.
 pub(crate) fn drive_gains(
     settings: &EstimationSettings,
     known: &[Vec<f64>],

@@ -26,9 +26,9 @@ pub fn difference_words(r: &ResultFile) -> Vec<String> {
         words.push(format!("It could also be: {}", others.join("; or ")));
     }
     words.push(String::from(if found.is_followed {
-        "The written model follows this; the other bodies keep the values of the robot description within its tolerance"
+        "The exported model follows this; the other bodies keep the values of the robot description within its tolerance"
     } else {
-        "The written model does not follow this, so the change may be spread over several bodies"
+        "The exported model is valid, but it may spread this change over several bodies, because the logs do not locate it well enough"
     }));
     words.extend(best.parts.iter().filter_map(|part| edit_test(found, part)));
     words
@@ -38,7 +38,7 @@ fn change(part: &ChangedPart) -> String {
     let Some((mass, bar)) = part.mass_kg.zip(part.half_width_95_kg) else { return part.part.clone() };
     if mass.abs() <= bar {
         return format!(
-            "{} differs from the robot description, its mass by {} ± {} kg",
+            "{} differs from the robot description in its mass distribution; its mass differs by {} ± {} kg",
             part.part,
             short(mass, 3),
             short(bar, 2)
@@ -46,7 +46,12 @@ fn change(part: &ChangedPart) -> String {
     }
     let [verb, more] = if mass > 0.0 { ["carries", "more"] } else { ["has", "less"] };
     let centre = part.centre_m.filter(|_| mass > 0.0).map_or_else(String::new, |at| {
-        format!(", centred at ({}, {}, {}) m", short(at[0], 2), short(at[1], 2), short(at[2], 2))
+        format!(
+            ", centred at ({}, {}, {}) m in the frame of the body",
+            short(at[0], 2),
+            short(at[1], 2),
+            short(at[2], 2)
+        )
     });
     let words = format!("{} ± {} kg {more} than the robot description", short(mass.abs(), 3), short(bar, 2));
     format!("{} {verb} {words}{centre}", part.part)
@@ -62,7 +67,8 @@ fn edit_test(found: &DescriptionComparison, part: &ChangedPart) -> Option<String
     let body = found.bodies.iter().find(|body| part.part == format!("body `{}`", body.name))?;
     let (error, most) = body.error_percent.zip(body.error_95_percent)?;
     Some(format!(
-        "Edit test: with {} as in the robot description, the expected torque error is {} %, at most {} % (95 %)",
+        "Edit test: if you set {} in the exported model back to the robot description, its torque error for such a robot is \
+         about {} %, at most {} % (95 %)",
         part.part,
         short(error, 2),
         short(most, 2)

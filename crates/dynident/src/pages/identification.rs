@@ -30,7 +30,7 @@ pub fn identification_report(
     robot: Option<&RobotAppearance>,
 ) -> Result<String, Error> {
     let mut page = Report::new(&r.name).subtitle(format!(
-        "{}: {} joints, {} base parameters; estimator {}, error bars {}",
+        "{}: {} joints, {} base parameters; estimator: {}; 95 % error bars by {}",
         r.robot.name,
         r.robot.dof,
         r.base_parameters.len(),

@@ -13,7 +13,15 @@ pub(super) fn verdict(r: &ResultFile) -> Text {
     let held_out = r.validation.first().map(|log| exported_report(log).relative_error_percent);
     let first = match held_out {
         Some(Some(error)) => {
-            format!("This model predicts the torque of motion that was not used for the fit to {} %.", short(error, 3))
+            let described = r.validation.first().and_then(|log| log.prior.as_ref()?.relative_error_percent);
+            let described = described.map_or_else(String::new, |error| {
+                format!(" The robot description predicts it to {} %.", short(error, 3))
+            });
+            format!(
+                "This model predicts the torque of motion that was not used for the fit to {} % (root mean square error \
+                 relative to the torque).{described}",
+                short(error, 3)
+            )
         }
         Some(None) => "The held-out log has no torque, so the error of this model is not known.".to_owned(),
         None => "No log was held out, so the error of this model on other motion is not known.".to_owned(),
@@ -90,11 +98,15 @@ pub(super) fn key_figures(r: &ResultFile) -> KeyFigures {
     let physical = if r.physical.consistent { ("yes", good) } else { ("no", Tone::Bad) };
     let fit = r.training.physical.as_ref().map_or(r.training.relative_error_percent, |own| own.relative_error_percent);
     figures
-        .figure("error of the fit", percent(fit), format!("{} rows", r.training.samples))
+        .figure("error of the fit", percent(fit), format!("{} rows of the filtered logs", r.training.samples))
         .judged("parameters within 30 %", format!("{} of {all}", within(30.0)), known.join("; "), tone)
-        .figure("condition number", short(r.method.condition_number_scaled, 3), "columns of unit length")
+        .figure(
+            "condition number",
+            short(r.method.condition_number_scaled, 3),
+            "of the regressor, with columns of unit length",
+        )
         .judged("physically consistent", physical.0, "", physical.1)
-        .figure("time", format!("{} s", short(r.timings_s.total, 3)), "")
+        .figure("computing time", format!("{} s", short(r.timings_s.total, 3)), "")
 }
 
 /// Errors of the exported model: the physically consistent set, or the estimate without one.
@@ -110,18 +122,11 @@ pub(super) fn model_description(r: &ResultFile) -> Text {
     let figures = "Figures and plots of held-out logs use the physically consistent model, which is the exported one; \
                    the unconstrained estimate is listed for comparison.";
     let Some(test) = fit.difference else { return Text::new(figures) };
-    let [parameters, rest] = test.degrees_of_freedom;
-    let numbers = format!(
-        "F({}, {}) = {}, p = {}",
-        short(parameters, 4),
-        short(rest, 4),
-        short(test.f, 3),
-        short(test.p_value, 2)
-    );
+    let numbers = format!("F test, p = {}", short(test.p_value, 2));
     let (tone, verdict) = if test.is_significant {
-        (Tone::Warning, "The difference is significant: no physically consistent model explains these logs completely")
+        (Tone::Warning, "The two differ significantly: no physically consistent model explains these logs completely")
     } else {
-        (Tone::Plain, "The difference is not significant")
+        (Tone::Plain, "The two do not differ significantly")
     };
     Text::new(figures).point(tone, format!("{verdict} ({numbers})."))
 }

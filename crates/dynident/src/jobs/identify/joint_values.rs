@@ -8,7 +8,7 @@ use dynident_model::terms::{JointProperty, TermClass, TorqueTerm};
 pub(super) struct JointValues {
     /// New damping, friction, drive inertia and stiffness.
     pub(super) changes: Vec<JointChange>,
-    /// Whether terms are missing in the form, so that the others were fitted again.
+    /// Whether this export format cannot hold some terms, and the other terms were fitted again to replace them.
     pub(super) is_refitted: bool,
 }
 

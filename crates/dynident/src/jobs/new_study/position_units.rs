@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// Parts of the names of joints that are often logged as a share of their range.
 const GRIPPERS: [&str; 4] = ["gripper", "jaw", "finger", "claw"];
-/// Full range of such a joint in logs: a share or percent.
+/// Logged position of an open gripper, if it is logged as a share of its range: 1, or 100 for percent.
 const FULL_RANGES: [f64; 2] = [1.0, 100.0];
 /// Part of the full range by which a logged share may exceed it.
 const MAX_EXCESS: f64 = 0.1;
