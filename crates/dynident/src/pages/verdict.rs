@@ -47,7 +47,10 @@ pub(super) fn verdict(r: &ResultFile) -> Text {
     let study = study.map_or("STUDY.toml", |study| study.file.as_str());
     text.point(
         Tone::Warning,
-        format!("{count} of {all} parameters are poorly known: their error bar is above {POORLY_KNOWN_PERCENT} % of the value."),
+        format!(
+            "{count} of {all} parameters are poorly known: their error bar is above {POORLY_KNOWN_PERCENT} % of the value. \
+             The torque of motion like the recorded one hardly depends on them."
+        ),
     )
     .point(
         Tone::Plain,
