@@ -157,8 +157,8 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
     };
     let (rest, named) = if joint.is_none() { without_brackets(&rest) } else { (rest, None) };
     let (rest, named) = match named.as_deref().and_then(|named| named.rsplit_once('.')) {
-        // `action[elbow.pos]`: the quantity is a part of the entry's name.
-        Some((own, quantity)) if POSITIONS.contains(&quantity) => (format!("{rest} {quantity}"), Some(own.to_owned())),
+        // `action[elbow.pos]`, `observation.state[joint_1.torque]`: the quantity is a part of the entry's name.
+        Some((own, quantity)) if is_quantity(quantity) => (format!("{rest} {quantity}"), Some(own.to_owned())),
         _ => (rest, named),
     };
     let words = words(&rest);
@@ -215,6 +215,11 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         unit,
         stem,
     }
+}
+
+fn is_quantity(word: &str) -> bool {
+    let lists: [&[&str]; 5] = [&POSITIONS, &VELOCITIES, &ACCELERATIONS, &TORQUES, &CURRENTS];
+    lists.iter().any(|list| list.contains(&word))
 }
 
 /// Places of the words that are neither a quantity nor a source, if they follow each other: `shoulder_pan` of
@@ -352,6 +357,9 @@ mod tests {
             ("action[elbow.pos]", Some(Position), Name("elbow".to_owned()), Source::Commanded, None),
             ("action[2]", Some(Position), Number(2), Source::Commanded, None),
             ("observation.state[elbow.pos]", Some(Position), Name("elbow".to_owned()), Source::Unstated, None),
+            ("observation.state[joint_1.torque]", Some(Torque), Joint(3), Source::Unstated, None),
+            ("observation.state[joint_2.torque]", Some(Torque), Name("joint_2".to_owned()), Source::Unstated, None),
+            ("observation.state[joint_2.vel]", Some(Velocity), Name("joint_2".to_owned()), Source::Unstated, None),
             ("observation.state[1]", Some(Position), Number(1), Source::Unstated, None),
             ("control.positions[Elbow]", Some(Position), Name("elbow".to_owned()), Source::Commanded, None),
             ("state_motor.positions[Elbow]", Some(Position), Name("elbow".to_owned()), Source::Unstated, None),

@@ -1,5 +1,6 @@
 //! Assigns the columns of a family to the robot's joints.
 
+use super::position_units::GRIPPERS;
 use crate::jobs::columns::{Basis, Family, JointKey, words};
 use crate::result::LogContents;
 use std::path::Path;
@@ -56,11 +57,16 @@ pub(super) fn logged_joints(family: &Family, robot: &RobotJoints<'_>, left_out: 
         })
         .collect();
     if let Some(names) = foreign {
+        let others: Vec<&str> = left_out.iter().map(String::as_str).filter(|name| !names.contains(name)).collect();
+        let unused = match &others[..] {
+            [] => String::new(),
+            others => format!("; not used, because the robot description has no such joint: {}", others.join(", ")),
+        };
         if let Some(joints) = by_words(&names, robot) {
-            let reason = "joints from the column names, which are parts of the joint names".to_owned();
+            let reason = format!("joints from the column names, which are parts of the joint names{unused}");
             return Some(LoggedJoints { joints, reason, is_sure: true });
         }
-        let unknown = format!("the robot description has no joint `{}`: {count} columns", names[0]);
+        let unknown = format!("the robot description has no joint `{}`: {count} columns{unused}", names[0]);
         return match by_numbers(&names) {
             Some(places) if count <= free.len() => {
                 let joints = places.into_iter().map(|place| free[place]).collect();
@@ -163,6 +169,18 @@ pub(super) fn with_partly_foreign_names(
     joined
 }
 
+/// Leaves out the columns of grippers where the robot description has fewer joints than the log and none of their names.
+pub(super) fn without_foreign_grippers(all: &[Family], robot: &RobotJoints<'_>) -> Vec<Family> {
+    let is_gripper = |(key, _): &(JointKey, String)| matches!(key, JointKey::Name(name) if GRIPPERS.iter().any(|gripper| name.contains(gripper)));
+    let mut all = all.to_vec();
+    for family in &mut all {
+        if family.columns.len() > robot.free.len() && !family.columns.iter().all(is_gripper) {
+            family.columns.retain(|column| !is_gripper(column));
+        }
+    }
+    all
+}
+
 /// The columns of `family` in the order of `joints`; `None` if one is missing.
 pub(super) fn in_order(family: &Family, logged: &Family, joints: &[usize]) -> Option<Vec<String>> {
     let name_at = |place: usize, joint: usize| {
@@ -245,6 +263,26 @@ mod tests {
         assert!(logged.is_sure && logged.joints == (0..7).collect::<Vec<_>>(), "{logged:?}");
         assert!(!logged_joints(&found[0], &robot(&[], 9, 9), &[]).unwrap().is_sure);
         assert_eq!(logged_joints(&found[0], &robot(&[], 5, 5), &[]), None);
+    }
+
+    #[test]
+    fn grippers_without_a_joint_are_left_out() {
+        let joints = ["panda_joint1", "panda_joint2"].map(str::to_owned);
+        let entries = ["joint_2", "joint_1", "gripper"];
+        let names: Vec<String> = ["pos", "vel", "torque"]
+            .iter()
+            .flat_map(|quantity| entries.map(|entry| format!("observation.state[{entry}.{quantity}]")))
+            .collect();
+        let logs = [(Path::new("set"), contents(&names.iter().map(String::as_str).collect::<Vec<_>>()))];
+        let all = families(logs.iter().map(|(path, log)| (*path, log)), &joints);
+        let robot = robot(&joints, 2, 2);
+        let found = without_foreign_grippers(&all, &robot);
+        let position = best(&found, Quantity::Position, |_| true).unwrap();
+        let logged = logged_joints(position, &robot, &["gripper".to_owned()]).unwrap();
+        assert!(logged.is_sure && logged.joints == [1, 0] && logged.reason.contains("gripper"), "{logged:?}");
+        let torque = best(&found, Quantity::Torque, |_| true).unwrap();
+        let columns = in_order(torque, position, &logged.joints).unwrap();
+        assert_eq!(columns, ["joint_2", "joint_1"].map(|joint| format!("observation.state[{joint}.torque]")));
     }
 
     #[test]

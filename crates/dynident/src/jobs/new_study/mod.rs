@@ -19,7 +19,9 @@ use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
 use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
 use crate::study::{LoadSettings, Study, XacroSettings, load_robot, relative_path};
-use channels::{LoggedJoints, RobotJoints, in_order, logged_joints, with_partly_foreign_names};
+use channels::{
+    LoggedJoints, RobotJoints, in_order, logged_joints, with_partly_foreign_names, without_foreign_grippers,
+};
 use draft::{Draft, Table};
 use drives::{DriveInertiaFinding, drive_inertia};
 use dynident_model::{JointKind, Model, Robot};
@@ -179,14 +181,15 @@ impl RecognisedColumns {
             let counts = [robot.free.len(), robot.turning.len()];
             all = logs.iter().enumerate().flat_map(|(file, (_, log))| families_by_order(file, log, &counts)).collect();
         }
-        let all = with_partly_foreign_names(&all, logs, &robot);
+        let joined = with_partly_foreign_names(&all, logs, &robot);
+        let all = without_foreign_grippers(&joined, &robot);
         let missing = |quantity| NewStudyError::NotRecognised { quantity, found: recognised(&all, logs) };
         let position = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions"))?;
         let same_kind = |family: &&Family| {
             (family.file, family.group, family.quantity, &family.stem)
                 == (position.file, position.group, position.quantity, &position.stem)
         };
-        let left_out: Vec<String> = all
+        let left_out: Vec<String> = joined
             .iter()
             .filter(same_kind)
             .flat_map(|family| &family.columns)
@@ -278,7 +281,7 @@ impl RecognisedColumns {
         let tables = [
             vec![self.robot_table(request, model, from), self.time_table(request)],
             vec![self.position_table(model, logs)],
-            self.velocity_table(logs, from).into_iter().collect(),
+            self.velocity_table(model, logs, from).into_iter().collect(),
             vec![if self.has_commands() {
                 self.command_table(model, logs, from)
             } else {
@@ -351,7 +354,7 @@ impl RecognisedColumns {
         PositionUnits::of(self, model, logs).with_unit(table, self.position.unit)
     }
 
-    fn velocity_table(&self, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
+    fn velocity_table(&self, model: &Model, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
         // Commands are compared with positions alone.
         let velocity = self.velocity.as_ref().filter(|_| !self.has_commands());
         let (family, columns) = velocity.zip(self.velocity_columns.as_ref())?;
@@ -362,6 +365,9 @@ impl RecognisedColumns {
         let table = self.with_file(table, family, logs, from).with("columns", column_list(columns), "");
         Some(match family.unit.filter(|unit| *unit != "rad/s") {
             Some(unit) => table.with("unit", quoted(unit), "by the names"),
+            None if family.unit.is_none() && PositionUnits::of(self, model, logs).are_degrees(self.position.unit) => {
+                table.with_unsure("unit", quoted("deg/s"), "positions are in degrees".to_owned())
+            }
             None => table,
         })
     }

@@ -8,7 +8,7 @@ use dynident_text::quoted;
 use std::path::Path;
 
 /// Parts of the names of joints that are often logged as a share of their range.
-const GRIPPERS: [&str; 4] = ["gripper", "jaw", "finger", "claw"];
+pub(super) const GRIPPERS: [&str; 4] = ["gripper", "jaw", "finger", "claw"];
 /// Logged position of an open gripper, if it is logged as a share of its range: 1, or 100 for percent.
 const FULL_RANGES: [f64; 2] = [1.0, 100.0];
 /// Part of the full range by which a logged share may exceed it.
@@ -73,6 +73,11 @@ impl PositionUnits {
         Self { columns: joints.len(), gripper, implausible: (most > limit).then_some(most) }
     }
 
+    /// Whether the positions are probably in degrees; `stated` is the unit in their names.
+    pub(super) fn are_degrees(&self, stated: Option<&'static str>) -> bool {
+        stated == Some("deg") || stated.is_none() && self.implausible.is_some()
+    }
+
     /// `table` with the unit of its columns, and the range of a gripper.
     pub(super) fn with_unit(&self, table: Table, stated: Option<&'static str>) -> Table {
         let table = match (stated, self.implausible) {
@@ -86,8 +91,7 @@ impl PositionUnits {
             }
         };
         let Some(Gripper { place, full, limits: [low, high] }) = &self.gripper else { return table };
-        let degrees = stated == Some("deg") || stated.is_none() && self.implausible.is_some();
-        let unit = if degrees { core::f64::consts::PI / 180.0 } else { 1.0 };
+        let unit = if self.are_degrees(stated) { core::f64::consts::PI / 180.0 } else { 1.0 };
         let list = |usual: f64, own: f64| {
             let values = (0..self.columns).map(|column| if column == *place { own } else { usual });
             format!("[{}]", values.map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", "))
