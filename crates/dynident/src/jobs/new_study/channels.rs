@@ -169,7 +169,7 @@ pub(super) fn with_partly_foreign_names(
     joined
 }
 
-/// Leaves out the columns of grippers where the robot description has fewer joints than the log and none of their names.
+/// Leaves out the columns of grippers where the robot description has fewer joints than the log, and no such joint.
 pub(super) fn without_foreign_grippers(all: &[Family], robot: &RobotJoints<'_>) -> Vec<Family> {
     let is_gripper = |(key, _): &(JointKey, String)| matches!(key, JointKey::Name(name) if GRIPPERS.iter().any(|gripper| name.contains(gripper)));
     let mut all = all.to_vec();
