@@ -24,9 +24,9 @@ const HOME_CAPABILITY: &str = "home";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 enum LineError {
-    #[error("longer than a megabyte")]
+    #[error("the line is longer than a megabyte")]
     TooLong,
-    #[error("not UTF-8")]
+    #[error("the line is not UTF-8 text")]
     NotText,
 }
 
