@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// A limit of `check` that the study or a program sets is zero, negative or not finite. Write a positive number.
+/// A setting of `check` is zero, negative or not finite. Write a positive number.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error("limit {name} = {value}: give a finite number above zero")]
 pub struct InvalidLimit {

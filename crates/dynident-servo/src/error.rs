@@ -7,7 +7,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ServoError {
-    /// A setting under `[servo]` is outside its range. Write a value within the range that the message names.
+    /// A setting of the fit to commands is outside its range. Write a positive number.
     #[error("{setting} = {value}: give a positive number; for step_s from 0.0001 to 0.05")]
     Setting {
         /// Name of the setting.
@@ -78,8 +78,8 @@ pub enum RunFault {
     /// A program passed lists of times, commands and positions of different lengths.
     #[error("columns of different length: give each stamp a command and a position of each joint")]
     Lengths,
-    /// `servo_gain` of a log is the gain of the servos relative to the other logs. Write one number for all joints, or
-    /// one for each joint.
+    /// `servo_gain` of a log is the gain of its servos relative to `stiffness`. Write one number, or one for each
+    /// joint; 0 if the position controller was off.
     #[error("servo_gain needs one number that is not negative, or {joints} of them, one for each joint")]
     Gains {
         /// Joints of the robot.

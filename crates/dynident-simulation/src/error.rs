@@ -33,7 +33,7 @@ pub enum SimulationError {
     /// `[controller]` for a simulation.
     #[error("the controller position-loop runs in the robot's drives: state its kp and kd to simulate it")]
     OwnLoop,
-    /// This controller computes torques from a model, and there is none yet. Choose another `kind` under
+    /// This controller computes torques from a model, and no model is available yet. Choose another `kind` under
     /// `[controller]`, or give a model.
     #[error("controller {controller} needs a model of the robot: give one, or use joint-pd or joint-pid")]
     NoModel {

@@ -57,8 +57,8 @@ pub enum LimitError {
         /// The value.
         value: f64,
     },
-    /// This factor reduces the limits of the robot description, so it cannot be above 1. Higher limits are written for
-    /// each joint.
+    /// The factors in `scale` under `[design.limits]` reduce the limits of the robot, so they cannot be above 1. Write
+    /// higher limits for each joint in `joints`.
     #[error("{what} is {value}: it must be at most 1 (state higher limits in `joints`)")]
     AboveOne {
         /// The factor.

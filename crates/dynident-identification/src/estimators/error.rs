@@ -14,8 +14,8 @@ pub enum EstimatorError {
     /// The rows do not determine an estimate.
     #[error("{0}")]
     Estimation(#[from] EstimationError),
-    /// The estimator of `estimator.method` needs something that this log or robot does not have. The message states
-    /// what; change the study or use `estimator.method = "auto"`.
+    /// This log or robot does not meet a requirement of `estimator.method`. Change the study as the message states, or
+    /// use `estimator.method = "auto"`.
     #[error("estimator.method = \"{method}\": {message}")]
     Requirement {
         /// Name of the estimator.

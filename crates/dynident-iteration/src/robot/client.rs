@@ -24,8 +24,12 @@ const HOME_CAPABILITY: &str = "home";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 enum LineError {
+    /// The program of the robot wrote a line above the size limit, probably without line ends. End each message with a
+    /// newline.
     #[error("the line is longer than a megabyte")]
     TooLong,
+    /// The program of the robot wrote binary data to standard output, which is reserved for messages. Write messages as
+    /// UTF-8 text.
     #[error("the line is not UTF-8 text")]
     NotText,
 }

@@ -449,8 +449,8 @@ pub enum RobotFault {
         "the study has a home, but the robot program does not report in its hello that it runs the paths from and to home (\"capabilities\":[\"home\"]): let it run approach.csv before and return.csv after the trajectory, use mode = \"step\", or remove home from [iteration] and move the robot to its start yourself"
     )]
     NoWays,
-    /// The controller computed NaN or an infinite torque, usually because the measured position was wrong. No torque
-    /// was sent.
+    /// The controller computed NaN or an infinite torque, usually because a measured position or velocity was wrong.
+    /// Check the samples of the robot.
     #[error("the controller's torque at sample {sample} is not a finite number")]
     Torque {
         /// The sample, from 0.

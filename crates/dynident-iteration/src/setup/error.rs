@@ -38,8 +38,8 @@ pub enum IterationError {
     /// Rows that are not sufficient for an estimate.
     #[error("{0}")]
     Estimation(#[from] EstimationError),
-    /// The samples that the robot returned cannot be differentiated or fitted, for example because they are too few.
-    /// The text after the joints has the cause.
+    /// The samples that the robot returned cannot be fitted, for example because they are too few or not where the
+    /// joints follow the motion. The text after the joints has the cause.
     #[error("the record of the run (joints {}): {problem}", joints.join(", "))]
     Record {
         /// Its joints.
@@ -47,7 +47,8 @@ pub enum IterationError {
         /// The problem and its fix.
         problem: String,
     },
-    /// The next motion depends on a good earlier run, and there is none. See why the earlier runs were rejected.
+    /// The next motion depends on a good earlier run, and all earlier runs were rejected. See the reasons in the output
+    /// of these runs.
     #[error("run {run}: {problem}")]
     Planning {
         /// The run.

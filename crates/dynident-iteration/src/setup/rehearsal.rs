@@ -108,8 +108,8 @@ pub enum RehearsalFailure {
     /// the robot.
     #[error("the motion leaves the envelope: {breach}; use another motion, or correct the limit in [iteration.envelope]", breach = .0)]
     Path(Breach),
-    /// The inertias of the robot description are not physically consistent. Run `dynident inspect ROBOT --fix
-    /// OUT.urdf`, or correct them.
+    /// The inertias of the model are not physically consistent. Run `dynident inspect ROBOT --fix OUT.urdf`, or correct
+    /// them in the robot description.
     #[error(
         "the model's mass matrix is not positive definite (eigenvalue {eigenvalue:.3e} kg m^2) at the positions {q:.3?}: a controller with this model may push in the wrong direction"
     )]
@@ -123,7 +123,7 @@ pub enum RehearsalFailure {
     /// under `[design.limits]`.
     #[error("the model's torque along the motion leaves the envelope: {breach}; use a slower motion", breach = .0)]
     Torque(Breach),
-    /// The command was stopped, for example by Ctrl-C, during the rehearsal. Nothing was sent to the robot.
+    /// The command was stopped, for example by Ctrl-C, during the rehearsal. Run it again.
     #[error("the rehearsal was interrupted")]
     Interrupted,
     /// A simulated robot with other masses and friction, within `uncertainty_percent`, stops early with these gains.

@@ -21,8 +21,8 @@ const MAX_PARENT_LEVELS: usize = 8;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum MeshError {
-    /// The robot description names a mesh file that is not in its folder or a folder above. Copy the meshes there, or
-    /// correct the name.
+    /// The robot description names a mesh file that Dynident does not find in its folder, nor, for `package://` names,
+    /// in the folders above. Copy the mesh there, or correct the name.
     #[error("mesh `{name}` is missing (searched next to and above {})", folder.display())]
     Missing {
         name: String,

@@ -35,8 +35,8 @@ pub enum MjcfFault {
     /// the robot alone.
     #[error("the document has more than {limit} {what}: give the MJCF of one robot")]
     TooLarge { limit: usize, what: &'static str },
-    /// The number of attributes in one tag, or of XML namespaces, exceeds the limit of the XML reader. No usual MJCF
-    /// has so many; check that the file is an MJCF.
+    /// One tag has too many attributes, or the document has too many XML namespaces. No usual MJCF reaches these
+    /// limits: check that the file is an MJCF.
     #[error("too many attributes in a tag, or namespaces in the document: give the MJCF of one robot")]
     Flood,
     /// `<!DOCTYPE>` can define entities that expand without limit, so Dynident rejects it. An MJCF does not need it.
@@ -54,7 +54,7 @@ pub enum MjcfFault {
     /// The attribute is a list of numbers, such as `pos="0 0 0.1"`, and a number is missing or extra.
     #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
     Count { element: String, attribute: String, expected: usize, found: usize },
-    /// The attribute permits only certain words, and this is none of them. It may be misspelt.
+    /// The attribute permits only certain words, and this word is unknown. It may be misspelt.
     #[error("`{attribute}` of <{element}> is `{text}`: write {expected}")]
     Word { element: String, attribute: String, text: String, expected: &'static str },
     /// Two elements of one kind have the same name, often after two files were merged.
@@ -84,7 +84,7 @@ pub enum MjcfFault {
     /// Dynident computes the mass of a geom from its size, and a number is missing, zero or negative.
     #[error("a geom of type `{kind}` needs {needed} positive numbers in `size`: write all of them")]
     Size { kind: &'static str, needed: usize },
-    /// Mass, density or armature below zero does not exist physically.
+    /// This quantity, such as a mass or an armature, cannot be negative physically. The sign is wrong.
     #[error("`{attribute}` of <{element}> is negative: write a value of zero or more")]
     Negative { element: String, attribute: &'static str },
     /// `settotalmass` scales all masses to a given sum, which is impossible while one mass is unknown. Add the

@@ -22,8 +22,8 @@ pub enum SdfFault {
     /// the robot alone.
     #[error("the document has more than {limit} nodes: give the SDF of one robot")]
     TooLarge { limit: u32 },
-    /// The number of attributes in one tag, or of XML namespaces, exceeds the limit of the XML reader. No usual SDF has
-    /// so many; check that the file is an SDF.
+    /// One tag has too many attributes, or the document has too many XML namespaces. No usual SDF reaches these limits:
+    /// check that the file is an SDF.
     #[error("too many attributes in a tag, or namespaces in the document: give the SDF of one robot")]
     Flood,
     /// `<!DOCTYPE>` can define entities that expand without limit, so Dynident rejects it. An SDF does not need it.
@@ -57,7 +57,7 @@ pub enum SdfFault {
     /// The element is a list of numbers, such as `<xyz>0 0 1</xyz>`, and a number is missing or extra.
     #[error("<{element}> holds {found} numbers: write {expected}, separated by spaces")]
     Count { element: String, expected: usize, found: usize },
-    /// The element permits only certain words, and this is none of them. It may be misspelt.
+    /// The element permits only certain words, and this word is unknown. It may be misspelt.
     #[error("`{text}` of <{element}> is unknown: write {expected}")]
     Word { element: String, text: String, expected: &'static str },
     /// Two links, joints, frames or nested models have the same name, often after two files were merged.

@@ -114,8 +114,8 @@ pub enum UrdfFault {
     /// The file has far more elements than one robot needs. It is probably another file, or several robots in one.
     #[error("the document has more than {limit} nodes: name the URDF of one robot")]
     TooLarge { limit: u32 },
-    /// The number of attributes in one tag, or of XML namespaces, exceeds the limit of the XML reader. No usual URDF
-    /// has so many; check that the file is a URDF.
+    /// One tag has too many attributes, or the document has too many XML namespaces. No usual URDF reaches these
+    /// limits: check that the file is a URDF.
     #[error("too many attributes in a tag, or namespaces in the document: name the URDF of one robot")]
     Flood,
     /// `<!DOCTYPE>` can define entities that expand without limit, so Dynident rejects it. A URDF does not need it.

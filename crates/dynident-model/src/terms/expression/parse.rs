@@ -58,8 +58,8 @@ pub enum ExpressionProblem {
     /// from 1.
     #[error("there is no joint {joint}: the joints are {}", known.join(", "))]
     Joint { joint: String, known: Vec<String> },
-    /// `q` or `dq` is written without a joint, but the expression has no joint of its own. Write the number of the
-    /// joint, counted from 1.
+    /// `q` or `dq` is written without a joint, in an expression that does not belong to one joint. Write the number of
+    /// the joint, counted from 1.
     #[error("the joint of {name} is missing: write {name}1, {name}2, ..")]
     WhichJoint { name: &'static str },
     /// `^` permits only a constant exponent. Write a variable exponent with `exp` and `ln`.
