@@ -49,7 +49,7 @@ pub enum ExportError {
         /// Time, s.
         at_s: f64,
     },
-    /// The format URScript is for arms with six joints. Choose another format, such as CSV.
+    /// The format `URScript` is for arms with six joints. Choose another format, such as CSV.
     #[error(
         "URScript needs the six joints of a UR arm, but the robot has {joints}: lock the others, or choose another format"
     )]

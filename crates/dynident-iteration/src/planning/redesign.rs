@@ -91,8 +91,8 @@ enum NotRedesigned {
         "every motion that was found needs up to {torque:.3} Nm at joint {joint} for some model within the uncertainty, and the limit is {limit:.3} Nm"
     )]
     Torque { joint: String, torque: f64, limit: f64 },
-    /// The iteration keeps its motion, because each run must begin where the last one ended. Choose a family that
-    /// returns, such as `fourier`.
+    /// The present motion ends where it begins, so a new one must do so as well, and this one does not. The iteration
+    /// keeps its motion. Choose a family that returns, such as `fourier`.
     #[error("the motion does not end at its start position at joint {joint}: use a family that returns")]
     Ends { joint: String },
     /// The command was stopped while it searched. The iteration keeps its motion.

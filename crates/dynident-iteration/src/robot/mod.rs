@@ -357,8 +357,8 @@ pub enum RobotFault {
         /// Why it is invalid.
         reason: String,
     },
-    /// The program does not keep the order of messages of the protocol. Compare it with [External
-    /// robots](robot-protocol.md).
+    /// The program does not keep the order of the messages. Compare it with the page "External robots: the line
+    /// protocol".
     #[error("the robot program sent a message of type {found} instead of {expected}")]
     OutOfTurn {
         /// Type of the message.
