@@ -134,7 +134,7 @@ pub(crate) fn page() -> Result<String, Box<dyn Error>> {
             return Err(format!("{kind}: no message in the sources: remove its row of SECTIONS").into());
         }
         write!(page, "\n## {heading}\n\nMore on this subject: [{}]({help}).\n\n", title(help)?)?;
-        page += "| code | message | reason |\n| --- | --- | --- |\n";
+        page += "| code | message | cause and fix |\n| --- | --- | --- |\n";
         for one in rows {
             let code = dynident::error_code(kind, one.variant.as_deref());
             writeln!(page, "| `{code}` | {} | {} |", code_span(&one.text), one.reason.replace('|', "\\|"))?;

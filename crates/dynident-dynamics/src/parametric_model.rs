@@ -10,7 +10,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ParametricModelError {
-    /// A torque term acts on a joint that does not exist.
+    /// A program added a torque term for a joint number that the robot does not have. Joint numbers start at 0.
     #[error("torque term {term}: the joint does not exist (the model has {joints} joints)")]
     NoSuchJoint {
         /// The term's symbol.
@@ -18,7 +18,7 @@ pub enum ParametricModelError {
         /// Joints of the model.
         joints: usize,
     },
-    /// The ratios of a coupling are out of range.
+    /// A coupling of joints has a ratio that is zero, too small or too large. Check the ratio and its units.
     #[error("coupling {term}: ratio {ratio} is out of range: use magnitudes from 1e-6 to 1e6")]
     Ratio {
         /// The term's symbol.
@@ -26,7 +26,7 @@ pub enum ParametricModelError {
         /// The ratio.
         ratio: f64,
     },
-    /// A declared torque depends on a joint that does not exist.
+    /// The expression of a `[[torque]]` uses a joint number that the robot does not have. Correct the number.
     #[error("torque {term}: joint number {joint} does not exist (the model has {joints} joints)")]
     FollowsNoJoint {
         /// The term's symbol.
@@ -36,7 +36,8 @@ pub enum ParametricModelError {
         /// Joints of the model.
         joints: usize,
     },
-    /// A declared torque is undefined at some state within the joint limits.
+    /// The expression or function of a `[[torque]]` has no value at a position and velocity that the joint limits
+    /// permit, for example a logarithm of a negative number.
     #[error(
         "torque {term} = {law}: no value at {at}, which is inside the joints' limits: keep the arguments of roots, logarithms and divisions valid, for example with max(.., 0), or narrow the limits"
     )]
@@ -48,7 +49,8 @@ pub enum ParametricModelError {
         /// Positions and velocities.
         at: String,
     },
-    /// A declared torque is zero everywhere.
+    /// The expression of a `[[torque]]` is zero at all positions and velocities within the joint limits, so that its
+    /// coefficient cannot be identified.
     #[error("torque {term} = {law}: this torque is zero (below 1e-9) within the joint limits: remove its [[torque]]")]
     Nothing {
         /// The term's symbol.
@@ -56,7 +58,8 @@ pub enum ParametricModelError {
         /// Its expression.
         law: String,
     },
-    /// The name of a declared torque is invalid or already in use.
+    /// The `name` of a `[[torque]]` has an invalid character, is too long, or is the name of another parameter. Rename
+    /// it.
     #[error(
         "torque {term}: the name is invalid, or the symbol of another parameter: use a unique name of a letter and up to 59 letters, digits and `_`"
     )]
@@ -64,7 +67,7 @@ pub enum ParametricModelError {
         /// The name.
         term: String,
     },
-    /// Wrong number of nominal values.
+    /// A program passed a list of nominal parameters of the wrong length. Pass one value for each parameter.
     #[error("wrong number of nominal parameters: expected {expected}, found {found}")]
     NominalLength {
         /// Ten per body and one per term.
@@ -72,7 +75,8 @@ pub enum ParametricModelError {
         /// Number given.
         found: usize,
     },
-    /// A nominal value is not finite.
+    /// A nominal parameter is NaN or infinite. Correct it in the robot description, or in `nominal` of the
+    /// `[[torque]]`.
     #[error("nominal parameter {value} is not finite: use finite numbers")]
     NominalNotFinite {
         /// The value.

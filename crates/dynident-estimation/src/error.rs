@@ -5,7 +5,8 @@ use thiserror::Error;
 /// Errors of factors, problems and estimators.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum EstimationError {
-    /// A slice of rows has the wrong length.
+    /// A program passed a row of the regression with the wrong number of values. Each row has one value for each
+    /// column, and the torque.
     #[error(
         "{what}: expected {expected} numbers, found {found}; give one number per column plus the torque for every row"
     )]
@@ -17,7 +18,8 @@ pub enum EstimationError {
         /// Number of values given.
         found: usize,
     },
-    /// A value in a row is NaN, infinite or too large to be squared.
+    /// A position, velocity or torque of the log leads to a value that is NaN, infinite or too large. Check units and
+    /// outliers of the log, or leave out the sample with `drop_time_s`.
     #[error(
         "row {row}, column {column}: {value} cannot be used in a fit (largest magnitude {limit:e}); remove this sample or fix its source"
     )]
@@ -31,7 +33,8 @@ pub enum EstimationError {
         /// Largest accepted magnitude.
         limit: f64,
     },
-    /// Numbers of columns, joints or rows do not agree.
+    /// Two inputs of a fit have different numbers of columns, joints or rows. In a program, pass lists of equal length;
+    /// otherwise report the message.
     #[error("{what}: expected {expected}, found {found}")]
     Mismatch {
         /// The quantity that was compared.
@@ -41,7 +44,7 @@ pub enum EstimationError {
         /// Number given.
         found: usize,
     },
-    /// A column number is out of range or duplicate.
+    /// A program fixed or selected a column number twice, or one that does not exist. Column numbers start at 0.
     #[error("log {log}, joint {joint}: column number {column} is given twice or is not below {columns}")]
     Column {
         /// The log.
@@ -53,7 +56,7 @@ pub enum EstimationError {
         /// Number of columns of the problem.
         columns: usize,
     },
-    /// A setting is out of range.
+    /// A setting of the estimator is outside its range. Write a value within the range that the message names.
     #[error("setting {setting} = {value}: {fix}")]
     Setting {
         /// Name of the setting.
@@ -63,7 +66,8 @@ pub enum EstimationError {
         /// The fix.
         fix: &'static str,
     },
-    /// There are not more rows than free parameters, so the noise cannot be estimated.
+    /// The logs have fewer usable samples than unknown parameters, or about as many. Record longer logs, or reduce the
+    /// friction laws under `[drive]`.
     #[error(
         "{what}: {rows} rows for {parameters} free parameters are too few to estimate the noise; use a longer log or fewer columns"
     )]
@@ -75,7 +79,8 @@ pub enum EstimationError {
         /// Free parameters that these rows determine; a joint's share need not be whole.
         parameters: f64,
     },
-    /// Cluster-robust covariance needs at least two segments.
+    /// The error bars are computed from the differences between time segments of the logs, and there is only one.
+    /// Record a longer log.
     #[error(
         "too few time segments ({clusters}): a covariance from segments needs at least two; use shorter segments, a longer log or the white-noise covariance"
     )]
@@ -83,7 +88,8 @@ pub enum EstimationError {
         /// Segments found.
         clusters: usize,
     },
-    /// The joints of one log are cut into different segments, so a covariance across joints is undefined.
+    /// A program passed different rows for the joints of one log, so that correlations between joints cannot be
+    /// computed. Pass the same rows for all joints.
     #[error(
         "log {log}: the segments of joint {joint} differ from those of the log's first joint; absorb the same rows for all joints or treat joints as independent"
     )]
@@ -93,10 +99,12 @@ pub enum EstimationError {
         /// The joint.
         joint: String,
     },
-    /// Ordinary least squares has no noise level to weigh a prior against.
+    /// A prior (nominal values with uncertainties) is weighed against the noise of the torque, which ordinary least
+    /// squares does not estimate. Write `estimator.method = "weighted"`.
     #[error("ordinary least squares has no noise level to weigh a prior against; use weighted least squares")]
     PriorWithoutNoiseLevel,
-    /// The estimate overflows because the magnitudes of columns and torque differ too much.
+    /// The estimated value is too large for a number. Position, time or torque probably has a wrong unit or scale:
+    /// correct `unit` or `scale` under `[format]`.
     #[error(
         "the estimate of {name} overflows: its regressor column and the torque differ by too many powers of ten; check the units and scales of position and torque"
     )]
@@ -104,7 +112,8 @@ pub enum EstimationError {
         /// The column.
         name: String,
     },
-    /// A custom estimator returned an invalid result.
+    /// The function that a program passed as estimator returned values of the wrong size, values that are not finite,
+    /// or a negative variance. Correct the function.
     #[error("invalid result of the estimator `{name}`: {problem}")]
     Own {
         /// Its name.
@@ -112,12 +121,14 @@ pub enum EstimationError {
         /// The problem and its fix.
         problem: String,
     },
-    /// The start parameters of an iteration cannot be simulated.
+    /// This estimator simulates the robot, and the simulation with the start values has no finite result. Correct mass
+    /// and inertia in the robot description, or use `estimator.method = "auto"`.
     #[error(
         "the simulation fails with the start values; start from a physically consistent robot description or estimate"
     )]
     NoSimulation,
-    /// The rows do not determine an unknown of the motion or a parameter.
+    /// Two unknowns have the same effect on the logs, so that the fit cannot separate them. Use a more exciting motion,
+    /// or fewer unknowns.
     #[error(
         "the rows do not determine {name} separately from the unknowns before it; remove {name}, use fewer unknowns for the motion, or use a longer or more exciting log"
     )]
@@ -125,13 +136,14 @@ pub enum EstimationError {
         /// Name of the unknown.
         name: String,
     },
-    /// A covariance is not positive definite.
+    /// The error bars of the compared results cannot all be correct, because a parameter was not determined. Identify
+    /// from logs with a more exciting motion (`dynident design`).
     #[error("the {what} is not positive definite; identify both results from logs that excite their parameters")]
     NotPositive {
         /// The covariance.
         what: &'static str,
     },
-    /// The problem has no rows.
+    /// The fit has no samples of any joint. Check that the logs have rows that are not dropped.
     #[error("no rows of any joint: absorb a log before estimating")]
     Empty,
 }

@@ -82,7 +82,8 @@ impl EventChoice {
     }
 }
 
-/// An invalid setting.
+/// A setting of the search for events is outside its range. Write a number within the range that the message names, or
+/// delete the key.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("events: {name} is {value}: use a number from {low} to {high}")]
 pub struct EventSettingsError {

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
-    /// The operating system could not read the file.
+    /// The file does not exist, or the operating system does not permit to read it. Correct the path or the
+    /// permissions.
     #[error("{}: cannot be read ({source}); check the path and its permissions", file.display())]
     Io {
         /// The file.
@@ -15,7 +16,7 @@ pub enum FileError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// The format is not supported.
+    /// Dynident recognised the file, but it does not read this format. Convert the file as the message states.
     #[error("{}: this is {format}, which is not read; {fix}", file.display())]
     OtherFormat {
         /// The file.
@@ -25,7 +26,8 @@ pub enum FileError {
         /// How to convert the file.
         fix: &'static str,
     },
-    /// This build does not include the format.
+    /// This program was compiled without the reader of this format. Use the released program, or build with the feature
+    /// that the message names.
     #[error(
         "{}: this is {format}, which this build does not read; build with the feature `{feature}` of dynident-formats",
         file.display()
@@ -38,7 +40,8 @@ pub enum FileError {
         /// The required feature.
         feature: &'static str,
     },
-    /// The file violates its format, or is truncated.
+    /// The file is truncated, damaged, or does not follow the rules of its format. Often the recorder was stopped while
+    /// it wrote. Copy or record the file again.
     #[error("{}: {format}, {place}: {problem}; {fix}", file.display())]
     Broken {
         /// The file.
@@ -52,7 +55,8 @@ pub enum FileError {
         /// The fix.
         fix: &'static str,
     },
-    /// The file has no column of numbers.
+    /// The file contains text or structures but no lists of numbers. Export the samples as columns, one row for each
+    /// sample.
     #[error("{}: {format} without a column of numbers ({found}); {fix}", file.display())]
     NoColumns {
         /// The file.

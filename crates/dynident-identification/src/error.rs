@@ -16,7 +16,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum IdentificationError {
-    /// No training log.
+    /// Every `[[log]]` of the study has `role = "validate"`. The fit needs at least one other log.
     #[error(
         "no log has the role \"identify\", so there are no data for the fit: remove role = \"validate\" from one [[log]]"
     )]
@@ -36,7 +36,8 @@ pub enum IdentificationError {
     /// Payloads, offsets per log or gains contradict each other.
     #[error("{0}")]
     Payload(#[from] PayloadError),
-    /// Prior knowledge of unknown bodies.
+    /// The values that the study states for bodies or laws under `[estimator.physical]` do not fit the robot. The text
+    /// after the section has the cause.
     #[error("[estimator.physical]: {0}")]
     Consistency(#[source] ConsistencyError),
     /// The logs cannot be reduced to factors.
@@ -45,7 +46,8 @@ pub enum IdentificationError {
     /// A threshold is invalid.
     #[error("{0}")]
     Threshold(#[from] ThresholdError),
-    /// The intervals cannot be computed.
+    /// The intervals of the physically consistent set cannot be computed. The text after the key has the cause; remove
+    /// `intervals` under `[estimator]` to continue without them.
     #[error("estimator.intervals: {0}")]
     Intervals(#[source] ConsistencyError),
     /// An invalid setting of the search for events.
@@ -81,12 +83,14 @@ impl From<EstimatorError> for IdentificationError {
 /// Reason why logs cannot be reduced to factors: a choice needs the samples of all logs.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ReduceError {
-    /// The cut-off is open.
+    /// `reduce` reads each log alone, so all logs need the same cut-off. Write `cutoff_hz` under
+    /// `[motion.differentiator]`, or give a model with `--like`.
     #[error(
         "the cut-off is left to the logs and would differ between them: state motion.differentiator.cutoff_hz, or reduce with the settings of a model that was identified from some of them"
     )]
     Cutoff,
-    /// Drive inertia is open.
+    /// `reduce` reads each log alone, but the automatic test of drive inertia needs all logs. Write `drive_inertia`
+    /// under `[drive]`, or give a model with `--like`.
     #[error(
         "the drive inertia of joint {joint} is automatic, which needs all logs: state it (drive.drive_inertia = true or false), or reduce with the settings of a model that was identified from some of them"
     )]
@@ -94,7 +98,8 @@ pub enum ReduceError {
         /// First such joint.
         joint: String,
     },
-    /// Friction is open.
+    /// `reduce` reads each log alone, but the automatic selection of friction needs all logs. State the laws under
+    /// `[drive]`, or give a model with `--like`.
     #[error(
         "the friction of joint {joint} is automatic, which needs all logs: state it (drive.friction = \"stated\" and its terms), or reduce with the settings of a model that was identified from some of them"
     )]
@@ -102,18 +107,21 @@ pub enum ReduceError {
         /// First such joint.
         joint: String,
     },
-    /// Load-dependent friction needs the samples again.
+    /// The law `load` needs the load of each joint from a previous fit and then the samples again. Factors do not
+    /// contain samples: remove the law, or identify from the logs.
     #[error(
         "load-dependent friction needs the samples again, with the load of the previous fit: remove the law `load`"
     )]
     Load,
-    /// Payloads, gains or offsets add columns for single logs.
+    /// Payloads, gains and offsets per log add unknowns for single logs, which factors do not contain. Run `identify`
+    /// on the logs.
     #[error("{what} cannot be estimated from reduced logs: identify them from the complete logs")]
     Columns {
         /// Requested columns.
         what: &'static str,
     },
-    /// The estimator reads the samples again.
+    /// Factors contain sums over the samples, and this estimator needs the samples. Write `estimator.method =
+    /// "weighted"` or `"ordinary"`.
     #[error("estimator.method = \"{method}\" reads the samples again: give \"weighted\" or \"ordinary\"")]
     Estimator {
         /// Name of the estimator.

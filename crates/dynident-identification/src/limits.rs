@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// A limit that is not a finite value above zero.
+/// A setting of `check` is zero, negative or not finite. Write a positive number.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error("limit {name} = {value}: give a finite number above zero")]
 pub struct InvalidLimit {

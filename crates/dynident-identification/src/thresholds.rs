@@ -5,7 +5,8 @@ use thiserror::Error;
 /// Default maximum lag, in seconds for an arm of usual size; drives and buses stay below.
 pub(crate) const LONGEST_DELAY_S: f64 = 0.1;
 
-/// A threshold outside of its range.
+/// A key of `[thresholds]` is not finite or below its minimum. Write a larger number, or delete the key to use the
+/// default.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error("thresholds.{name} = {value}: give a finite number of at least {minimum}")]
 pub struct ThresholdError {

@@ -36,22 +36,31 @@ pub struct LoopClosure {
 /// Why the mimic law of passive joints could not be computed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum LoopError {
+    /// `links` of a `[[robot.loop]]` names a link that the robot description does not have. Correct the name.
     #[error("there is no link `{link}`, which closes a loop: fix its name")]
     UnknownLink { link: String },
+    /// `passive` of a `[[robot.loop]]` names a joint that the robot does not have. Use one of the listed names.
     #[error("there is no joint `{joint}`; the joints are: {}", known.join(", "))]
     UnknownJoint { joint: String, known: Vec<String> },
+    /// `points_m` states where the two links of the loop meet. One of its numbers is NaN or infinite.
     #[error("points_m of the loop at `{link}`: give finite numbers, m")]
     NotFinite { link: String },
+    /// The two links of a `[[robot.loop]]` do not meet at `points_m` at any position of the passive joints. Correct
+    /// `links`, `points_m` or `passive`.
     #[error(
         "the loop between `{first}` and `{second}` does not close: with the other joints at zero its gap is at least {gap_m:.3e} m; check links, points_m and which joints are passive"
     )]
     Open { first: String, second: String, gap_m: f64 },
+    /// A joint in `passive` moves freely although the loop is closed, because it is not part of a loop. Remove it from
+    /// `passive`.
     #[error("the loops do not determine the passive joints {}: name only joints of a loop", joints.join(", "))]
     Undetermined { joints: Vec<String> },
+    /// Dynident supports closed chains that are parallelograms. This one is not: delete the `[[robot.loop]]`, so that
+    /// all its joints are independent.
     #[error(
-        "the loop between `{first}` and `{second}` is no parallelogram: passive joints that follow linearly give a gap of {gap_m:.3e} m; model it as a tree"
+        "the loop between `{first}` and `{second}` is not a parallelogram: passive joints that follow linearly give a gap of {gap_m:.3e} m; delete this [[robot.loop]]"
     )]
     NotLinear { first: String, second: String, gap_m: f64 },
 }

@@ -2,7 +2,8 @@
 
 use core::error::Error;
 
-/// A fault with its place in the text: 1-based line and column, columns in characters.
+/// Fault with its line and column in the robot file, both counted from 1. Open the file at this place; the text after
+/// the place has the cause.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{line}:{column}: {fault}")]
 pub struct Located<F: Error> {

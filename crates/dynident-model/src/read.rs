@@ -51,26 +51,41 @@ pub struct Robot {
 /// Why a file could not be read as a robot. Every message begins with the file, and with line and column if known.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum ReadError {
+    /// The robot file does not exist, or the operating system does not permit to read it. Correct the path, for example
+    /// `file` under `[robot]`, or the permissions.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
     File { path: PathBuf, source: std::io::Error },
+    /// Robot descriptions are far smaller, so the path names another file, such as a mesh or a log. Give the URDF,
+    /// MJCF, SDF or D-H file.
     #[error("{}: larger than {} MiB, too large for a robot description: name the URDF, MJCF, SDF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
     TooLarge { path: PathBuf },
+    /// The file contains only blanks. Often an export or a xacro expansion failed before. Write the file again.
     #[error("{}:1:1: the file is empty: name a URDF, an MJCF, an SDF or a D-H table", path.display())]
     Empty { path: PathBuf },
+    /// The file is binary or saved in another encoding, such as UTF-16 or Latin-1. Save it as UTF-8.
     #[error("{}:{line}:{column}: not UTF-8 text{hint}: save the description as UTF-8", path.display())]
     Encoding { path: PathBuf, line: u32, column: u32, hint: &'static str },
+    /// The content is that of another kind of file, such as a mesh, an archive or a web page. The message names the
+    /// file to give instead.
     #[error("{}:1:1: {what}, not a robot description: {fix}", path.display())]
     NoDescription { path: PathBuf, what: &'static str, fix: &'static str },
+    /// Only the program `xacro` can expand macros. Expand the file and use the result, or permit the program with
+    /// `--allow-command`.
     #[error("{}: the file contains xacro macros: expand it first (`xacro robot.urdf.xacro > robot.urdf`)", path.display())]
     Macros { path: PathBuf },
+    /// The URDF has the error that follows the path. See the tables *URDF* and *Robot models* below.
     #[error("{}:{source}", path.display())]
     Urdf { path: PathBuf, source: Box<UrdfError> },
+    /// The MJCF has the error that follows the path. See the tables *MJCF* and *Robot models* below.
     #[error("{}:{source}", path.display())]
     Mjcf { path: PathBuf, source: Box<MjcfError> },
+    /// The SDF has the error that follows the path. See the tables *SDF* and *Robot models* below.
     #[error("{}:{source}", path.display())]
     Sdf { path: PathBuf, source: Box<SdfError> },
+    /// The D-H table has the error that follows the path. See the tables *Denavit-Hartenberg tables* and *Robot models*
+    /// below.
     #[error("{}:{source}", path.display())]
     Dh { path: PathBuf, source: Box<DhError> },
 }

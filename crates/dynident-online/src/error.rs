@@ -7,14 +7,18 @@ use thiserror::Error;
 /// Why a sample or a setting is invalid. An invalid sample changes nothing.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum OnlineError {
+    /// A program passed a list of the wrong length to the monitor. Pass one entry for each joint or parameter.
     #[error("{what}: {found} entries where {expected} are needed")]
     Length { what: &'static str, expected: usize, found: usize },
+    /// A setting or a sample of the monitor is outside its range or not finite. Write a value as the message states.
     #[error("{what} = {value}: {fix}")]
     Number { what: &'static str, value: f64, fix: &'static str },
+    /// The error bars of the start model are not valid. Start from the result of `identify`, unchanged.
     #[error("the covariance of the start is not positive definite: give that of an identified model")]
     Covariance,
+    /// The model was identified with the friction law `temperature`, but the monitor gets no temperatures.
     #[error(
         "joint {joint}: its friction depends on the temperature, which samples do not contain: identify without the law `temperature`"
     )]

@@ -3,7 +3,8 @@
 use crate::place::LogPlace;
 use std::path::PathBuf;
 
-/// A [`LogFormat`](crate::LogFormat) that is inconsistent or does not match the joints.
+/// A key under `[format]` contradicts another key or does not match the joints or columns of the log. The message names
+/// the key and the correction.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("log format, key `{key}`: {problem}; {fix}")]
 pub struct FormatError {
@@ -28,7 +29,8 @@ pub enum RecordingError {
     /// The log format is invalid.
     #[error("{0}")]
     Format(#[from] FormatError),
-    /// The operating system could not read the file.
+    /// The log file does not exist, or the operating system does not permit to read it. Correct `file` of the `[[log]]`
+    /// or the permissions.
     #[error("{}: cannot be read ({source}); check the path and its permissions", file.display())]
     Io {
         /// The file.
@@ -36,19 +38,22 @@ pub enum RecordingError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// The file changed between two passes.
+    /// Dynident reads a log several times, and the file changed in between. Usually the recorder still writes. Wait
+    /// until the recording is complete.
     #[error("{}: the file changed while it was read; wait until nothing writes to it, then run the command again", file.display())]
     Changed {
         /// The file.
         file: PathBuf,
     },
-    /// The file contains no row of numbers.
+    /// The file has only a header or comments, or it ends before the first row of numbers. Give a complete recording,
+    /// and check the key `header` under `[format]`.
     #[error("{}; the log needs at least one row of numbers", no_rows(place))]
     NoRows {
         /// Place where reading stopped.
         place: LogPlace,
     },
-    /// The file is not text.
+    /// The file is binary, for example an HDF5 or MATLAB file with the ending `.csv`, or it was damaged. Export the log
+    /// as CSV text.
     #[error("{}:{line}: a NUL byte: this is not a text table; export the log as CSV", file.display())]
     Binary {
         /// The file.
@@ -56,7 +61,8 @@ pub enum RecordingError {
         /// 1-based line.
         line: u64,
     },
-    /// Lines end with a carriage return only.
+    /// The program that wrote the file ends lines with a carriage return only, as old Macintosh programs do. Convert
+    /// the line ends.
     #[error("{}:{line}: carriage returns without newlines; convert the line ends, e.g. with tr '\\r' '\\n'", file.display())]
     CarriageReturns {
         /// The file.
@@ -67,7 +73,8 @@ pub enum RecordingError {
     /// The file cannot be read in its format.
     #[error("{0}")]
     File(#[source] dynident_formats::FileError),
-    /// A line is longer than the limit.
+    /// The file has no line ends where Dynident expects them, so it is probably not a table with one sample per line.
+    /// Export one row for each sample.
     #[error("{}:{line}: the line is longer than {limit} bytes; is this a CSV file with one sample per line?", file.display())]
     LineTooLong {
         /// The file.
@@ -77,7 +84,8 @@ pub enum RecordingError {
         /// The limit in bytes.
         limit: usize,
     },
-    /// Two columns have the requested name.
+    /// Two columns of the header have the same name, so that the name in `[format]` is ambiguous. Write the number of
+    /// the column, counted from 0.
     #[error(
         "{place}: duplicate column name `{name}` (columns {first} and {second}); give its 0-based index instead of the name"
     )]
@@ -91,7 +99,8 @@ pub enum RecordingError {
         /// 0-based index of the second column.
         second: usize,
     },
-    /// A requested column does not exist.
+    /// The key under `[format]` names a column that the log does not have. Use a name of the header, or a number
+    /// counted from 0; `dynident log FILE` lists the columns.
     #[error("{place}: no column `{wanted}` (key `{key}`); {hint}")]
     UnknownColumn {
         /// Place of the column names, or the first row.
@@ -103,7 +112,8 @@ pub enum RecordingError {
         /// Existing columns, and the closest name.
         hint: String,
     },
-    /// A row has too few or too many fields.
+    /// The line has fewer or more fields than the header, because the file was damaged, or because another separator
+    /// appears in a field. Correct or delete the line.
     #[error("{place}: {found} fields where {expected} are expected; fix or delete the line{hint}")]
     RaggedRow {
         /// The place.
@@ -115,7 +125,8 @@ pub enum RecordingError {
         /// A further hint; may be empty.
         hint: &'static str,
     },
-    /// A field is not a number.
+    /// A column that the study uses contains text, or numbers with a decimal comma. Correct the field, or select
+    /// another column.
     #[error("{place}, column {column}: `{text}` is not a number; {fix}")]
     NotANumber {
         /// The place.
@@ -127,7 +138,8 @@ pub enum RecordingError {
         /// The fix.
         fix: &'static str,
     },
-    /// A field is empty, NaN or infinite under `missing = "error"`.
+    /// The field is empty, NaN or infinite, and `missing = "error"`. Write `missing = "drop"` under `[format]` to leave
+    /// out these rows.
     #[error(
         "{place}, column {column}: `{text}` is not a finite number; set missing = \"drop\" in [format] to leave such rows out"
     )]
@@ -139,7 +151,8 @@ pub enum RecordingError {
         /// The field.
         text: String,
     },
-    /// A channel exceeds 1e60 or is not finite after unit, scale, matrix and offset.
+    /// The value of this channel is beyond 1e60 or not finite after unit, scale, matrix and offset. The `scale` or
+    /// `unit` is wrong, or the raw value is. Correct it.
     #[error(
         "{log}, row {row}: {group} of joint `{joint}` is beyond 1e60 or not finite after scaling; \
          check unit, scale and offset of `{group}` in [format], and the raw value"
@@ -154,7 +167,8 @@ pub enum RecordingError {
         /// The joint.
         joint: String,
     },
-    /// Files of one log have different numbers of rows.
+    /// The channel groups of the log come from several files, and one file has fewer rows. Export all files from the
+    /// same recording.
     #[error("{log} ends after {rows} rows, before {other}; files of one log must contain the same samples")]
     UnequalFiles {
         /// The shorter file.
@@ -164,7 +178,8 @@ pub enum RecordingError {
         /// A longer file.
         other: String,
     },
-    /// Files of one log have different times in the same row.
+    /// Two files of one log have different times in the same row. They are of different recordings, or rows are missing
+    /// in one. Export them again, or raise `time.max_difference_s` if only the clocks differ.
     #[error(
         "{other}: in data row {row}, `{column}` is {difference_s:.3} s from that of {log}: the files are of different \
          recordings, or rows are missing in one of them; use files of one recording, or raise time.max_difference_s if \
@@ -182,7 +197,8 @@ pub enum RecordingError {
         /// Difference, s.
         difference_s: f64,
     },
-    /// A channel group names a file although the log is not a file.
+    /// `file` under `[format.position]` or another group names a second file, but the samples were passed from memory.
+    /// Remove the key and pass the channel with the other samples.
     #[error("{log}: `{key}.file` is not available for a log in memory; remove the key")]
     NoFolder {
         /// Label of the log.
@@ -190,7 +206,8 @@ pub enum RecordingError {
         /// Key of the channel group.
         key: &'static str,
     },
-    /// Samples in memory have inconsistent lengths.
+    /// The arrays that a program passed to Dynident have different lengths. Pass one value for each joint and each
+    /// sample.
     #[error("{log}: {problem}; give one value per joint and sample")]
     Samples {
         /// Label of the log.
@@ -198,7 +215,8 @@ pub enum RecordingError {
         /// The inconsistency.
         problem: String,
     },
-    /// The row or time range contains no row.
+    /// The keys `rows`, `fraction` or `time_range_s` of the `[[log]]`, or the rules that drop rows, exclude all rows.
+    /// Select a larger part of the log.
     #[error(
         "{log}: the selection ({selection}) leaves no row after {rows} rows were read; select a larger part of the log"
     )]
@@ -210,7 +228,8 @@ pub enum RecordingError {
         /// Number of data rows that were read.
         rows: u64,
     },
-    /// The time stamps do not determine a rate.
+    /// The time stamps are too irregular, too few or equal, or their unit is wrong. Correct `time.column` or
+    /// `time.unit` under `[format]`, or write the sampling rate as `rate_hz`.
     #[error(
         "{log}: column {column} does not determine a sampling rate ({reason}); \
          check time.column and time.unit, or give rate_hz"
@@ -226,7 +245,8 @@ pub enum RecordingError {
     /// A filter setting is invalid.
     #[error("{0}")]
     Filter(#[from] FilterError),
-    /// A table of the commanded motion is invalid.
+    /// The file that `reference` names is not a table of the commanded motion, for example a column is missing. Use the
+    /// table that `dynident design` wrote.
     #[error("{}: not a reference motion: {problem}; give a table as written by design: t_s, q1.., dq1.., ddq1..", file.display())]
     Reference {
         /// The file.
@@ -234,7 +254,8 @@ pub enum RecordingError {
         /// The problem.
         problem: String,
     },
-    /// A differentiator that needs the commanded motion applies to no sample.
+    /// The differentiator uses the commanded motion, but the measured motion differs from it everywhere. The file is of
+    /// another motion, or `start_s` or `max_lag_s` is wrong.
     #[error(
         "{log}: {method} applies to none of the {samples} samples: the joints do not follow this reference; \
          check its file, start_s and max_lag_s"
@@ -247,7 +268,8 @@ pub enum RecordingError {
         /// Number of samples.
         samples: u64,
     },
-    /// The rows are not ordered by time.
+    /// The rows are sorted by another column, or several recordings were joined. Sort the rows by time, or name another
+    /// column as `time.column`.
     #[error(
         "{log}: {backward} of {rows} stamps are earlier than the previous one: the rows are in no order of time; \
          sort them by the time column (`sort` or pandas' `sort_values`), or name another column as time"
@@ -260,7 +282,8 @@ pub enum RecordingError {
         /// Number of rows of the log.
         rows: u64,
     },
-    /// No segment of the log is long enough for the filter.
+    /// The filter or differentiator needs more consecutive samples than the longest part without gaps has. Select more
+    /// rows, record without gaps, or choose a shorter filter.
     #[error(
         "{log}: the longest uninterrupted piece has {found} samples, the {method} filter needs {needed}; \
          widen the range or choose a shorter filter"
@@ -327,7 +350,8 @@ fn no_rows(place: &LogPlace) -> String {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FilterError {
-    /// A setting is outside its range.
+    /// A setting of the filter or differentiator is outside its range. Write a value within the range that the message
+    /// names.
     #[error("filter setting `{name}` = {value}: {fix}")]
     Setting {
         /// Name of the setting.
@@ -337,7 +361,7 @@ pub enum FilterError {
         /// The allowed range.
         fix: &'static str,
     },
-    /// The cut-off is not below half the sampling rate.
+    /// A cut-off must be below half the sampling rate of the log. Lower `cutoff_hz`, or record at a higher rate.
     #[error("cut-off {cutoff_hz} Hz is not below half the sampling rate of {rate_hz} Hz; lower the cut-off")]
     AboveNyquist {
         /// The cut-off.
@@ -345,7 +369,8 @@ pub enum FilterError {
         /// The sampling rate.
         rate_hz: f64,
     },
-    /// The signal is shorter than the filter's padding or window.
+    /// The piece of the log is shorter than the window of this filter. Select more rows, or choose a filter with a
+    /// shorter window.
     #[error("{found} samples are too few: the {method} filter needs {needed}")]
     TooShort {
         /// The filter.
@@ -355,7 +380,8 @@ pub enum FilterError {
         /// Minimum number of samples.
         needed: usize,
     },
-    /// The samples do not determine the unknowns of a fit.
+    /// The piece of the log has too few samples for the unknowns of this fit of the motion. Use fewer unknowns, such as
+    /// `harmonics`, or a longer piece.
     #[error("{method}: {samples} samples do not determine the fit: {fix}")]
     Undetermined {
         /// The differentiator.
@@ -365,13 +391,15 @@ pub enum FilterError {
         /// The fix.
         fix: &'static str,
     },
-    /// The commanded motion is invalid.
+    /// The commanded motion has too few samples, times that do not increase, values that are not finite, or lacks a
+    /// joint. Correct the table that `reference` names.
     #[error("the reference motion is wrong: {problem}")]
     Reference {
         /// The problem and the fix.
         problem: String,
     },
-    /// The code of a caller's differentiator is not available.
+    /// The study was written by a program that passed its own function as differentiator; a file cannot contain this
+    /// function. Run the job from that program, or choose another differentiator.
     #[error(
         "the code of the differentiator function `{name}` is not available: pass it from a program (from Python as motion = {{\"differentiator\": {{\"function\": ..}}}})"
     )]
@@ -379,7 +407,8 @@ pub enum FilterError {
         /// Its name.
         name: String,
     },
-    /// A differentiator needs the commanded motion.
+    /// This differentiator fits the deviation from the commanded motion, so it needs the table of this motion. Write
+    /// its path as `reference`.
     #[error(
         "{method} needs the commanded motion: name its table, reference = \"trajectory.csv\", in the differentiator or in the log"
     )]

@@ -4,7 +4,7 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
-    /// A cell that links to a missing section.
+    /// A page that a program composed has a link to a section that it does not have. Correct the title in the link.
     #[error("table `{section}`: a cell links to the missing section `{to}`: use the title of a section of this page")]
     Link {
         /// Title of the table.
@@ -12,7 +12,7 @@ pub enum ReportError {
         /// The missing title.
         to: String,
     },
-    /// Lists with inconsistent lengths.
+    /// A program passed lists of different lengths to a plot or table.
     #[error("section `{section}`: {what} has {found} entries, but needs {expected}")]
     Shape {
         /// Title of the section.
@@ -24,7 +24,7 @@ pub enum ReportError {
         /// Actual number of entries.
         found: usize,
     },
-    /// An x axis that is not finite or decreases.
+    /// A program passed x values that decrease or are not finite. Sort the samples.
     #[error("section `{section}`: the x axis must be finite and not decrease, but entry {at} (0-based) is {value}")]
     Axis {
         /// Title of the section.
@@ -34,7 +34,7 @@ pub enum ReportError {
         /// The value.
         value: f64,
     },
-    /// A printed figure without room for its plots.
+    /// The figure is too narrow for text of this size. Increase the width, or reduce the size of the text.
     #[error(
         "a figure of {width_mm} mm with text of {font_pt} pt cannot hold a plot: give a width of at least 6 mm for each \
          point of the text (88 mm and 180 mm with 8 pt are usual)"
@@ -45,13 +45,13 @@ pub enum ReportError {
         /// Size of the text, pt.
         font_pt: f64,
     },
-    /// An invalid resolution of a PNG.
+    /// The resolution of a PNG file is outside its range. Usual are 150 to 600 dpi.
     #[error("invalid resolution of a PNG, {dpi} dpi: give 30 to 2400 dpi")]
     Resolution {
         /// Pixels per inch.
         dpi: f64,
     },
-    /// A PNG with too many pixels.
+    /// Width, height and resolution together give too many pixels. Reduce the resolution.
     #[error(
         "a PNG of {width_px} × {height_px} pixels is too large: reduce the resolution to at most 50 million pixels"
     )]
@@ -61,7 +61,8 @@ pub enum ReportError {
         /// Height, pixels.
         height_px: f64,
     },
-    /// Characters that the embedded font of PDF and PNG lacks.
+    /// A name in the figure has letters, for example Chinese or Arabic ones, that the font inside PDF and PNG files
+    /// lacks. Write SVG, or rename.
     #[error(
         "the font of PDF and PNG has no glyph for {characters:?}: write .svg, which uses the fonts of the computer, or rename the joint or parameter"
     )]
@@ -69,13 +70,13 @@ pub enum ReportError {
         /// The characters.
         characters: String,
     },
-    /// A form of figures that is not part of this build.
+    /// The program was compiled without this form of figures. Write SVG, or use the released program.
     #[error("this build of Dynident writes no {form}: write .svg and convert it, or use the program of the releases")]
     NotBuilt {
         /// The form.
         form: &'static str,
     },
-    /// A picture that cannot be converted, a bug in this crate.
+    /// A bug in Dynident: the figure cannot be converted. Report the message, and write SVG meanwhile.
     #[error("cannot write the {form} of a figure: {message}")]
     Conversion {
         /// The form.
@@ -83,10 +84,10 @@ pub enum ReportError {
         /// The problem.
         message: String,
     },
-    /// A template that failed, a bug in this crate.
+    /// A bug in Dynident: the page cannot be composed. Report the message.
     #[error("a template of the page failed: {0}")]
     Template(#[from] minijinja::Error),
-    /// Data that cannot be written as JSON, a bug in this crate.
+    /// A bug in Dynident: the data of a plot cannot be written as JSON. Report the message.
     #[error("cannot write the data of a plot: {0}")]
     Data(#[from] serde_json::Error),
 }

@@ -8,7 +8,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ResultFileError {
-    /// A file that cannot be read.
+    /// The result file does not exist, or the operating system does not permit to read it. Give the `result.json` that
+    /// `identify` wrote.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
     File {
         /// The file.
@@ -16,7 +17,8 @@ pub enum ResultFileError {
         /// Reason from the operating system.
         source: std::io::Error,
     },
-    /// A content that is invalid or does not belong to the study.
+    /// The file is damaged, was changed by hand, is of an incompatible version, or belongs to another robot or study.
+    /// Run `identify` again and use its new result.
     #[error("{}: {message}", path.display())]
     Content {
         /// The result file.

@@ -7,7 +7,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ServoError {
-    /// A setting out of range.
+    /// A setting of the fit to commands is outside its range. Write a positive number.
     #[error("{setting} = {value}: give a positive number; for step_s from 0.0001 to 0.05")]
     Setting {
         /// Name of the setting.
@@ -15,7 +15,7 @@ pub enum ServoError {
         /// Its value.
         value: f64,
     },
-    /// A setting of a design out of its range.
+    /// A setting of the designed motion is outside its range. Write a value within the range that the message names.
     #[error("{setting} = {value}: give a number from {least} to {most}")]
     DesignSetting {
         /// Name of the setting.
@@ -27,7 +27,8 @@ pub enum ServoError {
         /// Largest permitted value.
         most: f64,
     },
-    /// No candidate of a design keeps the limits.
+    /// All candidate motions exceed a limit of the joints or the workspace. Choose a start posture with more free space
+    /// around it, or wider limits.
     #[error(
         "none of {attempts} candidate motions keeps all limits: state a free start_posture in [design], or wider limits \
          in [design.limits]"
@@ -36,10 +37,11 @@ pub enum ServoError {
         /// Number of candidates.
         attempts: usize,
     },
-    /// No run to fit to.
+    /// Every `[[log]]` of the study has `role = "validate"`. The fit needs at least one other log.
     #[error("no log to fit to: give at least one log with the role identify")]
     NoRuns,
-    /// A run without enough samples, with stamps that do not rise, or without the robot's joints.
+    /// This log of commands and positions cannot be used. The text after its name has the cause; see the table *Logs of
+    /// commands*.
     #[error("{run}: {fault}")]
     Run {
         /// Name of the run.
@@ -48,7 +50,8 @@ pub enum ServoError {
         #[source]
         fault: RunFault,
     },
-    /// No simulation of the robot with the first values gives numbers.
+    /// With the start values, the simulated robot has no finite motion. State rough values of the drives in the study,
+    /// and check the masses in the robot description.
     #[error("the simulation of {run} fails with the first values: state stiffness, damping and armature of the drives")]
     Start {
         /// Name of the run.
@@ -63,7 +66,8 @@ pub enum ServoError {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum RunFault {
-    /// Fewer joints than the robot has, or more.
+    /// The log has commands and positions for another number of joints than the robot. Select one column for each joint
+    /// under `[format]`, or lock joints.
     #[error("{found} joints, and the robot has {expected}: map each joint to one column")]
     Joints {
         /// Joints of the run.
@@ -71,16 +75,17 @@ pub enum RunFault {
         /// Joints of the robot.
         expected: usize,
     },
-    /// Columns of different length.
+    /// A program passed lists of times, commands and positions of different lengths.
     #[error("columns of different length: give each stamp a command and a position of each joint")]
     Lengths,
-    /// A wrong number of relative gains, or negative ones.
+    /// `servo_gain` of a log is the gain of its servos relative to `stiffness`. Write one number, or one for each
+    /// joint; 0 if the position controller was off.
     #[error("servo_gain needs one number that is not negative, or {joints} of them, one for each joint")]
     Gains {
         /// Joints of the robot.
         joints: usize,
     },
-    /// Too few samples.
+    /// The log is too short for a fit. Record a longer log, or select more rows.
     #[error("{found} samples: give at least {least}")]
     Samples {
         /// Samples of the run.
@@ -88,13 +93,14 @@ pub enum RunFault {
         /// Least number of samples.
         least: usize,
     },
-    /// Stamps that do not rise.
+    /// A time stamp is equal to or earlier than the one before. Delete repeated rows, or select another time column.
     #[error("the stamp of sample {sample} is not above the one before: remove repeated rows, or map another clock")]
     Stamps {
         /// Index of the sample.
         sample: usize,
     },
-    /// A gap that would make the simulation endless.
+    /// The recorder paused. The simulated robot cannot follow the real one across such a gap. Use two `[[log]]`
+    /// entries, each with its `time_range_s`.
     #[error("a gap of {gap_s:.0} s before sample {sample}: split the log there, with time_range_s")]
     Gap {
         /// Index of the sample.
@@ -102,7 +108,7 @@ pub enum RunFault {
         /// Length, s.
         gap_s: f64,
     },
-    /// A value that is not a number.
+    /// A field of a command or position is empty, NaN or infinite. Delete this row of the log.
     #[error("a command or position of sample {sample} is not a number: remove the row")]
     NotANumber {
         /// Index of the sample.

@@ -8,7 +8,8 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SimulationError {
-    /// A value out of range.
+    /// A setting of the simulated robot, its controller or its motion is outside its range. Write a value within the
+    /// range that the message names.
     #[error("{what} = {value}: {fix}")]
     Value {
         /// The setting, as in a file.
@@ -18,7 +19,7 @@ pub enum SimulationError {
         /// The fix.
         fix: &'static str,
     },
-    /// A list that does not have one entry for each joint (or parameter).
+    /// A list must have one entry for each joint (or parameter). Add or remove entries.
     #[error("{what}: expected {expected} entries, found {found}")]
     Length {
         /// The list.
@@ -28,16 +29,18 @@ pub enum SimulationError {
         /// Given length.
         found: usize,
     },
-    /// The robot's own loop without stated gains.
+    /// The position loop runs inside the drives of a real robot, so its gains are unknown. Write `kp` and `kd` under
+    /// `[controller]` for a simulation.
     #[error("the controller position-loop runs in the robot's drives: state its kp and kd to simulate it")]
     OwnLoop,
-    /// A controller without the model that it needs.
+    /// This controller computes torques from a model, and no model is available yet. Choose another `kind` under
+    /// `[controller]`, or give a model.
     #[error("controller {controller} needs a model of the robot: give one, or use joint-pd or joint-pid")]
     NoModel {
         /// Name of the controller.
         controller: &'static str,
     },
-    /// A term that acts on a missing joint.
+    /// A program added a friction term for a joint number that the robot does not have.
     #[error("term {term} acts on a missing joint; the robot has {joints} joints")]
     TermJoint {
         /// Symbol of the term.
@@ -45,7 +48,8 @@ pub enum SimulationError {
         /// Number of joints of the robot.
         joints: usize,
     },
-    /// Negative friction or inertia, which would create energy.
+    /// Negative friction or inertia adds energy, so that the simulated robot would not stay bounded. Write zero or a
+    /// positive value.
     #[error("{term} = {value}: a simulated robot needs zero or more")]
     Negative {
         /// Symbol of the term.
@@ -53,7 +57,8 @@ pub enum SimulationError {
         /// Its parameter.
         value: f64,
     },
-    /// The mass matrix is singular: some joint moves no mass.
+    /// A joint of the simulated robot moves neither a mass nor a drive inertia, so that its acceleration is undefined.
+    /// Add the `<inertial>` of its link, or a drive inertia.
     #[error(
         "the simulated robot's mass matrix is not positive definite at the start: give every body at the tip a mass and an inertia, or its drive an inertia"
     )]

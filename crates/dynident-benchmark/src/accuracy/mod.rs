@@ -47,7 +47,8 @@ const START_SPREAD: f64 = 0.15;
 #[derive(Debug, ThisError)]
 #[non_exhaustive]
 pub enum BenchmarkError {
-    /// A name that is not in the registry.
+    /// The option names a robot, estimator or other entry that the benchmark does not have. Use one of the listed
+    /// names.
     #[error("unknown --{option} {name}: use one of {}", known.join(", "))]
     Unknown {
         /// The command-line option.
@@ -57,13 +58,13 @@ pub enum BenchmarkError {
         /// The known names.
         known: Vec<&'static str>,
     },
-    /// Invalid number of runs.
+    /// Error bars need at least two runs. Write a number within the range.
     #[error("--runs {runs} is out of range: use 2 to 100000")]
     Runs {
         /// The number given.
         runs: usize,
     },
-    /// A robot description that cannot be read.
+    /// The robot description of the benchmark cannot be read. The text after the name has the cause.
     #[error("robot {robot}: {source}")]
     Robot {
         /// The robot.
@@ -71,7 +72,7 @@ pub enum BenchmarkError {
         /// The cause.
         source: Box<UrdfError>,
     },
-    /// No excitation was found for a robot.
+    /// No motion was found that keeps the limits of this robot. Use another seed.
     #[error("robot {robot}: no excitation: {reason}")]
     Excitation {
         /// The robot.
@@ -79,13 +80,14 @@ pub enum BenchmarkError {
         /// The cause.
         reason: String,
     },
-    /// The excitation does not determine all base parameters.
+    /// With this motion some parameters have no effect, so that the best possible accuracy is not defined. Use another
+    /// seed.
     #[error("robot {robot}: the excitation does not determine all base parameters; use another seed")]
     NoBound {
         /// The robot.
         robot: String,
     },
-    /// An impossible filter.
+    /// The filter of the benchmark is impossible at the sampling rate. The text after the name has the cause.
     #[error("robot {robot}: {source}")]
     Filter {
         /// The robot.

@@ -27,7 +27,7 @@ pub(crate) struct Page {
 pub(crate) struct Entry<'a> {
     pub(crate) code: &'a str,
     pub(crate) message: &'a str,
-    /// When the message occurs and what to do; may be empty.
+    /// Cause and fix.
     pub(crate) reason: &'a str,
     /// Heading of its section, and the text before the table.
     pub(crate) section: &'a str,

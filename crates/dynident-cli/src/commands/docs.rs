@@ -56,7 +56,7 @@ pub struct DocsMessage {
     pub code: String,
     /// The message, with placeholders in braces.
     pub message: String,
-    /// When the message occurs, and for findings what to do; may be empty.
+    /// Cause and fix.
     pub reason: String,
     /// Heading of its section on the page "Messages".
     pub section: String,
@@ -138,7 +138,7 @@ fn explain(entry: &Entry<'_>, context: &Context) -> Result<Verdict, String> {
     }
     let mut body = format!("message: {message}\n\n");
     if !reason.is_empty() {
-        let _ = write!(body, "reason: {reason}\n\n");
+        let _ = write!(body, "cause and fix: {reason}\n\n");
     }
     let page = format!("# {}\n\n{body}{}\n", entry.code, entry.introduction);
     print(&book::rendered(&page, terminal::width(), terminal::is_styled()))

@@ -100,7 +100,7 @@ fn what_is_no_factors_and_what_does_not_go_together_has_status_2() {
     says("give 2026-01-05", &["reduce", &study, "--out", "c.factors", "--recorded-at", "monday"]);
     says("--out", &["reduce", &study]);
     says("stated.toml", &["reduce", &study, "--out", "stated.toml"]);
-    says("no file of factors", &["merge", "honest.csv", "--out", "c.factors"]);
+    says("not a factor file", &["merge", "honest.csv", "--out", "c.factors"]);
     says("gone.factors", &["merge", "gone.factors", "--out", "c.factors"]);
     says("all.factors", &["merge", "all.factors", "--out", "all.factors"]);
     says("cannot be used with", &["identify", &study, "--factors", "all.factors", "--out", "c"]);

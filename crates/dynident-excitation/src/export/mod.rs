@@ -30,7 +30,7 @@ pub struct Sampled<'a> {
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// Names, times and motion have different lengths.
+    /// A program passed joint names, times and motion of different lengths.
     #[error("{what}: expected {expected}, found {found}")]
     Shape {
         /// The list.
@@ -40,7 +40,8 @@ pub enum ExportError {
         /// Given length.
         found: usize,
     },
-    /// A value that is not finite.
+    /// A position, velocity or acceleration of the motion is NaN or infinite. Correct the trajectory table, or design
+    /// the motion again.
     #[error("the motion of joint `{joint}` is not finite at {at_s} s: export a finite motion")]
     NotFinite {
         /// Name of the joint.
@@ -48,7 +49,7 @@ pub enum ExportError {
         /// Time, s.
         at_s: f64,
     },
-    /// The format is for another number of joints.
+    /// The format `URScript` is for arms with six joints. Choose another format, such as CSV.
     #[error(
         "URScript needs the six joints of a UR arm, but the robot has {joints}: lock the others, or choose another format"
     )]
@@ -56,7 +57,7 @@ pub enum ExportError {
         /// Number of joints of the robot.
         joints: usize,
     },
-    /// A setting out of range.
+    /// A setting of the export is outside its range. Write a value within the range that the message names.
     #[error("{setting} = {value}: give {needed}")]
     Setting {
         /// Name of the setting.

@@ -5,7 +5,8 @@ use thiserror::Error;
 /// Reason why a family cannot be created.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum FamilyError {
-    /// A setting out of range.
+    /// A setting of the trajectory family under `[design.family]` is outside its range. Write a value within the range
+    /// that the message names.
     #[error("family {family}, setting {setting} = {value}: {fix}")]
     Setting {
         /// Name of the family.
@@ -17,7 +18,8 @@ pub enum FamilyError {
         /// Valid values.
         fix: &'static str,
     },
-    /// A user's motion function that violates its contract.
+    /// The function that a program passed as motion does not give what it promised: for example, velocities that are
+    /// not the derivatives of the positions, or values that are not finite. Correct the function.
     #[error("family function `{name}`: {problem}")]
     Function {
         /// Name of the function.
@@ -25,7 +27,7 @@ pub enum FamilyError {
         /// The problem and its fix.
         problem: &'static str,
     },
-    /// A list with the wrong number of entries.
+    /// A list of the trajectory family must have one entry for each joint or parameter. Add or remove entries.
     #[error("family {family}, {what}: expected {expected} entries, found {found}")]
     Length {
         /// Name of the family.

@@ -7,7 +7,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LimitError {
-    /// Unknown joint.
+    /// `joints` under `[design.limits]` names a joint that the robot does not have. Use one of the listed names.
     #[error("unknown joint `{joint}` in the limits; the robot's joints are: {}", known.join(", "))]
     UnknownJoint {
         /// Name in the limits.
@@ -15,7 +15,7 @@ pub enum LimitError {
         /// Names of the robot's joints.
         known: Vec<String>,
     },
-    /// Known torque of a joint that the robot does not have.
+    /// A program passed the known torque of a joint number that the robot does not have.
     #[error("known torque {term} acts on a missing joint; the robot has {joints} joints")]
     TorqueOfNoJoint {
         /// Symbol of the term.
@@ -23,13 +23,14 @@ pub enum LimitError {
         /// Number of joints of the robot.
         joints: usize,
     },
-    /// Two entries for one joint.
+    /// `joints` under `[design.limits]` has two entries for one joint. Write all limits of the joint in one entry.
     #[error("duplicate limits of joint `{joint}`: merge the entries")]
     DuplicateJoint {
         /// Name of the joint.
         joint: String,
     },
-    /// Unknown link.
+    /// A limit of the workspace or of distances under `[design.limits]` names a link that the robot does not have. Use
+    /// one of the listed names.
     #[error("unknown link `{link}` in {what}; the robot's links are: {}", known.join(", "))]
     UnknownLink {
         /// The limit.
@@ -39,7 +40,7 @@ pub enum LimitError {
         /// Names of the robot's links.
         known: Vec<String>,
     },
-    /// A value that is not finite.
+    /// A limit is NaN or infinite. To have no limit, delete the key.
     #[error("{what} is {value}: give a finite number, or omit the limit")]
     NotFinite {
         /// The limit.
@@ -47,7 +48,8 @@ pub enum LimitError {
         /// The value.
         value: f64,
     },
-    /// A limit that is not positive.
+    /// A limit of zero or less would forbid all motion. Delete the key for no limit, or add a joint that must not move
+    /// to `lock` under `[robot]`.
     #[error("{what} is {value}: it must be above 0 (omit it for no limit; lock a joint that must not move)")]
     NotPositive {
         /// The limit.
@@ -55,7 +57,8 @@ pub enum LimitError {
         /// The value.
         value: f64,
     },
-    /// A factor that would raise limits.
+    /// The factors in `scale` under `[design.limits]` reduce the limits of the robot, so they cannot be above 1. Write
+    /// higher limits for each joint in `joints`.
     #[error("{what} is {value}: it must be at most 1 (state higher limits in `joints`)")]
     AboveOne {
         /// The factor.
@@ -63,7 +66,7 @@ pub enum LimitError {
         /// The value.
         value: f64,
     },
-    /// A value outside its range.
+    /// The value of this limit is outside its valid range. Write a value within the range that the message names.
     #[error("{what} is {value}: it must be at least {at_least} and below {below}")]
     OutOfRange {
         /// The quantity.
@@ -75,7 +78,7 @@ pub enum LimitError {
         /// First value above the range.
         below: f64,
     },
-    /// A range whose ends are exchanged.
+    /// The two numbers of a range are in the wrong order. Write the lower one first.
     #[error("{what}: the lower end {lower} exceeds the upper end {upper}: exchange them")]
     LowerAboveUpper {
         /// The range.
@@ -85,7 +88,8 @@ pub enum LimitError {
         /// Its upper end.
         upper: f64,
     },
-    /// A position range of zero width.
+    /// The lower and the upper position limit of the joint are equal, also after margins. Widen the range, or lock the
+    /// joint.
     #[error("joint `{joint}` cannot leave position {position}: widen its position range, or lock the joint")]
     ZeroRange {
         /// Name of the joint.
@@ -93,7 +97,8 @@ pub enum LimitError {
         /// Its only position, rad or m.
         position: f64,
     },
-    /// A box that is too small for a point with its radius.
+    /// The box of the workspace is smaller than the sphere around a point that must stay in it. Enlarge the box, or
+    /// reduce the radius.
     #[error("{what}: the range {lower} to {upper} m is too small for a point of radius {radius_m} m")]
     NoRoom {
         /// Box, axis and point.
@@ -105,13 +110,14 @@ pub enum LimitError {
         /// Radius of the point, m.
         radius_m: f64,
     },
-    /// An empty list of points.
+    /// A limit of the workspace lists no link. List the links that must stay inside, or delete the limit.
     #[error("{what} has no points: list the links that it limits")]
     NoPoints {
         /// The limit.
         what: String,
     },
-    /// A torque or power limit without the inertial parameters to compute torque.
+    /// A limit of torque or power can be checked only with mass and inertia of the links, and the robot description has
+    /// none for these. Rough values are sufficient.
     #[error(
         "joint `{joint}` has a {kind} limit, but the inertial parameters of {} are unknown: add them to the robot description (rough values with a torque margin are sufficient), or remove the limit",
         bodies.join(", ")
@@ -124,7 +130,7 @@ pub enum LimitError {
         /// Bodies without a prior that the joint carries.
         bodies: Vec<String>,
     },
-    /// A vector of the wrong length.
+    /// A list of limits must have one number for each joint. Add or remove numbers.
     #[error("{what}: expected {expected} numbers, found {found}")]
     Length {
         /// The vector.
@@ -134,7 +140,7 @@ pub enum LimitError {
         /// Given length.
         found: usize,
     },
-    /// A start posture that violates a limit at rest.
+    /// The motion begins at rest at a posture that is outside a limit. Change the start posture, or widen the limit.
     #[error("the start violates the {kind} limit of `{subject}`: {amount}; move the start or widen the limit")]
     StartOutside {
         /// Kind of the limit.
@@ -144,7 +150,8 @@ pub enum LimitError {
         /// Description of the violation.
         amount: String,
     },
-    /// A duration too short for a motion with rest at both ends.
+    /// The motion must begin and end at rest, and the joint cannot do so in this time. Increase `duration_s`, or raise
+    /// its limits.
     #[error(
         "a duration of {duration_s} s is too short: joint `{joint}` needs at least {shortest_s:.4} s to move {displacement} from rest to rest within its limits; lengthen the motion or raise the limits"
     )]

@@ -50,7 +50,7 @@ type Objective<'a> = dyn Fn(&[f64]) -> f64 + Sync + 'a;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OptimiserError {
-    /// An empty range, or an infinite one where a finite one is needed.
+    /// A program gave a variable of the search a range that is empty, or infinite where the method needs a finite one.
     #[error(
         "variable {variable}: cannot search the range {lower} to {upper}; give lower < upper (both finite for the genetic algorithm)"
     )]
@@ -62,7 +62,7 @@ pub enum OptimiserError {
         /// Upper end.
         upper: f64,
     },
-    /// A vector of the wrong length.
+    /// A program passed a list of variables or bounds of the wrong length.
     #[error("{what} has {found} entries, expected {expected}")]
     Length {
         /// The vector.
@@ -72,7 +72,8 @@ pub enum OptimiserError {
         /// Given length.
         found: usize,
     },
-    /// A setting outside its range.
+    /// A setting of the search under `[design.search]` is outside its range. Write a value within the range that the
+    /// message names.
     #[error("setting `{name}` is {value}; it must be {needed}")]
     Setting {
         /// Name of the setting.
@@ -82,7 +83,7 @@ pub enum OptimiserError {
         /// Valid range.
         needed: &'static str,
     },
-    /// Objective or constraints are not finite at the start.
+    /// At the start of the search the objective or a limit has no finite value. Give another start.
     #[error("the objective or a constraint is not finite at the start; use another start")]
     Start,
 }

@@ -30,13 +30,15 @@ const VARIABLES_PER_STROKE: usize = 3;
 /// Reason why a joint cannot be designed separately.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum StepWiseError {
-    /// A prismatic joint: its motion alone determines a mass, for any window.
+    /// A windowed (step-wise) design identifies joints one after the other by gravity, which does not work for a joint
+    /// that slides. List only revolute joints in `criterion.joints`.
     #[error("joint `{joint}` is prismatic, but step-wise designs need revolute joints: list the revolute joints")]
     Slides {
         /// Name of the joint.
         joint: String,
     },
-    /// A joint without gravity torque.
+    /// A windowed (step-wise) design identifies joints one after the other by gravity, and gravity does not act on this
+    /// joint, for example because its axis is vertical. Remove it from `criterion.joints`.
     #[error(
         "gravity has no torque about joint `{joint}` while the others rest, so that its motion determines only one parameter: list the other joints"
     )]

@@ -8,7 +8,8 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ConsistencyError {
-    /// Knowledge of a link that is fixed to another link.
+    /// Two links that are joined by a fixed joint are one body, and only their sum can be identified. State their
+    /// values together under the name in the message.
     #[error("bodies.{link}: this link is fixed to {body}: write bodies.{body} with the values of both links together")]
     MergedLink {
         /// The link.
@@ -16,7 +17,7 @@ pub enum ConsistencyError {
         /// The body that contains it.
         body: String,
     },
-    /// Knowledge of an unknown body.
+    /// A key of `bodies` under `[estimator.physical]` is not a moving link of the robot. Use one of the listed names.
     #[error("bodies.{name}: unknown moving link; use one of {}", known.join(", "))]
     UnknownBody {
         /// The name.
@@ -24,7 +25,8 @@ pub enum ConsistencyError {
         /// The robot's bodies.
         known: Vec<String>,
     },
-    /// Limits of an unknown torque term.
+    /// A key of `laws` under `[estimator.physical]` is not a friction parameter of this study. Use one of the listed
+    /// symbols.
     #[error("laws.{symbol}: unknown law; [drive] has {}", known.join(", "))]
     UnknownTerm {
         /// The symbol.

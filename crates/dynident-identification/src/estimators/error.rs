@@ -14,7 +14,8 @@ pub enum EstimatorError {
     /// The rows do not determine an estimate.
     #[error("{0}")]
     Estimation(#[from] EstimationError),
-    /// A log or robot does not meet a requirement of the estimator.
+    /// This log or robot does not meet a requirement of `estimator.method`. Change the study as the message states, or
+    /// use `estimator.method = "auto"`.
     #[error("estimator.method = \"{method}\": {message}")]
     Requirement {
         /// Name of the estimator.
@@ -22,7 +23,8 @@ pub enum EstimatorError {
         /// Problem and fix.
         message: String,
     },
-    /// The instruments do not match the log.
+    /// The instruments (a second signal that is free of the measurement noise) do not match the log. Correct
+    /// `[estimator.instruments]` as the message states.
     #[error("log `{log}`, instruments: {message}")]
     Instruments {
         /// Name of the log.

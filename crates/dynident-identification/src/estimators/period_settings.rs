@@ -44,19 +44,20 @@ pub struct PeriodicFit {
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PeriodError {
-    /// Invalid period.
+    /// `period_s` in `periods` under `[estimator]` is zero, negative or too large. Write the period of the commanded
+    /// motion.
     #[error("period_s = {period_s:?}: give the period of the motion in seconds, at most {MAX_PERIOD_S:e}")]
     Period {
         /// Value.
         period_s: f64,
     },
-    /// Invalid start.
+    /// `skip_s` in `periods` under `[estimator]` is the time before the motion is periodic. It must not be negative.
     #[error("skip_s = {skip_s}: give 0 or more seconds")]
     Skip {
         /// Value.
         skip_s: f64,
     },
-    /// Invalid number of harmonics.
+    /// `harmonics` in `periods` under `[estimator]` is the number of harmonics of the motion. It is outside its range.
     #[error("harmonics = {harmonics}: give 1 to 200")]
     Harmonics {
         /// Value.

@@ -7,11 +7,17 @@ use thiserror::Error;
 
 #[derive(Debug, Error)]
 pub(super) enum NoStartError {
+    /// The estimator needs start values, and the physically consistent fit that gives them failed. The text has the
+    /// cause.
     #[error("no physically consistent set is available as start: {0}")]
     Inconsistent(#[source] ConsistencyError),
+    /// The estimator needs start values for all bodies, and the robot description has no `<inertial>` for these. Add it
+    /// with rough values.
     #[error("the robot description cannot be the start, because it has no inertial of {}", .0.join(", "))]
     Undescribed(Vec<String>),
-    #[error("{0}; {1}")]
+    /// Neither the fit nor the robot description can give start values for the estimator. Correct one of the two
+    /// causes.
+    #[error("{first}; {second}", first = .0, second = .1)]
     Both(Box<Self>, Box<Self>),
 }
 

@@ -52,7 +52,9 @@ const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 
 /// Reason for a missing consistent body.
 #[derive(Debug, Error)]
 pub(crate) enum NoBodyError {
-    #[error("its covariance is not positive definite")]
+    /// The training logs hardly determine the payload, so that no body can be computed from its estimate. Record a
+    /// motion that turns the last joints, with the payload (`dynident design`).
+    #[error("the logs hardly determine the payload: the covariance of its estimate is not positive definite")]
     Covariance,
     #[error("{0}")]
     Estimation(#[from] EstimationError),

@@ -74,21 +74,31 @@ impl RedesignSettings {
 
 #[derive(Clone, Debug, PartialEq, Error)]
 enum NotRedesigned {
+    /// The iteration keeps its motion, because the limits permit no other. The text after the colon has the cause.
     #[error("no motion within the limits: {0}")]
     Limits(#[from] LimitError),
+    /// The iteration keeps its motion, because the search for a better one failed. The text after the colon has the
+    /// cause.
     #[error("the search found no motion: {0}")]
     Search(#[from] OptimiserError),
-    /// The iteration keeps its motion: the best new one exceeds a limit.
+    /// The iteration keeps its motion, because every better one exceeds a limit. More search time under
+    /// `[design.search]` may help.
     #[error("the best motion that was found exceeds the limit of {what} by {percent:.2} %")]
     Broken { what: String, percent: f64 },
+    /// The iteration keeps its motion, because a better one could exceed the torque limit of this joint if the model is
+    /// slightly wrong. It may change after the next run.
     #[error(
         "every motion that was found needs up to {torque:.3} Nm at joint {joint} for some model within the uncertainty, and the limit is {limit:.3} Nm"
     )]
     Torque { joint: String, torque: f64, limit: f64 },
+    /// The present motion ends where it begins, so a new one must do so as well, and this one does not. The iteration
+    /// keeps its motion. Choose a family that returns, such as `fourier`.
     #[error("the motion does not end at its start position at joint {joint}: use a family that returns")]
     Ends { joint: String },
+    /// The command was stopped while it searched. The iteration keeps its motion.
     #[error("the search was interrupted")]
     Interrupted,
+    /// The iteration keeps its motion, because a new one would gain too little. No action is needed.
     #[error("the best other motion reduces the error bars by only {percent:.0} %")]
     NoBetter { percent: f64 },
     #[error("{0}")]

@@ -14,29 +14,34 @@ use thiserror::Error;
 #[serde(tag = "condition", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum UnmetCondition {
-    /// Fewer than two good runs, so no comparison is possible.
+    /// Convergence is a comparison of two good runs. Remove the cause of rejected runs, or allow more runs
+    /// (`max_runs`).
     #[error("{good} good runs, 2 are needed for a comparison")]
     TooFewRuns {
         /// Number of good runs.
         good: usize,
     },
-    /// The last run was rejected.
+    /// The last run cannot be used, for the reason in the message. Usually a first controller that holds the robot
+    /// steadily corrects this.
     #[error("the last run was rejected: {reason}")]
     LastRunRejected {
         /// Why.
         reason: String,
     },
-    /// The last run did not use the model-based controller with the undamped newest model.
+    /// The last run used a controller without the newest model, or only a part of the model's change. Allow more runs
+    /// (`max_runs`).
     #[error("the last run did not use the controller with the newest model")]
     NoModel,
-    /// The run is from an earlier version, without the evidence for the verdict.
+    /// An earlier version of Dynident made this run and did not store what the test of convergence needs. Start the
+    /// iteration again in an empty folder.
     #[error("run {run} was made by an earlier version, which did not store the evidence of its log")]
     NoEvidence {
         /// The run.
         run: usize,
     },
-    /// The tracking error of a joint exceeds the tolerance and the explained error.
-    #[error("joint {joint} was {error_rad:.2e} rad from its trajectory, tolerance {tolerance_rad:.2e}{}", floor_words(*.floor_rad))]
+    /// The robot does not follow the motion as closely as required. Something is missing in the model (stiction,
+    /// backlash, elasticity), or the gains are too low: raise them, or raise `settled.tracking_tolerance`.
+    #[error("joint {joint} was {error_rad:.2e} rad from its trajectory, tolerance {tolerance_rad:.2e}{floor}", floor = floor_words(*.floor_rad))]
     Tracking {
         /// The joint.
         joint: String,
@@ -47,7 +52,8 @@ pub enum UnmetCondition {
         /// Error that noise, friction and delay explain, rad (m); `None` if unknown.
         floor_rad: Option<f64>,
     },
-    /// The last run changed a parameter by too much.
+    /// The estimate still changes from run to run. Allow more runs (`max_runs`); if it continues, the parameter depends
+    /// on temperature, or the model lacks a term.
     #[error("{parameter} changed by {bars:.1} error bars with the last run, the limit is {allowed:.1}")]
     ParameterMoves {
         /// The base parameter.
@@ -57,7 +63,7 @@ pub enum UnmetCondition {
         /// Largest accepted change in error bars.
         allowed: f64,
     },
-    /// The error bar of a parameter is too wide.
+    /// The motion excites this parameter too little. Use a longer or another motion (`motion = "redesign"`).
     #[error(
         "the error bar of {parameter} is {percent:.0} % of the largest parameter (by torque), the limit is {allowed_percent:.0} %"
     )]
@@ -69,8 +75,9 @@ pub enum UnmetCondition {
         /// Largest accepted value, percent.
         allowed_percent: f64,
     },
-    /// Torque at the drive's limit.
-    #[error("the torque of joint {joint} is {torque:.3} Nm in {percent:.1} % of the samples: {}", clipping_words(*.stated))]
+    /// The drive delivers its largest torque, so that the logged torque does not follow the command. Use a slower
+    /// motion, or a torque limit under `[design.limits]`.
+    #[error("the torque of joint {joint} is {torque:.3} Nm in {percent:.1} % of the samples: {cause}", cause = clipping_words(*.stated))]
     Clipping {
         /// The joint.
         joint: String,
@@ -81,25 +88,27 @@ pub enum UnmetCondition {
         /// Whether this is a stated limit.
         stated: bool,
     },
-    /// Unexplained lag between torque and positions of the last log, after compensation.
-    #[error("unexplained lag: the torque of all joints is {:.1} +- {:.1} ms (95 %) {} the motion", 1e3 * .lag_s.abs(), 1e3 * .half_width_95_s, if *.lag_s > 0.0 { "after" } else { "before" })]
+    /// The recorder stores torque and position at different times, and the correction does not explain all of it.
+    /// Record both at the same instant.
+    #[error("unexplained lag: the torque of all joints is {lag_ms:.1} +- {half_width_ms:.1} ms (95 %) {after_or_before} the motion", lag_ms = 1e3 * .lag_s.abs(), half_width_ms = 1e3 * .half_width_95_s, after_or_before = if *.lag_s > 0.0 { "after" } else { "before" })]
     Lag {
         /// Lag after compensation, s.
         lag_s: f64,
         /// Half the width of its 95 % interval, s.
         half_width_95_s: f64,
     },
-    /// The compensated lag exceeds the limit by more than its 95 % interval: the true position differs from the logged
-    /// one.
-    #[error("torque and motion of the log are {:.1} ms apart, the limit is {:.1} ms", 1e3 * .lag_s, 1e3 * .allowed_s)]
+    /// The correction of the delay is larger than accepted, so that the logged position is not the true one. Record
+    /// both at the same instant, or raise `settled.most_lag_s`.
+    #[error("torque and motion of the log are {lag_ms:.1} ms apart, the limit is {allowed_ms:.1} ms", lag_ms = 1e3 * .lag_s, allowed_ms = 1e3 * .allowed_s)]
     LongLag {
         /// The longest lag of a joint, s.
         lag_s: f64,
         /// Limit, s.
         allowed_s: f64,
     },
-    /// The compensated lag differs between runs; a recorder delay would be constant.
-    #[error("the apparent torque lag of joint {joint} is {:.1} ms in the last run and {:.1} ms in an earlier run, +- {:.1} ms (95 %)", 1e3 * .lag_s, 1e3 * .before_s, 1e3 * .half_width_95_s)]
+    /// A delay of the recorder would be constant. A changing one is friction or elasticity that the model lacks: write
+    /// `friction = "auto"` under `[drive]`.
+    #[error("the apparent torque lag of joint {joint} is {lag_ms:.1} ms in the last run and {before_ms:.1} ms in an earlier run, +- {half_width_ms:.1} ms (95 %)", lag_ms = 1e3 * .lag_s, before_ms = 1e3 * .before_s, half_width_ms = 1e3 * .half_width_95_s)]
     LagChanges {
         /// The joint.
         joint: String,
@@ -110,7 +119,8 @@ pub enum UnmetCondition {
         /// Half the width of the 95 % interval of their difference, s.
         half_width_95_s: f64,
     },
-    /// The model of the earlier runs does not predict the last run.
+    /// The robot changed between the runs, for example its temperature, load or a sensor offset. Keep the conditions
+    /// constant, or let the robot warm up.
     #[error(
         "{inside_percent:.0} % of joint {joint}'s torque is inside the 95 % band of the model of the earlier runs: error {rms_error_nm:.3} Nm, band +- {half_width_nm:.3} Nm"
     )]
@@ -124,16 +134,19 @@ pub enum UnmetCondition {
         /// Mean half width of the band, Nm (N).
         half_width_nm: f64,
     },
-    /// The newest model has not been validated on the held-out motion yet.
+    /// The model is tested on a motion that was not used for the fit, and this run was not made yet. Allow more runs,
+    /// or set `held_out.every`.
     #[error("the newest model has not been validated on the held-out motion")]
     NotHeldOut,
-    /// The held-out motion was not completed, or its log is unusable.
+    /// The test run on another motion failed, for the reason in the message. Choose a held-out motion that the robot
+    /// can follow.
     #[error("the held-out run cannot validate the newest model: {reason}")]
     HeldOutFailed {
         /// Why.
         reason: String,
     },
-    /// The newest model does not predict the held-out motion.
+    /// The model is valid only for the motion of the fit. Use a more exciting motion (`motion = "redesign"`), or other
+    /// friction laws (`friction = "auto"`).
     #[error(
         "held-out motion: {inside_percent:.0} % of joint {joint}'s torque is inside the 95 % band of the newest model: error {rms_error_nm:.3} Nm, band +- {half_width_nm:.3} Nm"
     )]
@@ -147,7 +160,8 @@ pub enum UnmetCondition {
         /// Mean half width of the band, Nm (N).
         half_width_nm: f64,
     },
-    /// Torque that the model does not explain.
+    /// The model lacks a part of the real torque. Write `friction = "auto"` under `[drive]`, or correct lengths and
+    /// axes in the robot description.
     #[error(
         "{percent:.1} % of joint {joint}'s torque is unexplained beyond its noise, the limit is {allowed_percent:.1} %"
     )]
@@ -159,13 +173,13 @@ pub enum UnmetCondition {
         /// Limit, percent.
         allowed_percent: f64,
     },
-    /// Another link length explains the torque significantly better than that of the robot description.
+    /// A length in the robot description is probably wrong. Measure it on the robot and correct the description.
     #[error(
-        "{}: the residual of joint {} is then {:.3} Nm instead of {:.3} Nm", length_words(.0), .0.explained_joint, .0.left_with_nm, .0.left_nm
+        "{other_length}: the residual of joint {joint} is then {with_nm:.3} Nm instead of {without_nm:.3} Nm", other_length = length_words(.0), joint = .0.explained_joint, with_nm = .0.left_with_nm, without_nm = .0.left_nm
     )]
     Length(OtherLength),
-    /// The logged torque differs from the commanded torque.
-    #[error("{0}")]
+    /// The logged torque is not that of the drives. The message is one of the table *Commanded and logged torque*.
+    #[error("{torque_cause}", torque_cause = .0)]
     Torque(TorqueCause),
 }
 

@@ -159,15 +159,23 @@ fn most_trusted<'r>(records: &'r [RunRecord], thresholds: &VerdictSettings) -> O
 
 #[derive(Clone, Debug, PartialEq, Error)]
 pub(crate) enum Rejection {
+    /// The run stopped early: a limit, a fault of the robot or a stop by the user. The message states which; remove
+    /// this cause and run again.
     #[error("{outcome}")]
     NotDone { outcome: String },
+    /// The log of the run does not determine the parameters. The message states why; usually the motion or the
+    /// recording is too short.
     #[error("{reason}")]
     NoEstimate { reason: String },
-    #[error("no physically consistent model fits it: {reason}")]
+    /// The logged torque contradicts every real robot. Check signs, scales and order of the logged torques.
+    #[error("no physically consistent model fits the log of this run: {reason}")]
     Inconsistent { reason: String },
+    /// The robot did not follow the motion closely enough to use this run. Use stiffer gains or a slower motion.
     #[error("joint {joint} left its trajectory: error {error:.3} rad, limit {limit:.3} rad")]
     LeftTrajectory { joint: String, error: f64, limit: f64 },
-    #[error("it tracks worse: {now:.3e} rad after {then:.3e} rad")]
+    /// The controller with the new model follows the motion worse than that of an earlier run, so the new model is
+    /// probably wrong. Look at the torque log of this run.
+    #[error("the tracking error grew from {then:.3e} rad to {now:.3e} rad")]
     TracksWorse { now: f64, then: f64 },
 }
 

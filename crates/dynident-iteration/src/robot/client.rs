@@ -24,9 +24,13 @@ const HOME_CAPABILITY: &str = "home";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 enum LineError {
-    #[error("longer than a megabyte")]
+    /// The program of the robot wrote a line above the size limit, probably without line ends. End each message with a
+    /// newline.
+    #[error("the line is longer than a megabyte")]
     TooLong,
-    #[error("not UTF-8")]
+    /// The program of the robot wrote binary data to standard output, which is reserved for messages. Write messages as
+    /// UTF-8 text.
+    #[error("the line is not UTF-8 text")]
     NotText,
 }
 

@@ -10,13 +10,13 @@ const MAX_LOG_BYTES: u64 = 1 << 30;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LogTableError {
-    /// The file cannot be read.
+    /// The log file of the run cannot be opened, or is not CSV text. Write it again.
     #[error("{reason}")]
     Unreadable {
         /// Error of the operating system.
         reason: String,
     },
-    /// The header lacks a column.
+    /// The first line of the log must name all columns. Correct it as the message states.
     #[error("column {column} is missing in line 1 (`{found}`): write {}, separated by commas", expected.join(","))]
     NoColumn {
         /// The missing column.
@@ -26,7 +26,7 @@ pub enum LogTableError {
         /// The header.
         found: String,
     },
-    /// A row with another number of fields.
+    /// The line has fewer or more fields than the first line of the file. Write the row again, completely.
     #[error("line {line}: {found} fields where the header has {expected}")]
     Fields {
         /// The line, from 1.
@@ -36,7 +36,7 @@ pub enum LogTableError {
         /// Number of fields in the row.
         found: usize,
     },
-    /// A field that is not a finite number.
+    /// The field is empty, text, NaN or infinite. Write a number.
     #[error("line {line}, column {column}: `{field}` is not a finite number")]
     NotANumber {
         /// The line, from 1.
@@ -46,7 +46,7 @@ pub enum LogTableError {
         /// The field.
         field: String,
     },
-    /// Time that does not increase.
+    /// Each row must have a later time than the one before. Write each sample once, in order of time.
     #[error("line {line}: time {time_s} s does not come after the line before")]
     Time {
         /// The line, from 1.
@@ -54,7 +54,8 @@ pub enum LogTableError {
         /// Its time, s.
         time_s: f64,
     },
-    /// No rows, or an unfinished last line: the file is still being written.
+    /// The program is still writing the log, so the run is not used yet. Write the file under another name and rename
+    /// it when it is complete.
     #[error("the log is not complete: {reason}")]
     Incomplete {
         /// The missing part.

@@ -311,7 +311,8 @@ impl core::fmt::Display for RobotStatus {
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum RobotFault {
-    /// The program cannot be started.
+    /// `command` under `[iteration.robot]` names a program that does not exist or is not executable. Correct the
+    /// command.
     #[error("robot program {program}: cannot be started: {reason}")]
     NotStarted {
         /// The program.
@@ -319,7 +320,7 @@ pub enum RobotFault {
         /// Error of the operating system.
         reason: String,
     },
-    /// The program ended during the run.
+    /// The program stopped with an error. The message contains its last text on standard error.
     #[error("the robot program ended before it sent its {waiting_for} ({exit}){said}")]
     Died {
         /// The expected message.
@@ -329,7 +330,7 @@ pub enum RobotFault {
         /// The end of its standard error, or an empty string.
         said: String,
     },
-    /// No message within the time limit.
+    /// The program waits for something, or is slower than the limit. Run it by hand to see what it waits for.
     #[error(
         "the robot program sent no {waiting_for} within {limit_s} s: check the program, or raise this limit in limits of [iteration.robot]"
     )]
@@ -339,7 +340,7 @@ pub enum RobotFault {
         /// The time limit, s.
         limit_s: f64,
     },
-    /// Samples arrived in real time and then stopped during the motion.
+    /// The connection to the robot was lost, or the program stopped reading samples. Dynident sent a stop.
     #[error(
         "the robot program sent its samples in real time and then none for {limit_s:.2} s: check the program; if such a pause is normal, increase limits.silence_s"
     )]
@@ -347,7 +348,8 @@ pub enum RobotFault {
         /// The time limit, s.
         limit_s: f64,
     },
-    /// A line that is not a message of the protocol.
+    /// The program printed other text to standard output, which is reserved for messages. Print such text to standard
+    /// error.
     #[error("the robot program wrote a line that is not a message ({reason}): {line}")]
     Garbage {
         /// The line, cut to 200 characters.
@@ -355,7 +357,8 @@ pub enum RobotFault {
         /// Why it is invalid.
         reason: String,
     },
-    /// An unexpected message.
+    /// The program does not keep the order of the messages. Compare it with the page "External robots: the line
+    /// protocol".
     #[error("the robot program sent a message of type {found} instead of {expected}")]
     OutOfTurn {
         /// Type of the message.
@@ -363,7 +366,7 @@ pub enum RobotFault {
         /// Expected type.
         expected: String,
     },
-    /// A value that is missing or not finite.
+    /// The program sent a sample with a missing, NaN or infinite value. Correct the program.
     #[error("sample {sample} of the robot: {what} is not a finite number")]
     NotANumber {
         /// The sample, from 0.
@@ -371,7 +374,7 @@ pub enum RobotFault {
         /// The value.
         what: String,
     },
-    /// A vector of a wrong length.
+    /// The program sent a sample with the wrong number of joints. Send one entry for each joint of its `hello`.
     #[error("sample {sample} of the robot: {what} has {found} entries for {expected} joints")]
     WrongJoints {
         /// The sample, from 0.
@@ -383,7 +386,8 @@ pub enum RobotFault {
         /// Number of entries.
         found: usize,
     },
-    /// The robot has other joints.
+    /// The joint names in the `hello` of the program must be those of the robot description. Correct one of the two, or
+    /// lock joints in the study.
     #[error("the robot has the joints {}; expected {}", found.join(", "), expected.join(", "))]
     OtherJoints {
         /// Joints of the model.
@@ -391,7 +395,8 @@ pub enum RobotFault {
         /// Joints of the robot.
         found: Vec<String>,
     },
-    /// Time that does not increase.
+    /// The times of two samples are equal or in the wrong order. Send each sample once, with the time of the robot's
+    /// clock.
     #[error("sample {sample} of the robot: time {time_s} s comes after {before_s} s")]
     Time {
         /// The sample, from 0.
@@ -401,7 +406,7 @@ pub enum RobotFault {
         /// The previous time, s.
         before_s: f64,
     },
-    /// More samples than the largest number for this run.
+    /// The program sends samples faster than the stated rate, or did not stop after the motion. Correct the program.
     #[error("the robot sent more than {most} samples for a run of {duration_s} s")]
     TooMuch {
         /// Largest number of samples.
@@ -409,7 +414,8 @@ pub enum RobotFault {
         /// Length of the run, s.
         duration_s: f64,
     },
-    /// Another version of the protocol, or an unsupported mode.
+    /// The program was written for another version of the protocol, or lacks the `mode` of `[iteration.robot]`. Adapt
+    /// the program, or change `mode`.
     #[error("the robot program supports {found}, not {expected}")]
     Protocol {
         /// Supported by the program.
@@ -417,7 +423,8 @@ pub enum RobotFault {
         /// Required.
         expected: String,
     },
-    /// Logged torque from which the dynamics cannot be identified.
+    /// The `hello` of the program states that it logs a torque without gravity or friction, or currents with invalid
+    /// factors. Log the complete drive torque, or correct the factors.
     #[error("the robot logs torque {what}: {fix}")]
     LoggedTorque {
         /// The logged quantity.
@@ -425,7 +432,7 @@ pub enum RobotFault {
         /// Suggested fix.
         fix: String,
     },
-    /// The record ends before the trajectory.
+    /// The program reported success, but did not send all samples. Send the samples until the end of the motion.
     #[error("the robot reported done, but its record of the {} ends at {end_s} s of {duration_s} s", .part.name())]
     Short {
         /// Last time of the record, s.
@@ -436,18 +443,20 @@ pub enum RobotFault {
         #[serde(default, skip_serializing_if = "RunPart::is_motion")]
         part: RunPart,
     },
-    /// A program that does not support approach and return paths would start the motion at its current position.
+    /// Without the path from home, the robot would jump to the start of the motion, so the program is not started on
+    /// it.
     #[error(
         "the study has a home, but the robot program does not report in its hello that it runs the paths from and to home (\"capabilities\":[\"home\"]): let it run approach.csv before and return.csv after the trajectory, use mode = \"step\", or remove home from [iteration] and move the robot to its start yourself"
     )]
     NoWays,
-    /// The controller's torque is not finite.
+    /// The controller computed NaN or an infinite torque, usually because a measured position or velocity was wrong.
+    /// Check the samples of the robot.
     #[error("the controller's torque at sample {sample} is not a finite number")]
     Torque {
         /// The sample, from 0.
         sample: usize,
     },
-    /// A step of the time stamps that is far too long.
+    /// The times that the program sends are probably in ms or µs.
     #[error(
         "sample {sample} of the robot: its time is {step_s} s after the previous one, but the period is {period_s} s: give the time in seconds"
     )]
@@ -459,7 +468,7 @@ pub enum RobotFault {
         /// The period, s.
         period_s: f64,
     },
-    /// The function of a robot failed.
+    /// The function that a program passed as robot raised an error. The text after the sample has its message.
     #[error("the function of the robot failed at sample {sample}: {reason}")]
     Function {
         /// The sample, from 0.
@@ -467,7 +476,8 @@ pub enum RobotFault {
         /// The reason.
         reason: String,
     },
-    /// A file that cannot be written or read.
+    /// A file that is exchanged with the robot cannot be read or written, or its content is invalid. The text after the
+    /// path has the cause.
     #[error("{}: {reason}", path.display())]
     File {
         /// The file.

@@ -19,7 +19,7 @@ pub enum IterationError {
     /// Parts of the robot that do not fit together.
     #[error("{0}")]
     Model(#[from] ParametricModelError),
-    /// Stored friction of an earlier run that does not fit this robot.
+    /// The folder contains runs of another robot or study. Use an empty folder for this robot.
     #[error(
         "the friction that run {run} selected does not fit this robot: {source}; start afresh, or use another folder"
     )]
@@ -38,15 +38,17 @@ pub enum IterationError {
     /// Rows that are not sufficient for an estimate.
     #[error("{0}")]
     Estimation(#[from] EstimationError),
-    /// An unusable record.
-    #[error("record of joints {}: {problem}", joints.join(", "))]
+    /// The samples that the robot returned cannot be fitted, for example because they are too few or not where the
+    /// joints follow the motion. The text after the joints has the cause.
+    #[error("the record of the run (joints {}): {problem}", joints.join(", "))]
     Record {
         /// Its joints.
         joints: Vec<String>,
         /// The problem and its fix.
         problem: String,
     },
-    /// A run whose motion cannot be planned.
+    /// The next motion depends on a good earlier run, and all earlier runs were rejected. See the reasons in the output
+    /// of these runs.
     #[error("run {run}: {problem}")]
     Planning {
         /// The run.
@@ -54,7 +56,8 @@ pub enum IterationError {
         /// The problem and its fix.
         problem: String,
     },
-    /// A file of the iteration's folder that cannot be read or written; existing files are unchanged.
+    /// A file in the output folder cannot be read or written. Check permissions and free space. Existing files are
+    /// unchanged.
     #[error("{}: {source}; existing files are unchanged", path.display())]
     File {
         /// The file or folder.
@@ -62,7 +65,8 @@ pub enum IterationError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A file of the iteration's folder with invalid content.
+    /// A file in the output folder was changed by hand, truncated, or written by another version or study. Restore it,
+    /// or use an empty folder.
     #[error("{}: {problem}", path.display())]
     State {
         /// The file.

@@ -45,7 +45,8 @@ pub struct HomeSettings {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum HomeError {
-    /// A joint without velocity limit has to move.
+    /// Dynident plans the path from home to the start, and needs the velocity limit of each joint that moves. Add it to
+    /// the entry of the joint in `joints` under `[design.limits]`.
     #[error(
         "no velocity limit for joint {joint}, which has to move from home (the motion does not move it): add one to [design.limits]"
     )]
@@ -53,7 +54,8 @@ pub enum HomeError {
         /// The joint.
         joint: String,
     },
-    /// A motion that begins or ends at nonzero velocity.
+    /// The path from home ends at rest, so the motion must begin at rest (and end at rest for the path back). Choose
+    /// another trajectory family, or repeat the design.
     #[error(
         "the motion {} at {speed:.3} rad/s (m/s) of joint {joint}, but paths from and to home are from rest to rest: use a motion that begins and ends at rest",
         if *.begins { "begins" } else { "ends" }
@@ -66,7 +68,8 @@ pub enum HomeError {
         /// Whether this is the begin of the motion.
         begins: bool,
     },
-    /// A posture breaks a limit.
+    /// The home posture or the start of the motion is outside a limit, so that no path can reach it. Change the posture
+    /// or the limit.
     #[error("{posture} itself breaks the limit of {kind} of {subject} (ratio {ratio:.3}, 1 is the limit): {fix}")]
     Posture {
         /// The posture.
@@ -80,7 +83,8 @@ pub enum HomeError {
         /// Suggested fix.
         fix: &'static str,
     },
-    /// No path was found.
+    /// The straight path in joint space, and all detours that were tried, hit a limit, for example of the workspace.
+    /// Choose another `home` under `[iteration]`.
     #[error(
         "no clear path between home and {posture}: the direct path breaks the limit of {kind} of {subject} at {:.0} % of its length (ratio {ratio:.3}, 1 is the limit), and so do all paths through one or two of {tried} random postures; use another home, or a start_posture in [design] that is nearer",
         100.0 * .share
@@ -99,7 +103,7 @@ pub enum HomeError {
         /// Number of random postures that were tried.
         tried: usize,
     },
-    /// The search was interrupted.
+    /// The command was stopped, for example by Ctrl-C, while it planned the paths. Run it again.
     #[error("the search for the paths from and to home was interrupted")]
     Interrupted,
     /// Invalid limits.

@@ -104,10 +104,12 @@ pub struct Rehearsal {
 /// Why a motion is not commanded.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum RehearsalFailure {
-    /// The motion leaves the envelope.
-    #[error("the motion leaves the envelope: {0}; use another motion, or correct the limit in [iteration.envelope]")]
+    /// The commanded motion itself exceeds a limit of position, velocity or workspace, so Dynident does not run it on
+    /// the robot.
+    #[error("the motion leaves the envelope: {breach}; use another motion, or correct the limit in [iteration.envelope]", breach = .0)]
     Path(Breach),
-    /// The mass matrix is not positive definite.
+    /// The inertias of the model are not physically consistent. Run `dynident inspect ROBOT --fix OUT.urdf`, or correct
+    /// them in the robot description.
     #[error(
         "the model's mass matrix is not positive definite (eigenvalue {eigenvalue:.3e} kg m^2) at the positions {q:.3?}: a controller with this model may push in the wrong direction"
     )]
@@ -117,16 +119,18 @@ pub enum RehearsalFailure {
         /// The positions, rad (m).
         q: Vec<f64>,
     },
-    /// The motion needs more torque than the envelope allows.
-    #[error("the model's torque along the motion leaves the envelope: {0}; use a slower motion")]
+    /// The motion needs more torque than `[iteration.envelope]` permits. Reduce the velocity or acceleration limits
+    /// under `[design.limits]`.
+    #[error("the model's torque along the motion leaves the envelope: {breach}; use a slower motion", breach = .0)]
     Torque(Breach),
-    /// The rehearsal was interrupted.
+    /// The command was stopped, for example by Ctrl-C, during the rehearsal. Run it again.
     #[error("the rehearsal was interrupted")]
     Interrupted,
-    /// A possible robot does not follow the motion.
+    /// A simulated robot with other masses and friction, within `uncertainty_percent`, stops early with these gains.
+    /// The real robot could do so, too.
     #[error(
-        "in simulation, {robot} does not follow the motion: {verdict}; {}use other gains (kp, kd, or bandwidth_hz), compensate gravity (start = \"prior\"), or change rehearsal.uncertainty_percent or [iteration.envelope]",
-        room_words(.verdict)
+        "in simulation, {robot} does not follow the motion: {verdict}; {advice}use other gains (kp, kd, or bandwidth_hz), compensate gravity (start = \"prior\"), or change rehearsal.uncertainty_percent or [iteration.envelope]",
+        advice = room_words(.verdict)
     )]
     Loop {
         /// The simulated robot.
@@ -134,7 +138,8 @@ pub enum RehearsalFailure {
         /// How its run ended.
         verdict: RunStatus,
     },
-    /// A possible robot follows the motion but oscillates.
+    /// With these gains, the simulated robot vibrates: the gains are too high for the sampling rate or the delay. Lower
+    /// `kp` and `kd`, or `bandwidth_hz`.
     #[error("in simulation, {robot} oscillates: {oscillation}")]
     Oscillates {
         /// The simulated robot.
@@ -142,7 +147,8 @@ pub enum RehearsalFailure {
         /// The oscillation.
         oscillation: JointOscillation,
     },
-    /// A link of a possible robot leaves the workspace.
+    /// A simulated robot with other masses and friction leaves the workspace, because its tracking error is too large.
+    /// The real robot could do so, too.
     #[error("in simulation, {robot} leaves the envelope: {breach}; keep the motion further inside, or use other gains")]
     Outside {
         /// The simulated robot.

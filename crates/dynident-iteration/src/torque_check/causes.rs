@@ -13,7 +13,8 @@ const MAX_COMMON_SCALE_DEVIATION: f64 = 0.02;
 #[serde(tag = "cause", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum TorqueCause {
-    /// The logged torque has another scale.
+    /// Torque constant, gear ratio or unit of this joint is wrong in the log, or the gain of its drive is. Correct the
+    /// scale.
     #[error("the logged torque of joint {joint} is {factor:.3} ± {half_width_95:.3} times the commanded torque")]
     Scale {
         /// The joint.
@@ -23,14 +24,15 @@ pub enum TorqueCause {
         /// Half the width of its 95 % interval.
         half_width_95: f64,
     },
-    /// The logged torques of all joints have another scale.
+    /// All torques have a wrong unit or scale in the log. Correct the scale.
     #[error("the logged torques of all joints are {factor:.3} times the commanded torques")]
     CommonScale {
         /// Ratio of logged to commanded torque.
         factor: f64,
     },
-    /// The logged torque has the opposite sign.
-    #[error("{}", sign_words(.joints, *.is_commanded))]
+    /// The recorder or the drive uses the opposite direction for this joint. Reverse the sign of the logged torque (or
+    /// of the commanded torque, if the message names the motion).
+    #[error("{opposite_sign}", opposite_sign = sign_words(.joints, *.is_commanded))]
     Sign {
         /// The joints.
         joints: Vec<String>,
@@ -38,8 +40,8 @@ pub enum TorqueCause {
         #[serde(default, skip_serializing_if = "core::ops::Not::not")]
         is_commanded: bool,
     },
-    /// The torques of two joints are exchanged.
-    #[error("{}", exchanged_words(joint, of, *.is_commanded))]
+    /// Two columns of the log, or two commands, are in the wrong order. Correct the order of the joints.
+    #[error("{exchanged_joints}", exchanged_joints = exchanged_words(joint, of, *.is_commanded))]
     Exchanged {
         /// The joint.
         joint: String,
@@ -49,20 +51,21 @@ pub enum TorqueCause {
         #[serde(default, skip_serializing_if = "core::ops::Not::not")]
         is_commanded: bool,
     },
-    /// Gravity was subtracted.
+    /// The robot compensates gravity itself and logs only the rest. Log the complete torque of the drives.
     #[error("gravity is missing in the logged torque of {}", listed(.joints))]
     Gravity {
         /// The joints.
         joints: Vec<String>,
     },
-    /// Friction was subtracted.
+    /// The robot compensates friction itself and logs only the rest. Log the complete torque of the drives.
     #[error("friction is missing in the logged torque of {}", listed(.joints))]
     Friction {
         /// The joints.
         joints: Vec<String>,
     },
-    /// The drive delivers less torque than commanded.
-    #[error("{} although more is commanded: the drive is saturated", clipped_words(joint, *torque, *.is_commanded))]
+    /// The drive delivers less torque than commanded, because it reached its limit. Use a slower motion, or correct the
+    /// torque limit under `[design.limits]`.
+    #[error("{constant_torque} although more is commanded: the drive is saturated", constant_torque = clipped_words(joint, *torque, *.is_commanded))]
     Clipped {
         /// The joint.
         joint: String,
@@ -72,20 +75,21 @@ pub enum TorqueCause {
         #[serde(default, skip_serializing_if = "core::ops::Not::not")]
         is_commanded: bool,
     },
-    /// Positions and torques of the log were recorded at different times.
-    #[error("positions and torques of the log are {:.1} ms apart", 1e3 * .lag_s)]
+    /// The recorder stores positions and torques of different instants. Log both at the same instant.
+    #[error("positions and torques of the log are {lag_ms:.1} ms apart", lag_ms = 1e3 * .lag_s)]
     Delay {
         /// Delay of the torque relative to the positions, s.
         lag_s: f64,
     },
-    /// The clock of the log differs from that of the controller.
-    #[error("the clock of the log is {:.2} % {} than that of the controller", .percent.abs(), if *.percent < 0.0 { "faster" } else { "slower" })]
+    /// The log uses another clock than the controller. Log the time of the controller.
+    #[error("the clock of the log is {difference:.2} % {faster_or_slower} than that of the controller", difference = .percent.abs(), faster_or_slower = if *.percent < 0.0 { "faster" } else { "slower" })]
     Clock {
         /// Slowness of the log's clock, percent.
         percent: f64,
     },
-    /// The rows of one joint require other values of shared parameters than the rows of the other joints.
-    #[error("the torque of joint {joint} is {factor:.3} ± {half_width_95:.3} times what the torques of the other joints require{}{}", log_words(*.is_commanded), or_words(.or))]
+    /// The masses that this joint's torque requires differ from those that the other joints require. Correct its torque
+    /// constant or gear ratio, or check the gain of its drive.
+    #[error("the torque of joint {joint} is {factor:.3} ± {half_width_95:.3} times what the torques of the other joints require{note}{or_joints}", note = log_words(*.is_commanded), or_joints = or_words(.or))]
     JointScale {
         /// The joint.
         joint: String,
@@ -99,7 +103,8 @@ pub enum TorqueCause {
         /// Whether the logged torque is the commanded one.
         is_commanded: bool,
     },
-    /// None of the known causes explains the difference, or several explain it equally well.
+    /// Several causes fit equally well, or none does. Compare both torques in the report, and log the torque that the
+    /// drives deliver.
     #[error("the logged torque of joint {joint} differs from the commanded torque by {difference_percent:.1} %: cause not determined{}", candidate_words(.candidates))]
     Undetermined {
         /// The joint.

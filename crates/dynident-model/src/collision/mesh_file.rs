@@ -19,22 +19,28 @@ const MAX_PARENT_LEVELS: usize = 8;
 /// Why a collision shape cannot be used.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum MeshError {
+    /// The robot description names a mesh file that Dynident does not find in its folder, nor, for `package://` names,
+    /// in the folders above. Copy the mesh there, or correct the name.
     #[error("mesh `{name}` is missing (searched next to and above {})", folder.display())]
     Missing {
         name: String,
         /// Folder of the description.
         folder: PathBuf,
     },
+    /// The mesh file exists, but the operating system does not permit to read it. Correct the permissions.
     #[error("{}: cannot be read: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
+    /// The content of the mesh file is invalid. The text after the path has the cause; export the mesh again.
     #[error("{}: {fault}", path.display())]
     Content {
         path: PathBuf,
         #[source]
         fault: MeshFault,
     },
+    /// The robot description has a shape that Dynident cannot convert, for example a mesh with an unsupported scale.
+    /// The message names the element.
     #[error("{what}")]
     Unsupported {
         /// The element and what is wrong with it.
@@ -46,28 +52,29 @@ pub enum MeshError {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MeshFault {
-    /// Unknown format.
+    /// The mesh is in a format that Dynident does not read. Convert it to STL or OBJ.
     #[error("unknown format; STL (binary or text), OBJ, MSH (.msh) and COLLADA (.dae) are read")]
     Format,
-    /// The file exceeds the size limit.
+    /// The mesh is too detailed. Reduce its number of triangles, or use a simplified collision mesh.
     #[error("larger than {} MiB", MAX_MESH_BYTES >> 20)]
     TooLarge,
-    /// No vertex.
+    /// The file has no points, so that it has no shape. Export the mesh again.
     #[error("no vertices")]
     Empty,
-    /// A vertex without three numbers.
+    /// A point of the mesh does not consist of three numbers. The file is truncated or damaged: export the mesh again.
     #[error("a vertex without three numbers")]
     Vertex,
-    /// A coordinate that is not finite or too large.
+    /// A coordinate is NaN, infinite or above 1e9. Export the mesh again, with lengths in m.
     #[error("a vertex that is not finite, or beyond 1e9")]
     NotFinite,
-    /// A face with an invalid index.
+    /// A triangle refers to a point that the file does not contain. The file is truncated or damaged: export the mesh
+    /// again.
     #[error("a face names a vertex that does not exist")]
     Face,
-    /// The XML of a COLLADA file is malformed.
+    /// The COLLADA file does not follow the rules of XML; often it is truncated. Export the mesh again.
     #[error("malformed XML: {0}")]
     Xml(String),
-    /// An element of a COLLADA file that is missing, wrong or not supported.
+    /// An element of the COLLADA file is missing, wrong or not supported. Convert the mesh to STL or OBJ.
     #[error("COLLADA: {0}")]
     Collada(&'static str),
 }

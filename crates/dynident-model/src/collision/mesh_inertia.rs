@@ -37,16 +37,26 @@ pub struct MeshInertia {
 /// Why a mesh has no mass properties.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum MeshInertiaFault {
+    /// All triangles of the mesh have no area, so MuJoCo cannot compute a mass from it. Repair the mesh, or give the
+    /// body an `<inertial>`.
     #[error("its surface area is zero")]
     NoArea,
+    /// The mesh is flat or not closed, so that it has no volume for a mass. Write `inertia="shell"`, or give the body
+    /// an `<inertial>`.
     #[error("its volume is zero; use inertia=\"shell\" if it is a surface")]
     NoVolume,
+    /// The triangles of the mesh have the reverse order of corners. Recalculate the normals in a mesh editor, or give
+    /// the body an `<inertial>`.
     #[error("its volume is negative: its triangles are oriented inward")]
     Negative,
+    /// Some triangles of the mesh face inward and others outward. Repair the mesh, write another `inertia`, or give the
+    /// body an `<inertial>`.
     #[error("its triangles have inconsistent orientations, with which inertia=\"exact\" is undefined")]
     Orientation,
+    /// The points of the mesh are on one plane or line, so that their convex hull has no volume. Repair the mesh, or
+    /// give the body an `<inertial>`.
     #[error("its vertices have no convex hull with a volume")]
     NoHull,
 }

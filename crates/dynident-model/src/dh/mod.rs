@@ -68,32 +68,46 @@ pub type DhError = Located<DhFault>;
 /// A fault in a D-H table, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum DhFault {
+    /// The D-H table is not valid TOML, or a key is unknown or misspelt.
     #[error("{reason}; fix this entry of the D-H table")]
     Toml { reason: String },
+    /// The value is infinite, NaN or at least 1e9. Check the number and its unit.
     #[error("`{key}` is {value:e}: write a finite number below 1e9")]
     Number { key: &'static str, value: f64 },
+    /// One quantity is given in two units, for example in rad and in degrees.
     #[error("`{first}` and `{second}` are the same quantity: keep one")]
     BothUnits { first: &'static str, second: &'static str },
+    /// Keys in rad, degrees and Nm belong to revolute joints, keys in m and N to prismatic joints. This key belongs to
+    /// the other type.
     #[error("`{key}` does not fit a {kind} joint: use {fix}")]
     WrongUnit { key: &'static str, kind: &'static str, fix: &'static str },
+    /// `sign` states whether the joint turns (or moves) along its D-H axis or against it.
     #[error("`sign` is {sign}: write 1 or -1")]
     Sign { sign: f64 },
+    /// Names of joints and links must not be empty. The study and the logs refer to these names.
     #[error("a {what} has an empty name: give it one")]
     EmptyName { what: &'static str },
+    /// Two joints or two links of the table have the same name.
     #[error("duplicate {what} `{name}`: rename one")]
     DuplicateName { what: &'static str, name: String },
+    /// `parent` names a link that is not defined before this joint. It is misspelt, or the entries are in the wrong
+    /// order.
     #[error("there is no link `{parent}` above this joint: order joints from base to tip; known here: {}", known.join(", "))]
     UnknownParent { parent: String, known: Vec<String> },
+    /// The file has no `[[joint]]`. It may be another TOML file, such as a study.
     #[error("the table has no joint: add [[joint]] entries")]
     NoJoint,
+    /// The table contains more joints than Dynident can identify at once.
     #[error("the table has more than {limit} joints: remove some")]
     TooManyJoints { limit: usize },
+    /// The keys of a link's inertia are incomplete, or state it twice. Write one of the three forms in the message.
     #[error(
         "the inertial is incomplete or redundant: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters (ten numbers) alone; or no inertial, if it is unknown"
     )]
     Inertial,
+    /// The table is valid, but its joints and links are not a valid robot model. The text has the cause.
     #[error("{0}; fix the table")]
     Model(#[from] ModelError),
 }

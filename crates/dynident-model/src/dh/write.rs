@@ -18,15 +18,19 @@ const SIGNATURE: &str = "# identified: ";
 /// Why values could not be written into a D-H table.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum DhWriteError {
     /// The original is not readable.
     #[error("{0}")]
     Original(#[from] DhError),
+    /// The identified model has a link or joint that this D-H table does not contain. Give the table from which the
+    /// model was identified.
     #[error("the D-H table has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
+    /// A program passed two sets of values for one link or joint.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
+    /// A value to write is NaN or infinite. Identify the model again, or correct the values that the program passed.
     #[error("the new values of {kind} `{name}` are not all finite numbers")]
     NotFinite { kind: &'static str, name: String },
 }

@@ -24,27 +24,40 @@ use thiserror::Error;
 /// Why values could not be written into an MJCF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum MjcfWriteError {
     /// The original is not readable.
     #[error("{0}")]
     Original(#[from] MjcfError),
+    /// The identified model has a body or joint that this MJCF does not contain. Give the MJCF from which the model was
+    /// identified.
     #[error("the MJCF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
+    /// A program passed two sets of values for one body or joint.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
+    /// Dynident rewrites one file. Replace the `<include>` by the text of the included file, then run the command
+    /// again.
     #[error("{kind} `{name}` is in an included file, which is not rewritten: put the robot into one file")]
     Included { kind: &'static str, name: String },
+    /// A value to write is NaN, infinite or too large. Identify the model again, or correct the values that the program
+    /// passed.
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
     NotFinite { kind: &'static str, name: String },
+    /// The values are those of an unconstrained estimate, with a negative mass or an impossible inertia. Write the
+    /// physically consistent set, which is the default of `identify`.
     #[error(
         "the new values of body `{body}` are not physically consistent, and MuJoCo would refuse them: use physically consistent parameters"
     )]
     NotPhysical { body: String },
+    /// An MJCF body with two joints has one mass, behind the second joint. The identified model has mass between the
+    /// two joints.
     #[error(
         "`{link}` is between two joints of one MJCF body and cannot have mass there: in the MJCF, give each joint its own body"
     )]
     Between { link: String },
+    /// With this setting MuJoCo changes the masses when it loads the file, so that the written values would not be
+    /// used.
     #[error("`{setting}` of <compiler> changes the masses that are written: {fix}")]
     Compiler { setting: &'static str, fix: &'static str },
 }

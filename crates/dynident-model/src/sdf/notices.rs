@@ -16,14 +16,21 @@ pub struct SdfNotice {
 /// Kind of the part that is not represented.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum SdfLoss {
+    /// Without a valid `<inertial>` the mass of the link is unknown. Only jobs that need nominal masses (`design` with
+    /// torque limits, `simulate`, `iterate`) need it.
     #[error("the mass of link `{link}` {why}, so that it is unknown: give the link an <inertial>")]
     UnknownMass { link: String, why: &'static str },
+    /// `<gravity>false</gravity>` removes the weight of the link in simulation. A real link has weight, so Dynident
+    /// uses it.
     #[error("link `{link}` has no gravity, which is not supported: its full weight is used")]
     Weightless { link: String },
+    /// The inertia of the water around the link is missing in the model. In air it is zero; no action is needed there.
     #[error("link `{link}` has `fluid_added_mass`, which is not supported")]
     AddedMass { link: String },
+    /// The file refers to another model by `<include>`, which Dynident does not load. Links of that model are missing
+    /// in the robot.
     #[error("the model at `{uri}` is not read: expand the file with `gz sdf -p`")]
     Include { uri: String },
 }

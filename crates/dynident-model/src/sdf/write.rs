@@ -23,19 +23,27 @@ use thiserror::Error;
 /// Why values could not be written into an SDF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum SdfWriteError {
     /// The original is not readable.
     #[error("{0}")]
     Original(#[from] SdfError),
+    /// The identified model has a link or joint that this SDF does not contain. Give the SDF from which the model was
+    /// identified.
     #[error("the SDF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
+    /// A program passed two sets of values for one link or joint.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
+    /// A program asked to delete the `<inertial>` of this link. Simulators would then give the link a mass of 1 kg.
     #[error("link `{link}` needs an <inertial>, because SDF's default is 1 kg: keep it")]
     Removed { link: String },
+    /// A value to write is NaN, infinite or too large. Identify the model again, or correct the values that the program
+    /// passed.
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
     NotFinite { kind: &'static str, name: String },
+    /// The values are those of an unconstrained estimate, with a negative mass or an impossible inertia. Write the
+    /// physically consistent set, which is the default of `identify`.
     #[error(
         "the new values of link `{link}` are not physically consistent, and simulators would refuse them: use physically consistent parameters"
     )]

@@ -19,7 +19,7 @@ pub struct StatedJoint {
 
 /// An invalid constant of a stated law.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum StatedFault {
     /// A number outside its range.
     Range { key: &'static str, value: f64, range: [f64; 2] },

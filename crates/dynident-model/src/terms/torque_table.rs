@@ -36,12 +36,15 @@ pub struct TorqueTable {
 /// Error of a torque table.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum TorqueTableError {
+    /// `table` or `table_file` of a `[[torque]]` has too few or too many points. Add points, or thin out a long table.
     #[error("{found} points: give 2 to {MAX_POINTS}")]
     Points { found: usize },
+    /// A position or torque of the table is NaN, infinite or too large. Correct it, and check its unit.
     #[error("point {number}: {value}: give numbers of at most {MAX_VALUE:e} in size")]
     Number { number: usize, value: f64 },
+    /// The positions of the table must increase. Sort the points, and delete a position that appears twice.
     #[error("point {number}: position {position} after {before}: sort the points by position, each once")]
     Order { number: usize, position: f64, before: f64 },
 }

@@ -82,7 +82,7 @@ pub struct UnreadElement {
 
 /// A violation of the rules that does not make the robot ambiguous; other URDF readers ignore it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum UrdfIrregularity {
     /// Names with an undeclared namespace prefix.
     UndeclaredPrefix {
@@ -105,64 +105,97 @@ pub type UrdfError = Located<UrdfFault>;
 /// A fault in a URDF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum UrdfFault {
+    /// The file does not follow the rules of XML: for example, a tag is not closed, a quote is missing, or the end of
+    /// the file is missing.
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
     Xml { reason: String },
+    /// The file has far more elements than one robot needs. It is probably another file, or several robots in one.
     #[error("the document has more than {limit} nodes: name the URDF of one robot")]
     TooLarge { limit: u32 },
+    /// One tag has too many attributes, or the document has too many XML namespaces. No usual URDF reaches these
+    /// limits: check that the file is a URDF.
     #[error("too many attributes in a tag, or namespaces in the document: name the URDF of one robot")]
     Flood,
+    /// `<!DOCTYPE>` can define entities that expand without limit, so Dynident rejects it. A URDF does not need it.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
     Doctype,
+    /// The file is XML but not a URDF. Give the file whose root element is `<robot>`.
     #[error("the root element is <{root}>, not <robot>: give a URDF file{hint}")]
     NotUrdf { root: String, hint: &'static str },
+    /// The file still contains xacro expressions or macros, which only the program `xacro` expands.
     #[error("`{what}` is xacro: expand the file first (`xacro robot.urdf.xacro > robot.urdf`)")]
     Xacro { what: String },
+    /// URDF requires this element. Without it, the link or joint is incomplete.
     #[error("<{parent}> of `{owner}` has no <{element}>: add it{hint}")]
     MissingElement { parent: &'static str, owner: String, element: &'static str, hint: &'static str },
+    /// A link has one mass and one inertia. Add the two inertials to one, or delete the wrong one.
     #[error("link `{link}` has a second <inertial>: keep one")]
     RepeatedInertial { link: String },
+    /// URDF requires this attribute. It is missing or misspelt.
     #[error("<{element}> has no attribute `{attribute}`: add it")]
     MissingAttribute { element: String, attribute: &'static str },
+    /// Names of links and joints must not be empty. The study and the logs refer to these names.
     #[error("<{element}> has an empty `{attribute}`: fill it in")]
     EmptyName { element: String, attribute: &'static str },
+    /// The text is not a valid number for this attribute. The message states which values are valid.
     #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {fix}")]
     Number { element: String, attribute: String, text: String, fault: &'static str, fix: &'static str },
+    /// The attribute is a list of numbers, such as `xyz="0 0 0.1"`, and a number is missing or extra.
     #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
     Count { element: String, attribute: String, expected: usize, found: usize },
+    /// Two links or two joints have the same name, often after two files were merged.
     #[error("{kind} `{name}` is defined a second time (first in line {first_line}): rename or delete one")]
     DuplicateName { kind: &'static str, name: String, first_line: u32 },
+    /// The `<parent>` or `<child>` of a joint names a link that the file does not contain.
     #[error("joint `{joint}` names link `{link}`, which is not defined: add the link or fix the name")]
     UnknownLink { joint: String, link: String },
+    /// A `<mimic>` names the joint that it follows, and this must be another joint.
     #[error("joint `{joint}` mimics itself: fix the name or delete <mimic>")]
     OwnMimic { joint: String },
+    /// The two attributes could state different orientations.
     #[error("<origin> of {owner} has both `rpy` and `quat_xyzw`: keep one of them")]
     TwoRotations { owner: String },
+    /// Four numbers are an orientation only if the sum of their squares is 1. Zeros or numbers far from this give none.
     #[error(
         "`quat_xyzw` of <origin> of {owner} has length {norm:.3e}: give a unit quaternion x y z w, such as `0 0 0 1`"
     )]
     NoRotation { owner: String, norm: f64 },
+    /// Two joints have the same `<child>`, which closes a loop. Dynident reads trees: delete one joint. If the chain is
+    /// a parallelogram, state it by `[[robot.loop]]` of the study.
     #[error(
         "link `{link}` is the child of joint `{first}` and of joint `{second}`: a link has one parent, delete one joint"
     )]
     TwoParents { link: String, first: String, second: String },
+    /// Dynident reads joints with at most one degree of freedom. Replace a planar or floating joint by a chain of other
+    /// joints, or by `fixed`.
     #[error("joint `{joint}` is of type `{kind}`: use revolute, continuous, prismatic or fixed{hint}")]
     JointType { joint: String, kind: String, hint: &'static str },
+    /// The `xyz` of `<axis>` is `0 0 0`, so that the direction of motion is unknown.
     #[error("the axis of joint `{joint}` has length zero: give its direction, such as `0 0 1`")]
     ZeroAxis { joint: String },
+    /// The file has a `<robot>` element without links. It is probably a fragment that another file includes.
     #[error("the robot has no <link>: add its links and joints")]
     NoLinks,
+    /// All joints are fixed, so that there is nothing to identify. Often the export replaced moving joints by `fixed`.
     #[error("the robot has no moving joint: give at least one of type revolute, continuous or prismatic")]
     NoMovingJoint,
+    /// The joints form a ring. Dynident reads trees: delete one of these joints. If the chain is a parallelogram, state
+    /// it by `[[robot.loop]]` of the study.
     #[error("link `{link}` is its own ancestor: the joints form a loop; cut it at one joint")]
     Loop { link: String },
+    /// Two links have no parent joint, so the file contains two separate robots. Connect them by a fixed joint, or
+    /// delete one.
     #[error("links `{first}` and `{second}` both have no parent: join them, a robot has one base")]
     SeveralRoots { first: String, second: String },
+    /// The description contains more moving joints than Dynident can identify at once, such as those of hands or of a
+    /// second robot.
     #[error(
         "the robot has more than {limit} moving joints: write type=\"fixed\" for joints that the log does not contain"
     )]
     TooManyJoints { limit: usize },
+    /// The file is valid URDF, but its joints and links are not a valid robot model. The text has the cause.
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),
 }

@@ -62,24 +62,32 @@ pub struct JointChange {
 /// Why values could not be written into a URDF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum UrdfWriteError {
     /// The original is not readable.
     #[error("{0}")]
     Original(#[from] UrdfError),
+    /// The identified model has a link or joint that this URDF does not contain. Give the URDF from which the model was
+    /// identified.
     #[error("the URDF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
+    /// A program passed two sets of values for one link or joint.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
+    /// A value to write is NaN or infinite. Identify the model again, or correct the values that the program passed.
     #[error("the new values of {kind} `{name}` are not all finite numbers")]
     NotFinite { kind: &'static str, name: String },
+    /// The unconstrained estimate gives this link a moment but no mass. Write the physically consistent set, which is
+    /// the default of `identify`.
     #[error("link `{link}` has moments but no mass, which URDF cannot express: use physically consistent parameters")]
     NoMass { link: String },
+    /// A value is too large for any robot, usually because of a wrong unit. Check lengths and masses.
     #[error(
         "the new values of link `{link}` contain {value:e}, more than the limit of {MAX_MAGNITUDE:e}: check its lengths and masses"
     )]
     TooLarge { link: String, value: f64 },
-    #[error("{found} parameter sets for {expected} moving bodies")]
+    /// A program passed a list with the wrong number of parameter sets. Pass one set for each moving body.
+    #[error("{found} parameter sets for {expected} moving bodies: give one for each")]
     Counts { expected: usize, found: usize },
 }
 

@@ -8,7 +8,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// The log cannot be read.
+    /// This log cannot be read. The text after its name has the cause and the fix.
     #[error("log `{log}`: {source}")]
     Recording {
         /// Log.
@@ -16,7 +16,8 @@ pub enum LogError {
         /// Cause.
         source: Box<RecordingError>,
     },
-    /// A joint of the model is missing in the log.
+    /// The log has no columns for a joint of the robot model. Add its columns under `[format]`, or add the joint to
+    /// `lock` under `[robot]` if it did not move.
     #[error("log `{log}`: joint `{joint}` is missing; the columns belong to {}; add columns of this joint, or lock it under [robot]", known.join(", "))]
     NoSuchJoint {
         /// Log.
@@ -26,13 +27,14 @@ pub enum LogError {
         /// Joints of the log.
         known: Vec<String>,
     },
-    /// The samples of the log cannot be opened.
+    /// A program passed a log without samples, or the samples cannot be opened again. Pass raw samples or a prepared
+    /// motion.
     #[error("log `{log}` has no samples; give raw samples or a prepared motion")]
     NoSamples {
         /// Log.
         log: String,
     },
-    /// The parallel filter is impossible at the log's rate.
+    /// `[parallel_filter]` does not fit the sampling rate of this log. The text after the section has the cause.
     #[error("log `{log}`, [parallel_filter]: {source}")]
     Filter {
         /// Log.
@@ -40,7 +42,8 @@ pub enum LogError {
         /// Cause.
         source: FilterError,
     },
-    /// The log lacks the temperature on which friction depends.
+    /// The friction law `temperature` needs the temperature of the joint in each log. Add the columns under
+    /// `[format.temperature]`, or remove the law from `[drive]`.
     #[error(
         "log `{log}`: friction of joint `{joint}` depends on the temperature, but the log has no temperature; give its columns with the key `temperature` of the format, or remove the law `temperature`"
     )]
@@ -50,7 +53,8 @@ pub enum LogError {
         /// First joint that needs it.
         joint: String,
     },
-    /// The log leaves the domain of a declared torque.
+    /// The log contains a position or velocity for which a `[[torque]]` has no value. Widen its table, change its
+    /// expression, or leave out these rows.
     #[error(
         "log `{log}`, {time_s:.3} s: torque {torque} = {law} is undefined at {at}; widen the table, keep the expression defined, for example with max(.., 0), or exclude these rows with drop_time_s"
     )]
@@ -66,7 +70,8 @@ pub enum LogError {
         /// Positions and velocities at that time.
         at: String,
     },
-    /// The log has no rows after the filter.
+    /// The log is too short for the parallel filter, which needs several samples for each row of the fit. Use a longer
+    /// log, a higher cut-off, or `parallel_filter.enabled = false`.
     #[error(
         "log `{log}`: {rows} samples leave nothing behind the parallel filter, which needs {needed}; give a longer part of the log, a higher cut-off, or parallel_filter.enabled = false"
     )]
@@ -78,7 +83,8 @@ pub enum LogError {
         /// Samples that one filtered row needs.
         needed: usize,
     },
-    /// The rows of the log cannot be factored.
+    /// The samples of this log cannot be used in the fit, for example because a value is too large. The text after the
+    /// name has the cause.
     #[error("{log}: {source}")]
     Rows {
         /// Log.

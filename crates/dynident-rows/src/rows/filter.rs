@@ -44,7 +44,7 @@ impl From<Option<&DecimationSettings>> for ParallelFilterSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ParallelFilterError {
-    /// The decimation factor is zero.
+    /// `factor` is the number of samples from which the parallel filter makes one row. Write 1 or more.
     #[error("parallel_filter.factor = 0: give 1 or more")]
     ZeroFactor,
 }

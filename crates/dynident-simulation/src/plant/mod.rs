@@ -32,13 +32,16 @@ use thiserror::Error;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum PlantFault {
-    /// The mass matrix is not positive definite.
+    /// A joint of the simulated robot moves no mass at this posture, or an inertia is negative. Correct the inertias in
+    /// the robot description.
     #[error("the mass matrix of the simulated robot is not positive definite")]
     MassMatrix,
-    /// Positions or velocities are not finite.
+    /// The simulated motion grew without bound, usually because the controller is unstable. Lower the gains, or raise
+    /// `rate_hz`.
     #[error("the motion of the simulated robot is not finite")]
     NotFinite,
-    /// The adaptive integrator found no step within its tolerance.
+    /// The simulated motion changes too fast for the integrator, for example because of very stiff friction or a very
+    /// high gain. Lower the gains, or use a wider step of friction.
     #[error("the adaptive integrator cannot keep its tolerance")]
     StepSize,
 }

@@ -15,7 +15,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StudyFileError {
-    /// A file that cannot be read.
+    /// The study, a file that it names, or the folder of `--data` does not exist, or the operating system does not
+    /// permit to read it. Correct the path or the permissions.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
     File {
         /// The file.
@@ -23,7 +24,7 @@ pub enum StudyFileError {
         /// Reason from the operating system.
         source: std::io::Error,
     },
-    /// An error at a place in the text of a study.
+    /// The study has an error at this line and column. The text after the place has the cause and the fix.
     #[error("{}:{line}:{column}: {source}", path.display())]
     StudyAt {
         /// The study file.
@@ -35,7 +36,8 @@ pub enum StudyFileError {
         /// The problem.
         source: Box<StudyError>,
     },
-    /// An error of the whole study, or a mismatch with its robot.
+    /// The study as a whole has an error, or it does not match its robot. The text after the path names the key and the
+    /// fix.
     #[error("{}: {source}", path.display())]
     Study {
         /// The study file.
@@ -43,7 +45,8 @@ pub enum StudyFileError {
         /// The problem.
         source: Box<StudyError>,
     },
-    /// A file that is in none of the study's folders.
+    /// The study names a file that does not exist in the folder of the study or in the folder `data`. Correct the path,
+    /// or name the folder with `data` or `--data`.
     #[error("{} is in none of the study's folders (tried {}); correct its path in the study, or name its folder there with `data` (or with --data of the command){}",
         file.display(), list(tried), source_of_data.as_ref().map_or(String::new(), |s| format!(". The recordings are public: {s}")))]
     Missing {
@@ -57,7 +60,8 @@ pub enum StudyFileError {
     /// A robot description that cannot be read.
     #[error("{0}")]
     Robot(#[source] Box<ReadError>),
-    /// A robot file whose macros cannot be expanded.
+    /// The robot file contains xacro macros, and the program `xacro` could not expand them. The text after the path has
+    /// the cause.
     #[error("{}: {source}", path.display())]
     Xacro {
         /// The robot file.
@@ -65,7 +69,8 @@ pub enum StudyFileError {
         /// The problem.
         source: Box<XacroError>,
     },
-    /// A log that cannot be read.
+    /// The file of this `[[log]]` cannot be read, or its rows do not fit `[format]`. The text after the name has the
+    /// cause and the fix.
     #[error("log `{log}`: {source}")]
     Recording {
         /// The log.
@@ -73,7 +78,8 @@ pub enum StudyFileError {
         /// The problem.
         source: Box<RecordingError>,
     },
-    /// An invalid table of torque.
+    /// The `table_file` of a `[[torque]]` has a line that is not two numbers, position and torque, or invalid points.
+    /// Correct the printed line.
     #[error("{}:{line}: {message}", path.display())]
     Table {
         /// The table.

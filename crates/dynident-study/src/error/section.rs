@@ -23,7 +23,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StudyError {
-    /// An error at a place in the study.
+    /// The error is in this section or list entry of the study. The text after the place has the cause and the fix.
     #[error("{place}: {source}")]
     At {
         /// The section, or the list entry.
@@ -31,16 +31,16 @@ pub enum StudyError {
         /// The error.
         source: Box<StudyError>,
     },
-    /// Invalid TOML, or an unknown key.
+    /// The file is not valid TOML, or a key is misspelt or in the wrong section. Correct it at the printed line.
     #[error("{problem}; page \"The study file\" lists every key: `dynident docs study`")]
     Toml {
         /// Message of the parser.
         problem: String,
     },
-    /// Another encoding than UTF-8.
+    /// An editor saved the study in another encoding, such as Latin-1 or UTF-16. Save it as UTF-8.
     #[error("not UTF-8 text: save the study as UTF-8")]
     NotUtf8,
-    /// A file that is too large for a study.
+    /// The file that was given as study is probably a log or another large file. Give the study, a small TOML file.
     #[error("larger than {} MiB: give a study file", most_bytes >> 20)]
     TooLarge {
         /// Maximum size, bytes.
@@ -49,7 +49,7 @@ pub enum StudyError {
     /// Invalid settings of a fit to commands.
     #[error("{0}")]
     Servo(#[from] dynident_servo::ServoError),
-    /// A number outside its range.
+    /// The number of this key is outside its valid range. Write a number within the range that the message names.
     #[error("{key} = {value}: give {expected}")]
     Number {
         /// The key.
@@ -59,7 +59,8 @@ pub enum StudyError {
         /// The valid values.
         expected: Expected,
     },
-    /// An array with a number outside its range.
+    /// At least one number in the list of this key is outside its valid range. Write numbers within the range that the
+    /// message names.
     #[error("{key} = {values:?}: give {expected}")]
     Numbers {
         /// The key.
@@ -69,7 +70,8 @@ pub enum StudyError {
         /// The valid values.
         expected: &'static str,
     },
-    /// A list whose length differs from the number of joints.
+    /// The list must have one entry for each joint of the robot, in the order of the robot's joints. Add or remove
+    /// entries.
     #[error("{key} has {found} entries, the robot {expected} joints: give one entry per joint")]
     Length {
         /// The key.
@@ -79,7 +81,8 @@ pub enum StudyError {
         /// Joints.
         expected: usize,
     },
-    /// An unknown name.
+    /// The key names a joint, link, log or other object that does not exist. Use one of the listed names; capital and
+    /// small letters differ.
     #[error("{key}: unknown {what} `{name}`; known: {}", known.join(", "))]
     Unknown {
         /// The key.
@@ -91,8 +94,8 @@ pub enum StudyError {
         /// The known names.
         known: Vec<String>,
     },
-    /// A name of no log, or of several logs.
-    #[error("{}", log_name(name, *found, known))]
+    /// A name must belong to exactly one `[[log]]`. Correct the name, or give each `[[log]]` a unique `name`.
+    #[error("{problem}", problem = log_name(name, *found, known))]
     LogName {
         /// The name.
         name: String,
@@ -101,7 +104,8 @@ pub enum StudyError {
         /// The names of all logs.
         known: Vec<String>,
     },
-    /// A duplicate name in a list.
+    /// Two entries of a list have the same name, so that a reference to it would be ambiguous. Rename or remove one of
+    /// them.
     #[error("{what} `{name}` is given twice: {fix}")]
     Twice {
         /// The kind of list.
@@ -111,7 +115,7 @@ pub enum StudyError {
         /// The fix.
         fix: &'static str,
     },
-    /// A joint under two exclusive keys.
+    /// Two keys contradict each other about one joint. Remove the joint from one of the two keys.
     #[error("{key}: joint `{joint}` is {state} as well: remove it from {key} or from {other}")]
     JointInBoth {
         /// The joint.
@@ -123,7 +127,8 @@ pub enum StudyError {
         /// State of the joint under the other key.
         state: &'static str,
     },
-    /// A held-out log that contains training samples.
+    /// A log with `role = "validate"` and a training log select the same rows of one file. Validation then only repeats
+    /// the fit. Select different parts in both `[[log]]` entries.
     #[error(
         "validation log `{held_out}` contains samples of the training log `{training}`: select parts that do not overlap in both [[log]] entries (both by rows, by fraction, or by time_range_s), or use another file"
     )]
@@ -133,7 +138,8 @@ pub enum StudyError {
         /// The held-out log.
         held_out: String,
     },
-    /// A held-out log in another file that contains the same samples as a training log.
+    /// Two files contain the same recording, for example a copy or a longer export. Validation then only repeats the
+    /// fit. Use the recording of another run for validation.
     #[error(
         "validation log `{held_out}` contains the same samples as the training log `{training}`: its row {held_out_row} and the following equal those of `{training}` from row {training_row} (two runs never have identical positions and torques): name the file of another run in this [[log]], or select parts that do not overlap"
     )]
@@ -147,7 +153,8 @@ pub enum StudyError {
         /// First common row of the held-out log, 0-based.
         held_out_row: u64,
     },
-    /// Two training logs that contain the same samples, so that error bars would be too small.
+    /// Two training logs contain the same recording. The fit would use these samples twice, and the error bars would be
+    /// too small. Remove one of the logs.
     #[error(
         "training logs `{first}` and `{second}` contain the same samples: row {second_row} of `{second}` and the following equal those of `{first}` from row {first_row}, which would make the error bars too small: remove one of the logs, or select rows that do not overlap"
     )]
@@ -161,13 +168,14 @@ pub enum StudyError {
         /// First common row of the second log, 0-based.
         second_row: u64,
     },
-    /// Exclusive keys.
+    /// The two keys state the same quantity in two ways. Delete one of them.
     #[error("{} are both given: keep one", keys.join(" and "))]
     Exclusive {
         /// The stated keys.
         keys: Vec<&'static str>,
     },
-    /// A missing part of the study.
+    /// The command needs this part of the study, and the study does not have it. Add the key or section that the
+    /// message names.
     #[error("{what}: {fix}")]
     Missing {
         /// The missing part.
@@ -175,7 +183,7 @@ pub enum StudyError {
         /// The fix.
         fix: String,
     },
-    /// A key that conflicts with the rest of the study.
+    /// The key is valid, but it does not fit another key, the robot or the logs. The message names what to change.
     #[error("{key}: {fix}")]
     Conflict {
         /// The key.
@@ -183,7 +191,8 @@ pub enum StudyError {
         /// The conflict and the fix.
         fix: String,
     },
-    /// Bodies without the inertial parameters that a job needs.
+    /// The job computes torques, but the robot description has no `<inertial>` for these bodies. Add their mass, centre
+    /// of mass and inertia to the robot description.
     #[error("the inertial parameters of {} are unknown: {fix}", bodies.join(", "))]
     NoInertials {
         /// The bodies.
@@ -191,10 +200,12 @@ pub enum StudyError {
         /// The fix.
         fix: &'static str,
     },
-    /// An error of the program `xacro` or its settings.
+    /// The study has wrong settings for `xacro` under `[robot]`, or `xacro` failed. The text after `robot:` has the
+    /// cause.
     #[error("robot: {0}")]
     Xacro(#[source] Box<XacroError>),
-    /// A joint without a limit on its speed.
+    /// `design` needs a limit of how fast each joint may move, and neither the robot description nor the study has one.
+    /// Add the printed line under `[design.limits]`.
     #[error(
         "joint `{joint}` has no limit of speed, acceleration, jerk, torque or power, so its motion could be infinitely fast; add one under [design.limits]: joints = [{{ joint = \"{joint}\", acceleration = ... }}]"
     )]
@@ -202,7 +213,8 @@ pub enum StudyError {
         /// The joint.
         joint: String,
     },
-    /// A joint without a limit that its stroke needs.
+    /// A windowed (step-wise) design moves each joint of `criterion.joints` by strokes, and needs its limits of
+    /// position and of speed or acceleration. Add them to the entry of this joint in `joints` under `[design.limits]`.
     #[error("joint `{joint}` has no {limit} limit, which a stroke needs: add it to joints under [design.limits]")]
     NoStrokeLimit {
         /// The joint.
@@ -210,10 +222,11 @@ pub enum StudyError {
         /// The limit.
         limit: &'static str,
     },
-    /// A stroke that starts outside of the position limits.
+    /// In a windowed (step-wise) design, the start of this joint in `family.offsets` is outside its position limits, or
+    /// at the upper limit. Write a start inside the limits.
     #[error(
-        "family.offsets: joint `{joint}` starts its stroke at {offset_rad} rad, but its limits are {} to {} rad: give a start within them, from which the stroke can move in the positive direction",
-        limits_rad[0], limits_rad[1]
+        "family.offsets: joint `{joint}` starts its stroke at {offset_rad} rad, but its limits are {lower} to {upper} rad: give a start within them, from which the stroke can move in the positive direction",
+        lower = limits_rad[0], upper = limits_rad[1]
     )]
     StrokeStart {
         /// The joint.
@@ -226,13 +239,15 @@ pub enum StudyError {
     /// An invalid robot model.
     #[error("{0}")]
     Model(#[from] ModelError),
-    /// An inconsistent closed chain.
+    /// A `[[robot.loop]]` of the study does not describe a closed chain of this robot. The text after the section has
+    /// the cause.
     #[error("[[robot.loop]]: {0}")]
     Loop(#[from] LoopError),
-    /// An invalid expression.
+    /// The `expression` of a `[[torque]]` cannot be read. The message names the character; see the table *Mistakes in
+    /// expressions* below.
     #[error("expression {0}")]
     Expression(#[from] ExpressionError),
-    /// An invalid torque table.
+    /// The points of a torque table are invalid. See *Torque tables* below.
     #[error("table: {0}")]
     Table(#[from] TorqueTableError),
     /// Bodies and torque terms that do not match.

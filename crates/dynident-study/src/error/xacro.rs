@@ -7,7 +7,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum XacroError {
-    /// No program may be started.
+    /// The robot file is a xacro file, and programs run only with permission. Permit `xacro` with `--allow-command`, or
+    /// run the printed command and name its output as the robot file.
     #[error(
         "the file contains macros, which need the program xacro. xacro runs Python code of the file, so \
          it needs permission; no program was started. If you trust the file, permit it (--allow-command; in Python \
@@ -17,23 +18,26 @@ pub enum XacroError {
         /// The command to run by hand.
         by_hand: String,
     },
-    /// The program failed, or was stopped.
-    #[error("the macros of the file cannot be expanded: {source}{}", fix(source))]
+    /// `xacro` is not installed, stopped with an error or did not end in time. The text after the colon has its message
+    /// and the fix.
+    #[error("the macros of the file cannot be expanded: {source}{fix}", fix = fix(source))]
     Program {
         /// The failure.
         #[from]
         source: RunError,
     },
-    /// The output of the program is not text.
+    /// `xacro` ran, but its output is not a text. Run `xacro` by hand, check the output and save it as UTF-8.
     #[error("the macros of the file cannot be expanded: the output of xacro is not UTF-8 text")]
     NotText,
-    /// A file path that cannot be passed to the program.
+    /// The path of the robot file contains bytes that are not valid UTF-8. Rename the file or its folder.
     #[error("the path is not UTF-8 text and cannot be passed to xacro: rename the file")]
     Path,
-    /// Arguments for a file without macros.
+    /// The study or the command has xacro arguments, but the robot file has no macros that could use them. Remove the
+    /// arguments, or give the xacro file.
     #[error("the file contains no xacro macros: remove the xacro arguments ([robot] xacro, --xacro)")]
     NoMacros,
-    /// An invalid argument name.
+    /// A key of `xacro` under `[robot]`, or a `--xacro NAME=VALUE`, has a name that xacro does not accept. Correct the
+    /// name.
     #[error(
         "invalid xacro argument `{name}` = `{value}`: a name consists of ASCII letters, digits and `_-./` and begins with a letter or `_`"
     )]
@@ -43,7 +47,8 @@ pub enum XacroError {
         /// The value.
         value: String,
     },
-    /// A time limit that is not positive.
+    /// `xacro_limit_s` under `[robot]`, or `--xacro-limit-s`, is zero, negative or too large. Write the number of
+    /// seconds that `xacro` may run.
     #[error("xacro_limit_s = {limit_s}: give more than 0, at most 1e6 s")]
     TimeLimit {
         /// The limit, s.

@@ -43,7 +43,8 @@ impl ProgramRequest {
     }
 }
 
-/// A program was not permitted and not started.
+/// A study or a robot file names a program, and programs run only with permission. Read the command; if you trust it,
+/// permit it with `--allow-command` (Python: `allow_command=True`).
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{} was not permitted and not started: {}", .request.purpose, .request.command_line())]
 pub struct ProgramRefused {

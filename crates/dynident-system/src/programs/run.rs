@@ -29,20 +29,28 @@ pub struct RunLimits {
 /// Why a program gave no output. The program and all its child processes have been stopped.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum RunError {
+    /// The program is not installed, or its name is misspelt. Install it, or write its full path.
     #[error("the program {program} is not installed, or not in a folder of PATH")]
     NotFound { program: String },
+    /// The operating system refuses to start the program, for example because the file is not executable. Correct its
+    /// permissions.
     #[error("the program {program} cannot be started: {source}")]
     NotStarted { program: String, source: io::Error },
+    /// The program was slower than its time limit, or waits for input. Raise the limit, or run the program by hand.
     #[error("the program {program} did not end within {limit_s} s and was stopped")]
     TimedOut { program: String, limit_s: f64 },
+    /// You stopped the command, for example by Ctrl-C, and Dynident stopped the program.
     #[error("the program {program} was stopped on request")]
     Stopped { program: String },
+    /// The program printed far more than expected, probably in an endless loop. Run it by hand and check its output.
     #[error("the program {program} wrote more than {} MiB and was stopped", most_bytes >> 20)]
     TooLarge { program: String, most_bytes: u64 },
+    /// The program ended with an error. Its own message follows; run the program by hand to find the cause.
     #[error("the program {program} failed ({exit}): {message}")]
     Failed { program: String, exit: String, message: String },
+    /// The connection to the program broke. Run the command again.
     #[error("the output of the program {program} cannot be read: {source}")]
     Output { program: String, source: io::Error },
 }

@@ -7,56 +7,60 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FactorsError {
-    /// Not a factor file.
-    #[error("this is no file of factors: give a file that `reduce` wrote")]
+    /// The file was not written by `dynident reduce`. Give a factor file.
+    #[error("this is not a factor file: give a file that `dynident reduce` wrote")]
     Kind,
-    /// An unsupported version.
-    #[error("version {found} of the format; this program reads version {known}: reduce the logs again with it")]
+    /// Another version of Dynident wrote the file. Run `dynident reduce` again with this version.
+    #[error("version {found} of the format; this program reads version {known}: run `dynident reduce` on the logs again")]
     Version {
         /// Version of the file.
         found: u32,
         /// Version of the program.
         known: u32,
     },
-    /// A truncated file.
+    /// The file is not complete, usually because a copy was interrupted.
     #[error("truncated file ({bytes} bytes): copy it again")]
     Short {
         /// Length, bytes.
         bytes: usize,
     },
-    /// A corrupt file.
+    /// The content of the file changed after it was written, usually by a faulty copy.
     #[error("corrupt file (hash mismatch): copy it again")]
     Hash,
-    /// An unreadable header with a valid hash.
-    #[error("unreadable header: {problem}; reduce the logs again")]
+    /// The file is intact, but its header is not that of this version. Run `dynident reduce` again.
+    #[error("unreadable header: {problem}; run `dynident reduce` on the logs again")]
     Header {
         /// The problem.
         problem: String,
     },
-    /// Invalid numbers in a factor.
-    #[error("log {log}: {source}; reduce it again")]
+    /// The factor of this log contains numbers that are not finite or of the wrong size. Run `dynident reduce` on the
+    /// log again.
+    #[error("log {log}: {source}; run `dynident reduce` on this log again")]
     Numbers {
         /// The log.
         log: String,
         /// The problem.
         source: EstimationError,
     },
-    /// An empty list to merge.
+    /// The command got no factor file. Name at least one.
     #[error("no factors to merge: give at least one file")]
     Empty,
-    /// Factors of different robots or settings.
+    /// Factors can only be added if all were computed for the same robot with the same settings. Run `dynident reduce`
+    /// on all logs with one study.
     #[error("factors of different studies cannot be merged: {} differ; reduce all logs with the same study (and the same --like model)", sections.iter().map(|name| format!("[{name}]")).collect::<Vec<_>>().join(", "))]
     Unlike {
         /// The sections that differ.
         sections: Vec<String>,
     },
-    /// A study with code of the caller.
-    #[error("{part} is a function of the caller, but factor files cannot contain code: identify from the logs")]
+    /// The study uses a function of a calling program, such as an own friction law, and a file cannot contain it.
+    /// Identify from the logs in that program.
+    #[error("{part} is a function of the calling program, but factor files cannot contain code: run `identify` on the logs")]
     Function {
         /// The part with the name of its function.
         part: String,
     },
-    /// A study that refers to a file.
+    /// The study takes a torque from a `table_file`. Write its points as `table` into the study, or remove the
+    /// `[[torque]]`.
     #[error("the torque table {file} is a separate file, but factor files cannot contain files: remove this torque")]
     Table {
         /// The file.

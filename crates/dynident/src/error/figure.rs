@@ -6,7 +6,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FigureError {
-    /// A file name with an unknown ending.
+    /// The form of a figure or table follows from the ending of the file name, and this ending is unknown. Change the
+    /// file name.
     #[error("{}: give a file that ends in .svg, .pdf, .png, .csv, .tex or .md", path.display())]
     Ending {
         /// The file.

@@ -26,7 +26,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file that cannot be read.
+    /// The file does not exist, or the operating system does not permit to read it. Correct the path or the
+    /// permissions.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
     File {
         /// The file.
@@ -34,7 +35,8 @@ pub enum Error {
         /// Reason from the operating system.
         source: std::io::Error,
     },
-    /// An input file that changed while it was read, so that its hash is not valid.
+    /// Another program wrote to the file while Dynident read it, so the stored hash would not match. Wait until the
+    /// file is complete, then run the command again.
     #[error("{}: the file changed while it was read; run the command again when no program writes to it", path.display())]
     Changed {
         /// The file.
@@ -46,7 +48,7 @@ pub enum Error {
     /// A result file that cannot be used.
     #[error("{0}")]
     ResultFile(#[from] ResultFileError),
-    /// An identification that failed.
+    /// The fit ended with the error that follows the path. That error has its own code; run `dynident docs` with it.
     #[error("{}: {source}", path.display())]
     Identification {
         /// The study file.
@@ -54,7 +56,8 @@ pub enum Error {
         /// The problem.
         source: Box<IdentificationError>,
     },
-    /// A program in the study that was not permitted.
+    /// The study names a program, for example `iteration.robot.command`. Dynident starts programs only with your
+    /// permission. Read the command first.
     #[error(
         "{}: {source}. Read the command, and if you trust it, permit it (--allow-command; in Python allow_command=True)",
         path.display()
@@ -65,13 +68,15 @@ pub enum Error {
         /// The program.
         source: ProgramRefused,
     },
-    /// A report that could not be built.
+    /// The numbers of the result cannot be drawn. The study and the logs are not the cause; report the message and the
+    /// study.
     #[error("report.html: {0}; this is a bug in Dynident: please report it")]
     Report(#[from] dynident_report::ReportError),
     /// A figure that cannot be written.
     #[error("{0}")]
     Figure(#[from] FigureError),
-    /// A result that does not belong to the study.
+    /// The result file does not fit the study, the robot or the job: for example, it is of another robot, or it lacks
+    /// values that the job needs. The text after the path states what to do, usually to run `identify` again.
     #[error("{}: {message}", path.display())]
     Result {
         /// The result file.
@@ -79,7 +84,8 @@ pub enum Error {
         /// The problem and the fix.
         message: String,
     },
-    /// Factors that cannot be read or merged.
+    /// A factor file, written by `dynident reduce`, cannot be read or merged. The text after the path has the cause
+    /// with its own code.
     #[error("{}: {source}", path.display())]
     Factors {
         /// The file, or the study.
@@ -90,7 +96,8 @@ pub enum Error {
     /// Recordings from which a study cannot be written.
     #[error("{0}")]
     NewStudy(#[source] NewStudyError),
-    /// A model that the export target cannot represent.
+    /// The identified model cannot be written in the form that `dynident export` was given. The text after the path has
+    /// the cause with its own code.
     #[error("{}: {source}", path.display())]
     Export {
         /// The result file.
@@ -98,7 +105,8 @@ pub enum Error {
         /// The problem.
         source: Box<ExportError>,
     },
-    /// An invalid table of states.
+    /// A table of robot states or a trajectory table has a wrong header, a field that is not a number, or too few rows.
+    /// Correct the line that the message names.
     #[error("{}:{line}: {message}", path.display())]
     States {
         /// The table.
@@ -108,13 +116,13 @@ pub enum Error {
         /// The problem and the fix.
         message: String,
     },
-    /// A stop request before there was a result.
+    /// The command was stopped, for example by Ctrl-C, before it had a result. Run it again.
     #[error("{what} was interrupted before there was a result: run the command again to restart it")]
     Interrupted {
         /// The interrupted step.
         what: &'static str,
     },
-    /// An output that would overwrite an input.
+    /// The output folder or file of the command is one of its input files. Give another path with `--out`.
     #[error("{}: would overwrite the input {}; nothing was written: give another --out", output.display(), input.display())]
     Overwrite {
         /// The output.
@@ -122,7 +130,8 @@ pub enum Error {
         /// The input.
         input: PathBuf,
     },
-    /// An output that cannot be written. Existing files are unchanged.
+    /// The folder does not exist, the disk is full, or you have no permission to write. Correct this or give another
+    /// `--out`. Existing files are unchanged.
     #[error("{}: cannot be written: {source}; existing files are unchanged", path.display())]
     Output {
         /// The file.

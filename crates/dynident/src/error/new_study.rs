@@ -7,7 +7,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum NewStudyError {
-    /// No columns for a quantity, or not for the joints of the positions.
+    /// `new` recognises columns by common names, such as `actual_q_0` or `tau_1`, and found none for this quantity.
+    /// Rename the columns in the file, or write the study by hand.
     #[error("no columns of {quantity} recognised: {}; write the study by hand (page \"Your robot in 15 minutes\": `dynident docs your-robot`); `dynident log` shows the contents of a recording", listed(.found))]
     NotRecognised {
         /// `positions`, or `torques or currents`.
@@ -15,7 +16,8 @@ pub enum NewStudyError {
         /// The columns of each recording.
         found: Vec<RecognisedFile>,
     },
-    /// More position columns than joints.
+    /// The log has position columns for more joints than the robot. The robot description is of another robot, or the
+    /// log also contains a gripper or an external axis. Give the matching description.
     #[error(
         "{columns} position columns, but the robot description has {joints} independent joints: check that it is the robot of this recording"
     )]

@@ -21,7 +21,8 @@ pub struct JointNames<'a> {
     pub names: &'a [String],
 }
 
-/// A parse error of an expression, with its place.
+/// The `expression` of a `[[torque]]` has a mistake at this character, counted from 1. The text after the place has the
+/// cause; see *Mistakes in expressions* below.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("`{text}`, character {character}: {problem}")]
 pub struct ExpressionError {
@@ -37,23 +38,34 @@ pub struct ExpressionError {
 /// Kind of a parse error.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages describe variants and fields")]
+#[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum ExpressionProblem {
+    /// The expression exceeds the size that Dynident reads. Simplify it, or give the torque as a `table` over the
+    /// position.
     #[error("more than {most} {of}: write a shorter expression, or a table")]
     TooLong { most: usize, of: &'static str },
+    /// A bracket, an operator or an operand is missing or extra at this place.
     #[error("{found} where {expected} is expected")]
     Expected { expected: &'static str, found: String },
+    /// The expression uses a name that is not a position, a velocity, a constant or a known function. Correct its
+    /// spelling.
     #[error(
         "unknown name `{name}`: position and velocity are q and dq, those of other joints q(NAME) or q1, q2, ..; functions are {}",
         functions()
     )]
     Name { name: String },
+    /// The expression names a joint that the robot does not have. Use one of the listed names or its number, counted
+    /// from 1.
     #[error("there is no joint {joint}: the joints are {}", known.join(", "))]
     Joint { joint: String, known: Vec<String> },
+    /// `q` or `dq` is written without a joint, in an expression that does not belong to one joint. Write the number of
+    /// the joint, counted from 1.
     #[error("the joint of {name} is missing: write {name}1, {name}2, ..")]
     WhichJoint { name: &'static str },
+    /// `^` permits only a constant exponent. Write a variable exponent with `exp` and `ln`.
     #[error("the exponent is not a constant: write exp(exponent * ln(base))")]
     Exponent,
+    /// A number or an exponent in the expression is too large. Write a smaller one.
     #[error("{what} is not finite or exceeds 1e12 in magnitude")]
     Value { what: &'static str },
 }
