@@ -1,4 +1,4 @@
-"""Makes the pictures of the book and of README from the real output of the commands.
+"""Makes the pictures and films of the book and of README from the real output of the commands.
 
 python3 docs/pictures.py DYNIDENT CHROMIUM           writes all pictures into docs/src/images
 python3 docs/pictures.py DYNIDENT CHROMIUM --check   compares the text of the sessions with the output of the commands, except for
@@ -10,6 +10,7 @@ DYNIDENT_DATA, by default ../shared/data next to the repository. The pictures of
 
 import base64
 import html
+import io
 import os
 import pathlib
 import re
@@ -50,6 +51,28 @@ DESIGN = """(async () => {
   const [stage, gauges] = [".stage", ".gauges"].map((name) => document.querySelector(name).getBoundingClientRect());
   return { "design-robot": { x: 0, y: scrollY + stage.top - 4, width: innerWidth, height: gauges.bottom - stage.top + 8, scale: 1 } };
 })()"""
+
+# Frames of a film, time of each, and size of the file.
+FILM_FRAMES, FILM_FRAME_MS, MAX_FILM_BYTES = 60, 100, 400_000
+
+# Place of the robot in its page.
+STAGE = """(async () => {
+  document.querySelector(".view").scrollIntoView();
+  for (let k = 0; k < 200 && !document.querySelector(".view").posesAt; k++) await new Promise((done) => setTimeout(done, 20));
+  const stage = document.querySelector(".stage");
+  for (let k = 0; k < 3; k++) stage.dispatchEvent(new KeyboardEvent("keydown", { key: "+" }));
+  await new Promise((done) => setTimeout(done, 500));
+  const { x, y, width, height } = stage.getBoundingClientRect();
+  return { x: x + scrollX, y: y + scrollY, width, height };
+})()"""
+
+# Shows the robot at a share of the first six seconds of its motion.
+FRAME = """(async (share) => {
+  const slider = document.querySelector(".view input[type=range]");
+  slider.value = Number(slider.min) + share * Math.min(6, slider.max - slider.min);
+  slider.dispatchEvent(new Event("input"));
+  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+})"""
 
 # A mistake for `check`: the sign of the third torque.
 MISTAKE = ('torque = { columns = "tau{1..6}_Nm" }', 'torque = { columns = "tau{1..6}_Nm", sign = [1, 1, -1, 1, 1, 1] }')
@@ -132,6 +155,29 @@ def photograph(chromium, page, places):
         browser.close()
 
 
+def film(chromium, page, name):
+    """Writes the robot of a page, which plays its first motion, as an animated WebP."""
+    from PIL import Image
+    from pages import Browser
+
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        browser = Browser(chromium, profile)
+        browser.size(640, 700)
+        browser.scheme("light")
+        browser.call("Page.navigate", url=page.resolve().as_uri())
+        browser.wait_for("Page.loadEventFired")
+        clip, frames = browser.value(STAGE), []
+        for number in range(FILM_FRAMES):
+            browser.value(f"{FRAME}({number / FILM_FRAMES})")
+            shot = browser.call("Page.captureScreenshot", format="png", clip={**clip, "scale": 1}, captureBeyondViewport=True)
+            frames.append(Image.open(io.BytesIO(base64.b64decode(shot["data"]))).convert("RGB"))
+        browser.close()
+    path = IMAGES / f"{name}.webp"
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=FILM_FRAME_MS, loop=0, quality=60, method=6)
+    if path.stat().st_size > MAX_FILM_BYTES:
+        raise SystemExit(f"{path.name}: {path.stat().st_size} bytes, at most {MAX_FILM_BYTES}: reduce frames or quality")
+
+
 def main():
     arguments = [word for word in sys.argv[1:] if word != "--check"]
     check = "--check" in sys.argv
@@ -151,6 +197,10 @@ def main():
             (IMAGES / "motion.svg").write_bytes((folder / "ur10_motion" / "path.svg").read_bytes())
             photograph(arguments[1], folder / "result" / "report.html", REPORT)
             photograph(arguments[1], folder / "ur10_motion" / "report.html", DESIGN)
+            film(arguments[1], folder / "result" / "report.html", "identify-robot")
+            view = ["view", "robots/ur10.urdf", "ur10_motion/trajectory.csv", "--out", "view.html"]
+            subprocess.run([program, *view, "--quiet"], cwd=folder, check=True)
+            film(arguments[1], folder / "view.html", "view-robot")
     if check:
         print(f"differs from the output of the commands: {', '.join(wrong)}" if wrong else "the sessions agree with the output of the commands")
     sys.exit(bool(wrong))
