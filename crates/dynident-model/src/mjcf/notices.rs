@@ -50,7 +50,7 @@ pub enum MjcfLoss {
     #[error("body `{body}` has `gravcomp`, which is not supported: its full weight is used")]
     GravityCompensation { body: String },
     /// Dynident reads trees. The forces of this connection are ignored, so torques of the connected joints may be
-    /// wrong.
+    /// wrong. Delete the connection if the real robot does not have it.
     #[error(
         "<{element}> under <equality> connects {between}, which is not supported: torques are those of the tree without it"
     )]
