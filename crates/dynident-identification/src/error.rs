@@ -122,7 +122,9 @@ pub enum ReduceError {
     },
     /// Factors contain sums over the samples, and this estimator needs the samples. Write `estimator.method =
     /// "weighted"` or `"ordinary"`.
-    #[error("estimator.method = \"{method}\" cannot use reduced logs, because it reads the samples several times: give \"weighted\" or \"ordinary\"")]
+    #[error(
+        "estimator.method = \"{method}\" cannot use reduced logs, because it reads the samples several times: give \"weighted\" or \"ordinary\""
+    )]
     Estimator {
         /// Name of the estimator.
         method: &'static str,
