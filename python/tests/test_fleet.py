@@ -108,7 +108,7 @@ def test_what_is_left_to_the_logs_is_refused_or_taken_from_a_model(planar: dynid
     log = recorded(1, seconds=20.0)
     with pytest.raises(dynident.StudyError, match="friction of joint .* is automatic"):
         fleet.reduce(planar, log)
-    with pytest.raises(dynident.StudyError, match="cut-off is left to the logs"):
+    with pytest.raises(dynident.StudyError, match="cut-off is estimated from the logs"):
         fleet.reduce(planar, log, friction="stated")
     like = dynident.identify(planar, log)
     found = fleet.identify(fleet.reduce(planar, log, like=like, segments=64))

@@ -144,7 +144,7 @@ pub enum EstimationError {
         what: &'static str,
     },
     /// The fit has no samples of any joint. Check that the logs have rows that are not dropped.
-    #[error("no rows of any joint: absorb a log before estimating")]
+    #[error("no rows of any joint: add the rows of at least one log (absorb) before the estimation")]
     Empty,
 }
 

@@ -10,7 +10,7 @@ use thiserror::Error;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum ExportError {
-    /// A program passed the wrong number of coefficients for friction and other torque terms.
+    /// A program passed the wrong number of coefficients for friction and other torque terms. Correct the call.
     #[error("{found} values for {expected} torque terms: give one for each")]
     Values { expected: usize, found: usize },
     /// The model file was changed by hand or truncated. Run `identify` again.
@@ -32,10 +32,10 @@ pub enum ExportError {
         "the equations of motion contain the number {value}: a parameter or a constant of a torque term is too large or too small; identify the model again"
     )]
     Overflow { value: f64 },
-    /// A program passed the recorded velocities for the wrong number of joints.
+    /// A program passed the recorded velocities for the wrong number of joints. Correct the call.
     #[error("recorded velocities of {found} joints for {expected}: give a list for each, empty if unknown")]
     Velocities { expected: usize, found: usize },
-    /// A program passed a recorded velocity that is zero or not finite, or without samples.
+    /// A program passed a recorded velocity that is zero or not finite, or without samples. Correct the call.
     #[error(
         "joint `{joint}`: {samples} samples of the velocity {velocity}: it has to be finite and not zero, with a positive number of samples"
     )]

@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
-    /// The file does not exist, or the operating system does not permit to read it. Correct the path or the
-    /// permissions.
+    /// The file does not exist, or you have no permission to read it. Correct the path or the permissions.
     #[error("{}: cannot be read ({source}); check the path and its permissions", file.display())]
     Io {
         /// The file.
@@ -17,7 +16,7 @@ pub enum FileError {
         source: std::io::Error,
     },
     /// Dynident recognised the file, but it does not read this format. Convert the file as the message states.
-    #[error("{}: this is {format}, which is not read; {fix}", file.display())]
+    #[error("{}: this is {format}, which Dynident does not read; {fix}", file.display())]
     OtherFormat {
         /// The file.
         file: PathBuf,

@@ -86,13 +86,13 @@ pub enum ReduceError {
     /// `reduce` reads each log alone, so all logs need the same cut-off. Write `cutoff_hz` under
     /// `[motion.differentiator]`, or give a model with `--like`.
     #[error(
-        "the cut-off is left to the logs and would differ between them: state motion.differentiator.cutoff_hz, or reduce with the settings of a model that was identified from some of them"
+        "the cut-off is estimated from the logs and would differ between them: state motion.differentiator.cutoff_hz, or give a model that was identified from some of the logs (--like; in Python like = ..)"
     )]
     Cutoff,
     /// `reduce` reads each log alone, but the automatic test of drive inertia needs all logs. Write `drive_inertia`
     /// under `[drive]`, or give a model with `--like`.
     #[error(
-        "the drive inertia of joint {joint} is automatic, which needs all logs: state it (drive.drive_inertia = true or false), or reduce with the settings of a model that was identified from some of them"
+        "the drive inertia of joint {joint} is automatic, which needs all logs: state it (drive.drive_inertia = true or false), or give a model that was identified from some of the logs (--like; in Python like = ..)"
     )]
     DriveInertia {
         /// First such joint.
@@ -101,7 +101,7 @@ pub enum ReduceError {
     /// `reduce` reads each log alone, but the automatic selection of friction needs all logs. State the laws under
     /// `[drive]`, or give a model with `--like`.
     #[error(
-        "the friction of joint {joint} is automatic, which needs all logs: state it (drive.friction = \"stated\" and its terms), or reduce with the settings of a model that was identified from some of them"
+        "the friction of joint {joint} is automatic, which needs all logs: state it (drive.friction = \"stated\" and its terms), or give a model that was identified from some of the logs (--like; in Python like = ..)"
     )]
     Friction {
         /// First such joint.
@@ -110,7 +110,7 @@ pub enum ReduceError {
     /// The law `load` needs the load of each joint from a previous fit and then the samples again. Factors do not
     /// contain samples: remove the law, or identify from the logs.
     #[error(
-        "load-dependent friction needs the samples again, with the load of the previous fit: remove the law `load`"
+        "load-dependent friction cannot be estimated from reduced logs, because its fit reads the samples several times: remove the law `load`, or run `identify` on the complete logs"
     )]
     Load,
     /// Payloads, gains and offsets per log add unknowns for single logs, which factors do not contain. Run `identify`
@@ -122,7 +122,9 @@ pub enum ReduceError {
     },
     /// Factors contain sums over the samples, and this estimator needs the samples. Write `estimator.method =
     /// "weighted"` or `"ordinary"`.
-    #[error("estimator.method = \"{method}\" reads the samples again: give \"weighted\" or \"ordinary\"")]
+    #[error(
+        "estimator.method = \"{method}\" cannot use reduced logs, because it reads the samples several times: give \"weighted\" or \"ordinary\""
+    )]
     Estimator {
         /// Name of the estimator.
         method: &'static str,

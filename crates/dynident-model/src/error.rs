@@ -13,10 +13,10 @@ pub enum ModelError {
     /// Two joints have the same name, so that a column of the log could belong to either. Rename one.
     #[error("joint `{joint}` is named twice: joint names must be unique")]
     DuplicateJoint { joint: String },
-    /// A program built the model with a joint in front of the joint that carries it.
+    /// A program built the model with a joint in front of the joint that carries it. Correct the call.
     #[error("joint `{joint}` comes before its parent: order joints from base to tip")]
     ParentAfterChild { joint: String },
-    /// A program built the model with an axis whose length is not 1.
+    /// A program built the model with an axis whose length is not 1. Correct the call.
     #[error("the axis of joint `{joint}` is not a unit vector: normalise it")]
     AxisNotUnit { joint: String },
     /// Each of these joints follows another one (`<mimic>`, or `[[robot.follow]]` of the study), so that none of them
@@ -29,7 +29,7 @@ pub enum ModelError {
     /// `drop` under `[robot]`, or a program, names a link that the robot does not have. Use one of the listed names.
     #[error("there is no link `{link}`; the links are: {}", known.join(", "))]
     UnknownLink { link: String, known: Vec<String> },
-    /// A program built the model with a body that has no link.
+    /// A program built the model with a body that has no link. Correct the call.
     #[error("a body has no link: every body needs the link that its joint moves")]
     BodyWithoutLink,
     /// A value of the robot description or of `[robot]` is NaN or infinite. Correct the value that the message names.

@@ -53,8 +53,8 @@ pub struct Robot {
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum ReadError {
-    /// The robot file does not exist, or the operating system does not permit to read it. Correct the path, for example
-    /// `file` under `[robot]`, or the permissions.
+    /// The robot file does not exist, or you have no permission to read it. Correct the path, for example `file` under
+    /// `[robot]`, or the permissions.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
     File { path: PathBuf, source: std::io::Error },
     /// Robot descriptions are far smaller, so the path names another file, such as a mesh or a log. Give the URDF,

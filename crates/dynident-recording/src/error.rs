@@ -29,8 +29,8 @@ pub enum RecordingError {
     /// The log format is invalid.
     #[error("{0}")]
     Format(#[from] FormatError),
-    /// The log file does not exist, or the operating system does not permit to read it. Correct `file` of the `[[log]]`
-    /// or the permissions.
+    /// The log file does not exist, or you have no permission to read it. Correct `file` of the `[[log]]` or the
+    /// permissions.
     #[error("{}: cannot be read ({source}); check the path and its permissions", file.display())]
     Io {
         /// The file.
@@ -271,7 +271,7 @@ pub enum RecordingError {
     /// The rows are sorted by another column, or several recordings were joined. Sort the rows by time, or name another
     /// column as `time.column`.
     #[error(
-        "{log}: {backward} of {rows} stamps are earlier than the previous one: the rows are in no order of time; \
+        "{log}: {backward} of {rows} stamps are earlier than the previous one: the rows are not in order of time; \
          sort them by the time column (`sort` or pandas' `sort_values`), or name another column as time"
     )]
     Unordered {

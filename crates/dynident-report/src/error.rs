@@ -12,7 +12,7 @@ pub enum ReportError {
         /// The missing title.
         to: String,
     },
-    /// A program passed lists of different lengths to a plot or table.
+    /// A program passed lists of different lengths to a plot or table. Correct the call.
     #[error("section `{section}`: {what} has {found} entries, but needs {expected}")]
     Shape {
         /// Title of the section.

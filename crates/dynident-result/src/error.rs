@@ -8,8 +8,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ResultFileError {
-    /// The result file does not exist, or the operating system does not permit to read it. Give the `result.json` that
-    /// `identify` wrote.
+    /// The result file does not exist, or you have no permission to read it. Give the `result.json` that `identify`
+    /// wrote.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
     File {
         /// The file.

@@ -7,7 +7,8 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ServoError {
-    /// A setting of the fit to commands is outside its range. Write a positive number.
+    /// A setting of the fit to commands is outside its range. Write a positive number; for `step_s`, a number within
+    /// the range of the message.
     #[error("{setting} = {value}: give a positive number; for step_s from 0.0001 to 0.05")]
     Setting {
         /// Name of the setting.
@@ -27,8 +28,8 @@ pub enum ServoError {
         /// Largest permitted value.
         most: f64,
     },
-    /// All candidate motions exceed a limit of the joints or the workspace. Choose a start posture with more free space
-    /// around it, or wider limits.
+    /// All candidate motions exceed a limit of the joints or the workspace. Write another `start_posture` under
+    /// `[design]`, with more free space around it, or wider limits.
     #[error(
         "none of {attempts} candidate motions keeps all limits: state a free start_posture in [design], or wider limits \
          in [design.limits]"
@@ -75,7 +76,7 @@ pub enum RunFault {
         /// Joints of the robot.
         expected: usize,
     },
-    /// A program passed lists of times, commands and positions of different lengths.
+    /// A program passed lists of times, commands and positions of different lengths. Correct the call.
     #[error("columns of different length: give each stamp a command and a position of each joint")]
     Lengths,
     /// `servo_gain` of a log is the gain of its servos relative to `stiffness`. Write one number, or one for each

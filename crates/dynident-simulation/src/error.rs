@@ -40,7 +40,7 @@ pub enum SimulationError {
         /// Name of the controller.
         controller: &'static str,
     },
-    /// A program added a friction term for a joint number that the robot does not have.
+    /// A program added a friction term for a joint number that the robot does not have. Correct the call.
     #[error("term {term} acts on a missing joint; the robot has {joints} joints")]
     TermJoint {
         /// Symbol of the term.

@@ -80,7 +80,7 @@ fn factors_give_the_model_that_the_logs_give() {
     let open = std::fs::read_to_string(&study).unwrap().replace(", cutoff_hz = 10.0", "");
     std::fs::write(folder.join("open.toml"), open).unwrap();
     let left_open = ["reduce", "open.toml", "--log", "b", "--segments", "64", "--out", "like.factors"];
-    assert!(ran(folder, 2, &left_open).contains("cut-off is left to the logs"));
+    assert!(ran(folder, 2, &left_open).contains("cut-off is estimated from the logs"));
     ran(folder, 0, &[&left_open[..], &["--like", "logs/result.json"]].concat());
     status(&["identify", "--out", "like", "--quiet", "--factors", "like.factors"]);
     assert_eq!(result(&folder.join("like"))["base_parameters"], result(&folder.join("b"))["base_parameters"]);

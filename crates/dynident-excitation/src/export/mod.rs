@@ -30,7 +30,7 @@ pub struct Sampled<'a> {
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// A program passed joint names, times and motion of different lengths.
+    /// A program passed joint names, times and motion of different lengths. Correct the call.
     #[error("{what}: expected {expected}, found {found}")]
     Shape {
         /// The list.

@@ -15,7 +15,7 @@ pub enum LimitError {
         /// Names of the robot's joints.
         known: Vec<String>,
     },
-    /// A program passed the known torque of a joint number that the robot does not have.
+    /// A program passed the known torque of a joint number that the robot does not have. Correct the call.
     #[error("known torque {term} acts on a missing joint; the robot has {joints} joints")]
     TorqueOfNoJoint {
         /// Symbol of the term.

@@ -51,6 +51,7 @@ type Objective<'a> = dyn Fn(&[f64]) -> f64 + Sync + 'a;
 #[non_exhaustive]
 pub enum OptimiserError {
     /// A program gave a variable of the search a range that is empty, or infinite where the method needs a finite one.
+    /// Correct the call.
     #[error(
         "variable {variable}: cannot search the range {lower} to {upper}; give lower < upper (both finite for the genetic algorithm)"
     )]
@@ -62,7 +63,7 @@ pub enum OptimiserError {
         /// Upper end.
         upper: f64,
     },
-    /// A program passed a list of variables or bounds of the wrong length.
+    /// A program passed a list of variables or bounds of the wrong length. Correct the call.
     #[error("{what} has {found} entries, expected {expected}")]
     Length {
         /// The vector.

@@ -180,7 +180,10 @@ fn unsupported_formats_are_named() {
         (&b"#ROSBAG V2.0\n"[..], "without a column of numbers"),
         (b"#ROSBAG V1.2\n", "`rosbag fix`"),
         (b"FEA1\0\0", "pandas.read_feather"),
-        (b"TDSm\x0E\0\0\0", "a TDMS file of LabVIEW, which is not read; convert it in Python: `nptdms.TdmsFile"),
+        (
+            b"TDSm\x0E\0\0\0",
+            "a TDMS file of LabVIEW, which Dynident does not read; convert it in Python: `nptdms.TdmsFile",
+        ),
         (b"MDF     4.10    ", "asammdf.MDF"),
         (b"UnFinMF 4.10    ", "asammdf.MDF"),
         (b"\x0E\x03\x13\x01", "h4toh5"),

@@ -23,8 +23,8 @@ pub enum EstimatorError {
         /// Problem and fix.
         message: String,
     },
-    /// The instruments (a second signal that is free of the measurement noise) do not match the log. Correct
-    /// `[estimator.instruments]` as the message states.
+    /// The instruments are the motion of the same log with a second filter, and it does not cover the samples of the
+    /// fit. Leave out short pieces with `rows` or `time_range_s`, or pass raw samples instead of a prepared motion.
     #[error("log `{log}`, instruments: {message}")]
     Instruments {
         /// Name of the log.

@@ -29,7 +29,7 @@ pub enum MeshError {
         /// Folder of the description.
         folder: PathBuf,
     },
-    /// The mesh file exists, but the operating system does not permit to read it. Correct the permissions.
+    /// The mesh file exists, but you have no permission to read it. Correct the permissions.
     #[error("{}: cannot be read: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
     /// The content of the mesh file is invalid. The text after the path has the cause; export the mesh again.

@@ -31,7 +31,7 @@ pub enum MjcfLoss {
     /// The base of the robot can move, such as that of a humanoid. Dynident identifies only with a base at rest; use
     /// such logs.
     #[error(
-        "body `{body}` has a free joint: the robot floats, but is read as fixed to the world at `{body}` in its drawn pose; \
+        "body `{body}` has a free joint: the robot has no fixed base, but is read as fixed to the world at `{body}` in its drawn pose; \
          use only logs in which this body stands still and level as drawn"
     )]
     FloatingBase { body: String },
@@ -50,7 +50,7 @@ pub enum MjcfLoss {
     #[error("body `{body}` has `gravcomp`, which is not supported: its full weight is used")]
     GravityCompensation { body: String },
     /// Dynident reads trees. The forces of this connection are ignored, so torques of the connected joints may be
-    /// wrong.
+    /// wrong. Delete the connection if the real robot does not have it.
     #[error(
         "<{element}> under <equality> connects {between}, which is not supported: torques are those of the tree without it"
     )]

@@ -33,7 +33,7 @@ pub enum MjcfWriteError {
     /// identified.
     #[error("the MJCF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
-    /// A program passed two sets of values for one body or joint.
+    /// A program passed two sets of values for one body or joint. Correct the call.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
     /// Dynident rewrites one file. Replace the `<include>` by the text of the included file, then run the command

@@ -32,7 +32,7 @@ pub enum SdfWriteError {
     /// identified.
     #[error("the SDF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
-    /// A program passed two sets of values for one link or joint.
+    /// A program passed two sets of values for one link or joint. Correct the call.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
     /// A program asked to delete the `<inertial>` of this link. Simulators would then give the link a mass of 1 kg.

@@ -71,7 +71,7 @@ pub enum UrdfWriteError {
     /// identified.
     #[error("the URDF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
-    /// A program passed two sets of values for one link or joint.
+    /// A program passed two sets of values for one link or joint. Correct the call.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
     /// A value to write is NaN or infinite. Identify the model again, or correct the values that the program passed.

@@ -73,7 +73,7 @@ pub enum LogError {
     /// The log is too short for the parallel filter, which needs several samples for each row of the fit. Use a longer
     /// log, a higher cut-off, or `parallel_filter.enabled = false`.
     #[error(
-        "log `{log}`: {rows} samples leave nothing behind the parallel filter, which needs {needed}; give a longer part of the log, a higher cut-off, or parallel_filter.enabled = false"
+        "log `{log}`: the parallel filter makes no row from {rows} samples, because it needs {needed}; give a longer part of the log, a higher cut-off, or parallel_filter.enabled = false"
     )]
     NothingLeft {
         /// Log.

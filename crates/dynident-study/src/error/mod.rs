@@ -15,8 +15,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StudyFileError {
-    /// The study, a file that it names, or the folder of `--data` does not exist, or the operating system does not
-    /// permit to read it. Correct the path or the permissions.
+    /// The study, a file that it names, or the folder of `--data` does not exist, or you have no permission to read it.
+    /// Correct the path or the permissions.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
     File {
         /// The file.

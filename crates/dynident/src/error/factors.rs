@@ -11,7 +11,9 @@ pub enum FactorsError {
     #[error("this is not a factor file: give a file that `dynident reduce` wrote")]
     Kind,
     /// Another version of Dynident wrote the file. Run `dynident reduce` again with this version.
-    #[error("version {found} of the format; this program reads version {known}: run `dynident reduce` on the logs again")]
+    #[error(
+        "version {found} of the format; this program reads version {known}: run `dynident reduce` on the logs again"
+    )]
     Version {
         /// Version of the file.
         found: u32,
@@ -54,7 +56,9 @@ pub enum FactorsError {
     },
     /// The study uses a function of a calling program, such as an own friction law, and a file cannot contain it.
     /// Identify from the logs in that program.
-    #[error("{part} is a function of the calling program, but factor files cannot contain code: run `identify` on the logs")]
+    #[error(
+        "{part} is a function of the calling program, but factor files cannot contain code: run `identify` on the logs"
+    )]
     Function {
         /// The part with the name of its function.
         part: String,

@@ -26,8 +26,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The file does not exist, or the operating system does not permit to read it. Correct the path or the
-    /// permissions.
+    /// The file does not exist, or you have no permission to read it. Correct the path or the permissions.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
     File {
         /// The file.
