@@ -169,7 +169,7 @@ fn parallelograms_are_closed_and_other_chains_give_notices() {
     for (text, words) in [
         (linkage("", "2 0 0"), "no joint has an actuator; name the passive joints in [[robot.loop]]"),
         (linkage(all, "2 0 0"), "every joint of the chain has an actuator"),
-        (linkage(drive, "2 0 0.3"), "no parallelogram"),
+        (linkage(drive, "2 0 0.3"), "not a parallelogram"),
         (linkage(drive, "2 0 0").replace("body2=\"rocker\"", "body2=\"rokcer\""), "unknown body `rokcer`"),
     ] {
         let robot = read_mjcf(&text).unwrap();

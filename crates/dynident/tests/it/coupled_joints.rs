@@ -40,7 +40,7 @@ fn a_loop_that_is_none_and_a_link_that_is_needed_are_refused() {
         StudyRobot::new(&study, &path, &Folders::new(&study, &path, None)).unwrap_err().to_string()
     };
     let text = error(&|study| study.robot.loops[0].points_m[0][2] = 0.05);
-    assert!(text.contains("[[robot.loop]]") && text.contains("no parallelogram"), "{text}");
+    assert!(text.contains("[[robot.loop]]") && text.contains("not a parallelogram"), "{text}");
     let text = error(&|study| study.robot.loops[0].passive[0] = "ellbow".to_owned());
     assert!(text.contains("there is no joint `ellbow`"), "{text}");
     let text = error(&|study| study.robot.drop = vec!["base".to_owned()]);
