@@ -44,13 +44,14 @@ pub(crate) fn table(value: &Value) -> Option<ArrayTable> {
     let mut arrays = Vec::new();
     match value {
         Value::Array(rows) => arrays.extend(columns(rows)?),
-        Value::Object(entries) => match split_frame(entries) {
-            Some(columns) => arrays.extend(columns),
-            None => {
+        Value::Object(entries) => {
+            if let Some(columns) = split_frame(entries) {
+                arrays.extend(columns);
+            } else {
                 lists(entries, &mut String::new(), &mut arrays);
                 without_common_object(&mut arrays);
             }
-        },
+        }
         _ => return None,
     }
     ArrayTable::new(arrays).filter(|table| table.estimated_rows() > Some(1))
@@ -131,7 +132,9 @@ fn without_common_object(arrays: &mut [Array]) {
     if let Some(common) = arrays.first().and_then(object)
         && arrays.iter().all(|array| object(array).as_ref() == Some(&common))
     {
-        arrays.iter_mut().for_each(|array| drop(array.name.drain(..=common.len())));
+        for array in arrays {
+            array.name.drain(..=common.len());
+        }
     }
 }
 

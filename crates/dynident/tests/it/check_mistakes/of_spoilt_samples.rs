@@ -219,7 +219,7 @@ fn rows_out_of_order_and_rows_that_repeat_are_told() {
     write(&shuffled);
     let study = Study::load(&path).unwrap();
     let refused = dynident::check(&study, &path, &options).unwrap_err().to_string();
-    assert!(refused.contains("no order of time"), "{refused}");
+    assert!(refused.contains("not in order of time"), "{refused}");
 
     let held: Vec<Row> = (0..rows.len())
         .map(|k| {
