@@ -43,7 +43,9 @@ printf '        wheel of %s bytes\n' "$bytes"
 here=$PWD
 program=$scratch/python/bin
 "$program/dynident" --version
-"$program/python" -m pytest -q -p no:cacheprovider python/tests
+long=()
+[ "${2:-}" != --long ] || long=(env DYNIDENT_LONG=1)
+"${long[@]}" "$program/python" -m pytest -q -p no:cacheprovider python/tests
 (cd "$scratch" && "$program/mypy" --config-file "$here/pyproject.toml" -p dynident)
 (cd "$scratch" && "$program/stubtest" --mypy-config-file "$here/pyproject.toml" --allowlist "$here/python/tests/allowed.txt" dynident)
 "$program/python" .ci/python_pages.py docs/src/python.md docs/src/python-functions.md docs/src/fleets.md docs/src/online.md

@@ -245,6 +245,8 @@ def test_only_failing_items_of_a_batch_are_skipped(some: list[dynident.Factors])
 def test_a_poisoned_item_is_repeated_a_stated_number_of_times(engine: str, tmp_path: Path) -> None:
     pytest.importorskip("ray" if engine == "ray" else "distributed")
     if engine == "ray":
+        if "DYNIDENT_LONG" not in os.environ:
+            pytest.skip("Ray does not always notice on a loaded machine that its worker ended, and the test then hangs")
         import ray
 
         path = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
