@@ -301,8 +301,7 @@ class Log:
         if self.payload is not None:
             section["payload"] = self.payload
         if self.servo_gain is not None:
-            gain = self.servo_gain
-            section["servo_gain"] = list(gain) if isinstance(gain, Sequence) else gain
+            section["servo_gain"] = np.asarray(self.servo_gain, dtype=np.float64).tolist()
         return section
 
     def _samples(self) -> tuple[str, tuple[list[str], list[npt.NDArray[np.float64]]]] | None:
