@@ -21,6 +21,19 @@ pub struct ExaminationSettings {
     /// Ratio of a higher cut-off of the differentiator to that of the fit; 4. The torque predicted with both shows the
     /// error from motion above the cut-off of the fit.
     pub finer_cutoff_ratio: f64,
+    /// Share of a held-out log, from its start, that determines its torque offsets if each log has separate offsets,
+    /// from 0 to 1; 0.25. With the usual length of a log, the offset is then better known than the other parameters, and
+    /// most of the log remains as the test.
+    pub offset_share: f64,
+    /// Share of the unexplained torque of a joint that must be a function of its position, from 0 to 1, for a warning
+    /// about a spring or counterbalance; 0.5. A wrong posture or length at another joint gives less.
+    pub min_position_share: f64,
+    /// Size of that function relative to the torque of the joint (RMS); 0.02. A smaller function hardly improves the
+    /// prediction.
+    pub min_position_ratio: f64,
+    /// Variance of the function over the positions, relative to its expectation from the differences between visits of
+    /// the same position; 10. With 6 to 12 positions, chance exceeds 5 once in 10,000 joints.
+    pub min_position_fisher: f64,
 }
 
 impl Default for ExaminationSettings {
@@ -31,6 +44,10 @@ impl Default for ExaminationSettings {
             min_friction_deviations: 5.0,
             min_friction_ratio: 0.5,
             finer_cutoff_ratio: 4.0,
+            offset_share: 0.25,
+            min_position_share: 0.5,
+            min_position_ratio: 0.02,
+            min_position_fisher: 10.0,
         }
     }
 }
@@ -47,6 +64,10 @@ impl ExaminationSettings {
             ("min_friction_deviations", self.min_friction_deviations),
             ("min_friction_ratio", self.min_friction_ratio),
             ("finer_cutoff_ratio", self.finer_cutoff_ratio),
+            ("offset_share", self.offset_share),
+            ("min_position_share", self.min_position_share),
+            ("min_position_ratio", self.min_position_ratio),
+            ("min_position_fisher", self.min_position_fisher),
         ])
     }
 }

@@ -78,7 +78,13 @@
 //! // Lag of the torque, and error on held-out motion.
 //! let (lags, _) = examine_training(&logs, &settings.estimation, &training.model, 0, &estimate.values)?;
 //! assert_eq!(lags.len(), 6);
-//! let tested = ModelUnderTest { theta: &fit.base_values, physical: None, uncertainty: None, traced: false };
+//! let tested = ModelUnderTest {
+//!     theta: &fit.base_values,
+//!     physical: None,
+//!     uncertainty: None,
+//!     traced: false,
+//!     offset_share: None,
+//! };
 //! let held_out = examine_held_out(&logs, &settings.estimation, &training.model, 1, &tested)?;
 //! assert!(held_out.validation.model.relative_error_percent.unwrap() < 1.0);
 //! # for (value, truth) in estimate.values.iter().zip(robot.base().values(&truth)) {

@@ -125,6 +125,7 @@ fn identified(
         traces: Vec::new(),
         pooled_delays: vec![None; dof],
         sign: sign_evidence(&training_rows.model.parametric, &training_rows.problem, &estimate),
+        position_torques: Vec::new(),
         friction_signs: friction_signs(&training_rows.model, &training_rows.problem, &estimate),
     };
     Ok(Identification {

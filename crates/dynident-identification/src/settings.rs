@@ -135,6 +135,11 @@ impl IdentificationSettings {
         RowSettings { motion: &self.motion, parallel_filter: &self.parallel_filter }
     }
 
+    /// Share of a held-out log that determines its own offsets; `None` if all logs share the offsets.
+    pub fn held_out_offset_share(&self) -> Option<f64> {
+        (self.offsets == OffsetChoice::PerLog).then_some(self.examination.offset_share)
+    }
+
     /// Checks that the named bodies and terms exist.
     ///
     /// # Errors

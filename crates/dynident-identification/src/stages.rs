@@ -10,8 +10,9 @@ use crate::doubt::{break_limits, have_jumps, is_doubtful};
 use crate::error::IdentificationError;
 use crate::events::{RecordingEvents, left_out, without_intervals};
 use crate::examination::{
-    FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty,
-    WithoutEvents, examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
+    FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, MotionTrace, PositionTorque, TorqueLag,
+    TorqueSignCheck, Uncertainty, WithoutEvents, examine_training, friction_signs, pooled_delay, position_torques,
+    sign_evidence, tested_on,
 };
 use crate::settings::{DiagnosisChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
@@ -61,6 +62,8 @@ pub struct TrainingExamination {
     pub sign: Option<TorqueSignCheck>,
     /// Mean friction of every joint with friction terms; empty for payloads on a known arm.
     pub friction_signs: Vec<FrictionSign>,
+    /// Joints whose unexplained torque is a function of their position.
+    pub position_torques: Vec<PositionTorque>,
 }
 
 pub(crate) struct Stage<'a> {
@@ -137,8 +140,13 @@ impl Stage<'_> {
                 continue;
             }
             let (theta, physical) = values_of_log(training, estimate, physical, index);
-            let tested =
-                ModelUnderTest { theta: &theta, physical: physical.as_deref(), uncertainty: None, traced: false };
+            let tested = ModelUnderTest {
+                theta: &theta,
+                physical: physical.as_deref(),
+                uncertainty: None,
+                traced: false,
+                offset_share: settings.held_out_offset_share(),
+            };
             let limits = (&settings.estimation, &settings.examination);
             let LogValidation { model, physical, .. } =
                 tested_on(logs, limits, &training.model, index, &tested, false)?.validation;
@@ -345,7 +353,9 @@ fn examine_all_training(
     let (delays, traces): (Vec<Vec<Option<TorqueLag>>>, Vec<LogTrace>) = found.into_iter().unzip();
     let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|log| log[joint]).collect() };
     let pooled_delays = (0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect();
-    Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new() })
+    let motions: Vec<&MotionTrace> = traces.iter().map(|trace| &trace.motion).collect();
+    let position_torques = position_torques(training.model.model(), &motions, &settings.examination);
+    Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new(), position_torques })
 }
 
 /// Base parameters for a log: those of the estimate, and those of the consistent set if there is one.
@@ -385,6 +395,7 @@ fn examine_all_held_out(
             physical: physical.as_deref(),
             uncertainty: Some(&uncertainty),
             traced: true,
+            offset_share: settings.held_out_offset_share(),
         };
         Ok(tested_on(
             logs,

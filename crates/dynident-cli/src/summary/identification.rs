@@ -113,9 +113,10 @@ fn headline(r: &ResultFile) -> String {
         let without = without_events(log);
         text += &wrapped(
             &format!(
-                "held-out torque error {error}\u{a0}%{without} on [{}] {} (fit {fit}\u{a0}%{prior})",
+                "held-out torque error {error}\u{a0}%{without} on [{}] {}{} (fit {fit}\u{a0}%{prior})",
                 number + 1,
-                log.log
+                log.log,
+                own_offsets(log)
             ),
             2,
         );
@@ -123,6 +124,13 @@ fn headline(r: &ResultFile) -> String {
     text += &bands(r);
     text += &beside(r);
     text + &super::forms::forms(r)
+}
+
+/// The part of the log that determined its own offsets.
+fn own_offsets(log: &LogValidation) -> String {
+    log.own_offsets.as_ref().map_or_else(String::new, |own| {
+        format!(" after {:.1}\u{a0}s; the rows before determine the torque offsets of this log", own.fitted_s[1])
+    })
 }
 
 /// The error without the intervals of clear events, if there are any.

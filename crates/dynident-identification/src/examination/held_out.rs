@@ -3,6 +3,7 @@
 use super::finer_motion::{FinerRows, finer_rows};
 use super::motion_band::MotionBand;
 use super::nominal_agreement::{AgreementAccumulator, PriorAgreement};
+use super::own_offsets::{FittedOffsets, OwnOffsets};
 use super::residuals::{JointResiduals, ResidualAccumulator, Uncertainty};
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
@@ -36,6 +37,9 @@ pub struct LogValidation {
     pub prior: Option<ValidationReport>,
     /// Residual diagnostics of each joint.
     pub residuals: Vec<JointResiduals>,
+    /// Torque offsets of this log, if each log has separate offsets. The errors are those of the rest of the log.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub own_offsets: Option<OwnOffsets>,
     /// Errors without the intervals of clear events; missing without such events.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub without_events: Option<WithoutEvents>,
@@ -178,6 +182,9 @@ pub struct ModelUnderTest<'a> {
     pub uncertainty: Option<&'a Uncertainty>,
     /// Whether to keep the torque over time, predicted by the physically consistent set if given.
     pub traced: bool,
+    /// Share of the recording, from its start, that determines its own torque offsets, from 0 to 1; the rest is the
+    /// test. `None` for the offsets of the model.
+    pub offset_share: Option<f64>,
 }
 
 /// Tests base parameters, and those of the consistent set, on recording number `index`.
@@ -206,7 +213,11 @@ pub(crate) fn tested_on(
     tested: &ModelUnderTest<'_>,
     alone: bool,
 ) -> Result<HeldOutExamination, LogError> {
-    let ModelUnderTest { theta, physical, uncertainty, traced } = *tested;
+    if let Some(share) = tested.offset_share {
+        let plain = ModelUnderTest { offset_share: None, ..*tested };
+        return tested_on_rest(logs, (settings, limits), model, index, (&plain, share), alone);
+    }
+    let ModelUnderTest { theta, physical, uncertainty, traced, .. } = *tested;
     let (recording, joints) = (&logs.recordings[index], model.joint_names());
     let nominal = model.parametric.nominal_base();
     // The motion band needs the samples of a log.
@@ -259,6 +270,7 @@ pub(crate) fn tested_on(
             physical: tested_physical,
             prior: tested_prior,
             residuals,
+            own_offsets: None,
             without_events: None,
         },
         nominal_agreement: test.agreement.map(|rows| PriorAgreement::of_rows(model, &rows, limits)),
@@ -266,4 +278,30 @@ pub(crate) fn tested_on(
         trace: test.trace.map(|trace| trace.finished(name.clone(), Role::Validate, statistics.filtered_rate_hz)),
         statistics,
     })
+}
+
+/// [`tested_on`] with the offsets of the recording from its first `share`, on the rest.
+fn tested_on_rest(
+    logs: &Logs<'_>,
+    limits: (&EstimationSettings, &ExaminationSettings),
+    model: &RegressorModel,
+    index: usize,
+    (tested, share): (&ModelUnderTest<'_>, f64),
+    alone: bool,
+) -> Result<HeldOutExamination, LogError> {
+    let fitted = |theta: &[f64]| FittedOffsets::of(logs, model, index, theta, share);
+    let Some(own) = fitted(tested.theta)? else { return tested_on(logs, limits, model, index, tested, alone) };
+    // The residual of the consistent set has another mean.
+    let physical = match tested.physical {
+        Some(physical) => fitted(physical)?.map(|own| own.applied(model, physical)),
+        None => None,
+    };
+    let theta = own.applied(model, tested.theta);
+    let uncertainty = tested.uncertainty.map(|known| known.with_covariance(own.covariance(model, known.covariance())));
+    let rest = own.rest(logs.recordings, index);
+    let changed =
+        ModelUnderTest { theta: &theta, physical: physical.as_deref(), uncertainty: uncertainty.as_ref(), ..*tested };
+    let mut found = tested_on(&logs.with_recordings(&rest), limits, model, index, &changed, alone)?;
+    found.validation.own_offsets = Some(own.report(&model.joint_names()));
+    Ok(found)
 }

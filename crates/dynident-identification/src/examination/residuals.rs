@@ -61,6 +61,16 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
+    /// The same with another covariance.
+    pub(crate) fn with_covariance(&self, covariance: DMatrix<f64>) -> Self {
+        Self { covariance, ..self.clone() }
+    }
+
+    /// Covariance of the base parameters.
+    pub(crate) fn covariance(&self) -> &DMatrix<f64> {
+        &self.covariance
+    }
+
     /// For base parameters with the given covariance. `ratios` are factors κ on the band of each joint, from blocks of
     /// the training logs that were left out of the fit ([`left_out_ratios`](dynident_estimation::left_out_ratios)), or
     /// ones.

@@ -62,6 +62,7 @@ pub(crate) struct TraceConsumer<'a> {
     /// For each segment its first row, and the time of that row in s.
     starts: Vec<(usize, f64)>,
     buffer: Vec<f64>,
+    max_rows: usize,
 }
 
 impl<'a> TraceConsumer<'a> {
@@ -69,7 +70,12 @@ impl<'a> TraceConsumer<'a> {
         let dof = model.model().dof();
         let (joints, motion) = (vec![JointTrace::default(); dof], MotionTrace::new(dof));
         let trace = LogTrace { joints, motion, ..LogTrace::default() };
-        Self { model, theta, trace, segment: None, starts: Vec::new(), buffer: Vec::new() }
+        Self { model, theta, trace, segment: None, starts: Vec::new(), buffer: Vec::new(), max_rows: MAX_ROWS }
+    }
+
+    /// Keeps all rows, for an estimate from them.
+    pub(crate) fn with_all_rows(self) -> Self {
+        Self { max_rows: usize::MAX, ..self }
     }
 
     pub(crate) fn raw(&mut self, samples: &RawSamples<'_>) {
@@ -90,7 +96,7 @@ impl<'a> TraceConsumer<'a> {
     pub(crate) fn filtered(&mut self, rows: &JointRows<'_>) {
         let columns = self.model.layout().joint_columns(rows.joint);
         let JointTrace { measured_nm, predicted_nm } = &mut self.trace.joints[rows.joint];
-        let kept = rows.rows.min(MAX_ROWS.saturating_sub(measured_nm.len()));
+        let kept = rows.rows.min(self.max_rows.saturating_sub(measured_nm.len()));
         self.trace.cut |= kept < rows.rows;
         if kept > 0 {
             predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);

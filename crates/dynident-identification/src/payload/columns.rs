@@ -377,7 +377,7 @@ fn check(
 }
 
 /// Column `place` of B, with zeros for columns of the layout that are not base parameters.
-fn base_column(model: &RegressorModel, place: usize, rows: usize) -> DVector<f64> {
+pub(crate) fn base_column(model: &RegressorModel, place: usize, rows: usize) -> DVector<f64> {
     let base = model.base();
     let mut column = DVector::zeros(rows);
     if let Some(b) = base.independent().iter().position(|&index| index == place) {

@@ -22,7 +22,7 @@ pub use refit::Refit;
 pub use result::{ConsistentPayload, PayloadParameter, PayloadResult, payload_results};
 pub use round_body::{ControllerPayload, ControllerValue};
 
-pub(crate) use columns::SeenColumns;
+pub(crate) use columns::{SeenColumns, base_column};
 pub(crate) use free_gains::free_gains;
 pub(crate) use gain_error::gain_error;
 pub(crate) use gains::{Gains, drive_gains, known_loads};

@@ -86,7 +86,13 @@ fn validated(
             let carried = recordings[index].payload.as_ref();
             let theta = payloads.base_values(carried, &theta);
             let physical = consistent.as_ref().map(|values| payloads.base_values(carried, values));
-            let tested = ModelUnderTest { theta: &theta, physical: physical.as_deref(), uncertainty: None, traced };
+            let tested = ModelUnderTest {
+                theta: &theta,
+                physical: physical.as_deref(),
+                uncertainty: None,
+                traced,
+                offset_share: settings.held_out_offset_share(),
+            };
             examine_held_out(&logs, &settings.estimation, &model, index, &tested)
         };
         chosen.iter().map(one).collect::<Result<Vec<_>, _>>()

@@ -58,4 +58,5 @@ mod synthetic_truth;
 mod temperature;
 mod torque_band;
 mod torque_lag;
+mod unstated_spring;
 mod ur10_example;

@@ -213,12 +213,14 @@ fn offsets_differ_from_log_to_log() {
     let mut truth = Truth::near(&repository("robots/ur10.urdf"), 0.2, false);
     let mean: Vec<f64> = truth.drive.iter().map(|drive| drive[3]).collect();
     let mut logs = String::new();
-    for (number, change) in [0.9, -0.3, -0.6].into_iter().enumerate() {
+    for (number, (change, role)) in
+        [(0.9, ""), (-0.3, ""), (-0.6, ""), (2.5, ", role = \"validate\"")].into_iter().enumerate()
+    {
         truth.drive.iter_mut().zip(&mean).for_each(|(drive, mean)| drive[3] = mean + change);
         let file = format!("log{number}.csv");
         let motion = Motion::new(6, 1 + number as u64);
         write_log(&folder.path().join(&file), &truth, &motion, (400.0, 6.0), &header(6), plain);
-        write!(logs, "{{ file = \"{file}\" }},").unwrap();
+        write!(logs, "{{ file = \"{file}\"{role} }},").unwrap();
     }
     truth.drive.iter_mut().zip(&mean).for_each(|(drive, mean)| drive[3] = *mean);
     let text = format!(
@@ -235,6 +237,22 @@ fn offsets_differ_from_log_to_log() {
         for (offset, change) in offsets.iter().zip([0.9, -0.3, -0.6]) {
             assert!((offset.deviation_nm - change).abs() < 1e-5, "{offset:?}");
         }
+    }
+    // The first quarter of the held-out log determines its offsets, in a test of the stored result too.
+    let stored =
+        dynident::validate_result(&found.result, Path::new("result.json"), &job.study, &job.path, &Job::options(1))
+            .unwrap();
+    for test in [&found.result.validation[0], &stored.validation[0]] {
+        let own = test.own_offsets.as_ref().unwrap();
+        assert!((1.2..1.8).contains(&own.fitted_s[1]), "{:?}", own.fitted_s);
+        for offset in &own.joints {
+            assert!((offset.change_nm - 2.5).abs() < 1e-5, "{offset:?}");
+        }
+        assert!(test.model.relative_error_percent.unwrap() < 1e-4, "{:?}", test.model.relative_error_percent);
+        let physical = test.physical.as_ref().unwrap();
+        let fit = found.result.training.physical.as_ref().unwrap().relative_error_percent.unwrap();
+        // The bodies of this robot are not physically consistent, so the consistent set has an error in the fit, too.
+        assert!(physical.relative_error_percent.unwrap() < 2.0 * fit, "{physical:?}, {fit}");
     }
 }
 

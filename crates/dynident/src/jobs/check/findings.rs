@@ -12,6 +12,7 @@ use dynident_identification::diagnosis::{
     BeyondLimit, Channels, DescriptionFit, Diagnosis, DuplicateChannel, HeldOutHypothesis, Hypothesis,
     InconsistentTorque, Mistake, Search, UnmodelledPayload,
 };
+use dynident_identification::examination::PositionTable;
 use dynident_identification::{GainChoice, IdentificationSettings};
 use dynident_model::Model;
 use dynident_recording::Level;
@@ -328,6 +329,20 @@ fn unmodelled_payload(study: &Study, robot: &StudyRobot, payload: &UnmodelledPay
         StudyChange { table: format!("[[log]] number {}", number + 1), line: "payload = \"tool\"".to_owned() },
     ];
     found
+}
+
+/// Unexplained torque of a joint that is a function of its position.
+pub(super) fn position_torque(table: &PositionTable) -> CheckFinding {
+    let what = format!(
+        "joint `{}` may have a spring, counterbalance or cable that the study does not state",
+        table.torque.name
+    );
+    let write = table.keys().map(|line| StudyChange { table: "[[torque]]".to_owned(), line });
+    CheckFinding {
+        level: Level::Warning,
+        write: write.to_vec(),
+        ..finding("position-torque", what, table.torque.words())
+    }
 }
 
 /// A load that one of several training logs carries.

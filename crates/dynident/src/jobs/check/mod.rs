@@ -21,7 +21,7 @@ use dynident_identification::{
 };
 use dynident_model::{AuditFinding, AuditLevel, InertialParameters, Mat3, audit};
 use dynident_recording::{ImportReport, Level};
-use findings::{currents_without_scale, log_load, study_check};
+use findings::{currents_without_scale, log_load, position_torque, study_check};
 use std::path::Path;
 
 /// Audit checks for physically inconsistent bodies, independent of the robot's size.
@@ -69,6 +69,7 @@ pub fn check_with(
         || StudyCheck { joints: robot.parametric.joint_names(), ..StudyCheck::default() },
         |diagnosis| diagnosis_check(&study, &robot, &task.settings, diagnosis, thresholds),
     );
+    check.findings.extend(examined.position_torques.iter().map(position_torque));
     check.findings.extend(examined.loads.iter().map(|load| log_load(&study, &robot, load)));
     for (index, import) in &examined.imports {
         check.findings.extend(import.iter().flat_map(|import| import_findings(&study.log_name(*index), import)));

@@ -19,7 +19,7 @@ use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, 
 use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::diagnosis::Diagnosis;
 use dynident_identification::estimators::{Findings, InstrumentSource};
-use dynident_identification::examination::{LogTrace, friction_sign_findings, sign_findings};
+use dynident_identification::examination::{LogTrace, friction_sign_findings, position_torque_findings, sign_findings};
 use dynident_identification::friction::FrictionSearch;
 use dynident_identification::{
     DiagnosisChoice, Identification, IdentificationError, IdentificationTask, RecordingEvents, conditionals,
@@ -389,6 +389,7 @@ fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSu
         let mut summary = training_summary(&task.recordings[factors.index], factors, delays, &joints);
         summary.model_findings.extend(found.examination.sign.as_ref().and_then(sign_findings));
         summary.model_findings.extend(friction_sign_findings(&found.examination.friction_signs, is_best_as_written));
+        summary.model_findings.extend(position_torque_findings(&found.examination.position_torques));
         summary
     });
     let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));
