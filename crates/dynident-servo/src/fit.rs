@@ -13,8 +13,9 @@ use crate::normal::{PeriodSums, Periods, period_errors, period_sums, symmetric, 
 use crate::parameters::{Change, FreeParameter, ServoRobot, VariedRobot};
 use crate::run::Run;
 use crate::settings::ServoSettings;
-use crate::start::response_coordinates;
+use crate::start::{drive_coordinates, response_coordinates, with_equal_drives};
 use crate::step_state::Stepping;
+use crate::unknowns::unknowns;
 use nalgebra::{DMatrix, DVector};
 
 /// The first stages simulate with steps this many times longer.
@@ -223,13 +224,48 @@ impl Searcher<'_> {
         Some(covariance)
     }
 
-    /// The better of the ends of descents from `starts`; `None` if no start can be simulated.
-    fn best_of(&mut self, starts: Vec<Vec<f64>>) -> (Option<Vec<f64>>, usize) {
+    /// Coordinates of the best robot whose drives are nearly equal, and the iterations to find it. With separate values
+    /// for each joint the search has more local minima; equal drives are a start that leads past most of them.
+    fn equal_drives_start(&self) -> (Option<Vec<f64>>, usize) {
+        let settings = ServoSettings { alike: true, ..self.settings.clone() };
+        let nominal = with_equal_drives(self.nominal);
+        let parameters = unknowns(&nominal, &settings);
+        let starts = vec![vec![0.0; parameters.len()], response_coordinates(&nominal, &parameters, self.runs, false)];
+        let mut searcher = Searcher {
+            nominal: &nominal,
+            parameters: &parameters,
+            settings: &settings,
+            periods: self.periods.clone(),
+            correlated: self.correlated.clone(),
+            runs: self.runs,
+            stepping: self.stepping,
+            tolerance: self.tolerance,
+        };
+        let (found, iterations) = searcher.best_of(starts, None);
+        let start = found.and_then(|z| {
+            let robot = VariedRobot::new(&nominal, &parameters, &z).ok()?.robot;
+            let mut start = drive_coordinates(self.nominal, self.parameters, &robot, |_| true, true);
+            for (own, parameter) in start.iter_mut().zip(self.parameters).filter(|(_, own)| !own.quantity.is_of_drive())
+            {
+                let is_same =
+                    |other: &FreeParameter| other.quantity == parameter.quantity && other.members == parameter.members;
+                *own = parameters.iter().position(is_same).map_or(0.0, |place| z[place]);
+            }
+            Some(start)
+        });
+        (start, iterations)
+    }
+
+    /// The better of the ends of descents from `starts` and from `near`, which is close to a minimum and needs no
+    /// restarts; `None` if no start can be simulated.
+    fn best_of(&mut self, starts: Vec<Vec<f64>>, near: Option<Vec<f64>>) -> (Option<Vec<f64>>, usize) {
         let (mut best, mut iterations): (Option<(f64, Vec<f64>)>, usize) = (None, 0);
         let step_s = COARSE * self.settings.step_s;
-        for mut z in starts {
+        let all: &[f64] = &[RESTART_S, f64::INFINITY];
+        let starts = starts.into_iter().map(|z| (z, all)).chain(near.map(|z| (z, &all[1..])));
+        for (mut z, restarts) in starts {
             let mut cost = f64::INFINITY;
-            for restart_s in [RESTART_S, f64::INFINITY] {
+            for &restart_s in restarts {
                 self.stepping = Stepping { step_s, end_weight: 1.0, restart_s };
                 let Some(mut now) = self.point(&z) else { continue };
                 iterations += self.descend(&mut z, &mut now, ROUGH_ITERATIONS.min(self.settings.iterations)).0;
@@ -273,11 +309,16 @@ pub fn search(
         correlated: vec![FIRST_CORRELATED; nominal.model.dof()],
     };
     let mut starts = vec![start.to_vec()];
-    let responses = response_coordinates(nominal, parameters, runs);
+    let responses = response_coordinates(nominal, parameters, runs, !settings.alike);
     if responses.iter().zip(start).any(|(response, start)| (response - start).abs() > SAME_START) {
         starts.push(responses);
     }
-    let (z, mut iterations) = searcher.best_of(starts);
+    let (mut near, mut extra) = (None, 0);
+    if !settings.alike && nominal.model.dof() > 1 {
+        (near, extra) = searcher.equal_drives_start();
+    }
+    let (z, mut iterations) = searcher.best_of(starts, near);
+    iterations += extra;
     let mut z = z.ok_or_else(no_start)?;
     searcher.stepping = Stepping { restart_s: f64::INFINITY, ..searcher.stepping };
     let rough = |searcher: &Searcher<'_>, z: &[f64]| {

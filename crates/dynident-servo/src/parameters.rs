@@ -131,7 +131,8 @@ impl VariedRobot {
     }
 }
 
-/// The robot at coordinates of the parameters, with delays that are not negative.
+/// The robot at coordinates of the parameters, with read delays that are zero in the mean and delays that are not
+/// negative. Only the difference of both delays changes the measured motion.
 ///
 /// # Errors
 /// If the coordinates give bodies that are not numbers.
@@ -141,6 +142,11 @@ pub fn robot_at(
     coordinates: &[f64],
 ) -> Result<ServoRobot, ModelError> {
     let mut robot = VariedRobot::new(nominal, parameters, coordinates)?.robot;
+    let mean = robot.drives.iter().map(|drive| drive.read_delay_s).sum::<f64>() / robot.drives.len().max(1) as f64;
+    for drive in &mut robot.drives {
+        drive.delay_s -= mean;
+        drive.read_delay_s -= mean;
+    }
     let earliest = robot.drives.iter().map(|drive| drive.delay_s).fold(0.0, f64::min);
     // An effect before its command is a measurement after its stamp: only their difference matters.
     for drive in &mut robot.drives {

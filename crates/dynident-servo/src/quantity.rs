@@ -98,6 +98,11 @@ impl Quantity {
         }
     }
 
+    /// Whether the value belongs to a drive.
+    pub fn is_of_drive(self) -> bool {
+        !matches!(self, Self::Mass | Self::Centre(_) | Self::FloorHeight)
+    }
+
     /// Whether the value is a torque, an inertia or a mass, which positions give only up to one common factor.
     pub fn has_scale(self) -> bool {
         matches!(

@@ -53,7 +53,14 @@ impl Drive {
 /// First values of all drives; equal ones if all joints have the same servo (`alike`). Profiles are those of `stated`.
 pub fn start_drives(model: &Model, runs: &[Run], stated: &[Drive], alike: bool) -> Vec<Drive> {
     let runs: &[Run] = &runs.iter().map(|run| behind_profiles(run, stated)).collect::<Vec<_>>();
-    let inertias = mean_inertias(model, runs);
+    let mut inertias = mean_inertias(model, runs);
+    if !alike {
+        // The drive of a light distal link has more inertia than the link: halfway, in logarithms, to the mean.
+        let mean = inertias.iter().sum::<f64>() / inertias.len() as f64;
+        for inertia in &mut inertias {
+            *inertia = (*inertia * mean).sqrt();
+        }
+    }
     let mut drives: Vec<Drive> = (0..model.dof())
         .map(|joint| {
             let Response { frequency, ratio, delay_s } = response(runs, joint);
@@ -134,17 +141,17 @@ fn median_distance(runs: &[Run], joint: usize) -> f64 {
 }
 
 /// Coordinates of the responses of the joints, for a search whose nominal drives may be far away: values that several
-/// joints share get the mean, individual deviations from it are zero.
-pub(crate) fn response_coordinates(nominal: &ServoRobot, parameters: &[FreeParameter], runs: &[Run]) -> Vec<f64> {
-    let dof = nominal.model.dof();
+/// joints share get the mean. Deviations of the joints from it are zero if not `with_own`.
+pub(crate) fn response_coordinates(
+    nominal: &ServoRobot,
+    parameters: &[FreeParameter],
+    runs: &[Run],
+    with_own: bool,
+) -> Vec<f64> {
     let drives = start_drives(&nominal.model, runs, &nominal.drives, false);
     let responses = ServoRobot { drives, ..nominal.clone() };
-    let is_shared = |quantity: Quantity| {
-        parameters.iter().any(|other| other.quantity == quantity && other.members.len() == dof && dof > 1)
-    };
-    let coordinate = |parameter: &FreeParameter| {
-        let quantity = parameter.quantity;
-        let is_found = matches!(
+    let is_found = |quantity: Quantity| {
+        matches!(
             quantity,
             Quantity::Stiffness
                 | Quantity::Damping
@@ -152,21 +159,69 @@ pub(crate) fn response_coordinates(nominal: &ServoRobot, parameters: &[FreeParam
                 | Quantity::Coulomb
                 | Quantity::Stribeck
                 | Quantity::Delay
-        );
-        if !is_found || (parameter.members.len() == 1 && is_shared(quantity)) {
+        )
+    };
+    drive_coordinates(nominal, parameters, &responses, is_found, with_own)
+}
+
+/// Coordinates at which the drives of `nominal` have the values of `robot` for the quantities of `is_found`; zero for
+/// others. A value that several joints share gets the mean, and each joint its deviation if `with_own`.
+pub(crate) fn drive_coordinates(
+    nominal: &ServoRobot,
+    parameters: &[FreeParameter],
+    robot: &ServoRobot,
+    is_found: impl Fn(Quantity) -> bool,
+    with_own: bool,
+) -> Vec<f64> {
+    let dof = nominal.model.dof();
+    let all: Vec<usize> = (0..dof).collect();
+    let is_shared = |quantity: Quantity| {
+        parameters.iter().any(|other| other.quantity == quantity && other.members.len() == dof && dof > 1)
+    };
+    let coordinate = |parameter: &FreeParameter| {
+        let quantity = parameter.quantity;
+        let is_own = parameter.members.len() == 1 && is_shared(quantity);
+        if !quantity.is_of_drive() || !is_found(quantity) || (is_own && !with_own) {
             return 0.0;
         }
-        let difference = |&joint: &usize| {
-            let [found, stated] = [&responses, nominal].map(|robot| robot_value(robot, quantity, joint));
+        let difference = |joint: usize| {
+            let [found, stated] = [robot, nominal].map(|robot| robot_value(robot, quantity, joint));
             match parameter.change {
                 Change::Factor => (found / stated).ln(),
                 Change::Sum => found - stated,
             }
         };
-        let mean = parameter.members.iter().map(difference).sum::<f64>() / parameter.members.len() as f64;
-        if mean.is_finite() { mean } else { 0.0 }
+        let mean = |joints: &[usize]| joints.iter().map(|&joint| difference(joint)).sum::<f64>() / joints.len() as f64;
+        let common = if is_own { mean(&all) } else { 0.0 };
+        let own = mean(&parameter.members) - common;
+        if own.is_finite() { own } else { 0.0 }
     };
     parameters.iter().map(coordinate).collect()
+}
+
+/// The robot with equal drives: each value is the mean over the joints. Profiles and torque limits stay.
+pub(crate) fn with_equal_drives(robot: &ServoRobot) -> ServoRobot {
+    let mean = |value: fn(&Drive) -> f64| {
+        let logs = robot.drives.iter().map(|drive| value(drive).max(f64::MIN_POSITIVE).ln());
+        (logs.sum::<f64>() / robot.drives.len() as f64).exp()
+    };
+    let equal = Drive {
+        stiffness: mean(|drive| drive.stiffness),
+        damping: mean(|drive| drive.damping),
+        armature: mean(|drive| drive.armature),
+        coulomb: mean(|drive| drive.coulomb),
+        load_friction: mean(|drive| drive.load_friction),
+        stribeck: mean(|drive| drive.stribeck),
+        ..robot.drives[0]
+    };
+    let with_own = |drive: &Drive| Drive {
+        torque_limit: drive.torque_limit,
+        profile_acceleration: drive.profile_acceleration,
+        profile_speed: drive.profile_speed,
+        zero: drive.zero,
+        ..equal
+    };
+    ServoRobot { drives: robot.drives.iter().map(with_own).collect(), ..robot.clone() }
 }
 
 /// Response of one joint: natural frequency, rad/s, damping ratio and delay.

@@ -7,6 +7,11 @@ use crate::settings::ServoSettings;
 /// Standard deviation of the logarithm of a value of which nothing but the order of magnitude is known.
 const WIDE: f64 = 2.0;
 
+/// Standard deviation of the logarithm of a value that all joints share. Its centre comes from the responses of the
+/// joints, which contain the drives' inertia only by a guess, and it must not decide the common factor of all torques,
+/// inertias and masses: the masses of the robot description do.
+const FREE: f64 = 10.0;
+
 /// Least reach of a robot, m: a prior without width would exclude every motion.
 const LEAST_REACH_M: f64 = 0.01;
 
@@ -19,10 +24,14 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
         let mut add = |members: Vec<usize>, prior_sd: f64| {
             list.push(FreeParameter { quantity, members, change: Change::Factor, prior_sd });
         };
-        if settings.alike && dof > 1 {
-            add(joints.clone(), WIDE);
+        if dof > 1 {
+            add(joints.clone(), FREE);
         }
-        let own = if settings.alike && dof > 1 { deviation } else { WIDE };
+        let own = match dof {
+            1 => FREE,
+            _ if settings.alike => deviation,
+            _ => WIDE,
+        };
         for joint in 0..dof {
             add(vec![joint], own);
         }
@@ -36,10 +45,10 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
     }
     let has = |value: fn(&crate::drive::Drive) -> f64| robot.drives.iter().any(|drive| value(drive) > 0.0);
     if settings.load_friction && has(|drive| drive.load_friction) {
-        common(&mut list, &joints, Quantity::LoadFriction, WIDE);
+        common_or_own(&mut list, &joints, Quantity::LoadFriction, settings.alike);
     }
     if settings.load_friction && has(|drive| drive.stribeck) {
-        common(&mut list, &joints, Quantity::Stribeck, WIDE);
+        common_or_own(&mut list, &joints, Quantity::Stribeck, settings.alike);
     }
     let is_limited = |limit: fn(&crate::drive::Drive) -> f64| robot.drives.iter().all(|own| limit(own).is_finite());
     if is_limited(|drive| drive.profile_acceleration) {
@@ -50,13 +59,27 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
     }
     sum(&mut list, joints.clone(), Quantity::Delay, settings.delay_s);
     for joint in 0..dof {
-        sum(&mut list, vec![joint], Quantity::ReadDelay, settings.read_delay_s);
+        // The delay of a single joint is that from its command to its measurement.
+        if dof > 1 {
+            sum(&mut list, vec![joint], Quantity::ReadDelay, settings.read_delay_s);
+        }
         if settings.zero > 0.0 {
             sum(&mut list, vec![joint], Quantity::Zero, settings.zero);
         }
     }
     body_unknowns(robot, settings, &mut list);
     list
+}
+
+/// One factor for equal servos; otherwise one for each joint.
+fn common_or_own(list: &mut Vec<FreeParameter>, joints: &[usize], quantity: Quantity, alike: bool) {
+    if alike {
+        common(list, joints, quantity, WIDE);
+    } else {
+        for &joint in joints {
+            common(list, &[joint], quantity, WIDE);
+        }
+    }
 }
 
 fn common(list: &mut Vec<FreeParameter>, joints: &[usize], quantity: Quantity, prior_sd: f64) {

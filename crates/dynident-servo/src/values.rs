@@ -66,6 +66,7 @@ pub fn values(
             }
         }
     }
+    without_mean_read_delay(&mut rows, parameters, columns);
     let prior = DVector::from_iterator(columns, parameters.iter().map(|parameter| parameter.prior_sd.powi(2)));
     let direction = scale_direction(parameters, robot.model.dof());
     let variance = variance_along(&search.covariance, &direction);
@@ -87,6 +88,23 @@ pub fn values(
         prior_std: variance_along(&DMatrix::from_diagonal(&prior), &direction).sqrt(),
     };
     Ok((list, scale))
+}
+
+/// Subtracts the mean of the read delays from all delays, as [`robot_at`] does: the motion does not contain it.
+fn without_mean_read_delay(
+    rows: &mut BTreeMap<(Quantity, usize), DVector<f64>>,
+    parameters: &[FreeParameter],
+    columns: usize,
+) {
+    let is_read = |parameter: &FreeParameter| parameter.quantity == Quantity::ReadDelay;
+    let count = parameters.iter().filter(|parameter| is_read(parameter)).count();
+    let share = |parameter: &FreeParameter| if is_read(parameter) { 1.0 / count as f64 } else { 0.0 };
+    let mean = DVector::from_iterator(columns, parameters.iter().map(share));
+    for ((quantity, _), row) in rows {
+        if matches!(quantity, Quantity::Delay | Quantity::ReadDelay) {
+            *row -= &mean;
+        }
+    }
 }
 
 fn deviation(covariance: &DMatrix<f64>, row: &DVector<f64>) -> f64 {

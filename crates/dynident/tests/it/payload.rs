@@ -250,9 +250,8 @@ fn offsets_differ_from_log_to_log() {
         }
         assert!(test.model.relative_error_percent.unwrap() < 1e-4, "{:?}", test.model.relative_error_percent);
         let physical = test.physical.as_ref().unwrap();
-        let fit = found.result.training.physical.as_ref().unwrap().relative_error_percent.unwrap();
-        // The bodies of this robot are not physically consistent, so the consistent set has an error in the fit, too.
-        assert!(physical.relative_error_percent.unwrap() < 2.0 * fit, "{physical:?}, {fit}");
+        // The consistent set has an error of its own. A tenth of the offset shows that the offset is removed.
+        assert!(physical.rmse_nm < 0.25, "{physical:?}");
     }
 }
 

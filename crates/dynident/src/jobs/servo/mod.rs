@@ -211,6 +211,9 @@ fn first_drives(model: &Model, runs: &[Run], section: &ServoSection) -> Result<V
     let stated = section.drives(vec![Drive::typical(1.0, 1.0, 1.0, 1.0); model.dof()])?;
     let mut start = start_drives(model, runs, &stated, section.fit.alike);
     for (drive, joint) in start.iter_mut().zip(model.joints()) {
+        if !section.fit.load_friction {
+            (drive.load_friction, drive.stribeck) = (0.0, 0.0);
+        }
         drive.torque_limit = joint.limits.effort.filter(|effort| *effort > 0.0).unwrap_or(f64::INFINITY);
     }
     section.drives(start)

@@ -55,7 +55,7 @@ pub(super) fn servo_file(
         settled: found.search.settled,
         drives: drives.collect(),
         bodies: bodies.collect(),
-        scale: scale_of(&scale),
+        scale: scale_of(&scale, runs),
         joints,
         rotary,
         ..ServoFile::default()
@@ -135,8 +135,9 @@ fn drive_of(drive: &Drive, means: DriveMeans, values: Vec<ServoNumber>) -> Servo
     }
 }
 
-fn scale_of(scale: &Scale) -> ServoScale {
-    let determined = scale.std <= SCALE_DETERMINED * scale.prior_std;
+fn scale_of(scale: &Scale, runs: &[RoleRun]) -> ServoScale {
+    let has_payload = runs.iter().any(|run| run.role != Role::Validate && !run.run.payloads.is_empty());
+    let determined = has_payload && scale.std <= SCALE_DETERMINED * scale.prior_std;
     let percent = 100.0 * HALF_WIDTH_95 * scale.std;
     let anchor = if determined {
         format!("The known payloads of the logs give the scale to ±{percent:.0} %.")
