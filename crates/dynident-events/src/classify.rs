@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Measured torque without drives, relative to the predicted torque (squares).
 const MAX_TORQUE_OFF: f64 = 0.3;
-/// An interval that is at most this far from the start (end) of the log begins (ends) with the log, s.
+/// An interval that is at most this far from the first (last) bin with reliable motion begins (ends) with the log, s.
 const END_S: f64 = 1.0;
 /// Share of the unexplained squares that a signature has to explain.
 const MIN_EXPLAINED: f64 = 0.6;
@@ -78,7 +78,8 @@ fn classified(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interv
     if one.is_off || at_rest.iter().all(|rest| *rest) && is_torque_off(rows, scan, one, &joints) {
         return of(EventKind::DrivesOff);
     }
-    let persists = to_s + END_S >= rows.time_s[rows.len() - 1] || from_s - END_S <= rows.time_s[0];
+    let [first_s, last_s] = reliable(rows);
+    let persists = to_s + END_S >= last_s || from_s - END_S <= first_s;
     let (load, offset) = if persists { load_and_offset(rows, robot, scan, one) } else { (0.0, 0.0) };
     if one.is_stop {
         let alternative = (joints.len() > 1).then_some(EventKind::Contact);
@@ -120,8 +121,17 @@ fn time_at_stop(rows: &LogRows, one: &Interval) -> [f64; 2] {
 fn extended(rows: &LogRows, [from_s, to_s]: [f64; 2]) -> [f64; 2] {
     let half = 0.5 * rows.bin_s;
     let (first_s, last_s) = ((rows.time_s[0] - half).max(0.0), rows.time_s[rows.len() - 1] + half);
-    let from_s = if from_s - END_S <= first_s { first_s } else { from_s };
-    [from_s, if to_s + END_S >= last_s { last_s } else { to_s }]
+    let reliable = reliable(rows);
+    let from_s = if from_s - END_S <= reliable[0] { first_s } else { from_s };
+    [from_s, if to_s + END_S >= reliable[1] { last_s } else { to_s }]
+}
+
+/// Times of the first and the last bin with reliable motion, s; those of the log without such bins. The ends of a log
+/// have none if it starts or ends in motion.
+fn reliable(rows: &LogRows) -> [f64; 2] {
+    let first = rows.usable.iter().position(|usable| *usable).unwrap_or(0);
+    let last = rows.usable.iter().rposition(|usable| *usable).unwrap_or(rows.len() - 1);
+    [rows.time_s[first], rows.time_s[last]]
 }
 
 fn is_torque_off(rows: &LogRows, scan: &Scan, one: &Interval, joints: &[usize]) -> bool {

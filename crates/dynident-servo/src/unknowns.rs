@@ -20,15 +20,15 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
     let dof = robot.model.dof();
     let joints: Vec<usize> = (0..dof).collect();
     let mut list = Vec::new();
-    let mut factor = |quantity: Quantity, deviation: f64| {
+    let mut factor = |quantity: Quantity, common: f64, deviation: f64| {
         let mut add = |members: Vec<usize>, prior_sd: f64| {
             list.push(FreeParameter { quantity, members, change: Change::Factor, prior_sd });
         };
         if dof > 1 {
-            add(joints.clone(), FREE);
+            add(joints.clone(), common);
         }
         let own = match dof {
-            1 => FREE,
+            1 => common,
             _ if settings.alike => deviation,
             _ => WIDE,
         };
@@ -36,12 +36,13 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
             add(vec![joint], own);
         }
     };
-    factor(Quantity::Stiffness, settings.deviation);
-    factor(Quantity::Damping, settings.deviation);
-    factor(Quantity::Armature, settings.deviation);
-    factor(Quantity::Coulomb, settings.friction_deviation);
+    factor(Quantity::Stiffness, FREE, settings.deviation);
+    factor(Quantity::Damping, FREE, settings.deviation);
+    // Slow motion contains no inertia; without a prior its logarithm would have no lower end.
+    factor(Quantity::Armature, WIDE, settings.deviation);
+    factor(Quantity::Coulomb, FREE, settings.friction_deviation);
     if robot.drives.iter().all(|drive| drive.torque_limit.is_finite()) {
-        factor(Quantity::TorqueLimit, settings.torque_limit_deviation);
+        factor(Quantity::TorqueLimit, WIDE, settings.torque_limit_deviation);
     }
     let has = |value: fn(&crate::drive::Drive) -> f64| robot.drives.iter().any(|drive| value(drive) > 0.0);
     if settings.load_friction && has(|drive| drive.load_friction) {

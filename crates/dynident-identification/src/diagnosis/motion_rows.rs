@@ -8,6 +8,12 @@ use dynident_rows::{LogError, Logs, ParallelFilterSettings, RegressorModel, moti
 /// Number of instants; more do not improve the accuracy.
 pub(super) const INSTANTS: usize = 300;
 
+/// Velocity of a joint at rest relative to its root mean square velocity. The friction of a joint at rest can have any
+/// value up to that in motion, so its torque says nothing about a robot.
+const REST_SHARE: f64 = 0.02;
+/// Least number of instants without a joint at rest for which the others are left out.
+const MIN_MOVING: usize = 100;
+
 /// Standard deviation of a normal distribution over the median of its magnitude.
 const NORMAL_DEVIATION_OF_MEDIAN: f64 = 1.4826;
 /// Variance of the third difference of white noise of variance 1.
@@ -50,6 +56,8 @@ pub(super) struct MotionSamples {
     /// Largest interpolated share of a joint's torque, for each row; empty if no sample was rejected.
     interpolated: Vec<f64>,
     max_interpolated: f64,
+    /// Rows in which a joint rests that moves in other rows; empty if too few rows would remain.
+    resting: Vec<bool>,
 }
 
 impl MotionSamples {
@@ -115,12 +123,13 @@ impl MotionSamples {
             Ok(())
         };
         pass.each_block(&mut take)?;
-        Ok(Self { rows, pieces, spacing_s, rows_of_fit, interpolated, max_interpolated })
+        let resting = resting(&rows);
+        Ok(Self { rows, pieces, spacing_s, rows_of_fit, interpolated, max_interpolated, resting })
     }
 
     /// At most `most` of its instants, evenly chosen.
     pub(super) fn instants(&self, most: usize) -> MotionRows {
-        let all: Vec<usize> = (0..self.rows.len()).filter(|&row| !self.is_interpolated(row)).collect();
+        let all: Vec<usize> = (0..self.rows.len()).filter(|&row| self.is_usable(row)).collect();
         let count = all.len();
         let chosen: Vec<usize> = if count > most { (0..most).map(|k| all[k * count / most]).collect() } else { all };
         self.selected(&chosen, count)
@@ -147,7 +156,7 @@ impl MotionSamples {
     pub(super) fn shifted(&self, channels: Channels, lag_s: &[f64], reach_s: f64, most: usize) -> MotionRows {
         let reach = (reach_s / self.spacing_s).ceil() as usize + 1;
         let inside = |piece: Range<usize>| piece.start + reach..piece.end.saturating_sub(reach);
-        let all: Vec<usize> = self.each_piece().flat_map(inside).filter(|&row| !self.is_interpolated(row)).collect();
+        let all: Vec<usize> = self.each_piece().flat_map(inside).filter(|&row| self.is_usable(row)).collect();
         let chosen: Vec<usize> = (0..most.min(all.len())).map(|k| all[k * all.len() / most.min(all.len())]).collect();
         let mut rows = self.selected(&chosen, all.len());
         let shift = |to: &mut [Vec<f64>], from: &[Vec<f64>]| {
@@ -179,14 +188,28 @@ impl MotionSamples {
         MotionRows { q: take(q), dq: take(dq), ddq: take(ddq), tau: take(tau), rate_hz: *rate_hz, independent }
     }
 
-    fn is_interpolated(&self, row: usize) -> bool {
-        self.interpolated.get(row).is_some_and(|share| *share > self.max_interpolated)
+    fn is_usable(&self, row: usize) -> bool {
+        let is_interpolated = self.interpolated.get(row).is_some_and(|share| *share > self.max_interpolated);
+        !is_interpolated && !self.resting.get(row).copied().unwrap_or(false)
     }
 
     fn each_piece(&self) -> impl Iterator<Item = Range<usize>> {
         let ends = self.pieces.iter().skip(1).copied().chain([self.rows.len()]);
         self.pieces.iter().copied().zip(ends).map(|(from, to)| from..to)
     }
+}
+
+/// Rows in which a joint rests that moves in other rows; empty if less than [`MIN_MOVING`] others would remain.
+fn resting(rows: &MotionRows) -> Vec<bool> {
+    let mut resting = vec![false; rows.len()];
+    for dq in &rows.dq {
+        let rms = (dq.iter().map(|speed| speed * speed).sum::<f64>() / dq.len().max(1) as f64).sqrt();
+        for (rests, speed) in resting.iter_mut().zip(dq) {
+            *rests |= speed.abs() < REST_SHARE * rms;
+        }
+    }
+    let moving = resting.iter().filter(|rests| !**rests).count();
+    if moving < MIN_MOVING { Vec::new() } else { resting }
 }
 
 /// The parallel filter of instants, with four times the rows of a fit, since short logs would have too few.
@@ -326,6 +349,7 @@ mod tests {
                 rows_of_fit: 1.0,
                 interpolated: Vec::new(),
                 max_interpolated: 0.3,
+                resting: Vec::new(),
             };
             samples.torque_noise(0)
         };
@@ -349,8 +373,15 @@ mod tests {
             independent: 40.0,
         };
         let (pieces, interpolated) = (vec![0, 20], Vec::new());
-        let samples =
-            MotionSamples { rows, pieces, spacing_s: 0.1, rows_of_fit: 4.0, interpolated, max_interpolated: 0.3 };
+        let samples = MotionSamples {
+            rows,
+            pieces,
+            spacing_s: 0.1,
+            rows_of_fit: 4.0,
+            interpolated,
+            max_interpolated: 0.3,
+            resting: Vec::new(),
+        };
         assert!((samples.longest_s() - 2.0).abs() < 1e-12);
         let late = samples.shifted(Channels::Torque, &[0.25], 0.3, 100);
         // Both pieces lose four rows at each end.
@@ -361,5 +392,20 @@ mod tests {
         }
         let late = samples.shifted(Channels::Position, &[-0.1], 0.3, 100);
         assert!((0..late.len()).all(|row| (late.tau[0][row] - late.q[0][row] - 301.0).abs() < 1e-9));
+    }
+
+    #[test]
+    fn rests_are_left_out_if_enough_motion_remains() {
+        // Two joints that move together half of the time, and a dead one.
+        let dq = |row: usize| if (row / 50) % 2 == 0 { (0.2 * row as f64).sin() + 1.5 } else { 1e-3 };
+        let rows = |count: usize| MotionRows {
+            dq: vec![(0..count).map(dq).collect(), (0..count).map(|row| 0.1 * dq(row)).collect(), vec![0.0; count]],
+            q: vec![vec![0.0; count]; 3],
+            ..MotionRows::empty(3)
+        };
+        let of_400 = resting(&rows(400));
+        assert!((0..400).all(|row| of_400[row] == ((row / 50) % 2 == 1)));
+        assert!(resting(&rows(150)).is_empty() || resting(&rows(150)).iter().filter(|rests| !**rests).count() >= 100);
+        assert!(resting(&rows(100)).is_empty());
     }
 }

@@ -21,8 +21,8 @@ pub struct ServoChange {
     pub delay_s: f64,
 }
 
-/// Longest time between two values of a delayed command, s: MuJoCo keeps one for each step of its default length.
-const DELAY_STEP_S: f64 = 0.002;
+/// Shortest time step of a simulation for which the delay is complete, s: MuJoCo keeps one command for each step.
+const DELAY_STEP_S: f64 = 0.000_25;
 
 /// Constraint of a joint's friction that hardly creeps: MuJoCo's largest impedance. With its default a joint at rest
 /// moves by some milliradians a second, and faster with little armature.

@@ -2,8 +2,8 @@
 
 use crate::arm;
 use dynident_servo::{
-    CommandRange, DesignedCommands, Run, ServoDesignSettings, ServoError, ServoSettings, design_commands, search,
-    simulate, unknowns, values,
+    CommandRange, DesignedCommands, Run, ServoDesignSettings, ServoError, ServoSettings, ServoValue, design_commands,
+    search, simulate, unknowns, values,
 };
 use rayon::ThreadPoolBuilder;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -21,10 +21,14 @@ fn designed(settings: &ServoDesignSettings, is_permitted: &dyn Fn(&[Vec<f64>]) -
     design_commands(&robot, &parameters, (&RANGES, &[0.3, -0.4]), (&fit, settings), is_permitted, &|_| {}).unwrap()
 }
 
-/// Geometric mean of the error bars of the commands, divided by that of the chirp.
+/// Geometric mean of the error bars of the commands, divided by that of the chirp, of all values that one of both
+/// determines: their error bars are at most half of those before the fit.
 fn ratio(found: &DesignedCommands) -> f64 {
     let pairs = found.forecast.values.iter().zip(&found.chirp.values);
-    let logs: Vec<f64> = pairs.map(|(own, chirp)| (own.std_at_scale / chirp.std_at_scale).ln()).collect();
+    let is_determined =
+        |(own, chirp): &(&ServoValue, &ServoValue)| own.std_at_scale.min(chirp.std_at_scale) < 0.5 * own.prior_std;
+    let logs: Vec<f64> =
+        pairs.filter(is_determined).map(|(own, chirp)| (own.std_at_scale / chirp.std_at_scale).ln()).collect();
     (logs.iter().sum::<f64>() / logs.len() as f64).exp()
 }
 

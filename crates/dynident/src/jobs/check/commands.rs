@@ -53,7 +53,7 @@ pub(super) fn command_findings(
                 what: finding.what(names),
                 evidence: finding.evidence(names),
                 write: changes(&finding, &format, &table, names.len()),
-                or: Vec::new(),
+                or: of_position(&finding, &format, &table, names.len()).into_iter().collect(),
                 code: format!("check-{kind}"),
             };
             match found.iter_mut().find(|(known, _)| known.what == own.what) {
@@ -80,6 +80,27 @@ fn kind(finding: &CommandFinding) -> &'static str {
         CommandFinding::Degrees { .. } => "unit",
         _ => "command",
     }
+}
+
+/// The same correction of the position: commands and positions only show that one of both is wrong.
+fn of_position(finding: &CommandFinding, format: &LogFormat, table: &str, joints: usize) -> Option<String> {
+    let position = &format.position;
+    let line = match finding {
+        CommandFinding::Sign { joint, .. } => {
+            let own = |place: usize| at(position.sign.as_ref(), place, 1.0);
+            let value = |place: usize| own(place) * if place == *joint { -1.0 } else { 1.0 };
+            format!("sign = {}", list((0..joints).map(|place| value(place).to_string())))
+        }
+        CommandFinding::Offset { joint, offset } => {
+            let own = |place: usize| at(position.offset.as_ref(), place, 0.0);
+            let value = |place: usize| own(place) - if place == *joint { *offset } else { 0.0 };
+            format!("offset = {}", list((0..joints).map(|place| format!("{:.4}", value(place)))))
+        }
+        _ => return None,
+    };
+    Some(format!(
+        "the position is wrong, not the command ([{table}.position] {line}): compare both with the limits of the joint in the robot description"
+    ))
 }
 
 /// The keys that correct a mistake in a format of `joints` joints; empty if no key does.

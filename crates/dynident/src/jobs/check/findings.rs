@@ -318,16 +318,12 @@ fn unmodelled_payload(study: &Study, robot: &StudyRobot, payload: &UnmodelledPay
             payload.left_with
         ),
     );
-    let section = StudyChange { table: "[[payload]]".to_owned(), line: format!("name = \"tool\", link = {link:?}") };
-    let number = if payload.mass_kg > 0.0 {
-        payload.log
-    } else {
-        study.logs_of_role(Role::Identify).first().copied().unwrap_or(0)
-    };
-    found.write = vec![
-        section,
-        StudyChange { table: format!("[[log]] number {}", number + 1), line: "payload = \"tool\"".to_owned() },
-    ];
+    let is_trained = |log: &usize| study.log[*log].role == Role::Identify;
+    let loaded = if payload.mass_kg > 0.0 { vec![payload.log] } else { study.logs_of_role(Role::Identify) };
+    // Without a training log that carries it, a payload cannot be estimated together with the arm.
+    let known = (!loaded.iter().any(is_trained)).then_some((payload.mass_kg, payload.com_m));
+    found.write = payload_section(link, known);
+    found.write.extend(loaded.into_iter().map(carries_tool));
     found
 }
 
@@ -345,6 +341,20 @@ pub(super) fn position_torque(table: &PositionTable) -> CheckFinding {
     }
 }
 
+/// Keys of a payload at `link`, with mass and centre of mass if they have to be stated.
+fn payload_section(link: &str, known: Option<(f64, [f64; 3])>) -> Vec<StudyChange> {
+    let mut lines = vec!["name = \"tool\"".to_owned(), format!("link = {link:?}")];
+    if let Some((mass_kg, [x, y, z])) = known {
+        lines.push(format!("mass_kg = {mass_kg:.3}"));
+        lines.push(format!("com_m = [{x:.4}, {y:.4}, {z:.4}]"));
+    }
+    lines.into_iter().map(|line| StudyChange { table: "[[payload]]".to_owned(), line }).collect()
+}
+
+fn carries_tool(log: usize) -> StudyChange {
+    StudyChange { table: format!("[[log]] number {}", log + 1), line: "payload = \"tool\"".to_owned() }
+}
+
 /// A load that one of several training logs carries.
 pub(super) fn log_load(study: &Study, robot: &StudyRobot, load: &LogLoad) -> CheckFinding {
     let (log, link) = (study.log_name(load.log), robot.model().bodies()[load.body].name());
@@ -360,10 +370,8 @@ pub(super) fn log_load(study: &Study, robot: &StudyRobot, load: &LogLoad) -> Che
             100.0 * load.probability
         ),
     );
-    found.write = vec![
-        StudyChange { table: "[[payload]]".to_owned(), line: format!("name = \"tool\", link = {link:?}") },
-        StudyChange { table: format!("[[log]] number {}", load.log + 1), line: "payload = \"tool\"".to_owned() },
-    ];
+    found.write = payload_section(link, None);
+    found.write.push(carries_tool(load.log));
     found
 }
 

@@ -57,7 +57,14 @@ impl PositionUnits {
             let [low, high] = ranges(place);
             let is_share = |full: &f64| low >= -MAX_EXCESS * full && high <= (1.0 + MAX_EXCESS) * full;
             let full = FULL_RANGES.into_iter().find(is_share)?;
-            (is_named && limits[0] < limits[1]).then_some(Gripper { place, full, limits })
+            // Positions between the limits can be radians, except those from 0 to 1.
+            let is_inside = low >= limits[0] && high <= limits[1];
+            let is_unit_share = full == FULL_RANGES[0] && low >= 0.0;
+            (is_named && limits[0] < limits[1] && (!is_inside || is_unit_share)).then_some(Gripper {
+                place,
+                full,
+                limits,
+            })
         };
         let gripper = (0..joints.len()).find_map(|place| gripper(place).filter(|_| recognised.has_commands()));
         let is_turning = |place: &usize| {
