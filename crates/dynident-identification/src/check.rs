@@ -5,7 +5,7 @@ use crate::diagnosis::{Diagnosis, DiagnosisTask, diagnose};
 use crate::doubt::have_jumps;
 use crate::error::IdentificationError;
 use crate::events::{RecordingEvents, task_without_events};
-use crate::examination::{PositionTable, motion_of_training, position_table, position_torques};
+use crate::examination::{PositionTorque, position_torques};
 use crate::task::IdentificationTask;
 use crate::training::training_rows;
 use dynident_estimation::{WeightedSettings, weighted_least_squares};
@@ -24,7 +24,7 @@ pub struct StudyExamination {
     /// Events in the recordings; the diagnosis does not use intervals that are set aside.
     pub events: Vec<RecordingEvents>,
     /// Joints whose unexplained torque is a function of their position; empty if a mistake explains the recordings.
-    pub position_torques: Vec<PositionTable>,
+    pub position_torques: Vec<PositionTorque>,
     /// Number of rows of all joints for a fit.
     pub rows: usize,
     /// Number of base parameters for a fit.
@@ -68,13 +68,7 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     let diagnosis = if have_jumps(&training) { None } else { Some(diagnose(task)?) };
     let best = diagnosis.as_ref().is_none_or(|found| found.search.best.is_some());
     let position_torques = match known {
-        Some(theta) if !best => {
-            let one = |&index: &usize| motion_of_training(&logs, &training.model, index, theta);
-            let motions = execution.try_map(&chosen, one)?;
-            let found = position_torques(robot.model(), &motions.iter().collect::<Vec<_>>(), &settings.examination);
-            let tables = found.iter().map(|torque| position_table(&logs, &training.model, &chosen, torque));
-            tables.filter_map(Result::transpose).collect::<Result<_, _>>()?
-        }
+        Some(_) if !best => position_torques(&logs, &training.model, &chosen, &settings.examination)?,
         _ => Vec::new(),
     };
     let has_mistake = diagnosis.as_ref().is_none_or(|found| found.search.best.is_some() || found.is_unexplained());

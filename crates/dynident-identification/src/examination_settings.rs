@@ -25,15 +25,13 @@ pub struct ExaminationSettings {
     /// from 0 to 1; 0.25. With the usual length of a log, the offset is then better known than the other parameters, and
     /// most of the log remains as the test.
     pub offset_share: f64,
-    /// Share of the unexplained torque of a joint that must be a function of its position, from 0 to 1, for a warning
-    /// about a spring or counterbalance; 0.5. A wrong posture or length at another joint gives less.
-    pub min_position_share: f64,
-    /// Size of that function relative to the torque of the joint (RMS); 0.02. A smaller function hardly improves the
-    /// prediction.
+    /// Unexplained torque of a joint with a function of its position, relative to that without it, up to which a spring
+    /// or counterbalance is named; 0.6. Both fits have all parameters of the joint and all friction laws, so that
+    /// without such a torque the ratio is close to 1.
+    pub max_left_by_position: f64,
+    /// Least torque that only the function explains, relative to the torque of the joint (RMS); 0.02. A smaller function
+    /// hardly improves the prediction.
     pub min_position_ratio: f64,
-    /// Variance of the function over the positions, relative to its expectation from the differences between visits of
-    /// the same position; 10. With 6 to 12 positions, chance exceeds 5 once in 10,000 joints.
-    pub min_position_fisher: f64,
 }
 
 impl Default for ExaminationSettings {
@@ -45,9 +43,8 @@ impl Default for ExaminationSettings {
             min_friction_ratio: 0.5,
             finer_cutoff_ratio: 4.0,
             offset_share: 0.25,
-            min_position_share: 0.5,
+            max_left_by_position: 0.6,
             min_position_ratio: 0.02,
-            min_position_fisher: 10.0,
         }
     }
 }
@@ -65,9 +62,8 @@ impl ExaminationSettings {
             ("min_friction_ratio", self.min_friction_ratio),
             ("finer_cutoff_ratio", self.finer_cutoff_ratio),
             ("offset_share", self.offset_share),
-            ("min_position_share", self.min_position_share),
+            ("max_left_by_position", self.max_left_by_position),
             ("min_position_ratio", self.min_position_ratio),
-            ("min_position_fisher", self.min_position_fisher),
         ])
     }
 }

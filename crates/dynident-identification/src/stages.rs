@@ -10,7 +10,7 @@ use crate::doubt::{break_limits, have_jumps, is_doubtful};
 use crate::error::IdentificationError;
 use crate::events::{RecordingEvents, left_out, without_intervals};
 use crate::examination::{
-    FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, MotionTrace, PositionTorque, TorqueLag,
+    FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, PositionTorque, TorqueLag,
     TorqueSignCheck, Uncertainty, WithoutEvents, examine_training, friction_signs, pooled_delay, position_torques,
     sign_evidence, tested_on,
 };
@@ -353,8 +353,11 @@ fn examine_all_training(
     let (delays, traces): (Vec<Vec<Option<TorqueLag>>>, Vec<LogTrace>) = found.into_iter().unzip();
     let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|log| log[joint]).collect() };
     let pooled_delays = (0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect();
-    let motions: Vec<&MotionTrace> = traces.iter().map(|trace| &trace.motion).collect();
-    let position_torques = position_torques(training.model.model(), &motions, &settings.examination);
+    let chosen: Vec<usize> = training.logs.iter().map(|log| log.index).collect();
+    // Torque of payloads and offsets of single logs would need further columns.
+    let is_plain = training.columns.is_plain();
+    let chosen = if is_plain { &chosen[..] } else { &[] };
+    let position_torques = position_torques(logs, &training.model, chosen, &settings.examination)?;
     Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new(), position_torques })
 }
 

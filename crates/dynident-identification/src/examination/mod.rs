@@ -7,7 +7,6 @@ mod motion_band;
 mod motion_trace;
 mod nominal_agreement;
 mod own_offsets;
-mod position_table;
 mod position_torque;
 mod residuals;
 mod stiction;
@@ -25,7 +24,6 @@ pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, WithoutEve
 pub use motion_trace::MotionTrace;
 pub use nominal_agreement::{PriorAgreement, agreement_findings};
 pub use own_offsets::{OwnOffset, OwnOffsets};
-pub use position_table::PositionTable;
 pub use position_torque::{PositionTorque, position_torque_findings, position_torques};
 pub use residuals::{JointResiduals, TorqueBand, Uncertainty};
 pub use stiction::Stiction;
@@ -35,5 +33,3 @@ pub use training::examine_training;
 
 pub(crate) use held_out::tested_on;
 pub(crate) use motion_band::MotionBand;
-pub(crate) use position_table::position_table;
-pub(crate) use training::motion_of_training;

@@ -1,76 +1,78 @@
-//! Unexplained torque that repeats with the position of a joint, as of a spring, a counterbalance or a cable.
+//! Torque that is a function of a joint's position and that the study does not state: a spring, a counterbalance, a
+//! cable.
 //!
-//! The range of a joint is divided into bins. Consecutive samples in one bin with one direction of motion are a visit,
-//! and its datum is the mean residual. With means m₊ and m₋ of the visits in both directions, the torque at a bin is
+//! The torque of each joint is fitted by all columns w of its own rows, by further friction laws and an inertia, and by
+//! piecewise linear functions h over the range of its position:
 //!
 //! ```text
-//! f = (m₊ + m₋)/2
+//! min over θ, φ, f of  Σ (τ − w θ − l φ − h f)² + λ ‖f‖²
 //! ```
 //!
-//! so that errors of the friction cancel. A torque that depends on anything else than this position differs between the
-//! visits of a cell (bin and direction). With the mean square s² of these differences, the variance of f is
-//! `v = s² (1/n₊ + 1/n₋)/4`, and the share of the position is `σ_f²/(σ_f² + s²)`, where σ_f² is the variance of f over
-//! the bins minus the mean of v: the random-effects analysis of variance (Searle, Casella and McCulloch, *Variance
-//! Components*, 1992, chapter 3).
+//! λ is small. It moves what both explain, for example a weight, to the other columns. The function is named if the
+//! residual without h is clearly larger: friction that no law of the study has, or errors of other parameters, are
+//! explained by w and l and do not look like a spring.
 
-use super::motion_trace::MotionTrace;
 use crate::examination_settings::ExaminationSettings;
-use dynident_model::Model;
+use crate::friction::{FURTHER_LAWS, FurtherLaws};
+use crate::lag::DELAY_SAMPLES;
 use dynident_recording::{Finding, Level};
+use dynident_rows::{JointRows, LogError, LogPass, Logs, RawSamples, RegressorModel, RowConsumer, Silent};
+use nalgebra::{DMatrix, DVector};
 
-/// Number of bins over the range of a joint.
-const BINS: usize = 12;
+/// Number of pieces of the function.
+const PIECES: usize = 12;
 
-/// Smallest number of visits of a cell, for its mean and their differences.
-const MIN_VISITS: usize = 2;
+/// λ relative to the mean square of the functions.
+const RIDGE: f64 = 1e-3;
+
+/// Smallest weight of a column relative to its own square, so that dependent columns do no harm.
+const MIN_PIVOT: f64 = 1e-10;
+
+/// Samples per second: many more than a joint has positions in that time.
+const RATE_HZ: f64 = 50.0;
+
+/// Extension beyond the limits of the joint, relative to the range of the logs, so that rounded positions stay inside.
+const MARGIN: f64 = 0.1;
+
+/// Least number of samples per unknown.
+const MIN_SAMPLES: usize = 5;
 
 /// Unexplained torque of one joint as a function of its position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PositionTorque {
-    /// Index of the joint.
-    pub joint: usize,
     /// Name of the joint.
     pub name: String,
-    /// Share of the unexplained torque (variance of the means of visits) that is a function of the position.
-    pub share: f64,
-    /// Root mean square of the function, Nm (N).
+    /// Root mean square of the joint's torque that only the function explains, Nm (N).
     pub rms_nm: f64,
+    /// Unexplained torque with the function, relative to that without it.
+    pub left: f64,
     /// Root mean square of the measured torque, Nm (N).
     pub torque_nm: f64,
-    /// Lowest and highest position in the logs, rad (m).
-    pub range: [f64; 2],
+    /// Position, rad (m), and torque, Nm (N), in ascending order. The ends are beyond the limits of the joint.
+    pub points: Vec<[f64; 2]>,
 }
 
 impl PositionTorque {
+    /// The keys of a `[[torque]]` with this function.
+    pub fn keys(&self) -> [String; 3] {
+        let points: Vec<String> = self.points.iter().map(|[q, torque]| format!("[{q:.3}, {torque:.4}]")).collect();
+        [
+            format!("name = {:?}", format!("spring_{}", self.name)),
+            format!("joint = {:?}", self.name),
+            format!("table = [{}]", points.join(", ")),
+        ]
+    }
+
     /// What was found, with its size.
     pub fn words(&self) -> String {
         format!(
-            "{:.0} % of its unexplained torque repeats with its position ({:.3} Nm (N) RMS of {:.3}), as of a spring, counterbalance or cable",
-            100.0 * self.share,
+            "a function of its position explains {:.0} % of its unexplained torque ({:.3} Nm (N) of {:.3}, root mean squares), as of a spring, \
+             counterbalance or cable",
+            100.0 * (1.0 - self.left),
             self.rms_nm,
             self.torque_nm
         )
     }
-}
-
-/// Joints whose unexplained torque in the training logs is mostly a function of their own position.
-pub fn position_torques(model: &Model, traces: &[&MotionTrace], settings: &ExaminationSettings) -> Vec<PositionTorque> {
-    let of_joint = |joint: usize| {
-        let cells = Cells::of(joint, traces)?;
-        let function = cells.function()?;
-        let is_named = function.share >= settings.min_position_share
-            && function.fisher >= settings.min_position_fisher
-            && function.rms >= settings.min_position_ratio * cells.torque_rms;
-        is_named.then(|| PositionTorque {
-            joint,
-            name: model.joints()[joint].name.clone(),
-            share: function.share,
-            rms_nm: function.rms,
-            torque_nm: cells.torque_rms,
-            range: [cells.from, cells.from + cells.width * BINS as f64],
-        })
-    };
-    (0..model.dof()).filter_map(of_joint).collect()
 }
 
 /// A warning for each joint.
@@ -83,135 +85,188 @@ pub fn position_torque_findings(found: &[PositionTorque]) -> impl Iterator<Item 
     })
 }
 
-/// Means of the visits of one joint, by bin and direction.
-struct Cells {
-    from: f64,
-    width: f64,
-    torque_rms: f64,
-    visits: [[Vec<f64>; 2]; BINS],
+/// Joints whose torque in the training logs `chosen` needs a function of their own position. All logs together give at
+/// most as many samples as the lag of one log uses.
+///
+/// # Errors
+/// An unreadable recording.
+pub fn position_torques(
+    logs: &Logs<'_>,
+    model: &RegressorModel,
+    chosen: &[usize],
+    settings: &ExaminationSettings,
+) -> Result<Vec<PositionTorque>, LogError> {
+    let most_samples = Some((DELAY_SAMPLES / chosen.len().max(1)) as u64);
+    let one = |&index: &usize| {
+        let mut samples = AllJoints::new(model);
+        LogPass { most_samples, progress: &Silent, ..logs.pass(model, index) }.run(&mut samples)?;
+        Ok::<_, LogError>(samples.joints)
+    };
+    let of_logs = logs.execution.try_map(chosen, one)?;
+    let joint = |joint: usize| {
+        let parts: Vec<&JointSamples> = of_logs.iter().map(|log| &log[joint]).collect();
+        JointFit::new(model, joint, &parts)?.judged(settings)
+    };
+    Ok((0..model.dof()).filter_map(joint).collect())
 }
 
-/// A function of the position.
-struct Function {
-    share: f64,
-    /// Mean square of f over the bins relative to its expectation without a function.
-    fisher: f64,
-    rms: f64,
+/// Samples of one joint: the columns of its own rows with the torque behind them, row by row, and the position.
+#[derive(Default)]
+struct JointSamples {
+    rows: Vec<f64>,
+    motion: Vec<[f64; 3]>,
 }
 
-impl Cells {
-    /// `None` without motion.
-    fn of(joint: usize, traces: &[&MotionTrace]) -> Option<Self> {
-        let positions = || traces.iter().filter_map(|trace| trace.q.get(joint)).flatten().copied();
-        let (from, to) = (positions().fold(f64::INFINITY, f64::min), positions().fold(f64::NEG_INFINITY, f64::max));
-        let width = (to - from) / BINS as f64;
-        if !(width.is_finite() && width > 0.0) {
-            return None;
-        }
-        let (mut squares, mut samples) = (0.0, 0_usize);
-        let mut visits: [[Vec<f64>; 2]; BINS] = Default::default();
-        for trace in traces {
-            let (q, measured, predicted) = (&trace.q[joint], &trace.measured_nm[joint], &trace.predicted_nm[joint]);
-            // Bin and direction of the current visit, sum and number of its residuals.
-            let mut visit: Option<((usize, usize), f64, usize)> = None;
-            for k in 1..q.len() {
-                let residual = measured[k] - predicted[k];
-                if !residual.is_finite() {
-                    continue;
-                }
-                squares += measured[k] * measured[k];
-                samples += 1;
-                let bin = (((q[k] - from) / width) as usize).min(BINS - 1);
-                let cell = (bin, usize::from(q[k] < q[k - 1]));
-                match &mut visit {
-                    Some((own, sum, count)) if *own == cell => {
-                        *sum += residual;
-                        *count += 1;
-                    }
-                    _ => {
-                        if let Some(((bin, direction), sum, count)) = visit.replace((cell, residual, 1)) {
-                            visits[bin][direction].push(sum / count as f64);
-                        }
-                    }
-                }
-            }
-            if let Some(((bin, direction), sum, count)) = visit {
-                visits[bin][direction].push(sum / count as f64);
-            }
-        }
-        (samples > 0).then(|| Self { from, width, torque_rms: (squares / samples as f64).sqrt(), visits })
-    }
+struct AllJoints<'a> {
+    model: &'a RegressorModel,
+    joints: Vec<JointSamples>,
+}
 
-    /// The function, if at least half of the bins have enough visits in both directions.
-    fn function(&self) -> Option<Function> {
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        let known: Vec<(usize, &[Vec<f64>; 2])> = (self.visits.iter().enumerate())
-            .filter(|(_, both)| both.iter().all(|visits| visits.len() >= MIN_VISITS))
-            .collect();
-        if known.len() < BINS / 2 {
-            return None;
-        }
-        let cells = || known.iter().flat_map(|(_, both)| both.iter());
-        let freedom: usize = cells().map(|visits| visits.len() - 1).sum();
-        let squares: f64 =
-            cells().map(|visits| visits.iter().map(|one| (one - mean(visits)).powi(2)).sum::<f64>()).sum();
-        let within = squares / freedom as f64;
-        let bins = known.len() as f64;
-        let values: Vec<f64> = known.iter().map(|(_, [up, down])| 0.5 * (mean(up) + mean(down))).collect();
-        let inverse = |visits: &Vec<f64>| 1.0 / visits.len() as f64;
-        let expected: f64 =
-            known.iter().map(|(_, [up, down])| 0.25 * within * (inverse(up) + inverse(down))).sum::<f64>() / bins;
-        let centre = mean(&values);
-        let between = values.iter().map(|value| (value - centre).powi(2)).sum::<f64>() / (bins - 1.0);
-        let own = (between - expected).max(0.0);
-        Some(Function { share: own / (own + within), fisher: between / expected, rms: own.sqrt() })
+impl<'a> AllJoints<'a> {
+    fn new(model: &'a RegressorModel) -> Self {
+        Self { model, joints: (0..model.dof()).map(|_| JointSamples::default()).collect() }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+impl RowConsumer for AllJoints<'_> {
+    fn filtered(&mut self, _: &JointRows<'_>) -> Result<(), LogError> {
+        Ok(())
+    }
 
-    /// 60 s of a sine of two frequencies; the residual is `unexplained(q, dq, t)` with a noise of 0.2 Nm.
-    fn trace(unexplained: impl Fn(f64, f64, f64) -> f64) -> MotionTrace {
-        let times_s: Vec<f64> = (0..1500).map(|k| 0.04 * f64::from(k)).collect();
-        let q = |t: f64| (0.9 * t).sin() + 0.4 * (2.3 * t).sin();
-        let dq = |t: f64| 0.9 * (0.9 * t).cos() + 0.92 * (2.3 * t).cos();
-        let mut state = 1_u64;
-        let mut noise = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            0.7 * ((state >> 40) as f64 / f64::from(1 << 24) - 0.5)
+    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
+        let rows = samples.panels.samples();
+        let step = ((samples.rate_hz / RATE_HZ).round() as usize).max(1);
+        for (joint, to) in self.joints.iter_mut().enumerate() {
+            let columns = self.model.layout().joint_columns(joint).len();
+            let panel = samples.panels.joint(joint);
+            let is_valid = |row: usize| samples.set_aside.get(joint).is_none_or(|ignored| !ignored[row]);
+            for row in samples.settled.clone().step_by(step).filter(|&row| is_valid(row)) {
+                to.rows.extend((0..=columns).map(|column| panel[column * rows + row]));
+                to.motion.push([0, 1, 2].map(|of: usize| samples.motion[of][joint * rows + row]));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Normal equations of one joint: columns of the model, further laws and an inertia, functions of the position.
+struct JointFit<'a> {
+    model: &'a RegressorModel,
+    joint: usize,
+    range: [f64; 2],
+    gram: DMatrix<f64>,
+    right: DVector<f64>,
+    squares: f64,
+    samples: usize,
+}
+
+impl<'a> JointFit<'a> {
+    /// `None` without motion or with too few samples.
+    fn new(model: &'a RegressorModel, joint: usize, parts: &[&JointSamples]) -> Option<Self> {
+        let columns = model.layout().joint_columns(joint).len();
+        let others = columns + FURTHER_LAWS + 1;
+        let unknowns = others + PIECES + 1;
+        let motion = || parts.iter().flat_map(|part| &part.motion);
+        let from = motion().map(|[q, ..]| *q).fold(f64::INFINITY, f64::min);
+        let to = motion().map(|[q, ..]| *q).fold(f64::NEG_INFINITY, f64::max);
+        let samples = motion().count();
+        if !(to - from).is_finite() || to <= from || samples < MIN_SAMPLES * unknowns {
+            return None;
+        }
+        let laws = FurtherLaws::of(&model.parametric, joint);
+        let mut fit = Self {
+            model,
+            joint,
+            range: [from, to],
+            gram: DMatrix::zeros(unknowns, unknowns),
+            right: DVector::zeros(unknowns),
+            squares: 0.0,
+            samples,
         };
-        let predicted: Vec<f64> = times_s.iter().map(|t| 10.0 * q(*t).sin()).collect();
-        let measured = (times_s.iter().zip(&predicted))
-            .map(|(&t, torque)| torque + unexplained(q(t), dq(t), t) + noise())
-            .collect();
-        let q = times_s.iter().map(|&t| q(t)).collect();
-        MotionTrace { times_s, q: vec![q], measured_nm: vec![measured], predicted_nm: vec![predicted] }
+        let mut all = DVector::zeros(unknowns);
+        for part in parts {
+            for (own, &[q, dq, ddq]) in part.rows.chunks_exact(columns + 1).zip(&part.motion) {
+                let torque = own[columns];
+                all.fill(0.0);
+                all.as_mut_slice()[..columns].copy_from_slice(&own[..columns]);
+                all.as_mut_slice()[columns..others - 1].copy_from_slice(&laws.row(dq, torque));
+                all[others - 1] = ddq;
+                let (piece, share) = fit.piece(q);
+                all[others + piece] = 1.0 - share;
+                all[others + piece + 1] = share;
+                fit.gram.ger(1.0, &all, &all, 1.0);
+                fit.right.axpy(torque, &all, 1.0);
+                fit.squares += torque * torque;
+            }
+        }
+        Some(fit)
     }
 
-    fn found(trace: &MotionTrace) -> Option<Function> {
-        let function = Cells::of(0, &[trace])?.function()?;
-        let settings = ExaminationSettings::default();
-        (function.share >= settings.min_position_share && function.fisher >= settings.min_position_fisher)
-            .then_some(function)
+    /// Number of the piece at a position, and the position in it from 0 to 1.
+    fn piece(&self, q: f64) -> (usize, f64) {
+        let [from, to] = self.range;
+        let place = ((q - from) / (to - from) * PIECES as f64).clamp(0.0, PIECES as f64);
+        let piece = (place as usize).min(PIECES - 1);
+        (piece, place - piece as f64)
     }
 
-    #[test]
-    fn a_spring_is_found_next_to_unexplained_friction() {
-        let spring = |q: f64| 2.0 * q.powi(2);
-        let function = found(&trace(|q, dq, _| spring(q) + 1.5 * dq.signum())).expect("the spring is found");
-        // Over the range of ±1.4 rad the spring differs from its mean by 1.17 Nm (RMS). Noise of 0.2 Nm and twelve bins
-        // change this by less than a tenth.
-        assert!((function.rms - 1.17).abs() < 0.12 && function.share > 0.9, "{} {}", function.rms, function.share);
+    fn judged(&self, settings: &ExaminationSettings) -> Option<PositionTorque> {
+        let unknowns = self.right.len();
+        let others = unknowns - PIECES - 1;
+        let (_, without) = self.solved(others)?;
+        let (values, with) = self.solved(unknowns)?;
+        let mean_square = |squares: f64| squares / self.samples as f64;
+        let (rms_nm, torque_nm) = (mean_square(without - with).max(0.0).sqrt(), mean_square(self.squares).sqrt());
+        let left = (with / without).sqrt();
+        if !(left <= settings.max_left_by_position && rms_nm >= settings.min_position_ratio * torque_nm) {
+            return None;
+        }
+        let function: Vec<f64> = values.iter().skip(others).copied().collect();
+        let mean = function.iter().sum::<f64>() / function.len() as f64;
+        let centred: Vec<f64> = function.iter().map(|value| value - mean).collect();
+        let name = self.model.model().joints()[self.joint].name.clone();
+        Some(PositionTorque { name, rms_nm, left, torque_nm, points: self.points(&centred) })
     }
 
-    #[test]
-    fn noise_friction_and_time_are_no_function_of_the_position() {
-        assert!(found(&trace(|_, _, _| 0.0)).is_none());
-        assert!(found(&trace(|_, dq, _| 1.5 * dq.signum() + 0.5 * dq)).is_none());
-        assert!(found(&trace(|_, _, t| 1.5 * (0.1 * t).sin())).is_none());
-        // The posture of another joint: only a part is a function of the own position.
-        assert!(found(&trace(|q, _, t| 1.5 * (q + 1.3 * (1.37 * t).sin()).cos())).is_none());
+    /// Values of the first `count` unknowns, and the sum of the squared residuals; `None` if the equations are singular.
+    fn solved(&self, count: usize) -> Option<(DVector<f64>, f64)> {
+        let others = self.right.len() - PIECES - 1;
+        let mut gram = self.gram.view((0, 0), (count, count)).into_owned();
+        let right = self.right.rows(0, count).into_owned();
+        let functions = (others..self.right.len()).map(|k| self.gram[(k, k)]).sum::<f64>() / (PIECES + 1) as f64;
+        for k in 0..count {
+            let own = gram[(k, k)];
+            // A column that is zero in the logs gets the value zero.
+            let weight = if k < others { MIN_PIVOT * own + f64::from(u8::from(own == 0.0)) } else { RIDGE * functions };
+            gram[(k, k)] += weight;
+        }
+        let scale = gram.diagonal().map(|own| own.sqrt().recip());
+        let scaled = DMatrix::from_fn(count, count, |i, k| scale[i] * gram[(i, k)] * scale[k]);
+        let values = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
+        let explained = 2.0 * values.dot(&right) - values.dot(&(self.gram.view((0, 0), (count, count)) * &values));
+        // Rounding of a sum of squares.
+        Some((values, (self.squares - explained).max(1e-12 * self.squares)))
+    }
+
+    /// Points at the ends of all pieces. The first and the last piece continue for their length beyond the logs; from
+    /// there to the limits of the joint the torque is constant.
+    fn points(&self, values: &[f64]) -> Vec<[f64; 2]> {
+        let ([from, to], limits) = (self.range, self.model.model().joints()[self.joint].limits);
+        let length = (to - from) / PIECES as f64;
+        let last = values.len() - 1;
+        let mut points = vec![[from - length, 2.0 * values[0] - values[1]]];
+        points.extend(values.iter().enumerate().map(|(k, torque)| [from + length * k as f64, *torque]));
+        points.push([to + length, 2.0 * values[last] - values[last - 1]]);
+        let margin = MARGIN * (to - from);
+        let (before, behind) = (limits.lower.map(|lower| lower - margin), limits.upper.map(|upper| upper + margin));
+        if let Some(before) = before.filter(|before| *before < points[0][0]) {
+            points.insert(0, [before, points[0][1]]);
+        }
+        if let Some([q, torque]) = points.last().copied()
+            && let Some(behind) = behind.filter(|behind| *behind > q)
+        {
+            points.push([behind, torque]);
+        }
+        points
     }
 }

@@ -1,23 +1,9 @@
 //! A second pass over the first samples of a training log, with the estimated model.
 
-use super::motion_trace::MotionTrace;
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
 use crate::lag::{DELAY_SAMPLES, DelayCheck, TorqueLag, lags_after_pass};
 use dynident_rows::{JointRows, LogError, LogPass, Logs, RawSamples, RegressorModel, Role, RowConsumer, Silent};
-
-struct OnlyTrace<'a>(TraceConsumer<'a>);
-
-impl RowConsumer for OnlyTrace<'_> {
-    fn filtered(&mut self, _: &JointRows<'_>) -> Result<(), LogError> {
-        Ok(())
-    }
-
-    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
-        self.0.raw(samples);
-        Ok(())
-    }
-}
 
 struct SecondPass<'a> {
     delay: DelayCheck<'a>,
@@ -55,17 +41,4 @@ pub fn examine_training(
     let delays = lags_after_pass(second.delay, (logs, settings), index)?;
     let name = logs.recordings[index].name.clone();
     Ok((delays, second.trace.finished(name, Role::Identify, statistics.filtered_rate_hz)))
-}
-
-/// Motion and torque of the first samples of recording number `index`, with base parameters `theta`.
-pub(crate) fn motion_of_training(
-    logs: &Logs<'_>,
-    model: &RegressorModel,
-    index: usize,
-    theta: &[f64],
-) -> Result<MotionTrace, LogError> {
-    let mut second = OnlyTrace(TraceConsumer::new(model, theta));
-    LogPass { most_samples: Some(DELAY_SAMPLES as u64), progress: &Silent, ..logs.pass(model, index) }
-        .run(&mut second)?;
-    Ok(second.0.finished(String::new(), Role::Identify, 1.0).motion)
 }

@@ -12,7 +12,7 @@ use dynident_identification::diagnosis::{
     BeyondLimit, Channels, DescriptionFit, Diagnosis, DuplicateChannel, HeldOutHypothesis, Hypothesis,
     InconsistentTorque, Mistake, Search, UnmodelledPayload,
 };
-use dynident_identification::examination::PositionTable;
+use dynident_identification::examination::PositionTorque;
 use dynident_identification::{GainChoice, IdentificationSettings};
 use dynident_model::Model;
 use dynident_recording::Level;
@@ -328,17 +328,11 @@ fn unmodelled_payload(study: &Study, robot: &StudyRobot, payload: &UnmodelledPay
 }
 
 /// Unexplained torque of a joint that is a function of its position.
-pub(super) fn position_torque(table: &PositionTable) -> CheckFinding {
-    let what = format!(
-        "joint `{}` may have a spring, counterbalance or cable that the study does not state",
-        table.torque.name
-    );
-    let write = table.keys().map(|line| StudyChange { table: "[[torque]]".to_owned(), line });
-    CheckFinding {
-        level: Level::Warning,
-        write: write.to_vec(),
-        ..finding("position-torque", what, table.torque.words())
-    }
+pub(super) fn position_torque(torque: &PositionTorque) -> CheckFinding {
+    let what =
+        format!("joint `{}` may have a spring, counterbalance or cable that the study does not state", torque.name);
+    let write = torque.keys().map(|line| StudyChange { table: "[[torque]]".to_owned(), line });
+    CheckFinding { level: Level::Warning, write: write.to_vec(), ..finding("position-torque", what, torque.words()) }
 }
 
 /// Keys of a payload at `link`, with mass and centre of mass if they have to be stated.
