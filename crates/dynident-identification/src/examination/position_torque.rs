@@ -34,6 +34,10 @@ const RATE_HZ: f64 = 50.0;
 /// Extension beyond the limits of the joint, relative to the range of the logs, so that rounded positions stay inside.
 const MARGIN: f64 = 0.1;
 
+/// Velocity relative to the root mean square velocity of the joint below which a sample is left out: friction at rest
+/// can have any value up to that in motion, and rests at few positions look like a function of the position.
+const REST_SHARE: f64 = 0.05;
+
 /// Least number of samples per unknown.
 const MIN_SAMPLES: usize = 5;
 
@@ -166,7 +170,11 @@ impl<'a> JointFit<'a> {
         let columns = model.layout().joint_columns(joint).len();
         let others = columns + FURTHER_LAWS + 1;
         let unknowns = others + PIECES + 1;
-        let motion = || parts.iter().flat_map(|part| &part.motion);
+        let all = || parts.iter().flat_map(|part| &part.motion);
+        let squares: f64 = all().map(|[_, dq, _]| dq * dq).sum();
+        let rest_below = REST_SHARE * (squares / all().count().max(1) as f64).sqrt();
+        let moves = |[_, dq, _]: &[f64; 3]| dq.abs() > rest_below;
+        let motion = || all().filter(|sample| moves(sample));
         let from = motion().map(|[q, ..]| *q).fold(f64::INFINITY, f64::min);
         let to = motion().map(|[q, ..]| *q).fold(f64::NEG_INFINITY, f64::max);
         let samples = motion().count();
@@ -183,19 +191,20 @@ impl<'a> JointFit<'a> {
             squares: 0.0,
             samples,
         };
-        let mut all = DVector::zeros(unknowns);
+        let mut row = DVector::zeros(unknowns);
         for part in parts {
-            for (own, &[q, dq, ddq]) in part.rows.chunks_exact(columns + 1).zip(&part.motion) {
+            let samples = part.rows.chunks_exact(columns + 1).zip(&part.motion);
+            for (own, &[q, dq, ddq]) in samples.filter(|(_, sample)| moves(sample)) {
                 let torque = own[columns];
-                all.fill(0.0);
-                all.as_mut_slice()[..columns].copy_from_slice(&own[..columns]);
-                all.as_mut_slice()[columns..others - 1].copy_from_slice(&laws.row(dq, torque));
-                all[others - 1] = ddq;
+                row.fill(0.0);
+                row.as_mut_slice()[..columns].copy_from_slice(&own[..columns]);
+                row.as_mut_slice()[columns..others - 1].copy_from_slice(&laws.row(dq, torque));
+                row[others - 1] = ddq;
                 let (piece, share) = fit.piece(q);
-                all[others + piece] = 1.0 - share;
-                all[others + piece + 1] = share;
-                fit.gram.ger(1.0, &all, &all, 1.0);
-                fit.right.axpy(torque, &all, 1.0);
+                row[others + piece] = 1.0 - share;
+                row[others + piece + 1] = share;
+                fit.gram.ger(1.0, &row, &row, 1.0);
+                fit.right.axpy(torque, &row, 1.0);
                 fit.squares += torque * torque;
             }
         }
