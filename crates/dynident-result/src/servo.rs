@@ -111,8 +111,8 @@ impl ServoFile {
                 ("mean_friction", drive.mean_friction),
                 ("torque_limit", drive.torque_limit.unwrap_or(0.0)),
                 ("velocity_limit", drive.velocity_limit.unwrap_or(0.0)),
+                // Read delays are differences and may be negative.
                 ("delay_s", drive.delay_s),
-                ("read_delay_s", drive.read_delay_s),
             ];
             let (key, value) = not_negative.into_iter().find(|(_, value)| *value < 0.0)?;
             Some(format!("{key} = {value} of the drive of joint `{joint}`"))

@@ -64,8 +64,8 @@ fn pyarrow_reads(out: &Path, rows: &[Vec<f64>]) {
     let script = "import json, sys\nimport pyarrow.parquet as pq\n\
         table = pq.read_table(sys.argv[1])\n\
         print(json.dumps({'types': [str(field.type) for field in table.schema], **table.to_pydict()}))\n";
-    let output = Command::new("python3").args(["-c", script, "lerobot/data/chunk-000/episode_000000.parquet"]);
-    let output = output.current_dir(out).output();
+    let table = "lerobot/data/chunk-000/episode_000000.parquet";
+    let output = Command::new("python3").args(["-c", script, table]).current_dir(out).output();
     let Some(output) = output.ok().filter(|output| output.status.success()) else {
         println!("skipped: there is no `python3` with pyarrow");
         return;
