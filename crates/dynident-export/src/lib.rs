@@ -21,6 +21,8 @@
 //!
 //! The error bars of armature, damping, friction, delay and gain of every joint are in a [`SimulatorFile`].
 //!
+//! [`isaac_lab`] writes drives with a position controller as actuators of Isaac Lab.
+//!
 //! [`payload_command`] writes a payload as the command of a controller.
 //!
 //! Functions: `inverse_dynamics`, `gravity`, `coriolis`, `friction` (with constant offsets), `mass_matrix` (with the
@@ -40,6 +42,7 @@ mod exported;
 mod forward;
 mod from_file;
 mod graph;
+mod isaac_lab;
 mod languages;
 mod model_file;
 mod nearest_friction;
@@ -59,6 +62,7 @@ pub use descriptions::{notes_on_omitted, terms_left_out};
 pub use drive_torque::own_friction;
 pub use error::ExportError;
 pub use exported::Exported;
+pub use isaac_lab::{Actuator, isaac_lab};
 pub use model_file::{
     MODEL_SCHEMA, ModelBody, ModelConstant, ModelFile, ModelJoint, ModelLimits, ModelLink, ModelPlacement, ModelTerm,
 };

@@ -1,5 +1,6 @@
 //! Output of `export` as JSON.
 
+use crate::servo_form::ServoForm;
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`ExportFile`].
@@ -17,6 +18,9 @@ pub struct ExportFile {
     pub notes: Vec<String>,
     /// The output file; null if `text` contains the export.
     pub file: Option<String>,
+    /// For drives from commands: what the file does not contain, and the error of the motion simulated with it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub servo_forms: Vec<ServoForm>,
     /// The exported text.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,

@@ -2,6 +2,7 @@
 
 use super::forms::FormError;
 use super::provenance::Provenance;
+use super::servo_form::ServoForm;
 use dynident_export::ModelTerm;
 use dynident_identification::payload::ControllerPayload;
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,9 @@ pub struct ExportValidationFile {
     pub left_out: Vec<ModelTerm>,
     /// The payload of the file with the interval of each value; null for models of the arm.
     pub payload: Option<ControllerPayload>,
+    /// For drives from commands: the error of the motion that is simulated with the file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub servo_forms: Vec<ServoForm>,
     /// Problems of the result.
     pub problems: Vec<String>,
 }

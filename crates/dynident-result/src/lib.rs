@@ -25,6 +25,7 @@ mod read;
 mod seal;
 mod servo;
 mod servo_design;
+mod servo_form;
 mod simulation;
 mod sound;
 mod stored;
@@ -64,6 +65,7 @@ pub use provenance::{InputFile, Provenance};
 pub use read::{MAX_RESULT_BYTES, read_result};
 pub use servo::{SERVO_SCHEMA, ServoBody, ServoDrive, ServoFile, ServoLog, ServoMotion, ServoNumber, ServoScale};
 pub use servo_design::{SERVO_DESIGN_SCHEMA, ServoDesignFile, ServoForecast, ServoForecastValue};
+pub use servo_form::{ServoForm, ServoFormLog};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 pub use test_samples::{TEST_SAMPLES_SCHEMA, TestSamplesFile, TestedLog};
 // Types of lower crates in these files.

@@ -1,7 +1,11 @@
 //! Result of `identify` for logs of commands and positions.
 
+use crate::error::ResultFileError;
 use crate::provenance::Provenance;
+use crate::read::read_result;
+use crate::servo_form::ServoForm;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Name and version of the schema of [`ServoFile`].
 pub const SERVO_SCHEMA: &str = "dynident/servo/1";
@@ -40,6 +44,9 @@ pub struct ServoFile {
     pub bodies: Vec<ServoBody>,
     /// The factor that positions do not contain.
     pub scale: ServoScale,
+    /// The drives in each form of `dynident export`, with their errors; empty in results of older versions.
+    #[serde(default)]
+    pub forms: Vec<ServoForm>,
     /// Values that the motion did not determine, in words.
     pub not_determined: Vec<String>,
     /// Remarks, in words.
@@ -50,6 +57,68 @@ pub struct ServoFile {
     pub provenance: Option<Provenance>,
     /// Computing time, s.
     pub seconds: f64,
+}
+
+impl ServoFile {
+    /// Reads a result of `identify` for commands and positions; `None` if the file has another schema.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is not a result, or has implausible numbers.
+    pub fn read(path: &Path) -> Result<Option<Self>, ResultFileError> {
+        Self::parse(&read_result(path)?, path)
+    }
+
+    /// The same from text; `path` is its name in messages.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(text: &[u8], path: &Path) -> Result<Option<Self>, ResultFileError> {
+        #[derive(Deserialize)]
+        struct Schema {
+            schema: String,
+        }
+        let wrong = |message: String| ResultFileError::Content { path: path.to_owned(), message };
+        let not_a_result = |error: serde_json::Error| {
+            let (line, column) = (error.line(), error.column());
+            wrong(format!("line {line}, column {column}: not a result of `identify`: {error}"))
+        };
+        let Schema { schema } = serde_json::from_slice(text).map_err(not_a_result)?;
+        if schema != SERVO_SCHEMA {
+            return Ok(None);
+        }
+        let file: Self = serde_json::from_slice(text).map_err(not_a_result)?;
+        match file.implausible() {
+            Some(problem) => Err(wrong(format!("{problem}: the file was edited or damaged; identify again"))),
+            None => Ok(Some(file)),
+        }
+    }
+
+    /// The first list of a wrong length, or number that no drive has.
+    fn implausible(&self) -> Option<String> {
+        let joints = self.joints.len();
+        let errors = self.forms.iter().flat_map(|form| &form.logs);
+        let mut lengths = vec![("rotary", self.rotary.len()), ("drives", self.drives.len())];
+        lengths.extend(errors.clone().map(|log| ("model_errors", log.model_errors.len())));
+        lengths.extend(errors.filter_map(|log| Some(("errors", log.errors.as_ref()?.len()))));
+        if let Some((key, found)) = lengths.into_iter().find(|(_, found)| *found != joints) {
+            return Some(format!("{key} has {found} entries for {joints} joints"));
+        }
+        let of_drive = |(joint, drive): (&String, &ServoDrive)| {
+            let not_negative = [
+                ("stiffness", drive.stiffness),
+                ("damping", drive.damping),
+                ("armature", drive.armature),
+                ("mean_friction", drive.mean_friction),
+                ("torque_limit", drive.torque_limit.unwrap_or(0.0)),
+                ("velocity_limit", drive.velocity_limit.unwrap_or(0.0)),
+                // Read delays are differences and may be negative.
+                ("delay_s", drive.delay_s),
+            ];
+            let (key, value) = not_negative.into_iter().find(|(_, value)| *value < 0.0)?;
+            Some(format!("{key} = {value} of the drive of joint `{joint}`"))
+        };
+        self.joints.iter().zip(&self.drives).find_map(of_drive)
+    }
 }
 
 /// A log, simulated from its first position without resets.
@@ -111,6 +180,9 @@ pub struct ServoDrive {
     /// Largest speed of the set point, rad/s (m/s); null without limit.
     #[serde(default)]
     pub profile_speed: Option<f64>,
+    /// Largest speed of the joint in the robot description, rad/s (m/s); null without limit.
+    #[serde(default)]
+    pub velocity_limit: Option<f64>,
     /// Time from a command to its effect, s.
     pub delay_s: f64,
     /// Time from a stamp to the measurement of the position, s.

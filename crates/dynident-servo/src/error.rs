@@ -7,9 +7,9 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ServoError {
-    /// A setting of the fit to commands is outside its range. Write a positive number; for `step_s`, a number within
-    /// the range of the message.
-    #[error("{setting} = {value}: give a positive number; for step_s from 0.0001 to 0.05")]
+    /// A setting of the fit to commands is outside its range. Write a positive number; for `step_s` and
+    /// `physics_step_s`, a number within the range of the message.
+    #[error("{setting} = {value}: give a positive number; for step_s and physics_step_s from 0.0001 to 0.05")]
     Setting {
         /// Name of the setting.
         setting: &'static str,

@@ -8,6 +8,7 @@
 //! without restarts. The better end is refined with accurate time steps.
 
 use crate::error::ServoError;
+use crate::law::DriveLaw;
 use crate::likelihood::{JointLikelihood, joint_likelihood};
 use crate::normal::{PeriodSums, Periods, period_errors, period_sums, symmetric, total_gram};
 use crate::parameters::{Change, FreeParameter, ServoRobot, VariedRobot};
@@ -266,7 +267,7 @@ impl Searcher<'_> {
         for (mut z, restarts) in starts {
             let mut cost = f64::INFINITY;
             for &restart_s in restarts {
-                self.stepping = Stepping { step_s, end_weight: 1.0, restart_s };
+                self.stepping = Stepping { step_s, end_weight: 1.0, restart_s, law: DriveLaw::Identified };
                 let Some(mut now) = self.point(&z) else { continue };
                 iterations += self.descend(&mut z, &mut now, ROUGH_ITERATIONS.min(self.settings.iterations)).0;
                 cost = now.cost;

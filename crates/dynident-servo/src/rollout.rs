@@ -11,6 +11,7 @@
 //! stiffness × h. Dry friction has the sign of `x`. The derivatives are in `sensitivity.rs`.
 
 use crate::command::SetPoint;
+use crate::law::DriveLaw;
 use crate::parameters::VariedRobot;
 use crate::quantity::Quantity;
 use crate::run::Run;
@@ -175,15 +176,23 @@ impl<'a> Rollout<'a> {
             step.commands[joint] = command;
             step.at_rest[joint] = (-(step.v[joint] / drive.stribeck_speed).powi(2)).exp();
             let stiffness = self.run.gain(joint) * drive.stiffness;
-            step.laws.joints[joint] = JointLaw {
+            let friction =
+                drive.coulomb + drive.load_friction * step.loads[joint].abs() + drive.stribeck * step.at_rest[joint];
+            let identified = JointLaw {
                 stiffness,
                 pull: stiffness * (command.mean - step.q[joint] - weight * known * h * step.v[joint]),
                 slope: stiffness * h * weight * weight,
                 limit: drive.torque_limit,
                 damping: drive.damping * weight,
-                friction: drive.coulomb
-                    + drive.load_friction * step.loads[joint].abs()
-                    + drive.stribeck * step.at_rest[joint],
+                friction,
+            };
+            step.laws.joints[joint] = match self.stepping.law {
+                DriveLaw::Identified => identified,
+                DriveLaw::Implicit => identified.with_limited_damping(),
+                DriveLaw::Explicit => {
+                    let torque = stiffness * (command.mean - step.q[joint]) - drive.damping * step.v[joint];
+                    JointLaw::held(torque.clamp(-drive.torque_limit, drive.torque_limit), friction)
+                }
             };
             let row = &step.a[joint * dof..(joint + 1) * dof];
             step.w[joint] = row.iter().zip(&step.v).map(|(a, v)| a * v).sum::<f64>()

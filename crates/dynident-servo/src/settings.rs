@@ -10,6 +10,9 @@ use serde::{Deserialize, Serialize};
 pub struct ServoSettings {
     /// Time step of the simulation, s. The search begins with four times this step. Default 0.0025.
     pub step_s: f64,
+    /// Physics step of the simulator for which `export` estimates the error of its files, s. Default 0.005, the step of
+    /// many tasks of Isaac Lab.
+    pub physics_step_s: f64,
     /// Most steps of the search. Default 60; fits of an SO-101 need 10 to 40.
     pub iterations: usize,
     /// The search ends when the cost, in units of minus twice the log-likelihood, falls by less than this. Default
@@ -61,6 +64,7 @@ impl Default for ServoSettings {
     fn default() -> Self {
         Self {
             step_s: 0.0025,
+            physics_step_s: 0.005,
             iterations: 60,
             tolerance: 0.01,
             period_s: 2.0,
@@ -92,8 +96,10 @@ impl ServoSettings {
     /// # Errors
     /// A value that is not positive, or not a number; a time step outside of 0.1 to 50 ms.
     pub fn validate(&self) -> Result<(), ServoError> {
-        if !(LEAST_STEP_S..=LONGEST_STEP_S).contains(&self.step_s) {
-            return Err(ServoError::Setting { setting: "step_s", value: self.step_s });
+        for (setting, value) in [("step_s", self.step_s), ("physics_step_s", self.physics_step_s)] {
+            if !(LEAST_STEP_S..=LONGEST_STEP_S).contains(&value) {
+                return Err(ServoError::Setting { setting, value });
+            }
         }
         let positive = [
             ("tolerance", self.tolerance),

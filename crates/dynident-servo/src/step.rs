@@ -29,6 +29,18 @@ pub(crate) struct JointLaw {
     pub(crate) friction: f64,
 }
 
+impl JointLaw {
+    /// The law whose limit applies to the sum of the position controller and the damping.
+    pub(crate) fn with_limited_damping(self) -> Self {
+        Self { slope: self.slope + self.damping, damping: 0.0, ..self }
+    }
+
+    /// A constant torque with friction.
+    pub(crate) fn held(torque: f64, friction: f64) -> Self {
+        Self { pull: torque, limit: f64::INFINITY, friction, ..Self::default() }
+    }
+}
+
 /// How a joint moves in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) enum Motion {

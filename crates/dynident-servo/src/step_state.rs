@@ -2,6 +2,7 @@
 
 use crate::command::StepCommand;
 use crate::floor::PointHeight;
+use crate::law::DriveLaw;
 use crate::step::{Contact, JointLaw, Mode, StepLaws};
 
 /// How a simulation steps.
@@ -14,12 +15,19 @@ pub(crate) struct Stepping {
     pub(crate) end_weight: f64,
     /// The simulation restarts from the measured motion after this time, s; never if infinite.
     pub(crate) restart_s: f64,
+    /// How the torque of the drives is computed. Derivatives are those of [`DriveLaw::Identified`].
+    pub(crate) law: DriveLaw,
 }
 
 impl Stepping {
     /// Accurate steps without restarts.
     pub(crate) fn accurate(step_s: f64) -> Self {
-        Self { step_s, end_weight: 0.5, restart_s: f64::INFINITY }
+        Self::of_law(DriveLaw::Identified, step_s)
+    }
+
+    /// Steps of a simulator with this law, without restarts.
+    pub(crate) fn of_law(law: DriveLaw, step_s: f64) -> Self {
+        Self { step_s, end_weight: law.end_weight(), restart_s: f64::INFINITY, law }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Motion of a fitted robot along recorded commands.
 
 use crate::error::ServoError;
+use crate::law::DriveLaw;
 use crate::parameters::{ServoRobot, VariedRobot};
 use crate::rollout::Rollout;
 use crate::run::Run;
@@ -12,10 +13,23 @@ use crate::step_state::Stepping;
 /// # Errors
 /// A run that does not fit the robot.
 pub fn simulate(robot: &ServoRobot, run: &Run, step_s: f64) -> Result<Option<Vec<Vec<f64>>>, ServoError> {
+    simulate_with_law(robot, run, step_s, DriveLaw::Identified)
+}
+
+/// As [`simulate`] with the steps of a simulator that computes the torque of the drives by `law`.
+///
+/// # Errors
+/// A run that does not fit the robot.
+pub fn simulate_with_law(
+    robot: &ServoRobot,
+    run: &Run,
+    step_s: f64,
+    law: DriveLaw,
+) -> Result<Option<Vec<Vec<f64>>>, ServoError> {
     run.validate(robot.model.dof())?;
     let varied = VariedRobot::new(robot, &[], &[])?;
     let mut positions = vec![vec![0.0; run.times_s.len()]; run.positions.len()];
-    let ended = Rollout::new(&varied, run, Stepping::accurate(step_s), false).is_some_and(|rollout| {
+    let ended = Rollout::new(&varied, run, Stepping::of_law(law, step_s), false).is_some_and(|rollout| {
         rollout.simulate(|predicted| positions[predicted.joint][predicted.sample] = predicted.position)
     });
     Ok(ended.then_some(positions))

@@ -348,6 +348,7 @@ impl Study {
                 return Err(at()(StudyError::missing("neither torque nor command", fix)));
             }
         }
+        self.check_servo_gains()?;
         self.drive.validate()?;
         self.check_temperature()?;
         for (index, coupling) in self.coupling.iter().enumerate() {
@@ -372,6 +373,18 @@ impl Study {
         }
         self.motion.validate().map_err(StudyError::at("[motion]"))?;
         self.estimator.validate()
+    }
+
+    /// Checks that only logs that are fitted to commands state the gain of their servos.
+    fn check_servo_gains(&self) -> Result<(), StudyError> {
+        let Some(log) = self.log.iter().find(|log| log.servo_gain.is_some() && !self.fits_commands()) else {
+            return Ok(());
+        };
+        Err(StudyError::conflict(
+            format!("servo_gain of the log {}", log.file.display()),
+            "this study is identified from torque, which has no servo gain; remove servo_gain, or describe the servos in \
+             [drive.servo] to identify from commands",
+        ))
     }
 
     /// Checks that temperature-dependent friction is stated and the estimator supports it.

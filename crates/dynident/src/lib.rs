@@ -86,15 +86,16 @@ pub use jobs::compare::compare;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::export::{
-    EXPORT_VALIDATION_SUFFIX, ExportSettings, export_model, export_payload, export_payload_of, export_result,
-    export_simulator, export_simulator_of, export_stored, export_validation, payload_validation, selected_payload,
-    table_validation,
+    EXPORT_VALIDATION_SUFFIX, ExportSettings, ServoExport, ServoTarget, export_model, export_payload,
+    export_payload_of, export_result, export_servos, export_simulator, export_simulator_of, export_stored,
+    export_validation, payload_validation, selected_payload, servo_validation, table_validation,
 };
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{
     CorrectedDescription, InspectSettings, inspect, inspect_robot, inspect_with, mended, mended_robot,
 };
 pub use jobs::iterate::{IterationWatch, MotionObserver, RobotMaker, iterate_study, iterate_with_robot};
+pub use jobs::lerobot::{LeRobotActions, lerobot_actions};
 pub use jobs::log::log_contents;
 pub use jobs::new_study::{NewStudy, NewStudySettings, new_study, new_study_with};
 pub use jobs::options::RunOptions;

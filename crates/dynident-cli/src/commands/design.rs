@@ -1,4 +1,4 @@
-use super::design_commands::design_commands;
+use super::design_commands::{CommandForms, design_commands, lerobot_files};
 use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, interruption, json, known_in, message_of, pretty_json, refuse_overwriting};
@@ -6,7 +6,8 @@ use crate::{Verdict, summary, terminal};
 use clap::ValueEnum;
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{
-    ExportError, Sampled, UrScriptSettings, fitness_csv, ros2_joint_trajectory, trajectory_csv, urscript, waypoints_csv,
+    ExportError, LEROBOT_FILES, Sampled, UrScriptSettings, fitness_csv, ros2_joint_trajectory, trajectory_csv,
+    urscript, waypoints_csv,
 };
 use dynident::iteration::StopSignal;
 use dynident::{
@@ -71,7 +72,8 @@ impl Options {
         let given = [
             ("--check", self.check.is_some()),
             ("--check-log", self.check_log.is_some()),
-            ("--to", !self.to.is_empty()),
+            ("--to urscript", self.to.contains(&Format::Urscript)),
+            ("--to waypoints", self.to.contains(&Format::Waypoints)),
             ("--rate-hz", self.rate_hz.is_some()),
         ];
         given.into_iter().find_map(|(name, is_given)| is_given.then_some(name))
@@ -86,6 +88,8 @@ enum Format {
     Urscript,
     /// Time and positions, CSV.
     Waypoints,
+    /// LeRobot data set of version 2.1 with one episode, in the folder lerobot.
+    Lerobot,
 }
 
 fn rate(text: &str) -> Result<f64, String> {
@@ -99,10 +103,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         if let Some(option) = options.only_for_torque() {
             return Err(format!("{option} needs a study with torque, and this one has [drive.servo]: remove it"));
         }
+        let forms =
+            CommandForms { ros2: options.to.contains(&Format::Ros2), lerobot: options.to.contains(&Format::Lerobot) };
         return design_commands(
             &mut study,
             (&options.study, &options.out),
             (options.data.as_deref(), options.seed),
+            forms,
             context,
         );
     }
@@ -110,7 +117,8 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         study.design.get_or_insert_default().search.seed = seed;
     }
     let given = options.check.is_some() || options.check_log.is_some();
-    let names: Vec<&str> = FILES.into_iter().filter(|name| !(given && *name == TRAJECTORY)).collect();
+    let names: Vec<&str> =
+        FILES.into_iter().chain(LEROBOT_FILES).filter(|name| !(given && *name == TRAJECTORY)).collect();
     let sections: &[&str] = if options.check_log.is_some() {
         &["robot", "torque", "design", "log"]
     } else {
@@ -136,14 +144,15 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if interruption::pressed() {
         terminal::remark("search stopped: this is the best motion found");
     }
-    let files = files(&outcome, options)?;
+    let files = files(&outcome, &study, options, context)?;
     let mut set = OutputSet::new(&options.out).file("design.json", pretty_json(&outcome.file)?);
     for (name, contents) in &files {
         set = set.file(name, contents.as_slice());
     }
     // Remove files of an earlier design.
     let is_checked = outcome.file.given.is_some();
-    let others = OPTIONAL_FILES.iter().filter(|name| !files.iter().any(|(written, _)| written == *name));
+    let others =
+        OPTIONAL_FILES.iter().chain(&LEROBOT_FILES).filter(|name| !files.iter().any(|(written, _)| written == *name));
     for name in others.filter(|name| !(is_checked && **name == TRAJECTORY)) {
         set = set.absent(name);
     }
@@ -177,7 +186,12 @@ fn writable_formats(options: &Options, study: &Study) -> Result<(), String> {
 const UR_JOINTS: usize = 6;
 
 /// The files next to design.json, all generated before the first is written.
-fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str, Vec<u8>)>, String> {
+fn files(
+    outcome: &DesignOutcome,
+    study: &Study,
+    options: &Options,
+    context: &Context,
+) -> Result<Vec<(&'static str, Vec<u8>)>, String> {
     let file = &outcome.file;
     let at = |rate_hz: f64, write: &dyn Fn(&Sampled<'_>) -> Result<String, String>| {
         let (times_s, motion) = outcome.sampled(rate_hz);
@@ -201,16 +215,22 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
     }
     // A motion that breaks limits must not be sent to the robot.
     for format in options.to.iter().filter(|_| file.feasible) {
-        files.push(match format {
-            Format::Ros2 => ("trajectory.ros2.yaml", plain(ros2_joint_trajectory)?),
-            Format::Waypoints => ("waypoints.csv", plain(waypoints_csv)?),
+        match format {
+            Format::Ros2 => files.push(("trajectory.ros2.yaml", plain(ros2_joint_trajectory)?)),
+            Format::Waypoints => files.push(("waypoints.csv", plain(waypoints_csv)?)),
+            Format::Lerobot => {
+                let (_, motion) = outcome.sampled(rate_hz);
+                let positions: Vec<Vec<f64>> = motion.q.chunks(motion.samples).map(<[f64]>::to_vec).collect();
+                let of_study = (study, &*options.study);
+                files.extend(lerobot_files(of_study, &outcome.robot, (&file.name[..], rate_hz), &positions, context)?);
+            }
             Format::Urscript => {
                 let mut settings = UrScriptSettings::default();
                 settings.rate_hz = options.rate_hz.unwrap_or(settings.rate_hz);
                 let write = |sampled: &Sampled<'_>| urscript(sampled, &settings).map_err(|error| error.to_string());
-                ("trajectory.script", at(settings.rate_hz, &write)?)
+                files.push(("trajectory.script", at(settings.rate_hz, &write)?));
             }
-        });
+        }
     }
     Ok(files)
 }

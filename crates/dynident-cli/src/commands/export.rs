@@ -3,10 +3,11 @@ use super::{Context, json, known_in, message_of, pretty_json, result_file};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::export::{CodeOptions, ControllerBrand, Exported, Target};
-use dynident::result::{EXPORT_SCHEMA, ExportFile, ExportValidationFile};
+use dynident::result::{EXPORT_SCHEMA, ExportFile, ExportValidationFile, ServoFile, ServoForm};
 use dynident::{
-    EXPORT_VALIDATION_SUFFIX, ExportSettings, OutputSet, ResultFile, export_payload_of, export_result,
-    export_simulator_of, export_stored, export_validation, payload_validation, selected_payload, study_inputs,
+    EXPORT_VALIDATION_SUFFIX, ExportSettings, OutputSet, ResultFile, ServoTarget, Study, export_payload_of,
+    export_result, export_servos, export_simulator_of, export_stored, export_validation, payload_validation,
+    selected_payload, servo_validation, study_inputs,
 };
 use std::path::{Path, PathBuf};
 
@@ -45,6 +46,13 @@ pub(crate) struct Options {
     programs: ProgramOptions,
 }
 
+impl Options {
+    /// Name of the output file; empty for standard output.
+    fn file_name(&self) -> String {
+        self.out.as_ref().map_or_else(String::new, |out| file_name(out))
+    }
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 enum Form {
     /// C99, one header.
@@ -73,6 +81,8 @@ enum Form {
     Ros2Yaml,
     /// All numbers of the model.
     Json,
+    /// Actuators of Isaac Lab, Python; for drives that were fitted to commands.
+    IsaacLab,
     /// Armature, damping, friction, delay and gain of every joint with error bars, for a simulator: JSON.
     Simulator,
     /// The same as a Markdown table.
@@ -92,6 +102,8 @@ enum Kind {
     SimulatorJson,
     SimulatorTable,
     Payload(ControllerBrand),
+    /// Only for drives that were fitted to commands.
+    Drives,
 }
 
 impl Form {
@@ -120,6 +132,7 @@ impl Form {
             Self::Sdf => Kind::Model(Target::Sdf),
             Self::Ros2Yaml => Kind::Model(Target::Ros2Yaml),
             Self::Json => Kind::Model(Target::Json),
+            Self::IsaacLab => Kind::Drives,
             Self::Simulator => Kind::SimulatorJson,
             Self::SimulatorTable => Kind::SimulatorTable,
             Self::PayloadUr => Kind::Payload(ControllerBrand::UniversalRobots),
@@ -147,13 +160,17 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         let study = study.as_ref().map(|(study, path)| (study, *path));
         study.ok_or_else(|| "--study STUDY.toml is missing: state the study of the result".to_owned())
     };
+    let code = CodeOptions { float32: options.float32, regressor: options.regressor, step_width: options.step_width };
+    if let Some(file) = ServoFile::read(&result).map_err(message_of)? {
+        let study = study.as_ref().map(|(study, path)| (study, *path));
+        return drives(&file, &result, study, (options, code), context);
+    }
     let read = if options.accept_edited { ResultFile::read_edited } else { ResultFile::read };
     let stored = read(&result).map_err(message_of)?;
-    let drives = || -> Result<_, String> {
+    let simulator = || -> Result<_, String> {
         let (study, path) = with_study()?;
         export_simulator_of(&stored, &result, study, path, data).map_err(known_in(path))
     };
-    let code = CodeOptions { float32: options.float32, regressor: options.regressor, step_width: options.step_width };
     if !matches!(options.to.kind(), Kind::Model(_)) && code != CodeOptions::default() {
         return Err("--float32, --regressor and --step-width are options of code: omit them".to_owned());
     }
@@ -167,22 +184,67 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
                 None => export_stored(&stored, &result, form).map_err(message_of)?,
             }
         }
-        Kind::SimulatorJson => drives()?.json().map_err(|error| error.to_string())?,
-        Kind::SimulatorTable => drives()?.table(),
+        Kind::SimulatorJson => simulator()?.json().map_err(|error| error.to_string())?,
+        Kind::SimulatorTable => simulator()?.table(),
         Kind::Payload(reader) => {
             export_payload_of(&stored, &result, options.payload.as_deref(), reader).map_err(message_of)?
         }
+        Kind::Drives => {
+            return Err(format!(
+                "--to {}: {} is a result of torque; this form needs drives that were fitted to commands ([drive.servo])",
+                options.to.name(),
+                result.display()
+            ));
+        }
     };
-    let name = options.out.as_ref().map_or_else(String::new, |out| file_name(out));
+    let name = options.file_name();
     let validation = match options.to.kind() {
         Kind::Model(target) => Some(export_validation(&stored, target, &name, &exported.text)),
-        Kind::SimulatorJson | Kind::SimulatorTable => None,
+        Kind::SimulatorJson | Kind::SimulatorTable | Kind::Drives => None,
         Kind::Payload(_) => {
             let payload = selected_payload(&stored, &result, options.payload.as_deref()).map_err(message_of)?;
             Some(payload_validation(&stored, payload.controller.as_ref(), &options.to.name(), &name, &exported.text))
         }
     };
-    write(options, context, exported, validation.as_ref())
+    write(options, context, exported, Vec::new(), validation.as_ref())
+}
+
+/// Exports the drives of a result of commands and positions.
+fn drives(
+    file: &ServoFile,
+    result: &Path,
+    study: Option<(&Study, &Path)>,
+    (options, code): (&Options, CodeOptions),
+    context: &Context,
+) -> Result<Verdict, String> {
+    let form = options.to.name();
+    let target = match options.to {
+        Form::IsaacLab => ServoTarget::IsaacLab,
+        Form::Mjcf => ServoTarget::Mjcf,
+        Form::Urdf => ServoTarget::Urdf,
+        _ => {
+            return Err(format!(
+                "--to {form}: {} has drives that were fitted to commands and no torque model: use --to isaac-lab, mjcf or \
+                 urdf, or the file itself, which is JSON with all values",
+                result.display()
+            ));
+        }
+    };
+    for (option, is_given) in [
+        ("--float32, --regressor and --step-width", code != CodeOptions::default()),
+        ("--payload", options.payload.is_some()),
+    ] {
+        if is_given {
+            return Err(format!("{option}: not for drives that were fitted to commands; omit it"));
+        }
+    }
+    let made = export_servos(file, result, target, study, options.data.as_deref());
+    let made = made.map_err(|error| match study {
+        Some((_, path)) => known_in(path)(error),
+        None => message_of(error),
+    })?;
+    let validation = servo_validation(file, &made.forms, &form, &options.file_name(), &made.exported.text);
+    write(options, context, made.exported, made.forms, Some(&validation))
 }
 
 fn file_name(path: &Path) -> String {
@@ -202,6 +264,7 @@ fn write(
     options: &Options,
     context: &Context,
     exported: Exported,
+    servo_forms: Vec<ServoForm>,
     validation: Option<&ExportValidationFile>,
 ) -> Result<Verdict, String> {
     let Exported { text, notes } = exported;
@@ -221,7 +284,7 @@ fn write(
         let file = options.out.as_ref().map(|path| path.display().to_string());
         let text = options.out.is_none().then_some(text);
         let schema = EXPORT_SCHEMA.to_owned();
-        terminal::print_document(&json(&ExportFile { schema, target, notes, file, text })?)?;
+        terminal::print_document(&json(&ExportFile { schema, target, notes, file, servo_forms, text })?)?;
         return Ok(Verdict::Good);
     }
     // A problem of the result is shown even with --quiet.

@@ -1,6 +1,6 @@
 use super::text::{table, wrapped};
 use core::fmt::Write;
-use dynident::result::{ServoFile, ServoLog, ServoNumber};
+use dynident::result::{ServoFile, ServoForm, ServoLog, ServoNumber};
 use dynident::verdict_words;
 use std::path::Path;
 
@@ -41,6 +41,7 @@ pub(crate) fn servo(file: &ServoFile, out: &Path, models: &[&str]) -> String {
         text,
         "  in Nm, rad, s, kg (N, m for a slide), ± 95 % at this scale; in brackets: not determined by the motion"
     );
+    text += &forms(file);
     for note in &file.notes {
         text += &wrapped(&format!("note: {note}"), 2);
     }
@@ -48,6 +49,24 @@ pub(crate) fn servo(file: &ServoFile, out: &Path, models: &[&str]) -> String {
         ["result.json", "report.html"].iter().chain(models).map(|name| out.join(name).display().to_string()).collect();
     text += &wrapped(&format!("written: {}", files.join(", ")), 2);
     text
+}
+
+/// The errors of exported files, next to those of the identified drives.
+fn forms(file: &ServoFile) -> String {
+    let Some(model) = file.forms.iter().find_map(ServoForm::mean_errors).map(|[_, model]| model) else {
+        return String::new();
+    };
+    let form = |form: &ServoForm| {
+        let error = form.mean_errors().map_or_else(|| "diverges".to_owned(), |[own, _]| format!("{:.1}", 1e3 * own));
+        format!("{} {error}", form.form)
+    };
+    let forms: Vec<String> = file.forms.iter().map(form).collect();
+    let line = format!(
+        "error with the drives of exported files, mrad (mm), mean over joints and logs: {}; identified drives {:.1}",
+        forms.join(", "),
+        1e3 * model
+    );
+    wrapped(&line, 2)
 }
 
 fn estimate(value: &ServoNumber) -> String {

@@ -3,8 +3,12 @@
 
 use super::common::{repository, run_in};
 use dynident::excitation::Motion;
-use dynident::excitation::export::{Sampled, ros2_joint_trajectory, trajectory_csv, waypoints_csv};
-use dynident::export::{ControllerBrand, Exported, PayloadBody, RobotModel, Target, export, payload_command};
+use dynident::excitation::export::{
+    LeRobotEpisode, Sampled, lerobot_episode, ros2_commands, ros2_joint_trajectory, trajectory_csv, waypoints_csv,
+};
+use dynident::export::{
+    Actuator, ControllerBrand, Exported, PayloadBody, RobotModel, Target, export, isaac_lab, payload_command,
+};
 use dynident::model::terms::{Declared, DeclaredLaw, Expression, JointNames, Offset, TorqueTerm, Viscous};
 use dynident::model::{
     InertialParameters, JointChange, LinkChange, Model, link_changes, load_robot, read_mjcf, read_sdf, read_urdf,
@@ -413,6 +417,65 @@ fn rewritten(name: &str) {
     assert_eq!(read_sdf(&written).unwrap().model.joints()[0].name, read.model.joints()[0].name);
 }
 
+/// The texts of a LeRobot data set: one document, or one in each line.
+fn data_set_has_names(name: &str, joints: &[String]) {
+    let actions = vec![vec![0.5]; joints.len()];
+    let episode = LeRobotEpisode { robot_type: name, task: name, rate_hz: 50.0, names: joints, actions: &actions };
+    let files = lerobot_episode(&episode).unwrap();
+    let texts: Vec<&str> = files[..4].iter().map(|(_, contents)| core::str::from_utf8(contents).unwrap()).collect();
+    for text in &texts {
+        assert_visible("lerobot", text);
+    }
+    let info: Value = serde_json::from_str(texts[0]).unwrap();
+    assert_eq!((&info["features"]["action"]["names"], &info["robot_type"]), (&serde_json::json!(joints), &name.into()));
+    assert!(texts[1..].iter().all(|text| text.lines().count() == 1));
+    assert_eq!(serde_json::from_str::<Value>(texts[1]).unwrap()["task"], name);
+}
+
+/// Actuators of Isaac Lab: names are strings, and notes are comments.
+#[test]
+fn names_are_no_code_in_actuators() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = names();
+    for (number, name) in names.iter().enumerate() {
+        let actuator = Actuator {
+            joint: name.clone(),
+            stiffness: 10.0,
+            damping: 0.5,
+            armature: 0.01,
+            friction: 0.1,
+            effort_limit: None,
+            velocity_limit: None,
+            delay_s: 0.01,
+        };
+        let text = isaac_lab(name, &[actuator], 0.005, vec![format!("From the study {name}")]).text;
+        assert_visible("isaac-lab", &text);
+        std::fs::write(folder.path().join(format!("drives{number}.py")), text).unwrap();
+        std::fs::write(folder.path().join(format!("drives{number}.name")), name).unwrap();
+    }
+    if has("python3", &["--version"]) {
+        std::fs::write(folder.path().join("look.py"), LOOK_AT_DRIVES).unwrap();
+        let told = run(folder.path(), "python3", &["look.py"]);
+        assert_eq!(told.trim(), format!("{} modules", names.len()));
+    }
+}
+
+/// Reads every module without running it: its joint is the name, and everything else is that of the first.
+const LOOK_AT_DRIVES: &str = r#"
+import ast, glob
+files = sorted(glob.glob("drives*.py"))
+found = set()
+for file in files:
+    tree = ast.parse(open(file, "rb").read(), file)
+    drives = next(node.value for node in tree.body if isinstance(node, ast.Assign) and node.targets[0].id == "DRIVES")
+    [key] = drives.keys
+    assert key.value.encode() == open(file.replace(".py", ".name"), "rb").read(), file
+    key.value = ""
+    found.add(ast.dump(tree))
+assert len(found) == 1, len(found)
+print(len(files), "modules")
+"#;
+
 #[test]
 fn tables_and_json_hold_names_as_names() {
     let mut tables = 0;
@@ -426,6 +489,10 @@ fn tables_and_json_hold_names_as_names() {
         assert_visible("ros2", &trajectory);
         assert_eq!(trajectory.lines().count(), 4 + 2 + 1 + 3 * 4, "{trajectory}");
         assert_visible("trajectory.csv", &trajectory_csv(&sampled).unwrap());
+        let commands = ros2_commands(&joints, &[0.0, 0.5], &[vec![0.0; 2], vec![1.0; 2]]).unwrap();
+        assert_visible("commands.ros2.yaml", &commands);
+        assert_eq!(commands.lines().count(), 4 + 2 + 1 + 2 * 2, "{commands}");
+        data_set_has_names(name, &joints);
         let waypoints = waypoints_csv(&sampled).unwrap();
         assert_visible("waypoints.csv", &waypoints);
         let mut table = csv::Reader::from_reader(waypoints.as_bytes());

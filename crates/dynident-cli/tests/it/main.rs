@@ -27,6 +27,7 @@ mod programs;
 mod reproduce;
 mod robots_outside;
 mod schemas;
+mod servo;
 mod sources;
 mod verdict;
 mod view;

@@ -1,13 +1,15 @@
 //! **Export**: a sampled motion as tables and programs for robots, one format per file.
 
 mod fitness_csv;
+mod lerobot;
 mod ros2;
 mod trajectory_csv;
 mod urscript;
 mod waypoints;
 
 pub use fitness_csv::fitness_csv;
-pub use ros2::ros2_joint_trajectory;
+pub use lerobot::{EpisodeFiles, LEROBOT_FILES, LeRobotEpisode, lerobot_episode};
+pub use ros2::{ros2_commands, ros2_joint_trajectory};
 pub use trajectory_csv::trajectory_csv;
 pub use urscript::{UrScriptSettings, urscript};
 pub use waypoints::waypoints_csv;
@@ -56,6 +58,21 @@ pub enum ExportError {
     SixJoints {
         /// Number of joints of the robot.
         joints: usize,
+    },
+    /// This program was compiled without the writer of this format. Use the released program, or build with the feature
+    /// that the message names.
+    #[error("this build does not write {format}: build with the feature `{feature}` of dynident-excitation")]
+    NotBuilt {
+        /// The format.
+        format: &'static str,
+        /// The required feature.
+        feature: &'static str,
+    },
+    /// The table of a data set cannot be encoded. The motion is not the cause; report the message and the study.
+    #[error("the Parquet table cannot be written: {message}; this is a bug in Dynident: please report it")]
+    Parquet {
+        /// Message of the encoder.
+        message: String,
     },
     /// A setting of the export is outside its range. Write a value within the range that the message names.
     #[error("{setting} = {value}: give {needed}")]

@@ -15,7 +15,7 @@ pub(crate) use cpp::cpp_header;
 pub(crate) use jax::jax_module;
 pub(crate) use matlab::matlab_function;
 pub(crate) use pinocchio::pinocchio_module;
-pub(crate) use python::python_module;
+pub(crate) use python::{python_module, python_string};
 pub(crate) use rust::rust_module;
 
 use crate::equation::Equation;

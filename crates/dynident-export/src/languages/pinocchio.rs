@@ -1,7 +1,7 @@
 //! Python with Pinocchio: a program that builds the model, with the torque of the drives from the graph.
 
 use super::Source;
-use super::python::{ArraySyntax, write_function, write_helpers};
+use super::python::{ArraySyntax, python_string, write_function, write_helpers};
 use crate::drive_torque::drive_inertia;
 use crate::nearest_friction::NearestFriction;
 use core::fmt::Write;
@@ -86,7 +86,7 @@ fn joint_entry(source: &Source<'_>, index: usize) -> String {
     let inertia = inertial.inertia_at_com().map_or([[0.0; 3]; 3], |inertia| inertia.0);
     format!(
         "({}, {}, {}, {:?}, {:?}, {:?}, {:?}, {com:?}, {inertia:?}, {}, {}, {}, {}, {armature:?}, {:?}, {:?})",
-        quoted(&joint.name),
+        python_string(&joint.name),
         joint.parent.map_or(-1, |parent| parent as i64),
         if joint.is_rotary() { "True" } else { "False" },
         joint.placement.rotation.0,
@@ -100,16 +100,6 @@ fn joint_entry(source: &Source<'_>, index: usize) -> String {
         friction.viscous,
         friction.coulomb,
     )
-}
-
-/// A string of Python: printable ASCII, everything else escaped.
-fn quoted(text: &str) -> String {
-    let escaped = text.chars().map(|c| match c {
-        '"' | '\\' => format!("\\{c}"),
-        ' '..='~' => c.to_string(),
-        _ => format!("\\U{:08x}", u32::from(c)),
-    });
-    format!("\"{}\"", escaped.collect::<String>())
 }
 
 /// Positions of the joints of the tree from those of the independent joints: `EXPANSION q + OFFSET`.

@@ -45,6 +45,16 @@ impl Syntax for ArraySyntax {
     }
 }
 
+/// A string of Python: printable ASCII, everything else escaped.
+pub(crate) fn python_string(text: &str) -> String {
+    let escaped = text.chars().map(|c| match c {
+        '"' | '\\' => format!("\\{c}"),
+        ' '..='~' => c.to_string(),
+        _ => format!("\\U{:08x}", u32::from(c)),
+    });
+    format!("\"{}\"", escaped.collect::<String>())
+}
+
 pub(crate) fn python_module(source: &Source<'_>) -> String {
     let syntax = ArraySyntax { library: "np" };
     let mut text = source.comment("#");

@@ -5,6 +5,7 @@
 mod common;
 mod compiled;
 mod descriptions;
+mod isaac_lab;
 mod memory;
 mod parameters;
 mod refused;

@@ -1,6 +1,6 @@
 //! Converts columns to joint values: unit, sign, scale, matrix, offset.
 
-use super::channels::ChannelGroup;
+use super::channels::{ChannelGroup, ColumnRef};
 use super::units::{Quantity, si_factor};
 use crate::error::FormatError;
 
@@ -17,13 +17,7 @@ impl Mapping {
         let key = quantity.key();
         let joints = names.len();
         let columns = group.columns_of(key, names)?.len();
-        let factor = |column: usize| {
-            let unit = group.unit.as_ref().and_then(|unit| unit.at(column));
-            let unit = unit.map_or(Some(1.0), |unit| si_factor(&unit, quantity)).unwrap_or(1.0);
-            let scale = group.scale.as_ref().and_then(|scale| scale.at(column)).unwrap_or(1.0);
-            let sign = group.sign.as_ref().and_then(|sign| sign.at(column)).unwrap_or(1.0);
-            unit * scale * sign
-        };
+        let factor = |column: usize| group.factor(quantity, column);
         let matrix = match (&group.matrix, &group.inverse_matrix) {
             (Some(matrix), _) => Some(matrix.clone()),
             (None, Some(matrix)) => Some(inverse(matrix).ok_or_else(|| {
@@ -72,6 +66,46 @@ impl Mapping {
     }
 }
 
+impl ChannelGroup {
+    /// Factor from a column to SI: unit, scale and sign.
+    fn factor(&self, quantity: Quantity, column: usize) -> f64 {
+        let unit = self.unit.as_ref().and_then(|unit| unit.at(column));
+        let unit = unit.map_or(Some(1.0), |unit| si_factor(&unit, quantity)).unwrap_or(1.0);
+        let scale = self.scale.as_ref().and_then(|scale| scale.at(column)).unwrap_or(1.0);
+        let sign = self.sign.as_ref().and_then(|sign| sign.at(column)).unwrap_or(1.0);
+        unit * scale * sign
+    }
+
+    /// The columns that give these values of the joints, in SI, by the inverse of the conversion: `(joint - offset) /
+    /// (scale · sign · unit)`, with the names of the columns.
+    ///
+    /// # Errors
+    /// Another number of columns than of joints; a matrix, or a factor of zero.
+    pub fn recorded(
+        &self,
+        quantity: Quantity,
+        joints: &[String],
+        values: &[Vec<f64>],
+    ) -> Result<Vec<(ColumnRef, Vec<f64>)>, FormatError> {
+        let key = quantity.key();
+        self.validate(quantity, joints)?;
+        if self.matrix.is_some() || self.inverse_matrix.is_some() {
+            let problem = "values of the joints are converted to columns by unit, scale, sign and offset only";
+            return Err(FormatError::new(format!("{key}.matrix"), problem, "remove the matrix for this command"));
+        }
+        let columns = self.columns_of(key, joints)?;
+        let converted = columns.into_iter().zip(values).enumerate().map(|(joint, (column, values))| {
+            let offset = self.offset.as_ref().and_then(|offset| offset.at(joint)).unwrap_or(0.0);
+            let factor = self.factor(quantity, joint);
+            if factor == 0.0 {
+                return Err(FormatError::new(format!("{key}.scale"), "a factor of zero", "give another factor"));
+            }
+            Ok((column, values.iter().map(|value| (value - offset) / factor).collect()))
+        });
+        converted.collect()
+    }
+}
+
 /// Gauss-Jordan inversion with row pivoting; `None` if a pivot is below 1e-12 of the largest entry.
 fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let n = matrix.len();
@@ -113,6 +147,25 @@ mod tests {
 
     fn joints(count: usize) -> Vec<String> {
         (0..count).map(|joint| joint.to_string()).collect()
+    }
+
+    #[test]
+    fn recorded_columns_give_the_values_of_the_joints() {
+        let text = "columns = [\"action[a]\", \"action[b]\"]\nunit = [\"deg\", \"rad\"]\nscale = [1.0, 0.02]\nsign = [-1, 1]\noffset = [0.25, -0.5]";
+        let group = group(text);
+        let values = vec![vec![0.0, 1.5], vec![-0.5, 1.5]];
+        let recorded = group.recorded(Quantity::Command, &joints(2), &values).unwrap();
+        assert_eq!(recorded[1], (ColumnRef::Name("action[b]".into()), vec![0.0, 100.0]));
+        let columns: Vec<Vec<f64>> = recorded.into_iter().map(|(_, values)| values).collect();
+        let mut out = vec![Vec::new(); 2];
+        Mapping::new(&group, Quantity::Command, &joints(2)).unwrap().apply(&columns, &mut out);
+        for (out, value) in out.iter().flatten().zip(values.iter().flatten()) {
+            // A division and a multiplication of numbers near one.
+            assert!((out - value).abs() < 1e-15, "{out} {value}");
+        }
+        let coupled = ChannelGroup { matrix: Some(vec![vec![1.0, 0.0], vec![1.0, 1.0]]), ..group };
+        let refused = coupled.recorded(Quantity::Command, &joints(2), &values).unwrap_err();
+        assert!(refused.to_string().contains("command.matrix"), "{refused}");
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod figure_files;
 pub(crate) mod identify;
 pub(crate) mod inspect;
 pub(crate) mod iterate;
+pub(crate) mod lerobot;
 pub(crate) mod log;
 mod log_summary;
 pub(crate) mod new_study;

@@ -52,6 +52,7 @@ mod same_result;
 mod scales;
 mod sdf;
 mod servo;
+mod servo_export;
 mod simulated_loop;
 mod spoilt_logs;
 mod synthetic_truth;

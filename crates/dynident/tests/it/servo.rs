@@ -5,11 +5,11 @@ use dynident_servo::{Drive, Run, ServoRobot, simulate};
 use std::fmt::Write;
 use std::path::Path;
 
-const OPTIONS: RunOptions<'_> = RunOptions { data: None, threads: 2, progress: &Silent };
+pub(crate) const OPTIONS: RunOptions<'_> = RunOptions { data: None, threads: 2, progress: &Silent };
 const COUNT: f64 = core::f64::consts::TAU / 4096.0;
 
 /// Writes a log of a simulated arm with two servos.
-fn write_log(path: &Path, phase: f64) {
+pub(crate) fn write_log(path: &Path, phase: f64) {
     let model = dynident::model::load_robot(dynident_testing::repository("robots/planar2r.urdf")).unwrap().model;
     let drive = Drive {
         stiffness: 300.0,
@@ -47,7 +47,7 @@ fn write_log(path: &Path, phase: f64) {
     std::fs::write(path, text).unwrap();
 }
 
-fn study(folder: &Path, extra: &str) -> Study {
+pub(crate) fn study(folder: &Path, extra: &str) -> Study {
     let robot = dynident_testing::repository("robots/planar2r.urdf");
     let text = format!(
         "[robot]\nfile = \"{}\"\n[format]\ntime = {{ column = \"t\" }}\nposition = {{ columns = \"q{{1..2}}\" }}\n\
@@ -112,16 +112,16 @@ fn a_payload_of_unknown_inertia_and_a_wrong_link_are_refused() {
 }
 
 /// A study without logs, with these lines in `[drive.servo]`, and others.
-fn designed(folder: &Path, drive: &str, others: &str) -> Study {
+pub(crate) fn designed(folder: &Path, drive: &str, others: &str) -> Study {
     let robot = dynident_testing::repository("robots/planar2r.urdf");
     let text = format!("[robot]\nfile = \"{}\"\n[drive.servo]\n{drive}\n{others}", robot.display());
     Study::parse(&text, &folder.join("study.toml")).unwrap()
 }
 
-const DRIVES: &str = "stiffness = 300.0\ndamping = 25.0\narmature = 0.8\ncoulomb = [3.0, 1.5]\n\
+pub(crate) const DRIVES: &str = "stiffness = 300.0\ndamping = 25.0\narmature = 0.8\ncoulomb = [3.0, 1.5]\n\
                       fit = { step_s = 0.005 }\n\
                       design = { duration_s = 12.0, candidates = 8, exchanges = 1, seed = 3 }\n";
-const LIMITS: &str = "[design.defaults]\nfloor = false\nself_collision = false\n[design.limits]\njoints = [{ joint = \"joint1\", position = [-1.0, 1.2], speed = 2.0 }, \
+pub(crate) const LIMITS: &str = "[design.defaults]\nfloor = false\nself_collision = false\n[design.limits]\njoints = [{ joint = \"joint1\", position = [-1.0, 1.2], speed = 2.0 }, \
                       { joint = \"joint2\", position = [-1.5, 1.5], speed = 3.0 }]\n";
 
 #[test]

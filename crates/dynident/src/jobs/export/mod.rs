@@ -1,10 +1,14 @@
 //! `export`: an identified model for a controller or a simulator.
 
+mod servo;
 mod simulator;
 mod validation;
 
+pub use servo::{ServoExport, ServoTarget, export_servos};
 pub use simulator::{export_simulator, export_simulator_of};
-pub use validation::{EXPORT_VALIDATION_SUFFIX, export_validation, payload_validation, table_validation};
+pub use validation::{
+    EXPORT_VALIDATION_SUFFIX, export_validation, payload_validation, servo_validation, table_validation,
+};
 
 use crate::error::Error;
 use crate::jobs::recorded_velocities::recorded_velocities;

@@ -1,7 +1,9 @@
 //! `NAME.validation.json`: the held-out error of an exported file.
 
 use crate::digest::hexadecimal;
-use crate::result::{EXPORT_VALIDATION_SCHEMA, ExportValidationFile, FormError, FormJointError, ResultFile};
+use crate::result::{
+    EXPORT_VALIDATION_SCHEMA, ExportValidationFile, FormError, FormJointError, ResultFile, ServoFile, ServoForm,
+};
 use dynident_export::{Target, terms_left_out};
 use dynident_identification::examination::LogValidation;
 use dynident_identification::payload::ControllerPayload;
@@ -31,6 +33,30 @@ pub fn payload_validation(
     text: &str,
 ) -> ExportValidationFile {
     ExportValidationFile { payload: payload.cloned(), ..empty(stored, form, file, text) }
+}
+
+/// As [`export_validation()`] for drives from commands: the error of the motion that is simulated with the file.
+pub fn servo_validation(
+    stored: &ServoFile,
+    forms: &[ServoForm],
+    form: &str,
+    file: &str,
+    text: &str,
+) -> ExportValidationFile {
+    ExportValidationFile {
+        schema: EXPORT_VALIDATION_SCHEMA.to_owned(),
+        provenance: stored.provenance.clone(),
+        name: stored.study.clone(),
+        form: form.to_owned(),
+        file: file.to_owned(),
+        sha256: hexadecimal(&Sha256::digest(text.as_bytes())),
+        refitted: false,
+        held_out: Vec::new(),
+        left_out: Vec::new(),
+        payload: None,
+        servo_forms: forms.to_vec(),
+        problems: stored.problems.clone(),
+    }
 }
 
 fn of_class(
@@ -85,6 +111,7 @@ fn empty(stored: &ResultFile, form: &str, file: &str, text: &str) -> ExportValid
         held_out: Vec::new(),
         left_out: Vec::new(),
         payload: None,
+        servo_forms: Vec::new(),
         problems: stored.problems.clone(),
     }
 }

@@ -32,6 +32,8 @@ pub struct ServoDesignOutcome {
     pub commands: Vec<Vec<f64>>,
     /// Simulated positions of each joint, rad (m).
     pub positions: Vec<Vec<f64>>,
+    /// The robot.
+    pub robot: StudyRobot,
 }
 
 impl ServoDesignOutcome {
@@ -105,7 +107,8 @@ fn from_files(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<ServoDes
     (file.assumed, file.not_checked) = (assumed, not_checked);
     file.provenance = Some(provenance);
     file.seconds = begin.elapsed().as_secs_f64();
-    Ok(ServoDesignOutcome { file, times_s: found.times_s, commands: found.commands, positions: found.positions })
+    let DesignedCommands { times_s, commands, positions, .. } = found;
+    Ok(ServoDesignOutcome { file, times_s, commands, positions, robot })
 }
 
 /// The assumed drives.

@@ -3,22 +3,21 @@
 use crate::result::ServoFile;
 use crate::study::StudyRobot;
 use dynident_model::mjcf::{ServoChange, included_from, rewrite_servos};
-use dynident_model::{DescriptionFormat, JointChange, link_changes, rewrite_mjcf, rewrite_urdf};
-use dynident_servo::ServoRobot;
+use dynident_model::{DescriptionFormat, JointChange, Model, link_changes, rewrite_mjcf, rewrite_urdf};
 use std::path::Path;
 
 /// Robot descriptions with the found values.
 #[derive(Debug, Default)]
-pub(super) struct ServoModelFiles {
-    pub(super) mjcf: Option<String>,
-    pub(super) urdf: Option<String>,
+pub(in crate::jobs) struct ServoModelFiles {
+    pub(in crate::jobs) mjcf: Option<String>,
+    pub(in crate::jobs) urdf: Option<String>,
     /// Why there is no description, in words.
-    pub(super) missing: Option<String>,
+    pub(in crate::jobs) missing: Option<String>,
 }
 
 /// Writes the found values into the user's MJCF or URDF. Friction is one number there: the mean of the training
 /// logs. Simulators read positions without a delay, so the file has the delay from a command to its measurement.
-pub(super) fn model_files(robot: &StudyRobot, found: &ServoRobot, result: &ServoFile) -> ServoModelFiles {
+pub(in crate::jobs) fn model_files(robot: &StudyRobot, found: &Model, result: &ServoFile) -> ServoModelFiles {
     let description = &robot.robot;
     let written = match description.format {
         DescriptionFormat::Mjcf => mjcf(robot, found, result).map(|text| (Some(text), None)),
@@ -47,8 +46,8 @@ fn joint_changes(result: &ServoFile) -> Vec<JointChange> {
     result.joints.iter().zip(&result.drives).map(change).collect()
 }
 
-fn mjcf(robot: &StudyRobot, found: &ServoRobot, result: &ServoFile) -> Result<String, String> {
-    let links = link_changes(robot.model(), found.model.inertials()).map_err(|error| error.to_string())?;
+fn mjcf(robot: &StudyRobot, found: &Model, result: &ServoFile) -> Result<String, String> {
+    let links = link_changes(robot.model(), found.inertials()).map_err(|error| error.to_string())?;
     let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
     let text = rewrite_mjcf(&robot.robot.text, &mut included_from(folder), &links, &joint_changes(result))
         .map_err(|error| error.to_string())?;
@@ -66,7 +65,7 @@ fn mjcf(robot: &StudyRobot, found: &ServoRobot, result: &ServoFile) -> Result<St
     rewrite_servos(&text, &servos).map_err(|error| error.to_string())
 }
 
-fn urdf(robot: &StudyRobot, found: &ServoRobot, result: &ServoFile) -> Result<String, String> {
-    let links = link_changes(robot.model(), found.model.inertials()).map_err(|error| error.to_string())?;
+fn urdf(robot: &StudyRobot, found: &Model, result: &ServoFile) -> Result<String, String> {
+    let links = link_changes(robot.model(), found.inertials()).map_err(|error| error.to_string())?;
     rewrite_urdf(&robot.robot.text, &links, &joint_changes(result)).map_err(|error| error.to_string())
 }

@@ -2,9 +2,11 @@
 
 mod design;
 mod files;
+mod forms;
 mod result;
 
 pub use design::{ServoDesignOutcome, design_servos};
+pub(in crate::jobs) use files::model_files;
 
 use crate::error::Error;
 use crate::inputs::InputFiles;
@@ -19,7 +21,7 @@ use dynident_identification::Role;
 use dynident_model::Model;
 use dynident_recording::CommandedMotion;
 use dynident_servo::{Drive, Run, Search, ServoRobot, robot_at, search, simulate, start_drives, unknowns};
-use files::{ServoModelFiles, model_files};
+use files::ServoModelFiles;
 use std::path::Path;
 use std::time::Instant;
 
@@ -97,7 +99,9 @@ fn from_files(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<ServoOut
     let hashes = || provenance(study, &read);
     let (provenance, found) = concurrently(options.threads, hashes, || fitted(study, &fit, options));
     let (found, provenance) = (found?, provenance?);
-    outcome(study, &fit, &found, provenance, start.elapsed().as_secs_f64())
+    let mut outcome = outcome(study, &fit, &found, provenance, options)?;
+    outcome.result.seconds = start.elapsed().as_secs_f64();
+    Ok(outcome)
 }
 
 /// The training logs, without payloads.
@@ -232,16 +236,18 @@ fn outcome(
     fit: &Fit,
     found: &Found,
     provenance: crate::result::Provenance,
-    seconds: f64,
+    options: &RunOptions<'_>,
 ) -> Result<ServoOutcome, Error> {
     let mut result = result::servo_file(study, fit.robot.model(), &fit.runs, found, &fit.section)?;
     result.provenance = Some(provenance);
-    result.seconds = seconds;
+    let steps_s = [fit.section.fit.step_s, fit.section.fit.physics_step_s];
+    result.forms = on_threads(options.threads, || forms::forms(&result, &fit.runs, found, steps_s))
+        .map_err(|error| Error::section(study.path, "drive.servo")(error))?;
     let motions = result::motions(&fit.runs, found);
     if !result.validation.is_empty() {
         result.motion = motions.first().cloned();
     }
-    let ServoModelFiles { mjcf, urdf, missing } = model_files(&fit.robot, &found.robot, &result);
+    let ServoModelFiles { mjcf, urdf, missing } = model_files(&fit.robot, &found.robot.model, &result);
     result.notes.extend(missing);
     let robot = RobotAppearance::new(fit.robot.model(), &fit.robot.robot.path);
     Ok(ServoOutcome { result, motions, mjcf, urdf, robot, model: found.robot.model.clone() })

@@ -33,7 +33,9 @@ pub(super) fn servo_file(
     let number = |value: &ServoValue, is_rotary: bool| number(value, is_rotary);
     let drives = found.robot.drives.iter().enumerate().map(|(joint, drive)| {
         let own = list.iter().filter(|value| value.index == joint && !is_of_body(value.quantity));
-        drive_of(drive, means[joint], own.map(|value| number(value, rotary[joint])).collect())
+        let velocity_limit = model.joints()[joint].limits.velocity.filter(|limit| *limit > 0.0);
+        let values = own.map(|value| number(value, rotary[joint])).collect();
+        ServoDrive { velocity_limit, ..drive_of(drive, means[joint], values) }
     });
     let bodies = found.robot.model.inertials().iter().enumerate().map(|(body, inertial)| ServoBody {
         body: found.robot.model.bodies()[body].name().to_owned(),
@@ -126,6 +128,7 @@ fn drive_of(drive: &Drive, means: DriveMeans, values: Vec<ServoNumber>) -> Servo
         torque_limit: finite(drive.torque_limit),
         profile_acceleration: finite(drive.profile_acceleration),
         profile_speed: finite(drive.profile_speed),
+        velocity_limit: None,
         delay_s: drive.delay_s,
         read_delay_s: drive.read_delay_s,
         zero: drive.zero,
