@@ -121,7 +121,7 @@ fn description(
     let robot = StudyRobot::new(study, study_path, &Folders::new(study, study_path, data))?;
     let model = robot.model();
     let of_robot = model.joints().iter().map(|joint| &joint.name);
-    let bodies = model.bodies().iter().map(|body| body.name());
+    let bodies = model.bodies().iter().map(dynident_model::Body::name);
     if !of_robot.eq(&file.joints) || !bodies.eq(file.bodies.iter().map(|body| body.body.as_str())) {
         return Err(wrong("its joints or bodies are not those of the study's robot: name its study".to_owned()));
     }
