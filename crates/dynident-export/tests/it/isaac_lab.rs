@@ -29,6 +29,7 @@ fn actuators() -> Vec<Actuator> {
 }
 
 /// What the functions return: implicit, delayed with the written step, delayed with a step of 1 ms.
+#[allow(clippy::print_stdout, reason = "a test that is skipped says so")]
 fn made() -> Option<Vec<Value>> {
     if !has("python3") {
         println!("skipped: there is no `python3`");
