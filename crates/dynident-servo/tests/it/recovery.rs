@@ -186,3 +186,18 @@ fn a_push_hardly_changes_the_fit() {
     let intervals: Vec<_> = found.unexplained.iter().filter(|own| own.run == 0 && own.joint == 0).collect();
     assert!(intervals.len() == 1 && intervals[0].interval_s == [10.0, 12.0], "{:?}", found.unexplained);
 }
+
+/// A light distal link: its response alone is a bad guess of the inertia of its drive.
+#[test]
+fn a_light_link_is_fitted_without_equal_servos() {
+    let arm = arm();
+    let light = InertialParameters::from_centre_of_mass(0.01, Vec3([0.02, 0.0, 0.0]), &Mat3::IDENTITY.scale(1e-6));
+    let model = arm.model.with_inertials(&[arm.model.inertials()[0], light]).unwrap();
+    let truth = ServoRobot { model, ..arm };
+    let settings = ServoSettings { alike: false, ..ServoSettings::default() };
+    let runs = [measured(&truth, commands(0.0), settings.step_s)];
+    let (robot, found, _) = fitted_from(truth, &runs, &settings);
+    assert!(found.errors.iter().all(|error| *error < COUNT), "{:?} {:?}", found.errors, robot.drives);
+    let reads: f64 = robot.drives.iter().map(|drive| drive.read_delay_s).sum();
+    assert!(reads.abs() < 1e-12, "read delays are zero in the mean");
+}

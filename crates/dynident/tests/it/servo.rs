@@ -96,6 +96,30 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
     assert_eq!(found[0], found[1]);
 }
 
+/// Without friction per load no fixed torque remains that would measure the scale.
+#[test]
+fn load_friction_that_is_switched_off_is_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    write_log(&folder.path().join("one.csv"), 0.0);
+    write_log(&folder.path().join("two.csv"), 1.0);
+    let study = study(folder.path(), "[drive.servo.fit]\nload_friction = false\nstep_s = 0.005\n");
+    let result = identify_servos(&study, &folder.path().join("study.toml"), &OPTIONS).unwrap().result;
+    for drive in &result.drives {
+        assert_eq!((drive.load_friction, drive.stribeck), (0.0, 0.0));
+        // The delay is that from a command to its measurement. The held command of a step of 5 ms is averaged.
+        let delay = drive.values.iter().find(|value| value.name == "delay").unwrap();
+        assert!((delay.value - 0.02).abs() < delay.half_width_95 + 0.0005, "{delay:?}");
+    }
+    let reads: f64 = result.drives.iter().map(|drive| drive.read_delay_s).sum();
+    assert!(reads.abs() < 1e-12, "{reads}");
+    assert!(!result.scale.determined && result.scale.anchor.contains("[[payload]]"), "{:?}", result.scale);
+    // The masses of the description decide the scale: they are right here.
+    for drive in &result.drives {
+        let stiffness = drive.values.iter().find(|value| value.name == "stiffness").unwrap();
+        assert!((stiffness.value - 300.0).abs() < stiffness.half_width_95, "{stiffness:?}");
+    }
+}
+
 #[test]
 fn a_payload_of_unknown_inertia_and_a_wrong_link_are_refused() {
     let folder = tempfile::tempdir().unwrap();
