@@ -22,15 +22,15 @@ pub struct ExaminationSettings {
     /// error from motion above the cut-off of the fit.
     pub finer_cutoff_ratio: f64,
     /// Share of a held-out log, from its start, that determines its torque offsets if each log has separate offsets,
-    /// from 0 to 1; 0.25. With the usual length of a log, the offset is then better known than the other parameters, and
-    /// most of the log remains as the test.
+    /// from 0 to 1; 0.25. With the usual length of a log, the offset is then better known than the other parameters,
+    /// and most of the log remains as the test.
     pub offset_share: f64,
     /// Unexplained torque of a joint with a function of its position, relative to that without it, up to which a spring
     /// or counterbalance is named; 0.6. Both fits have all parameters of the joint and all friction laws, so that
     /// without such a torque the ratio is close to 1.
     pub max_left_by_position: f64,
-    /// Least torque that only the function explains, relative to the torque of the joint (RMS); 0.02. A smaller function
-    /// hardly improves the prediction.
+    /// Least torque that only the function explains, relative to the torque of the joint (RMS); 0.02. A smaller
+    /// function hardly improves the prediction.
     pub min_position_ratio: f64,
 }
 

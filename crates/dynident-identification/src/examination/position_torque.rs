@@ -237,7 +237,7 @@ impl<'a> JointFit<'a> {
         Some(PositionTorque { name, rms_nm, left, torque_nm, points: self.points(&centred) })
     }
 
-    /// Values of the first `count` unknowns, and the sum of the squared residuals; `None` if the equations are singular.
+    /// Values of the first `count` unknowns, and the sum of the squared residuals; `None` for singular equations.
     fn solved(&self, count: usize) -> Option<(DVector<f64>, f64)> {
         let others = self.right.len() - PIECES - 1;
         let mut gram = self.gram.view((0, 0), (count, count)).into_owned();

@@ -11,8 +11,8 @@ const STRIBECK_RAD_S: [f64; 3] = [0.03, 0.1, 0.3];
 /// Number of columns.
 pub(crate) const FURTHER_LAWS: usize = 4 + STRIBECK_RAD_S.len();
 
-/// Further friction of one joint: load dependence `|τ| s(q̇)`, asymmetry `|s(q̇)|` and `|q̇|`, square root `s(q̇) √|q̇|`,
-/// Stribeck `s(q̇) e^(−(q̇/v)²)`.
+/// Further friction of one joint: load dependence `|τ| s(q̇)`, asymmetry `|s(q̇)|` and `|q̇|`, square root
+/// `s(q̇) √|q̇|`, Stribeck `s(q̇) e^(−(q̇/v)²)`.
 pub(crate) struct FurtherLaws {
     step: CoulombShape,
     stribeck: [f64; STRIBECK_RAD_S.len()],
