@@ -183,8 +183,18 @@ pub(super) fn diagnosis_check(
     let mut check = study_check(study, robot, settings, diagnosis, thresholds);
     if let Some(currents) = currents_without_scale(study, settings) {
         let is_of_torque = |change: &StudyChange| change.table.ends_with("torque");
-        check.findings.retain(|finding| finding.kind != "unit" || !finding.write.iter().all(is_of_torque));
-        check.findings.insert(0, currents);
+        let is_unit = |finding: &CheckFinding| finding.kind == "unit" && finding.write.iter().all(is_of_torque);
+        let estimated = check.findings.iter().find(|finding| is_unit(finding) && !finding.write.is_empty()).cloned();
+        check.findings.retain(|finding| !is_unit(finding));
+        let with_estimate = |estimated: CheckFinding| CheckFinding {
+            evidence: format!(
+                "{}; estimated with the masses of the robot description: {}",
+                currents.evidence, estimated.evidence
+            ),
+            write: estimated.write,
+            ..currents.clone()
+        };
+        check.findings.insert(0, estimated.map_or_else(|| currents.clone(), with_estimate));
     }
     check
 }
