@@ -56,15 +56,7 @@ const ACCELERATIONS: [&str; 7] = ["ddq", "qdd", "qddot", "acc", "accel", "accele
 const TORQUES: [&str; 10] =
     ["tau", "torque", "torques", "effort", "efforts", "moment", "moments", "trq", "msrtrq", "jointtorque"];
 const CURRENTS: [&str; 5] = ["current", "currents", "curr", "amps", "ampere"];
-const COMMANDED: [&str; 24] = [
-    "set",
-    "sp",
-    "planned",
-    "plan",
-    "traj",
-    "interp",
-    "ik",
-    "leader",
+const COMMANDED: [&str; 16] = [
     "cmd",
     "cmds",
     "command",
@@ -87,10 +79,7 @@ const COMMANDED_POSITIONS: [&str; 9] =
     ["cmd", "cmds", "command", "commands", "target", "targets", "goal", "goals", "action"];
 /// Beginning of the columns of the commands in a SAGE recording.
 const SAGE_COMMANDS: &str = "control.";
-const MEASURED: [&str; 15] = [
-    "actual", "act", "measured", "meas", "msr", "sensor", "sensed", "enc", "encoder", "executed", "real", "fb",
-    "feedback", "fbk", "follower",
-];
+const MEASURED: [&str; 6] = ["actual", "measured", "meas", "msr", "sensor", "sensed"];
 const COMPUTED: [&str; 20] = [
     "computed",
     "calculated",
