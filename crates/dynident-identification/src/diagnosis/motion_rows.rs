@@ -13,6 +13,9 @@ pub(super) const INSTANTS: usize = 300;
 const REST_SHARE: f64 = 0.02;
 /// Least number of instants without a joint at rest for which the others are left out.
 const MIN_MOVING: usize = 100;
+/// Least share of instants with a joint at rest for which they are left out. The reversals of seven joints that move all
+/// the time are about a tenth.
+const MIN_RESTING_SHARE: f64 = 0.15;
 
 /// Standard deviation of a normal distribution over the median of its magnitude.
 const NORMAL_DEVIATION_OF_MEDIAN: f64 = 1.4826;
@@ -199,7 +202,8 @@ impl MotionSamples {
     }
 }
 
-/// Rows in which a joint rests that moves in other rows; empty if less than [`MIN_MOVING`] others would remain.
+/// Rows in which a joint rests that moves in other rows; empty for motion without pauses ([`MIN_RESTING_SHARE`]), and if
+/// less than [`MIN_MOVING`] others would remain.
 fn resting(rows: &MotionRows) -> Vec<bool> {
     let mut resting = vec![false; rows.len()];
     for dq in &rows.dq {
@@ -209,7 +213,8 @@ fn resting(rows: &MotionRows) -> Vec<bool> {
         }
     }
     let moving = resting.iter().filter(|rests| !**rests).count();
-    if moving < MIN_MOVING { Vec::new() } else { resting }
+    let is_continuous = ((rows.len() - moving) as f64) < MIN_RESTING_SHARE * rows.len() as f64;
+    if moving < MIN_MOVING || is_continuous { Vec::new() } else { resting }
 }
 
 /// The parallel filter of instants, with four times the rows of a fit, since short logs would have too few.

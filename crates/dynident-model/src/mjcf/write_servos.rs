@@ -133,7 +133,7 @@ mod tests {
         let text = rewrite_servos(ARM, &[servo("a", None, 0.0), servo("b", Some(3.0), 0.01)]).unwrap();
         assert!(text.contains(r#"name="first" joint="a" kp="12.5" />"#), "{text}");
         assert!(text.contains(r#"<position kv="0" gear="1" forcelimited="false" name="first""#), "{text}");
-        let added = r#"<position joint="b" kp="12.5" kv="0" gear="1" forcelimited="true" forcerange="-3.0 3.0" delay="0.01" nsample="5"/>"#;
+        let added = r#"<position joint="b" kp="12.5" kv="0" gear="1" forcelimited="true" forcerange="-3.0 3.0" delay="0.01" nsample="40"/>"#;
         assert!(text.contains(added), "{text}");
         assert_eq!(text.matches("solreffriction").count(), 2);
         Document::parse(&text).unwrap();
