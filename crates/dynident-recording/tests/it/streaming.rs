@@ -313,8 +313,11 @@ proptest! {
 #[test]
 fn stamps_of_an_overflowing_counter_rise() {
     let stamp = |i: u64| (4_294_967_296 - 300 * 8000 + i * 8000) % 4_294_967_296;
-    let text: String = (0..600).map(|i| format!("{},{:?},0\n", stamp(i), (0.02 * i as f64).sin())).collect();
-    let file = file_with(&format!("t_us,q,tau\n{text}"));
+    let mut text = "t_us,q,tau\n".to_owned();
+    for i in 0..600 {
+        writeln!(text, "{},{:?},0", stamp(i), (0.02 * i as f64).sin()).unwrap();
+    }
+    let file = file_with(&text);
     let format = format(
         "time = { column = \"t_us\", unit = \"us\" }\nposition = { columns = [\"q\"] }\ntorque = { columns = [\"tau\"] }",
     );
