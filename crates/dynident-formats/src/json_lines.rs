@@ -1,4 +1,5 @@
-//! JSON lines: one object per line; columns are its numbers, named by their path.
+//! JSON lines: one object per line; columns are its numbers, named by their path, and by the names of joints in an
+//! array of the same object.
 
 use crate::error::FileError;
 use crate::table::Table;
@@ -18,7 +19,7 @@ mod json {
     use super::{BufRead, FileError, Path, Table};
     use crate::arrays::MAX_COLUMNS;
     use crate::json_document;
-    use crate::json_numbers::flattened;
+    use crate::json_numbers::flattened_message;
     use crate::kind::FileFormat;
     use crate::table::slots;
     use serde_json::Value;
@@ -67,7 +68,7 @@ mod json {
         };
         while table.waiting.len() < SEARCHED_LINES {
             let Some(value) = table.read()? else { break };
-            flattened(&value, &mut String::new(), &mut |name, _| {
+            flattened_message(&value, &mut String::new(), &mut |name, _| {
                 if !table.column_of.contains_key(name) && table.names.len() < MAX_COLUMNS {
                     table.column_of.insert(name.to_owned(), table.names.len());
                     table.names.push(name.to_owned());
@@ -159,7 +160,7 @@ mod json {
             let mut path = core::mem::take(&mut self.number_path);
             // Most lines have the same numbers in the same order, so try the expected name first.
             let mut next = 0;
-            flattened(&value, &mut path, &mut |name, number| {
+            flattened_message(&value, &mut path, &mut |name, number| {
                 let is_next = self.names.get(next).is_some_and(|expected| expected == name);
                 let column = if is_next { Some(next) } else { self.column_of.get(name).copied() };
                 let Some(column) = column else { return };

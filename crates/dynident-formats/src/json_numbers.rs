@@ -9,16 +9,17 @@ pub(crate) fn flattened(value: &Value, path: &mut String, found: &mut impl FnMut
 }
 
 /// As [`flattened`], for a message: the entries of its arrays have the names of the accompanying array of texts.
-#[cfg(feature = "bags")]
-pub(crate) fn flattened_message(value: &Value, found: &mut impl FnMut(&str, f64)) {
-    add(value, &mut String::new(), Some(&[]), found);
+pub(crate) fn flattened_message(value: &Value, path: &mut String, found: &mut impl FnMut(&str, f64)) {
+    add(value, path, Some(&[]), found);
 }
 
 /// The names of the entries of other arrays in `entries`, if there are any.
 fn names(entries: &serde_json::Map<String, Value>) -> Option<&[Value]> {
     let is_names = |key: &str| key == "name" || key == "names" || key.ends_with("_names");
     let lists = entries.iter().filter(|(key, _)| is_names(key)).filter_map(|(_, value)| value.as_array());
-    lists.into_iter().find(|list| !list.is_empty() && list.iter().all(Value::is_string)).map(Vec::as_slice)
+    let are_distinct =
+        |list: &[Value]| list.iter().enumerate().all(|(at, name)| name.is_string() && !list[..at].contains(name));
+    lists.into_iter().find(|list| !list.is_empty() && are_distinct(list)).map(Vec::as_slice)
 }
 
 /// Adds the numbers of `value`; `labels` are names of entries, `None` without them.

@@ -128,7 +128,7 @@ impl Topic {
         let mut names = Vec::new();
         match &mut self.reader {
             Reader::Named(value) => {
-                flattened_message(&value(message)?, &mut |name, _| names.push(name.to_owned()));
+                flattened_message(&value(message)?, &mut String::new(), &mut |name, _| names.push(name.to_owned()));
             }
             Reader::Binary(decoders) => {
                 let mut outcome = Err("its definition is missing".to_owned());
@@ -181,7 +181,7 @@ impl Topic {
         sample.values[0] = seconds(log_ns, self.origins_ns.get(&0));
         match &mut self.reader {
             Reader::Named(value) => {
-                flattened_message(&value(message)?, &mut |name, number| {
+                flattened_message(&value(message)?, &mut String::new(), &mut |name, number| {
                     if let Some(column) = self.column_of.get(name) {
                         sample.values[*column] = number;
                     }

@@ -2,8 +2,9 @@
 
 use super::plain_row::plain_decimal;
 
-/// The number in a field: in the syntax of the standard library, including `nan` and `inf`; 1 and 0 for true and false;
-/// seconds for a [date and time](seconds). A decimal comma is read if `comma` allows it.
+/// The number in a field: in the syntax of the standard library, including `nan` and `inf`, or of Fortran (`1.5D-3`); 1
+/// and 0 for true and false; seconds for a [date and time](seconds) and for `0.5 sec`. A decimal comma is read if
+/// `comma` allows it.
 pub(super) fn number(field: &[u8], comma: bool) -> Option<f64> {
     match plain_decimal(field) {
         Some((value, length)) if length == field.len() => return Some(value),
@@ -16,9 +17,17 @@ pub(super) fn number(field: &[u8], comma: bool) -> Option<f64> {
     match text {
         "true" | "True" | "TRUE" => Some(1.0),
         "false" | "False" | "FALSE" => Some(0.0),
-        _ if comma && text.matches(',').count() == 1 && !text.contains('.') => text.replace(',', ".").parse().ok(),
-        _ => seconds(text),
+        _ if comma && text.matches(',').count() == 1 && !text.contains('.') => {
+            text.replace(',', ".").parse().ok().or_else(|| seconds(text))
+        }
+        _ => fortran(text).or_else(|| text.strip_suffix(" sec")?.parse().ok()).or_else(|| seconds(text)),
     }
+}
+
+/// A number in double precision as Fortran writes it: `-0.15D+01`.
+fn fortran(text: &str) -> Option<f64> {
+    let is_number = |byte: u8| byte.is_ascii_digit() || matches!(byte, b'+' | b'-' | b'.' | b'D' | b'd');
+    text.bytes().all(is_number).then(|| text.replace(['D', 'd'], "e").parse().ok())?
 }
 
 /// Entry number `place` of a list of `count` numbers such as `[0.1, 0.2]`, `(0.1; 0.2)` or `[0.1 0.2]`.
@@ -44,17 +53,11 @@ fn entries(field: &[u8]) -> Option<impl Iterator<Item = &[u8]>> {
     Some(inner.split(between).filter(|entry| !entry.is_empty()))
 }
 
-/// Seconds since 1970 of `2026-01-31 10:00:00.5`, with `T` or a blank, and without a zone, with `Z`, or with `+01:00`;
-/// seconds of the day of `10:00:00.5`.
+/// Seconds since 1970 of `2026-01-31 10:00:00.5`, with `T` or a blank, and without a zone, with `Z`, or with `+01:00`,
+/// and of the other [notations of the date](days); seconds of the day of `10:00:00.5` or `10:00:00.5 PM`.
 fn seconds(text: &str) -> Option<f64> {
     let Some((date, time)) = text.split_once(['T', ' ']) else { return seconds_of_day(text) };
-    let mut parts = date.splitn(3, '-');
-    let [year, month, day] =
-        [(4, parts.next()?), (2, parts.next()?), (2, parts.next()?)].map(|(count, part)| digits(part, count));
-    let (year, month, day) = (year?, month?, day?);
-    if !(1..=12).contains(&month) || !(1..=31).contains(&day) {
-        return None;
-    }
+    let Some(days) = days(date) else { return seconds_of_day(text) };
     let (time, zone_s) = match (time.strip_suffix('Z'), time.rfind(['+', '-'])) {
         (Some(time), _) => (time, 0.0),
         (None, None) => (time, 0.0),
@@ -64,17 +67,57 @@ fn seconds(text: &str) -> Option<f64> {
             (&time[..at], if time[at..].starts_with('-') { -zone_s } else { zone_s })
         }
     };
-    Some(86_400.0 * days_since_1970(year, month, day) as f64 + (seconds_of_day(time)? - zone_s))
+    // The basic form `100000.5` of ISO 8601.
+    let of_day_s = match (time.get(..2), time.get(2..4), time.get(4..)) {
+        (Some(hours), Some(minutes), Some(rest)) if !time.contains(':') => {
+            seconds_of_day(&format!("{hours}:{minutes}:{rest}"))?
+        }
+        _ => seconds_of_day(time)?,
+    };
+    Some(86_400.0 * days as f64 + (of_day_s - zone_s))
+}
+
+/// Days since 1970 of `2026-01-31`, `20260131`, `2026/1/31`, `31.1.2026`, and `1/31/2026`, where the day is first if
+/// the first number is above 12.
+fn days(date: &str) -> Option<i64> {
+    let short = |text: &str| (text.len() <= 2).then(|| digits(text, text.len()))?;
+    let parts = |separator: char| date.split(separator).collect::<Vec<&str>>();
+    let (year, month, day) = match (&parts('-')[..], &parts('.')[..], &parts('/')[..]) {
+        ([year, month, day], ..) => (digits(year, 4)?, digits(month, 2)?, digits(day, 2)?),
+        (_, [day, month, year], _) => (digits(year, 4)?, short(month)?, short(day)?),
+        (_, _, [year, month, day]) if year.len() == 4 => (digits(year, 4)?, short(month)?, short(day)?),
+        (_, _, [first, second, year]) => {
+            let (first, second) = (short(first)?, short(second)?);
+            let (month, day) = if first > 12 { (second, first) } else { (first, second) };
+            (digits(year, 4)?, month, day)
+        }
+        _ => {
+            let all = digits(date, 8)?;
+            (all / 10_000, all / 100 % 100, all % 100)
+        }
+    };
+    let is_valid = (1..=12).contains(&month) && (1..=31).contains(&day);
+    is_valid.then(|| days_since_1970(year, month, day))
 }
 
 fn seconds_of_day(time: &str) -> Option<f64> {
+    let half = time.len().checked_sub(3).and_then(|at| Some((time.get(..at)?, time.get(at..)?)));
+    let (time, noon_h) = match half {
+        Some((time, half)) if half.eq_ignore_ascii_case(" am") => (time, Some(0)),
+        Some((time, half)) if half.eq_ignore_ascii_case(" pm") => (time, Some(12)),
+        _ => (time, None),
+    };
     let mut parts = time.splitn(3, ':');
-    let [hours, minutes] = [digits(parts.next()?, 2)?, digits(parts.next()?, 2)?];
-    let seconds = parts.next()?;
-    let whole = seconds.split('.').next().unwrap_or_default();
-    let is_plain = seconds.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
+    let (hours, minutes, seconds) = (parts.next()?, digits(parts.next()?, 2)?, parts.next()?);
+    let hours = match noon_h {
+        Some(noon_h) => digits(hours, hours.len()).filter(|hours| (1..=12).contains(hours))? % 12 + noon_h,
+        None => digits(hours, 2)?,
+    };
+    let whole = seconds.split(['.', ',']).next().unwrap_or_default();
+    let is_plain = seconds.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b'.' | b','));
     let is_valid = hours < 24 && minutes < 60 && digits(whole, 2)? <= 60 && is_plain;
-    if is_valid { Some((60 * hours + minutes) as f64 * 60.0 + seconds.parse::<f64>().ok()?) } else { None }
+    let seconds: f64 = seconds.replace(',', ".").parse().ok()?;
+    is_valid.then_some((60 * hours + minutes) as f64 * 60.0 + seconds)
 }
 
 fn digits(text: &str, count: usize) -> Option<i64> {
@@ -103,6 +146,10 @@ mod tests {
         assert_eq!([read("1e5"), read("+1"), read("1.5")], [Some(1e5), Some(1.0), Some(1.5)]);
         assert_eq!([read(""), read("1..2"), read("1,5"), read("RUNNING")], [None; 4]);
         assert_eq!([read("True"), read("false")], [Some(1.0), Some(0.0)]);
+        assert_eq!(
+            [read("-0.15D+01"), read("2d3"), read("D"), read("0.008 sec")],
+            [Some(-1.5), Some(2e3), None, Some(0.008)]
+        );
         assert_eq!(number(b"-1,5", true), Some(-1.5));
         assert_eq!([number(b"1,000,000", true), number(b"1.000,5", true)], [None; 2]);
     }
@@ -118,12 +165,29 @@ mod tests {
             ("1969-12-31T23:00:00-01:30", 1_800.0),
             ("2100-03-01 00:00:00", 4_107_542_400.0),
             ("12:00:01.5", 43_201.5),
+            ("12:00:01,5", 43_201.5),
+            ("05.03.2024 12:00:00,004", 1_709_640_000.004),
+            ("3/5/2024 12:00:00.004 PM", 1_709_640_000.004),
+            ("3/5/2024 1:00:00 AM", 1_709_600_400.0),
+            ("31/12/1969 23:59:59", -1.0),
+            ("2024/3/5 12:00:00", 1_709_640_000.0),
+            ("20240305T120000.5Z", 1_709_640_000.5),
+            ("12:30:00 am", 1_800.0),
         ] {
             assert_eq!(read(text), Some(expected), "{text}");
         }
-        for text in
-            ["2026-13-01T00:00:00", "2026-01-02", "26-01-02T00:00:00", "24:00:00", "1:2:3", "12:00", "T", "12:00:-1"]
-        {
+        for text in [
+            "2026-13-01T00:00:00",
+            "2026-01-02",
+            "26-01-02T00:00:00",
+            "24:00:00",
+            "1:2:3",
+            "12:00",
+            "T",
+            "12:00:-1",
+            "13:00:00 PM",
+            "1.2.3 4",
+        ] {
             assert_eq!(read(text), None, "{text}");
         }
     }

@@ -4,6 +4,7 @@ use super::format::{Header, LogFormat};
 use super::part::PartTable;
 use super::sage::SageTable;
 use super::source::{LogGroup, LogSource, LogTable};
+use super::split_stamps::SplitStamps;
 use super::text::TextTable;
 use crate::error::RecordingError;
 use crate::place::LogPlace;
@@ -74,6 +75,7 @@ impl FileLog {
             Contents::Text(text) => Box::new(TextTable::open(&self.path, text, self.header, self.delimiter)?),
             Contents::Table(table) => Box::new(FileTable { label: self.label(), table, rows: 0 }),
         };
+        let table = SplitStamps::joined(table);
         match &self.part {
             Some(part) => Ok((opened.format, Box::new(PartTable::new(table, part)?))),
             None => Ok((opened.format, table)),

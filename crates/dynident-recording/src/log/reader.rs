@@ -6,6 +6,7 @@ use super::format::{LogFormat, Missing};
 use super::found_rules::FoundRules;
 use super::mapping::Mapping;
 use super::source::LogSource;
+use super::stamps::ContinuedStamps;
 use super::units::Quantity;
 use super::{FileLog, Log};
 use crate::error::RecordingError;
@@ -80,6 +81,7 @@ pub struct LogReader {
     max_difference_s: f64,
     period_s: f64,
     first_stamp_s: Option<f64>,
+    stamps: ContinuedStamps,
     rows: [u64; 2],
     keep_every: u64,
     time_range_s: [f64; 2],
@@ -134,6 +136,7 @@ impl LogReader {
             max_difference_s: format.time.as_ref().map_or(f64::INFINITY, |time| time.max_difference_s),
             period_s: format.rate_hz.map_or(0.0, |rate_hz| keep_every as f64 / rate_hz),
             first_stamp_s: None,
+            stamps: ContinuedStamps::new(time.map_or(1.0, |time| time.2)),
             rows,
             keep_every,
             time_range_s: format.time_range_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
@@ -249,7 +252,7 @@ impl LogReader {
         }
         let time_s = match self.time {
             Some((table, slot, seconds)) => {
-                let stamp = self.tables[table].values[slot];
+                let stamp = self.stamps.next(self.tables[table].values[slot]);
                 // Subtract stamps before scaling: nanoseconds since 1970 lose precision in the multiplication.
                 (stamp - *self.first_stamp_s.get_or_insert(stamp)) * seconds
             }
@@ -325,7 +328,9 @@ impl LogReader {
     /// Leaves out a row with a missing value in table `index`, if a rule or the settings allow it.
     fn leave_out_missing(&mut self, row: u64, index: usize) -> Result<(), RecordingError> {
         let values = &self.tables[0].values;
-        let since = |stamp: f64| (stamp - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.2);
+        let since = |stamp: f64| {
+            (self.stamps.continued(stamp) - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.2)
+        };
         let stamp = |(table, slot, _): (usize, usize, f64)| since(self.tables[table].values[slot]);
         let time_s = self.time.map_or(row as f64 * self.period_s, stamp);
         // Rows that a rule leaves out may contain invalid values.

@@ -5,8 +5,9 @@ use super::field::number;
 use super::format::Header;
 use super::lines::Lines;
 use super::plain_row::read_plain_row;
+use super::row_labels::RowLabels;
 use super::source::LogTable;
-use super::text_columns::{Column, are_units, columns, guessed_delimiter, split};
+use super::text_columns::{Column, are_second_names, are_units, columns, guessed_delimiter, split};
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 use std::io::Read;
@@ -26,10 +27,15 @@ pub(super) struct TextTable {
     lines: Lines,
     delimiter: u8,
     header_line: u64,
+    /// The line of the names, which a recorder that is started again repeats.
+    header: Option<Vec<u8>>,
+    repeated_headers: u64,
     names: Option<Vec<String>>,
     /// Fields of the row below the header, if it contains units.
     units: Option<Vec<String>>,
     columns: Vec<Column>,
+    /// Names of joints in text fields.
+    labels: Option<RowLabels>,
     /// Number of fields of a row.
     field_count: usize,
     first_row_is_pending: bool,
@@ -74,6 +80,7 @@ impl TextTable {
             Header::Auto => !fields.iter().all(|(from, to)| number(&first[*from..*to], comma).is_some()),
         };
         let header_line = lines.number();
+        let header = has_header.then(|| first.to_vec());
         let (mut names, mut units, mut first_row_is_pending) = (None, None, true);
         let mut row = fields.clone();
         if has_header {
@@ -84,18 +91,34 @@ impl TextTable {
                 units = Some(texts(lines.line(), &row));
                 first_row_is_pending = lines.advance()?;
                 split(lines.line(), delimiter, &mut row);
+            } else if let Some(names) = names.as_mut().filter(|_| first_row_is_pending)
+                && row.len() == fields.len()
+                && are_second_names(names, lines.line(), &row)
+            {
+                for (name, second) in names.iter_mut().zip(texts(lines.line(), &row)) {
+                    *name = if second.is_empty() { name.clone() } else { format!("{name}[{second}]") };
+                }
+                first_row_is_pending = lines.advance()?;
+                split(lines.line(), delimiter, &mut row);
             }
         }
         let columns = columns(lines.line(), &row, fields.len());
-        let names = names.map(|names: Vec<String>| columns.iter().map(|column| column.name(&names)).collect());
+        let labelled = names.as_ref().and_then(|names| RowLabels::find(names, &columns, lines.line(), &row));
+        let (labels, names) = match labelled {
+            Some((labels, names)) => (Some(labels), Some(names)),
+            None => (None, names.map(|names| columns.iter().map(|column| column.name(&names)).collect())),
+        };
         let mut table = Self {
             label,
             delimiter,
             header_line,
+            header,
+            repeated_headers: 0,
             names,
             units,
             text: vec![None; columns.len()],
             columns,
+            labels,
             field_count: fields.len(),
             first_row_is_pending,
             wanted: Vec::new(),
@@ -112,6 +135,20 @@ impl TextTable {
     /// Number of rows read so far.
     pub(super) fn rows_read(&self) -> u64 {
         self.rows
+    }
+
+    /// Moves to the next row, beyond copies of the header line.
+    fn advance(&mut self) -> Result<bool, RecordingError> {
+        if core::mem::take(&mut self.first_row_is_pending) {
+            return Ok(true);
+        }
+        while self.lines.advance()? {
+            if self.header.as_deref() != Some(self.lines.line()) {
+                return Ok(true);
+            }
+            self.repeated_headers += 1;
+        }
+        Ok(false)
     }
 
     fn place_of_line(&self, line: u64) -> LogPlace {
@@ -160,7 +197,7 @@ impl TextTable {
         values: &mut [f64],
         mut unread: impl FnMut(&mut Self, usize) -> Result<(), RecordingError>,
     ) -> Result<bool, RecordingError> {
-        if !(core::mem::take(&mut self.first_row_is_pending) || self.lines.advance()?) {
+        if !self.advance()? {
             return Ok(false);
         }
         if !self.places.is_empty() && read_plain_row(self.lines.line(), self.delimiter, &self.places, values) {
@@ -184,8 +221,13 @@ impl TextTable {
                 },
             });
         }
+        let order = self.labels.as_ref().and_then(|labels| labels.order(self.lines.line(), &self.fields));
         for (place, value) in values.iter_mut().enumerate() {
-            let column = self.wanted[place];
+            let moved = |order| self.labels.as_ref().and_then(|labels| labels.column(self.wanted[place], order));
+            let Some(column) = order.as_ref().map_or(Some(self.wanted[place]), moved) else {
+                *value = f64::NAN;
+                continue;
+            };
             let (from, to) = self.fields[column.field];
             *value = match column.value(&self.lines.line()[from..to], self.delimiter != b',') {
                 Some(value) => value,
@@ -229,7 +271,9 @@ impl LogTable for TextTable {
                 format!("column {label}: {count} fields are not numbers, the first is `{first}` in line {first_line}")
             })
         });
-        units.chain(text).collect()
+        let headers = (self.repeated_headers > 0)
+            .then(|| format!("copies of the header line, which are skipped: {}", self.repeated_headers));
+        units.chain(text).chain(headers).collect()
     }
 
     fn is_text(&self, column: usize) -> bool {
@@ -238,13 +282,14 @@ impl LogTable for TextTable {
 
     fn select(&mut self, fields: &[usize]) {
         self.wanted = fields.iter().map(|column| self.columns[*column]).collect();
-        let is_plain = self.delimiter != b' ' && self.columns.iter().all(|column| column.entry.is_none());
+        let is_plain =
+            self.delimiter != b' ' && self.labels.is_none() && self.columns.iter().all(|column| column.entry.is_none());
         let place = |field| fields.iter().position(|wanted| *wanted == field);
         self.places = if is_plain { (0..self.field_count).map(place).collect() } else { Vec::new() };
     }
 
     fn skip_row(&mut self) -> Result<bool, RecordingError> {
-        let found = core::mem::take(&mut self.first_row_is_pending) || self.lines.advance()?;
+        let found = self.advance()?;
         self.rows += u64::from(found);
         Ok(found)
     }
@@ -341,6 +386,47 @@ mod tests {
         assert_eq!(all(&mut log), [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]]);
         // Text that names no unit is data.
         assert_eq!(all(&mut table("mode,state\nA,B\nC,D\n")).len(), 2);
+    }
+
+    /// Columns as `rostopic echo -p` and as bagpy write them; the order of the joints changes in the last row.
+    #[test]
+    fn names_in_text_fields_name_the_columns() {
+        let numbered = "t,m.name0,m.name1,m.pos0,m.pos1,other_0,other_1\n0,b,a,1,2,5,6\n1,b,a,3,4,5,6\n2,a,b,7,8,5,6\n";
+        let lists =
+            "t,name,pos\n0,\"['b', 'a']\",\"[1, 2]\"\n1,\"['b', 'a']\",\"[3, 4]\"\n2,\"['a', 'b']\",\"[7, 8]\"\n";
+        for (text, names) in [(numbered, ["m.pos[b]", "m.pos[a]"]), (lists, ["pos[b]", "pos[a]"])] {
+            let mut log = table(text);
+            let columns = names.map(|name| log.names().unwrap().iter().position(|known| known == name).unwrap());
+            log.select(&columns);
+            let mut rows = [[0.0; 2]; 3];
+            rows.iter_mut().for_each(|row| assert!(log.next_row(row).unwrap()));
+            assert_eq!(rows, [[1.0, 2.0], [3.0, 4.0], [8.0, 7.0]], "{text}");
+        }
+        assert!(table(numbered).names().unwrap().ends_with(&["other_0".to_owned(), "other_1".to_owned()]));
+        // A joint that a row lacks is missing; equal names name nothing.
+        let mut log = table("name0,name1,q0,q1\na,b,1,2\na,c,3,4\n");
+        assert_eq!(log.names().unwrap()[2..], ["q[a]", "q[b]"]);
+        assert!(all(&mut log)[1][2..].iter().zip([3.0, f64::NAN]).all(|(a, b)| a.to_bits() == b.to_bits()));
+        assert_eq!(table("name0,name1,q0,q1\na,a,1,2\n").names().unwrap()[2..], ["q0", "q1"]);
+    }
+
+    #[test]
+    fn repeated_headers_are_no_rows() {
+        let text = "t,q1\n0,1\nt,q1\n1,2\n";
+        let mut log = table(text);
+        assert_eq!(all(&mut log), [[0.0, 1.0], [1.0, 2.0]]);
+        assert!(log.notes()[0].ends_with("skipped: 1"), "{:?}", log.notes());
+        let mut log = table(text);
+        assert!(log.skip_row().unwrap() && log.skip_row().unwrap() && !log.skip_row().unwrap());
+    }
+
+    #[test]
+    fn two_header_lines_become_one() {
+        let mut log = table("time,pos,pos,eff,eff\ns,a,b,a,b\n0,1,2,3,4\n");
+        assert_eq!(log.names().unwrap(), ["time[s]", "pos[a]", "pos[b]", "eff[a]", "eff[b]"]);
+        assert_eq!(all(&mut log), [[0.0, 1.0, 2.0, 3.0, 4.0]]);
+        // A row of text below different names is data.
+        assert_eq!(table("mode,state\nA,B\nC,D\n").names().unwrap(), ["mode", "state"]);
     }
 
     #[test]

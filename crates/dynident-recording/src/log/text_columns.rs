@@ -100,6 +100,15 @@ pub(super) fn are_units(line: &[u8], row: &[(usize, usize)]) -> bool {
     2 * units > fields().count() && fields().all(|field| number(field, true).is_none() && list_length(field).is_none())
 }
 
+/// Whether the row below `names` completes them, because they repeat: quantities above the joints, as in pandas.
+pub(super) fn are_second_names(names: &[String], line: &[u8], row: &[(usize, usize)]) -> bool {
+    let is_repeated = (1..names.len()).any(|at| !names[at].is_empty() && names[..at].contains(&names[at]));
+    let mut fields = row.iter().map(|(from, to)| &line[*from..*to]);
+    is_repeated
+        && row.iter().any(|(from, to)| from < to)
+        && fields.all(|field| number(field, true).is_none() && list_length(field).is_none())
+}
+
 /// A unit without the brackets around it.
 fn bare(field: &[u8]) -> &[u8] {
     match field {

@@ -308,3 +308,24 @@ proptest! {
         }
     }
 }
+
+/// A counter of microseconds with 32 bits overflows in the log.
+#[test]
+fn stamps_of_an_overflowing_counter_rise() {
+    let stamp = |i: u64| (4_294_967_296 - 300 * 8000 + i * 8000) % 4_294_967_296;
+    let mut text = "t_us,q,tau\n".to_owned();
+    for i in 0..600 {
+        writeln!(text, "{},{:?},0", stamp(i), (0.02 * i as f64).sin()).unwrap();
+    }
+    let file = file_with(&text);
+    let format = format(
+        "time = { column = \"t_us\", unit = \"us\" }\nposition = { columns = [\"q\"] }\ntorque = { columns = [\"tau\"] }",
+    );
+    let log = Log::file(file.path(), format, &["joint".to_owned()]);
+    let (mut reader, mut block) = (LogReader::open(&log).unwrap(), RawBlock::default());
+    assert!(reader.next_block(&mut block).unwrap());
+    for (i, time_s) in block.time_s.iter().enumerate() {
+        assert!((time_s - 0.008 * i as f64).abs() < 1e-9, "{i}: {time_s}");
+    }
+    assert_eq!(block.rows(), 600);
+}

@@ -139,7 +139,7 @@ fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace], is_consist
         let part = if trace.cut || trace.role == Role::Identify { "; the first samples" } else { "" };
         let is_written = trace.role == Role::Validate && is_consistent;
         let predicted_by = if is_written { "predicted" } else { "predicted by the unconstrained estimate" };
-        let (time, rows) = (&trace.time_s, trace.time_s.len());
+        let (time, rows) = (rising(&trace.time_s), trace.time_s.len());
         for (name, joint) in joints.iter().zip(&trace.joints) {
             let (measured, predicted) = (joint.measured_nm[..rows].to_vec(), joint.predicted_nm[..rows].to_vec());
             page.add(
@@ -152,6 +152,19 @@ fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace], is_consist
             );
         }
     }
+}
+
+/// The times of a recorder that was started again, on one axis: time does not decrease.
+fn rising(times: &[f64]) -> Vec<f64> {
+    let (mut added, mut before) = (0.0, f64::NEG_INFINITY);
+    let continued = |time: &f64| {
+        if *time < before {
+            added += before - time;
+        }
+        before = *time;
+        time + added
+    };
+    times.iter().map(continued).collect()
 }
 
 fn base_table(page: &mut Report, r: &ResultFile) {

@@ -40,6 +40,7 @@ mod mjcf;
 mod modules;
 mod mutated_studies;
 mod new_study;
+mod new_study_doubts;
 mod new_study_mapping;
 mod payload;
 mod payload_unknowns;

@@ -6,7 +6,7 @@ use super::study_keys::{KeyChange, StudyKeys, list};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
 use dynident_dynamics::ParametricModel;
-use dynident_recording::log::ColumnRef;
+use dynident_recording::log::{ChannelGroup, ColumnRef};
 use dynident_text::quoted;
 
 /// The columns are in another order: joint `j` needs the columns of joint `order[j]`.
@@ -70,8 +70,7 @@ impl MistakeKind for Order {
     }
 
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
-        let of = |channels: Channels| {
-            let (group, table) = keys.group(channels);
+        let of = |(group, table): (Option<&ChannelGroup>, String)| {
             let columns = group?.column_list("columns").ok().filter(|columns| columns.len() == keys.columns)?;
             let mut ordered = columns.clone();
             for (joint, &from) in self.order.iter().enumerate() {
@@ -83,10 +82,42 @@ impl MistakeKind for Order {
             };
             Some(KeyChange { table, line: format!("columns = {}", list(ordered.into_iter().map(name))) })
         };
-        self.channels.each().filter_map(of).collect()
+        let groups = self.channels.each().map(|channels| keys.group(channels));
+        // Velocities and accelerations have the order of the positions.
+        let is_of_position = self.channels.each().any(|channels| channels == Channels::Position);
+        groups.chain(is_of_position.then(|| keys.derivatives()).into_iter().flatten()).filter_map(of).collect()
     }
 
     fn with_channels(&self, channels: Channels) -> Option<Mistake> {
         Some(Self { channels, ..self.clone() }.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn velocities_follow_the_order_of_the_positions() {
+        let format = "rate_hz = 100.0\nposition = { columns = \"q{1..3}\" }\nvelocity = { columns = \"v{1..3}\" }\n\
+                      torque = { columns = \"tau{1..3}\" }";
+        let keys = StudyKeys {
+            format: toml::from_str(format).unwrap(),
+            table: "format".to_owned(),
+            places: vec![0, 1, 2],
+            columns: 3,
+            torque_lag_s: None,
+            has_base_rotation: false,
+        };
+        let changed = |channels| {
+            let changes = Order { order: vec![1, 0, 2], channels }.changes(&keys);
+            changes.into_iter().map(|change| format!("{} {}", change.table, change.line)).collect::<Vec<_>>()
+        };
+        let line =
+            |table: &str, name: &str| format!("format.{table} columns = [\"{name}2\", \"{name}1\", \"{name}3\"]");
+        let [position, torque, velocity] = [line("position", "q"), line("torque", "tau"), line("velocity", "v")];
+        assert_eq!(changed(Channels::Both), [position.clone(), torque.clone(), velocity.clone()]);
+        assert_eq!(changed(Channels::Position), [position, velocity]);
+        assert_eq!(changed(Channels::Torque), [torque]);
     }
 }

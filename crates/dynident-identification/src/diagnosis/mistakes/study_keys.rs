@@ -41,6 +41,15 @@ impl StudyKeys {
         (group, format!("{}.{name}", self.table))
     }
 
+    /// The columns of logged velocities and accelerations, and their tables.
+    pub(super) fn derivatives(&self) -> [(Option<&ChannelGroup>, String); 2] {
+        let Self { format, table, .. } = self;
+        [
+            (format.velocity.as_ref(), format!("{table}.velocity")),
+            (format.acceleration.as_ref(), format!("{table}.acceleration")),
+        ]
+    }
+
     /// Whether the format applies to all logs.
     pub(super) fn is_common(&self) -> bool {
         self.table == "format"

@@ -27,6 +27,8 @@ use std::path::Path;
 /// Audit checks for physically inconsistent bodies, independent of the robot's size.
 const INCONSISTENT_BODY_CHECKS: [&str; 4] =
     ["mass-not-positive", "inertia-not-positive", "triangle-inequality", "inertia-too-large"];
+/// Code of the finding about a recorder that repeats rows.
+pub(super) const REPEATED_VALUES: &str = "import-repeated-values";
 /// Largest inertia about the centre of mass of a point mass, relative to mass times squared arm length.
 const MAX_POINT_INERTIA_RATIO: f64 = 1e-12;
 
@@ -201,7 +203,15 @@ pub(super) fn diagnosis_check(
 
 fn import_findings(log: &str, import: &ImportReport) -> Vec<CheckFinding> {
     let matters = import.findings.iter().filter(|finding| finding.level != Level::Info);
-    matters.map(|finding| log_finding(log, finding)).collect()
+    // The key applies to all logs, and to positions and torques together.
+    let every =
+        import.rows_to_a_position.filter(|every| import.rows_to_a_torque.is_none_or(|of_torque| of_torque == *every));
+    let key = every.map(|every| StudyChange { table: "format".to_owned(), line: format!("keep_every = {every}") });
+    let found = |finding: &dynident_recording::Finding| CheckFinding {
+        write: key.iter().filter(|_| finding.code == REPEATED_VALUES).cloned().collect(),
+        ..log_finding(log, finding)
+    };
+    matters.map(found).collect()
 }
 
 fn log_finding(log: &str, finding: &dynident_recording::Finding) -> CheckFinding {

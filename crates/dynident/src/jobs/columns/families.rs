@@ -1,6 +1,6 @@
 //! Columns of one quantity, one per joint.
 
-use super::meaning::{JointKey, Meaning, Source, meaning, of_file};
+use super::meaning::{JointKey, Meaning, Source, is_quantity, meaning, of_file};
 use super::quantity::Quantity;
 use super::units::with_unit;
 use crate::result::LogContents;
@@ -13,6 +13,8 @@ pub(in crate::jobs) enum Basis {
     FileName,
     /// The order of columns without names.
     Order,
+    /// Nothing but the number of columns.
+    Assumption,
 }
 
 /// Columns of one quantity, one per joint of `joints`.
@@ -23,7 +25,10 @@ pub(in crate::jobs) struct Family {
     pub(in crate::jobs) group: usize,
     pub(in crate::jobs) quantity: Quantity,
     pub(in crate::jobs) source: Source,
+    /// Unit of the first column.
     pub(in crate::jobs) unit: Option<&'static str>,
+    /// Columns with another unit.
+    pub(in crate::jobs) other_units: Vec<(String, Option<&'static str>)>,
     pub(in crate::jobs) basis: Basis,
     /// The names without their joints.
     pub(in crate::jobs) stem: String,
@@ -31,6 +36,32 @@ pub(in crate::jobs) struct Family {
     pub(in crate::jobs) in_message_order: bool,
     /// Joint and name of each column: in the order of the robot's joints, of the numbers, or of the file.
     pub(in crate::jobs) columns: Vec<(JointKey, String)>,
+}
+
+impl Family {
+    /// The unit in the name of one of its columns.
+    pub(in crate::jobs) fn unit_of(&self, column: &str) -> Option<&'static str> {
+        self.other_units.iter().find(|(name, _)| name == column).map_or(self.unit, |(_, unit)| *unit)
+    }
+
+    /// Rank among families of one quantity: the source, known joints, the number of joints.
+    fn rank(&self) -> (Source, bool, usize, bool, Source) {
+        let key = &self.columns[0].0;
+        // Names of entries of an array are names of joints; other words may be axes of a tool.
+        let is_known = !matches!(key, JointKey::Name(_) | JointKey::Alone) || self.columns[0].1.ends_with(']');
+        let is_named = matches!(key, JointKey::Joint(_));
+        (self.source.min(Source::Unstated), is_known, self.columns.len(), is_named, self.source)
+    }
+
+    /// Number of words, apart from quantities, that only one of both names has: `arm1_pos` belongs to `arm1_torque`.
+    fn distance(&self, other: Option<&Self>) -> usize {
+        let words =
+            |family: &Self| family.stem.split('_').map(str::to_owned).filter(|word| !is_quantity(word)).collect();
+        let Some(other) = other else { return 0 };
+        let (own, other): (Vec<String>, Vec<String>) = (words(self), words(other));
+        let only = |one: &[String], all: &[String]| one.iter().filter(|word| !all.contains(word)).count();
+        only(&own, &other) + only(&other, &own)
+    }
 }
 
 pub(in crate::jobs) fn families<'a>(
@@ -41,46 +72,107 @@ pub(in crate::jobs) fn families<'a>(
     for (file, (path, contents)) in logs.into_iter().enumerate() {
         let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         let (of_file, source_of_file) = of_file(&stem);
+        // A file without names that has a column for each joint.
+        let is_nameless = is_nameless(contents) && contents.channels.len() <= joints.len();
         for channel in contents.channels.iter().filter(|channel| channel.samples > 0) {
-            let Meaning { quantity, joint, source, unit, stem } =
+            let Meaning { quantity, joint, source, unit, stem, .. } =
                 meaning(&with_unit(&channel.name, channel.unit.as_deref()), joints);
             // The file name gives the quantity of columns that are named by joints alone.
-            let bare = quantity.is_none() && matches!(joint, JointKey::Joint(_)) && stem.is_empty();
+            let is_joint = matches!(joint, JointKey::Joint(_)) || is_nameless;
+            let bare = quantity.is_none() && is_joint && stem.is_empty();
             let (quantity, source) = if bare { (of_file, source_of_file) } else { (quantity, source) };
             let Some(quantity) = quantity else { continue };
-            let same = |family: &&mut Family| {
-                (family.file, family.group, family.quantity) == (file, channel.group, quantity)
-                    && family.stem == stem
-                    && core::mem::discriminant(&family.columns[0].0) == core::mem::discriminant(&joint)
-            };
-            let column = (joint.clone(), channel.name.clone());
-            match found.iter_mut().find(same) {
-                // Of several columns for one joint, the first is used.
-                Some(family) if family.columns.iter().any(|(key, _)| *key == joint) => {}
-                Some(family) => family.columns.push(column),
-                None => found.push(Family {
+            let basis = if bare { Basis::FileName } else { Basis::ColumnNames };
+            let column = (joint, channel.name.clone());
+            add(
+                &mut found,
+                Family {
                     file,
                     group: channel.group,
                     quantity,
                     source,
                     unit,
-                    basis: if bare { Basis::FileName } else { Basis::ColumnNames },
+                    other_units: Vec::new(),
+                    basis,
                     in_message_order: is_message(contents, channel.group) && is_array_entry(&channel.name),
                     stem,
                     columns: vec![column],
-                }),
-            }
+                },
+            );
         }
     }
-    for family in &mut found {
-        // In the order of the robot's joints, or by number; other names keep the order of the file.
+    in_order_of_joints(&mut found);
+    found
+}
+
+/// Adds `column`, a family of one column, to its family in `found`.
+fn add(found: &mut Vec<Family>, column: Family) {
+    let same = |family: &&mut Family| {
+        (family.file, family.group, family.quantity, &family.stem)
+            == (column.file, column.group, column.quantity, &column.stem)
+            && core::mem::discriminant(&family.columns[0].0) == core::mem::discriminant(&column.columns[0].0)
+    };
+    match found.iter_mut().find(same) {
+        // Of several columns for one joint, the first is used.
+        Some(family) if family.columns.iter().any(|(key, _)| *key == column.columns[0].0) => {}
+        Some(family) => {
+            if family.unit != column.unit {
+                family.other_units.push((column.columns[0].1.clone(), column.unit));
+            }
+            family.columns.extend(column.columns);
+        }
+        None => found.push(column),
+    }
+}
+
+/// Sorts columns in the order of the robot's joints, or by number; other names keep the order of the file.
+fn in_order_of_joints(found: &mut [Family]) {
+    for family in found {
         family.columns.sort_by_key(|(key, _)| match key {
             JointKey::Joint(place) => *place as u64,
             JointKey::Number(number) => *number,
             JointKey::Name(_) | JointKey::Alone => 0,
         });
     }
+}
+
+/// Groups of columns, one for each of several joints, whose names state no quantity: `A1` to `A7`. They become
+/// families of `quantity` by assumption.
+pub(in crate::jobs) fn families_without_quantity<'a>(
+    logs: impl IntoIterator<Item = (&'a Path, &'a LogContents)>,
+    joints: &[String],
+    quantity: Quantity,
+) -> Vec<Family> {
+    let mut found: Vec<Family> = Vec::new();
+    for (file, (_, contents)) in logs.into_iter().enumerate() {
+        let is_time = |name: &str| contents.groups.iter().any(|group| group.time.as_deref() == Some(name));
+        let channels = contents.channels.iter().filter(|channel| channel.samples > 0 && !is_time(&channel.name));
+        for channel in channels {
+            let found_meaning = meaning(&with_unit(&channel.name, channel.unit.as_deref()), joints);
+            let Meaning { quantity: None, is_part: false, joint, source, unit, stem } = found_meaning else { continue };
+            if matches!(joint, JointKey::Joint(_) | JointKey::Number(_)) {
+                let family = Family {
+                    file,
+                    group: channel.group,
+                    quantity,
+                    source,
+                    unit,
+                    other_units: Vec::new(),
+                    basis: Basis::Assumption,
+                    in_message_order: false,
+                    stem,
+                    columns: vec![(joint, channel.name.clone())],
+                };
+                add(&mut found, family);
+            }
+        }
+    }
+    in_order_of_joints(&mut found);
     found
+}
+
+fn is_nameless(contents: &LogContents) -> bool {
+    contents.channels.iter().enumerate().all(|(at, channel)| channel.name == at.to_string())
 }
 
 fn is_message(contents: &LogContents, group: usize) -> bool {
@@ -97,13 +189,12 @@ fn is_array_entry(name: &str) -> bool {
 pub(in crate::jobs) fn families_by_order(file: usize, contents: &LogContents, counts: &[usize]) -> Vec<Family> {
     use Quantity::{Acceleration, Position, Torque, Velocity};
     let time = contents.groups.first().and_then(|group| group.time.as_ref());
-    let is_nameless = contents.channels.iter().enumerate().all(|(at, channel)| channel.name == at.to_string());
     let columns: Vec<&String> =
         contents.channels.iter().map(|channel| &channel.name).filter(|name| Some(*name) != time).collect();
     let orders = [&[Position, Torque][..], &[Position, Velocity, Torque], &[Position, Velocity, Acceleration, Torque]];
     let fits = |count: &usize| orders.iter().find(|order| *count > 0 && order.len() * count == columns.len());
     let Some((count, order)) = counts.iter().find_map(|count| Some((*count, *fits(count)?))) else { return Vec::new() };
-    if !is_nameless {
+    if !is_nameless(contents) {
         return Vec::new();
     }
     let family = |(quantity, columns): (&Quantity, &[&String])| Family {
@@ -112,6 +203,7 @@ pub(in crate::jobs) fn families_by_order(file: usize, contents: &LogContents, co
         quantity: *quantity,
         source: Source::Unstated,
         unit: None,
+        other_units: Vec::new(),
         basis: Basis::Order,
         stem: String::new(),
         in_message_order: false,
@@ -120,21 +212,39 @@ pub(in crate::jobs) fn families_by_order(file: usize, contents: &LogContents, co
     order.iter().zip(columns.chunks(count)).map(family).collect()
 }
 
-/// The best family with this quantity: measured before commanded before computed, then columns with the names of joints
-/// or with numbers, then the largest number of joints; the first of equals.
+/// The best family with this quantity: measured before filtered, commanded and computed, then columns with the names of
+/// joints or with numbers, then the largest number of joints; the first of equals.
 pub(in crate::jobs) fn best(
     families: &[Family],
     quantity: Quantity,
     fits: impl Fn(&Family) -> bool,
 ) -> Option<&Family> {
+    best_next_to(families, quantity, None, fits)
+}
+
+/// As [`best`]; of equals, the one whose name is most similar to that of `other`.
+pub(in crate::jobs) fn best_next_to<'a>(
+    families: &'a [Family],
+    quantity: Quantity,
+    other: Option<&Family>,
+    fits: impl Fn(&Family) -> bool,
+) -> Option<&'a Family> {
     let of_quantity = families.iter().filter(|family| family.quantity == quantity && fits(family));
-    of_quantity.rev().max_by_key(|family| {
-        let key = &family.columns[0].0;
-        // Names of entries of an array are names of joints; other words may be axes of a tool.
-        let is_known = !matches!(key, JointKey::Name(_) | JointKey::Alone) || family.columns[0].1.ends_with(']');
-        let is_named = matches!(key, JointKey::Joint(_));
-        let source = family.source.min(Source::Unstated);
-        (source, is_known, family.columns.len(), is_named, family.source)
+    of_quantity.rev().max_by_key(|family| (family.rank(), core::cmp::Reverse(family.distance(other))))
+}
+
+/// Another family in the file of `chosen` that nothing but its place in the file distinguishes from it.
+pub(in crate::jobs) fn equal_choice<'a>(
+    families: &'a [Family],
+    chosen: &Family,
+    other: Option<&Family>,
+    fits: impl Fn(&Family) -> bool,
+) -> Option<&'a Family> {
+    families.iter().find(|family| {
+        (family.file, family.quantity, family.rank(), family.distance(other))
+            == (chosen.file, chosen.quantity, chosen.rank(), chosen.distance(other))
+            && *family != chosen
+            && fits(family)
     })
 }
 
@@ -152,10 +262,15 @@ pub(in crate::jobs) fn is_unsigned(family: &Family, contents: &LogContents) -> b
         && family.columns.iter().any(|(_, name)| range(name).is_some_and(|[_, high]| high > 0.0))
 }
 
-/// The best torques: measured torques, measured currents, commanded torques, commanded currents, then computed ones.
-pub(in crate::jobs) fn best_torque(families: &[Family], fits: impl Fn(&Family) -> bool) -> Option<&Family> {
-    let torque = best(families, Quantity::Torque, &fits);
-    let current = best(families, Quantity::Current, &fits);
+/// The best torques for these positions: measured torques, measured currents, commanded torques, commanded currents,
+/// then computed ones.
+pub(in crate::jobs) fn best_torque<'a>(
+    families: &'a [Family],
+    position: Option<&Family>,
+    fits: impl Fn(&Family) -> bool,
+) -> Option<&'a Family> {
+    let torque = best_next_to(families, Quantity::Torque, position, &fits);
+    let current = best_next_to(families, Quantity::Current, position, &fits);
     let tier = |family: &Family| family.source.min(Source::Unstated);
     match (torque, current) {
         (Some(torque), Some(current)) if tier(current) > tier(torque) => Some(current),

@@ -23,6 +23,8 @@ pub(in crate::jobs) enum Source {
     Computed,
     /// A commanded value.
     Commanded,
+    /// A filtered copy of a recorded value, according to the name.
+    Filtered,
     /// Not stated in the name.
     Unstated,
     /// A measured value, according to the name.
@@ -44,19 +46,48 @@ pub(in crate::jobs) struct Meaning {
     pub(in crate::jobs) source: Source,
     /// In the notation of a study.
     pub(in crate::jobs) unit: Option<&'static str>,
+    /// Whether it is a part or an error of a quantity, a limit or a status.
+    pub(in crate::jobs) is_part: bool,
     /// The name without its joint, equal for the columns of all joints.
     pub(in crate::jobs) stem: String,
 }
 
-const POSITIONS: [&str; 10] =
-    ["q", "pos", "position", "positions", "angle", "angles", "theta", "jointpos", "jointposition", "phi"];
-const VELOCITIES: [&str; 11] =
-    ["dq", "qd", "qdot", "vel", "velocity", "velocities", "speed", "speeds", "omega", "dtheta", "jointvel"];
+const POSITIONS: [&str; 11] =
+    ["q", "qs", "pos", "position", "positions", "angle", "angles", "theta", "jointpos", "jointposition", "phi"];
+const VELOCITIES: [&str; 14] = [
+    "dq",
+    "dqs",
+    "qd",
+    "vels",
+    "vitesse",
+    "qdot",
+    "vel",
+    "velocity",
+    "velocities",
+    "speed",
+    "speeds",
+    "omega",
+    "dtheta",
+    "jointvel",
+];
 const ACCELERATIONS: [&str; 7] = ["ddq", "qdd", "qddot", "acc", "accel", "acceleration", "accelerations"];
-const TORQUES: [&str; 10] =
-    ["tau", "torque", "torques", "effort", "efforts", "moment", "moments", "trq", "msrtrq", "jointtorque"];
+const TORQUES: [&str; 13] = [
+    "tau",
+    "taus",
+    "eff",
+    "couple",
+    "torque",
+    "torques",
+    "effort",
+    "efforts",
+    "moment",
+    "moments",
+    "trq",
+    "msrtrq",
+    "jointtorque",
+];
 const CURRENTS: [&str; 5] = ["current", "currents", "curr", "amps", "ampere"];
-const COMMANDED: [&str; 16] = [
+const COMMANDED: [&str; 25] = [
     "cmd",
     "cmds",
     "command",
@@ -68,10 +99,19 @@ const COMMANDED: [&str; 16] = [
     "targets",
     "ref",
     "reference",
+    "set",
     "setpoint",
+    "sp",
+    "soll",
+    "demand",
+    "demanded",
+    "planned",
+    "lead",
+    "leader",
     "goal",
     "goals",
     "action",
+    "interp",
     "d",
 ];
 /// Names without a quantity that are positions: a command alone, and the words of a LeRobot data set.
@@ -79,7 +119,11 @@ const COMMANDED_POSITIONS: [&str; 9] =
     ["cmd", "cmds", "command", "commands", "target", "targets", "goal", "goals", "action"];
 /// Beginning of the columns of the commands in a SAGE recording.
 const SAGE_COMMANDS: &str = "control.";
-const MEASURED: [&str; 6] = ["actual", "measured", "meas", "msr", "sensor", "sensed"];
+const MEASURED: [&str; 18] = [
+    "actual", "act", "measured", "meas", "msr", "sensor", "sensed", "ist", "fb", "fbk", "feedback", "executed", "real",
+    "present", "encoder", "enc", "follow", "follower",
+];
+const FILTERED: [&str; 7] = ["filtered", "filt", "flt", "smoothed", "smooth", "lowpass", "lpf"];
 const COMPUTED: [&str; 20] = [
     "computed",
     "calculated",
@@ -150,7 +194,15 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         }
     };
     // Only units of joint quantities: the suffix of a motor torque `tau_m` is not metres.
-    let with_unit = |text: &str| ended(text).filter(|(_, _, quantity)| quantity.is_some());
+    let is_length = |before: &str, unit: &str| {
+        let is_position = |word: &String| !is_quantity(word) || POSITIONS.contains(&word.as_str());
+        (unit == "mm" || unit == "m" && joint.is_some()) && words(before).iter().all(is_position)
+    };
+    let with_unit = |text: &str| {
+        let (before, unit, quantity) = ended(text)?;
+        let quantity = quantity.or_else(|| is_length(&before, unit).then_some(Quantity::Position))?;
+        Some((before, unit, Some(quantity)))
+    };
     let (rest, unit) = match with_unit(&rest) {
         Some((rest, unit, quantity)) => (rest, Some((unit, quantity))),
         None => (rest, None),
@@ -161,7 +213,7 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         Some((own, quantity)) if is_quantity(quantity) => (format!("{rest} {quantity}"), Some(own.to_owned())),
         _ => (rest, named),
     };
-    let words = words(&rest);
+    let words: Vec<String> = words(&rest).into_iter().flat_map(split_compound).collect();
     let (number, words) = match words.iter().rposition(|word| word.bytes().all(|byte| byte.is_ascii_digit())) {
         Some(at) => (words[at].parse().ok(), [&words[..at], &words[at + 1..]].concat()),
         None => (None, words),
@@ -175,11 +227,20 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         (&TORQUES[..], Quantity::Torque),
         (&POSITIONS[..], Quantity::Position),
     ];
+    let place = |list: &[&str]| words.iter().position(|word| list.contains(&word.as_str()));
+    // A current position, velocity or torque is the present one.
+    let is_present = place(&["current"]).is_some_and(|at| {
+        [&VELOCITIES[..], &TORQUES, &POSITIONS].into_iter().any(|list| place(list).is_some_and(|word| word > at))
+    });
+    let by_words = by_words.into_iter().filter(|(_, quantity)| !is_present || *quantity != Quantity::Current);
     let by_word = by_words.into_iter().find(|(list, _)| has(list)).map(|(_, quantity)| quantity);
     let is_entry = joint.is_some() || named.is_some() || number.is_some();
     let of_entries = match &words[..] {
         [word] if COMMANDED_POSITIONS.contains(&&word[..]) => Some(Quantity::Position),
         [first, second] if first == "observation" && second == "state" => Some(Quantity::Position),
+        [.., first, second] if first == "joint" && ["state", "states"].contains(&&second[..]) => {
+            Some(Quantity::Position)
+        }
         _ => None,
     };
     let by_word = by_word.or_else(|| of_entries.filter(|_| is_entry && unit.is_none()));
@@ -201,7 +262,9 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         Source::Computed
     } else if has(&COMMANDED) || name.starts_with(SAGE_COMMANDS) {
         Source::Commanded
-    } else if has(&MEASURED) {
+    } else if has(&FILTERED) {
+        Source::Filtered
+    } else if has(&MEASURED) || is_present {
         Source::Measured
     } else {
         Source::Unstated
@@ -213,11 +276,25 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
             .unwrap_or(JointKey::Alone),
         source,
         unit,
+        is_part,
         stem,
     }
 }
 
-fn is_quantity(word: &str) -> bool {
+/// Splits a word of a quantity and its source: `qdes`, `taufb`, `sollposition`.
+fn split_compound(word: String) -> Vec<String> {
+    let is_source = |part: &str| part.len() > 1 && (COMMANDED.contains(&part) || MEASURED.contains(&part));
+    if is_quantity(&word) || is_source(&word) {
+        return vec![word];
+    }
+    let is_compound = |(first, second): &(&str, &str)| {
+        is_quantity(first) && is_source(second) || is_source(first) && is_quantity(second)
+    };
+    let parts = word.char_indices().skip(1).map(|(at, _)| word.split_at(at)).find(is_compound);
+    parts.map_or_else(|| vec![word.clone()], |(first, second)| vec![first.to_owned(), second.to_owned()])
+}
+
+pub(super) fn is_quantity(word: &str) -> bool {
     let lists: [&[&str]; 5] = [&POSITIONS, &VELOCITIES, &ACCELERATIONS, &TORQUES, &CURRENTS];
     lists.iter().any(|list| list.contains(&word))
 }
@@ -225,8 +302,8 @@ fn is_quantity(word: &str) -> bool {
 /// Places of the words that are neither a quantity nor a source, if they follow each other: `shoulder_pan` of
 /// `shoulder_pan.pos`.
 fn other_words(words: &[String]) -> Range<usize> {
-    let lists: [&[&str]; 8] =
-        [&POSITIONS, &VELOCITIES, &ACCELERATIONS, &TORQUES, &CURRENTS, &COMMANDED, &MEASURED, &COMPUTED];
+    let lists: [&[&str]; 9] =
+        [&POSITIONS, &VELOCITIES, &ACCELERATIONS, &TORQUES, &CURRENTS, &COMMANDED, &MEASURED, &COMPUTED, &FILTERED];
     let is_other = |word: &String| !lists.iter().any(|list| list.contains(&word.as_str()));
     match (words.iter().position(is_other), words.iter().rposition(is_other)) {
         (Some(first), Some(last)) if words[first..=last].iter().all(is_other) => first..last + 1,
@@ -243,13 +320,15 @@ pub(in crate::jobs) fn of_file(stem: &str) -> (Option<Quantity>, Source) {
 /// Splits camel case: `actualQ` becomes `actual_Q`.
 fn split_camel_case(name: &str) -> String {
     let mut text = String::with_capacity(name.len() + 4);
-    let mut before = ' ';
+    let (mut earlier, mut before) = (' ', ' ');
     for c in name.chars() {
-        if before.is_lowercase() && c.is_uppercase() {
+        // Not in the units `mNm` and `kNm`.
+        let is_prefix = c == 'N' && ['m', 'k'].contains(&before) && !earlier.is_alphabetic();
+        if before.is_lowercase() && c.is_uppercase() && !is_prefix {
             text.push('_');
         }
         text.push(c);
-        before = c;
+        (earlier, before) = (before, c);
     }
     text
 }
@@ -343,7 +422,27 @@ mod tests {
             ("msrJointTorque2", Some(Torque), Number(2), Source::Measured, None),
             ("position_deg[4]", Some(Position), Number(4), Source::Unstated, Some("deg")),
             ("J2 torque [Nm]", Some(Torque), Number(2), Source::Unstated, Some("N m")),
-            ("axis 3 act angle [deg]", Some(Position), Number(3), Source::Unstated, Some("deg")),
+            ("axis 3 act angle [deg]", Some(Position), Number(3), Source::Measured, Some("deg")),
+            ("tau2(mNm)", Some(Torque), Number(2), Source::Unstated, Some("mN m")),
+            ("tau2_mNm", Some(Torque), Number(2), Source::Unstated, Some("mN m")),
+            ("tau2 [Ncm]", Some(Torque), Number(2), Source::Unstated, Some("N cm")),
+            ("tau2 [N*m]", Some(Torque), Number(2), Source::Unstated, Some("N m")),
+            ("Couple axe 2 (N·m)", Some(Torque), Number(2), Source::Unstated, Some("N m")),
+            ("shoulder_pan_joint_mm", Some(Position), Joint(2), Source::Unstated, Some("mm")),
+            ("shoulder_pan_joint_tau_m", Some(Torque), Joint(2), Source::Unstated, None),
+            ("tau_3_m", Some(Torque), Number(3), Source::Unstated, None),
+            ("SetPos1", Some(Position), Number(1), Source::Commanded, None),
+            ("ActTorque1", Some(Torque), Number(1), Source::Measured, None),
+            ("qdes1", Some(Position), Number(1), Source::Commanded, None),
+            ("taufb1", Some(Torque), Number(1), Source::Measured, None),
+            ("Sollmoment_A3", Some(Torque), Number(3), Source::Commanded, None),
+            ("planned_q4", Some(Position), Number(4), Source::Commanded, None),
+            ("q_filtered_1", Some(Position), Number(1), Source::Filtered, None),
+            ("current_position_1", Some(Position), Number(1), Source::Measured, None),
+            ("current_torque_1", Some(Torque), Number(1), Source::Measured, None),
+            ("torque_current_1", Some(Current), Number(1), Source::Unstated, None),
+            ("joint_states[4]", Some(Position), Number(4), Source::Unstated, None),
+            ("wrist_2_joint_eff", Some(Torque), Number(2), Source::Unstated, None),
             ("Joint 4 angle (deg)", Some(Position), Number(4), Source::Unstated, Some("deg")),
             ("joint_1", None, Joint(3), Source::Unstated, None),
             ("wrist_flex.pos", Some(Position), Name("wrist_flex".to_owned()), Source::Unstated, None),

@@ -7,7 +7,8 @@ mod spelling;
 mod units;
 
 pub(in crate::jobs) use families::{
-    Basis, Family, best, best_command, best_torque, families, families_by_order, is_unsigned,
+    Basis, Family, best, best_command, best_next_to, best_torque, equal_choice, families, families_by_order,
+    families_without_quantity, is_unsigned,
 };
 pub(in crate::jobs) use meaning::{JointKey, Source, words};
 pub(in crate::jobs) use quantity::Quantity;

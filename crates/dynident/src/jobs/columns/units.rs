@@ -4,7 +4,7 @@ use super::quantity::Quantity;
 use std::borrow::Cow;
 
 /// Ending, unit in study notation, and joint quantity with this unit; longest ending first.
-const ENDINGS: [(&str, &str, Option<Quantity>); 43] = [
+const ENDINGS: [(&str, &str, Option<Quantity>); 56] = [
     ("rad_per_s2", "rad/s^2", Some(Quantity::Acceleration)),
     ("rad_s2", "rad/s^2", Some(Quantity::Acceleration)),
     ("rad/s^2", "rad/s^2", Some(Quantity::Acceleration)),
@@ -27,6 +27,9 @@ const ENDINGS: [(&str, &str, Option<Quantity>); 43] = [
     ("°/s", "deg/s", Some(Quantity::Velocity)),
     ("deg/s", "deg/s", Some(Quantity::Velocity)),
     ("rpm", "rpm", Some(Quantity::Velocity)),
+    ("mm/s", "mm/s", Some(Quantity::Velocity)),
+    ("mm_s", "mm/s", Some(Quantity::Velocity)),
+    ("m/s", "m/s", Some(Quantity::Velocity)),
     ("mrad", "mrad", Some(Quantity::Position)),
     ("radians", "rad", Some(Quantity::Position)),
     ("rad", "rad", Some(Quantity::Position)),
@@ -35,6 +38,16 @@ const ENDINGS: [(&str, &str, Option<Quantity>); 43] = [
     ("°", "deg", Some(Quantity::Position)),
     ("rev", "rev", Some(Quantity::Position)),
     ("mnm", "mN m", Some(Quantity::Torque)),
+    ("mn m", "mN m", Some(Quantity::Torque)),
+    ("knm", "kN m", Some(Quantity::Torque)),
+    ("kn m", "kN m", Some(Quantity::Torque)),
+    ("ncm", "N cm", Some(Quantity::Torque)),
+    ("n cm", "N cm", Some(Quantity::Torque)),
+    ("nmm", "N mm", Some(Quantity::Torque)),
+    ("n mm", "N mm", Some(Quantity::Torque)),
+    ("kgf cm", "kgf cm", Some(Quantity::Torque)),
+    ("lbf in", "lbf in", Some(Quantity::Torque)),
+    ("lbf ft", "lbf ft", Some(Quantity::Torque)),
     ("n m", "N m", Some(Quantity::Torque)),
     ("nm", "N m", Some(Quantity::Torque)),
     ("ma", "mA", Some(Quantity::Current)),
@@ -93,7 +106,9 @@ pub(in crate::jobs) fn unit(name: &str) -> Option<&'static str> {
 /// Splits a lower-case name into the part before its unit (with any index in brackets), the unit, and its quantity.
 pub(super) fn ended(lower: &str) -> Option<(String, &'static str, Option<Quantity>)> {
     if let Some((before, inside)) = in_brackets(lower)
-        && let Some((_, unit, quantity)) = ENDINGS.iter().find(|(ending, ..)| *ending == inside)
+        // `N·m`, `kgf.cm`.
+        && let plain = inside.replace(['·', '⋅', '*', '.'], " ")
+        && let Some((_, unit, quantity)) = ENDINGS.iter().find(|(ending, ..)| *ending == inside || *ending == plain)
         // `effort[a]` is the effort of a joint a.
         && (inside.len() > 1 || before.ends_with(' ') || !lower.ends_with(']'))
     {
@@ -130,7 +145,12 @@ pub(in crate::jobs) fn time_unit_s(name: &str) -> Option<f64> {
     let own = lower.rsplit(['.', '/']).next().unwrap_or(&lower);
     let (word, unit) = in_brackets(own).or_else(|| own.rsplit_once('_')).unwrap_or((own, ""));
     let word = word.trim_end();
-    let named = |word: &str| matches!(word, "t" | "time" | "timestamp" | "stamp" | "log_time" | "elapsed" | "seconds");
+    let named = |word: &str| {
+        matches!(
+            word,
+            "t" | "time" | "timestamp" | "stamp" | "log_time" | "elapsed" | "seconds" | "secs" | "sec" | "clock"
+        )
+    };
     match (named(own), named(word), unit) {
         (true, _, _) | (_, true, "s" | "sec") => Some(1.0),
         (_, true, "ms") => Some(1e-3),
@@ -154,11 +174,14 @@ pub(in crate::jobs) fn with_unit<'a>(name: &'a str, stated: Option<&str>) -> Cow
 /// The time column as the value of a study's `time`; `unit` is that of its channel.
 pub(in crate::jobs) fn time_as_toml(name: &str, unit: Option<&str>) -> String {
     // A column that was found by its values has no unit in its name.
-    let stated = unit.filter(|_| time_unit_s(name).is_none()).map(|unit| unit.trim_matches(['[', ']', '(', ')']));
+    let stated = unit
+        .filter(|unit| time_unit_s(name).is_none() || *unit == "d")
+        .map(|unit| unit.trim_matches(['[', ']', '(', ')']));
     let unit = match (time_unit_s(&with_unit(name, unit)), stated) {
         (Some(1e-3), _) | (None, Some("ms")) => ", unit = \"ms\"",
         (Some(1e-6), _) | (None, Some("us")) => ", unit = \"us\"",
         (Some(1e-9), _) | (None, Some("ns")) => ", unit = \"ns\"",
+        (_, Some("d")) => ", scale = 86400.0",
         _ => "",
     };
     format!("{{ column = {}{unit} }}", dynident_text::quoted(name))
@@ -193,6 +216,7 @@ mod tests {
         assert_eq!(time_unit_s("tau"), None);
         assert_eq!(time_as_toml("t_us", None), "{ column = \"t_us\", unit = \"us\" }");
         // A unit in a row of units.
+        assert_eq!(time_as_toml("t", Some("d")), "{ column = \"t\", scale = 86400.0 }");
         assert_eq!(time_as_toml("t", Some("[ms]")), "{ column = \"t\", unit = \"ms\" }");
         assert_eq!([with_unit("q1", Some("[deg]")), with_unit("q1_rad", Some("deg"))], ["q1 [deg]", "q1_rad"]);
     }

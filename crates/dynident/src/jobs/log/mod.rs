@@ -13,8 +13,8 @@ use dynident_recording::RecordingError;
 use dynident_recording::log::{FileLog, LogGroup, LogTable};
 use std::path::Path;
 
-/// Units of time stamps, s; the largest plausible one is taken where the name states none.
-const TIME_UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
+/// Units of time stamps, s; the first plausible one is taken where the name states none. Excel and MATLAB count days.
+const TIME_UNITS: [(&str, f64); 5] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("d", 86_400.0)];
 /// Sample rates of robot logs, Hz: slower logs contain no acceleration, faster ones do not exist.
 const MIN_RATE_HZ: f64 = 2.0;
 const MAX_RATE_HZ: f64 = 2e4;
@@ -168,9 +168,14 @@ mod tests {
 
     #[test]
     fn the_unit_of_a_clock_follows_from_its_rate() {
-        for (step, expected) in
-            [(0.004, Some(1.0)), (4.0, Some(1e-3)), (20_080.0, Some(1e-6)), (1e6, Some(1e-9)), (1e-9, None)]
-        {
+        for (step, expected) in [
+            (0.004, Some(1.0)),
+            (4.0, Some(1e-3)),
+            (20_080.0, Some(1e-6)),
+            (1e6, Some(1e-9)),
+            (1e-7, Some(86_400.0)),
+            (1e-10, None),
+        ] {
             assert_eq!(unit_of_rate(1.0 / step), expected, "{step}");
         }
     }

@@ -28,7 +28,7 @@ fn of_recording(found: &LogContents, first: &str) -> String {
     let all = families([(Path::new(&found.file), found)], &[]);
     let position = best(&all, Quantity::Position, |_| true);
     let command = best_command(&all, |family| position != Some(family));
-    let torque = best_torque(&all, |family| command.is_none() || !is_unsigned(family, found));
+    let torque = best_torque(&all, position, |family| command.is_none() || !is_unsigned(family, found));
     let drive = match (torque, command) {
         (None, Some(command)) => ("command", "rad", Some(command)),
         (torque, _) => ("torque", "N m", torque),

@@ -23,11 +23,32 @@ pub(super) struct RobotJoints<'a> {
     pub(super) free: Vec<usize>,
     /// Indices of the revolute ones among them.
     pub(super) turning: Vec<usize>,
+    /// The joint that carries each joint.
+    pub(super) parents: Vec<Option<usize>>,
+}
+
+impl RobotJoints<'_> {
+    /// A joint that carries one of `joints` and is not among them, although it moves independently.
+    fn missing_below(&self, joints: &[usize]) -> Option<&str> {
+        let parent = |joint: &usize| self.parents.get(*joint).copied().flatten();
+        let mut below = joints.iter().flat_map(|joint| core::iter::successors(parent(joint), parent));
+        below.find(|joint| self.free.contains(joint) && !joints.contains(joint)).map(|joint| &self.names[joint][..])
+    }
 }
 
 /// Assigns the columns of `family` to the joints: by the names of joints, then by numbers, then in order. `left_out`
 /// are joint names of further columns of the same kind. `None` if there are more columns than joints.
 pub(super) fn logged_joints(family: &Family, robot: &RobotJoints<'_>, left_out: &[String]) -> Option<LoggedJoints> {
+    let found = assigned(family, robot, left_out)?;
+    let Some(missing) = robot.missing_below(&found.joints).filter(|_| found.is_sure) else { return Some(found) };
+    let reason = format!(
+        "{}; joint `{missing}` carries some of them and has no column, so it is locked at 0: if it moved or was elsewhere, this is wrong",
+        found.reason
+    );
+    Some(LoggedJoints { reason, is_sure: false, ..found })
+}
+
+fn assigned(family: &Family, robot: &RobotJoints<'_>, left_out: &[String]) -> Option<LoggedJoints> {
     let RobotJoints { free, turning, .. } = robot;
     let of_name = |(key, _): &(JointKey, String)| match key {
         JointKey::Joint(place) => Some(*place),
@@ -86,30 +107,41 @@ pub(super) fn logged_joints(family: &Family, robot: &RobotJoints<'_>, left_out: 
     let unnamed = match family.basis {
         Basis::Order => "; the columns have no names",
         _ if family.in_message_order => "; the message has no joint names",
+        Basis::Assumption => "; their names state no quantity",
         Basis::ColumnNames | Basis::FileName => "",
     };
     Some(LoggedJoints { joints, reason: format!("{reason}{unnamed}"), is_sure: unnamed.is_empty() })
 }
 
-/// The joint of each name whose words are part of the joint's name, or the reverse: `elbow` and `elbow_joint`. `None`
-/// if a name has no joint or several, or two names have one.
+/// The joint of each name whose words are part of the joint's name, or the reverse: `elbow` and `elbow_joint`;
+/// otherwise whose words begin those of the joint: `w1` and `wrist_1_joint`. `None` if a name has no joint or several,
+/// or two names have one.
 fn by_words(names: &[&str], robot: &RobotJoints<'_>) -> Option<Vec<usize>> {
     let of_joints: Vec<Vec<String>> = robot.names.iter().map(|name| words(&name.to_lowercase())).collect();
-    let contains = |all: &[String], part: &[String]| all.windows(part.len().max(1)).any(|window| window == part);
-    let mut joints = Vec::new();
-    for name in names {
-        let own = words(name);
-        let mut found = robot
-            .free
-            .iter()
-            .copied()
-            .filter(|&joint| contains(&of_joints[joint], &own) || contains(&own, &of_joints[joint]));
-        match (found.next(), found.next()) {
-            (Some(joint), None) if !joints.contains(&joint) => joints.push(joint),
-            _ => return None,
+    let contains = |all: &[String], part: &[String], is_like: fn(&String, &String) -> bool| {
+        let is_part = |window: &[String]| window.iter().zip(part).all(|(word, part)| is_like(word, part));
+        part.len() <= all.len() && all.windows(part.len().max(1)).any(is_part)
+    };
+    let is_equal: fn(&String, &String) -> bool = |word, part| word == part;
+    let begins: fn(&String, &String) -> bool = |word, part| {
+        let is_number = part.bytes().all(|byte| byte.is_ascii_digit());
+        word == part || !is_number && word.starts_with(part.as_str())
+    };
+    [is_equal, begins].into_iter().find_map(|is_like| {
+        let mut joints = Vec::new();
+        for name in names {
+            let own = words(name);
+            let is_of = |joint: usize| {
+                contains(&of_joints[joint], &own, is_like) || contains(&own, &of_joints[joint], is_equal)
+            };
+            let mut found = robot.free.iter().copied().filter(|&joint| is_of(joint));
+            match (found.next(), found.next()) {
+                (Some(joint), None) if !joints.contains(&joint) => joints.push(joint),
+                _ => return None,
+            }
         }
-    }
-    Some(joints)
+        Some(joints)
+    })
 }
 
 /// The rank of each name by its last number, for names that differ in it alone: `j_1, j_2, j_0` gives 1, 2, 0.
@@ -169,6 +201,51 @@ pub(super) fn with_partly_foreign_names(
     joined
 }
 
+/// Joins columns with names and with numbered names, `q_elbow` next to `q_w1`, if together the log has a column for
+/// each of the free joints.
+pub(super) fn with_numbered_names(
+    all: &[Family],
+    logs: &[(&Path, LogContents)],
+    robot: &RobotJoints<'_>,
+) -> Vec<Family> {
+    let kind = |family: &Family| (family.file, family.group, family.quantity);
+    // The words of a numbered name that the other name lacks, if it has all of the other's.
+    let further = |numbered: &Family, named: &Family| {
+        let of = |family: &Family| family.stem.split('_').map(str::to_owned).collect::<Vec<String>>();
+        let (all, part) = (of(numbered), of(named));
+        let rest: Vec<String> = all.iter().filter(|word| !part.contains(word)).cloned().collect();
+        (part.iter().all(|word| all.contains(word)) && !rest.is_empty()).then(|| rest.join("_"))
+    };
+    let is = |family: &Family, number: bool| match family.columns[0].0 {
+        JointKey::Name(_) => !number,
+        JointKey::Number(_) => number,
+        JointKey::Joint(_) | JointKey::Alone => false,
+    };
+    let mut joined = all.to_vec();
+    for named in all.iter().filter(|family| is(family, false)) {
+        let own =
+            |family: &&Family| kind(family) == kind(named) && is(family, true) && further(family, named).is_some();
+        let numbered: Vec<&Family> = all.iter().filter(own).collect();
+        let count = named.columns.len() + numbered.iter().map(|family| family.columns.len()).sum::<usize>();
+        if numbered.is_empty() || count != robot.free.len() {
+            continue;
+        }
+        let mut columns = named.columns.clone();
+        for family in &numbered {
+            let name = further(family, named).unwrap_or_default();
+            columns.extend(family.columns.iter().filter_map(|(key, column)| match key {
+                JointKey::Number(number) => Some((JointKey::Name(format!("{name}{number}")), column.clone())),
+                _ => None,
+            }));
+        }
+        let place = |column: &String| logs[named.file].1.channels.iter().position(|channel| channel.name == *column);
+        columns.sort_by_key(|(_, column)| place(column));
+        joined.retain(|family| !numbered.contains(&family));
+        joined.iter_mut().filter(|family| *family == named).for_each(|family| family.columns.clone_from(&columns));
+    }
+    joined
+}
+
 /// Leaves out the columns of grippers where the robot description has fewer joints than the log, and no such joint.
 pub(super) fn without_foreign_grippers(all: &[Family], robot: &RobotJoints<'_>) -> Vec<Family> {
     let is_gripper = |(key, _): &(JointKey, String)| matches!(key, JointKey::Name(name) if GRIPPERS.iter().any(|gripper| name.contains(gripper)));
@@ -181,24 +258,43 @@ pub(super) fn without_foreign_grippers(all: &[Family], robot: &RobotJoints<'_>) 
     all
 }
 
-/// The columns of `family` in the order of `joints`; `None` if one is missing.
+/// The columns of `family` in the order of `joints`: by joint, by number, or by the place of their numbers, `tau1` of
+/// `q0`. `None` if one is missing.
 pub(super) fn in_order(family: &Family, logged: &Family, joints: &[usize]) -> Option<Vec<String>> {
     let name_at = |place: usize, joint: usize| {
         let by_name = family.columns.iter().find(|(key, _)| *key == JointKey::Joint(joint));
         let by_number = || family.columns.iter().find(|(key, _)| *key == logged.columns[place].0);
         by_name.or_else(by_number).map(|(_, name)| name.clone())
     };
-    joints.iter().enumerate().map(|(place, joint)| name_at(place, *joint)).collect()
+    let by_key: Option<Vec<String>> = joints.iter().enumerate().map(|(place, joint)| name_at(place, *joint)).collect();
+    by_key.or_else(|| {
+        let has_numbers = family.columns.iter().all(|(key, _)| matches!(key, JointKey::Number(_)));
+        let has_names = logged.columns.iter().any(|(key, _)| matches!(key, JointKey::Name(_)));
+        let mut sorted = joints.to_vec();
+        sorted.sort_unstable();
+        if !has_numbers || has_names || family.columns.len() != joints.len() {
+            return None;
+        }
+        let column = |joint: &usize| Some(family.columns.get(sorted.binary_search(joint).ok()?)?.1.clone());
+        joints.iter().map(column).collect()
+    })
+}
+
+/// Whether the columns of `family` have numbers and those of `logged` the names of joints, so that the order of the
+/// numbers is assumed.
+pub(super) fn is_numbered_next_to_names(family: &Family, logged: &Family) -> bool {
+    let is_number = |family: &Family| matches!(family.columns[0].0, JointKey::Number(_));
+    is_number(family) && !is_number(logged)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jobs::columns::{Quantity, Source, best, families};
+    use crate::jobs::columns::{Quantity, Source, best, best_torque, equal_choice, families};
     use crate::result::{LOG_SCHEMA, LogChannel};
 
     fn robot(names: &[String], free: usize, turning: usize) -> RobotJoints<'_> {
-        RobotJoints { names, free: (0..free).collect(), turning: (0..turning).collect() }
+        RobotJoints { names, free: (0..free).collect(), turning: (0..turning).collect(), parents: Vec::new() }
     }
 
     fn contents(names: &[&str]) -> LogContents {
@@ -263,6 +359,56 @@ mod tests {
         assert!(logged.is_sure && logged.joints == (0..7).collect::<Vec<_>>(), "{logged:?}");
         assert!(!logged_joints(&found[0], &robot(&[], 9, 9), &[]).unwrap().is_sure);
         assert_eq!(logged_joints(&found[0], &robot(&[], 5, 5), &[]), None);
+    }
+
+    #[test]
+    fn a_joint_between_logged_ones_is_a_doubt() {
+        let names = ["a", "b", "c", "gripper"].map(|name| format!("joint_{name}"));
+        let robot = RobotJoints { parents: vec![None, Some(0), Some(1), Some(2)], ..robot(&names, 4, 4) };
+        let logged = |joints: &[&str]| {
+            let columns: Vec<String> = joints.iter().map(|joint| format!("joint_{joint}.pos")).collect();
+            let logs = [(Path::new("run"), contents(&columns.iter().map(String::as_str).collect::<Vec<_>>()))];
+            let found = families(logs.iter().map(|(path, log)| (*path, log)), &names);
+            logged_joints(&found[0], &robot, &[]).unwrap()
+        };
+        assert!(logged(&["a", "b", "c"]).is_sure);
+        let doubt = logged(&["a", "c"]);
+        assert!(!doubt.is_sure && doubt.reason.contains("`joint_b`") && doubt.joints == [0, 2], "{doubt:?}");
+    }
+
+    #[test]
+    fn short_names_are_joined_and_assigned() {
+        let joints = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint"]
+            .map(str::to_owned);
+        let columns = ["elbow", "lift", "pan", "w1", "w2"].map(|joint| format!("q_{joint}"));
+        let logs = [(Path::new("run"), contents(&columns.each_ref().map(String::as_str)))];
+        let all = families(logs.iter().map(|(path, log)| (*path, log)), &joints);
+        let robot = robot(&joints, 5, 5);
+        let joined = with_numbered_names(&all, &logs, &robot);
+        assert_eq!((all.len(), joined.len()), (2, 1), "{joined:?}");
+        let logged = logged_joints(&joined[0], &robot, &[]).unwrap();
+        assert!(logged.is_sure && logged.joints == [2, 1, 0, 3, 4], "{logged:?}");
+    }
+
+    #[test]
+    fn torques_of_another_numbering_belong_to_the_joints_in_order() {
+        let logs = [(Path::new("run"), contents(&["q0", "q1", "q2", "tau1", "tau2", "tau3"]))];
+        let found = families(logs.iter().map(|(path, log)| (*path, log)), &[]);
+        let torques = in_order(&found[1], &found[0], &[2, 0, 1]).unwrap();
+        assert_eq!(torques, ["tau3", "tau1", "tau2"]);
+        assert!(!is_numbered_next_to_names(&found[1], &found[0]));
+    }
+
+    #[test]
+    fn names_of_one_arm_belong_together() {
+        let names = ["l_pos_1", "l_pos_2", "r_pos_1", "r_pos_2", "r_tau_1", "r_tau_2", "l_tau_1", "l_tau_2"];
+        let logs = [(Path::new("run"), contents(&names))];
+        let all = families(logs.iter().map(|(path, log)| (*path, log)), &[]);
+        let position = best(&all, Quantity::Position, |_| true).unwrap();
+        let torque = best_torque(&all, Some(position), |_| true).unwrap();
+        assert_eq!([position, torque].map(|family| &family.stem[..]), ["l_pos", "l_tau"]);
+        assert_eq!(equal_choice(&all, position, None, |_| true).unwrap().stem, "r_pos");
+        assert_eq!(equal_choice(&all, torque, Some(position), |_| true), None);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Draft of a study: tables and keys with reasons.
 
+use crate::jobs::check::REPEATED_VALUES;
 use crate::result::{CheckFinding, StudyChange, StudyCheck, Unsure};
 use core::fmt::Write;
 use dynident_recording::Level;
@@ -82,8 +83,8 @@ impl Draft {
     }
 
     /// Applies unambiguous corrections of an examination; returns whether anything changed. Signs, orders, mountings
-    /// and units have few possible values. A zero or a factor has any value and may compensate for another mistake, so
-    /// a person decides.
+    /// and units have few possible values, and the rows that a recorder repeats are counted. A zero or a factor has any
+    /// value and may compensate for another mistake, so a person decides.
     pub(super) fn apply_corrections(&mut self, found: &StudyCheck) -> bool {
         let is_discrete = |finding: &&CheckFinding| match finding.kind.as_str() {
             "sign" | "order" | "mounting" => true,
@@ -91,7 +92,8 @@ impl Draft {
             _ => false,
         };
         let problems = found.findings.iter().filter(|finding| finding.level == Level::Problem && finding.or.is_empty());
-        let corrections = problems.filter(is_discrete);
+        let repeated = found.findings.iter().filter(|finding| finding.code == REPEATED_VALUES);
+        let corrections = repeated.chain(problems.filter(is_discrete));
         let mut changed = false;
         for finding in corrections {
             for change in &finding.write {

@@ -12,22 +12,24 @@ pub use settings::NewStudySettings;
 use crate::error::{Error, NewStudyError};
 use crate::jobs::check::check;
 use crate::jobs::columns::{
-    Basis, Family, JointKey, Quantity, Source, best, best_command, best_torque, column_list, families,
-    families_by_order, is_unsigned, time_as_toml, time_unit_s, with_unit,
+    Basis, Family, JointKey, Quantity, Source, best, best_command, best_next_to, best_torque, column_list,
+    equal_choice, families, families_by_order, families_without_quantity, is_unsigned, shown, time_as_toml,
+    time_unit_s, unit, with_unit,
 };
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
 use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
 use crate::study::{LoadSettings, Study, XacroSettings, load_robot, relative_path};
 use channels::{
-    LoggedJoints, RobotJoints, in_order, logged_joints, with_partly_foreign_names, without_foreign_grippers,
+    LoggedJoints, RobotJoints, in_order, is_numbered_next_to_names, logged_joints, with_numbered_names,
+    with_partly_foreign_names, without_foreign_grippers,
 };
 use draft::{Draft, Table};
 use drives::{DriveInertiaFinding, drive_inertia};
 use dynident_model::{JointKind, Model, Robot};
 use dynident_recording::Level;
 use dynident_text::quoted;
-use position_units::PositionUnits;
+use position_units::{PositionUnits, one_or_list};
 use reasons::{alternatives, basis, recognised};
 use std::path::{Path, PathBuf};
 
@@ -67,7 +69,7 @@ impl NewStudy {
 ///
 /// # Errors
 /// A robot description or recording that cannot be read, or without recognisable columns of positions and of torques or
-/// commands.
+/// commands. A recording that cannot be used with the written study is a doubt, not an error.
 pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStudyFile, Error> {
     new_study_with(request, options, &NewStudySettings::default())
 }
@@ -108,7 +110,15 @@ pub fn new_study_with(
     if !unsure.iter().any(without_rate) {
         for _ in 0..MAX_ROUNDS {
             let study = request.study(&draft)?;
-            let found = check(&study, &request.out, options)?.check;
+            let found = match check(&study, &request.out, options) {
+                Ok(found) => found.check,
+                Err(error @ Error::Interrupted { .. }) => return Err(error),
+                // The study is known except for what the error names, so it is written.
+                Err(error) => {
+                    unsure.push(Unsure { line: None, proposed: Vec::new(), reason: error.to_string() });
+                    break;
+                }
+            };
             let changed = draft.apply_corrections(&found);
             examined = Some(found);
             if !changed {
@@ -154,6 +164,10 @@ struct RecognisedColumns {
     time: Option<LogClock>,
     /// Other columns of the quantities of positions, velocities and torques.
     alternatives: [String; 3],
+    /// Columns of positions and of torques that are as likely as the chosen ones.
+    equals: [Option<String>; 2],
+    /// Rows of the recordings for one row with values in all columns.
+    rows_of_complete_one: f64,
 }
 
 struct LogClock {
@@ -163,6 +177,8 @@ struct LogClock {
     rate_hz: Option<f64>,
     /// Whether its name, not its values, shows that it is the clock.
     is_named: bool,
+    /// Whether the stamps are 0, 1, 2, .. without a unit.
+    counts: bool,
 }
 
 impl RecognisedColumns {
@@ -175,16 +191,32 @@ impl RecognisedColumns {
         let free: Vec<usize> = (0..model.dof()).filter(|&joint| model.joints()[joint].mimic.is_none()).collect();
         let is_rotary = |joint: &usize| model.joints()[*joint].kind != JointKind::Prismatic;
         let turning = free.iter().copied().filter(is_rotary).collect();
-        let robot = RobotJoints { names: &names, free, turning };
-        let mut all = families(logs.iter().map(|(path, log)| (*path, log)), &names);
+        let parents = model.joints().iter().map(|joint| joint.parent).collect();
+        let robot = RobotJoints { names: &names, free, turning, parents };
+        let paths = || logs.iter().map(|(path, log)| (*path, log));
+        let mut all = families(paths(), &names);
+        let counts = [robot.free.len(), robot.turning.len()];
         if all.is_empty() {
-            let counts = [robot.free.len(), robot.turning.len()];
             all = logs.iter().enumerate().flat_map(|(file, (_, log))| families_by_order(file, log, &counts)).collect();
         }
-        let joined = with_partly_foreign_names(&all, logs, &robot);
-        let all = without_foreign_grippers(&joined, &robot);
-        let missing = |quantity| NewStudyError::NotRecognised { quantity, found: recognised(&all, logs) };
-        let position = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions"))?;
+        let joined = with_numbered_names(&with_partly_foreign_names(&all, logs, &robot), logs, &robot);
+        let mut all = without_foreign_grippers(&joined, &robot);
+        let missing =
+            |quantity, all: &[Family]| NewStudyError::NotRecognised { quantity, found: recognised(all, logs) };
+        // Unknown columns, one for each joint.
+        let assume = |all: &mut Vec<Family>, quantity| {
+            let known: Vec<String> =
+                all.iter().flat_map(|family| &family.columns).map(|(_, name)| name.clone()).collect();
+            let is_new = |family: &Family| {
+                counts.contains(&family.columns.len()) && family.columns.iter().all(|(_, name)| !known.contains(name))
+            };
+            all.extend(families_without_quantity(paths(), &names, quantity).into_iter().find(is_new));
+        };
+        if best(&all, Quantity::Position, |_| true).is_none() {
+            assume(&mut all, Quantity::Position);
+        }
+        let position = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions", &all))?.clone();
+        let position = &position;
         let same_kind = |family: &&Family| {
             (family.file, family.group, family.quantity, &family.stem)
                 == (position.file, position.group, position.quantity, &position.stem)
@@ -211,28 +243,39 @@ impl RecognisedColumns {
             family.file != position.file && rows(family) == rows(position) && ordered(family).is_some()
         };
         let is_commanded = |family: &Family| position.source != Source::Commanded && family != position;
-        let command = best_command(&all, |family| is_commanded(family) && in_same_file(family))
-            .or_else(|| best_command(&all, |family| is_commanded(family) && in_other_file(family)));
-        let is_torque = |family: &Family| command.is_none() || !is_unsigned(family, &logs[family.file].1);
-        let torques = |is_recorded: bool, fits: &dyn Fn(&Family) -> bool| {
-            let is_usable = |family: &Family| is_torque(family) && (family.source.is_recorded() || !is_recorded);
-            best_torque(&all, |family| is_usable(family) && fits(family))
+        let find_drive = |all: &[Family]| {
+            let command = best_command(all, |family| is_commanded(family) && in_same_file(family))
+                .or_else(|| best_command(all, |family| is_commanded(family) && in_other_file(family)));
+            let is_torque = |family: &Family| command.is_none() || !is_unsigned(family, &logs[family.file].1);
+            let torques = |is_recorded: bool, fits: &dyn Fn(&Family) -> bool| {
+                let is_usable = |family: &Family| is_torque(family) && (family.source.is_recorded() || !is_recorded);
+                best_torque(all, Some(position), |family| is_usable(family) && fits(family))
+            };
+            let torque = torques(true, &in_same_file)
+                .or_else(|| torques(true, &in_other_file))
+                .or_else(|| torques(false, &in_same_file))
+                .or_else(|| torques(false, &in_other_file));
+            torque.or(command).cloned()
         };
-        let torque = torques(true, &in_same_file)
-            .or_else(|| torques(true, &in_other_file))
-            .or_else(|| torques(false, &in_same_file))
-            .or_else(|| torques(false, &in_other_file));
-        let drive = torque.or(command).ok_or_else(|| missing("torques, currents or commanded positions"))?;
-        let velocity = best(&all, Quantity::Velocity, in_same_file)
-            .or_else(|| best(&all, Quantity::Velocity, in_other_file))
+        let mut drive = find_drive(&all);
+        if drive.is_none() {
+            assume(&mut all, Quantity::Torque);
+            drive = find_drive(&all);
+        }
+        let none = || missing("torques, currents or commanded positions", &all);
+        let drive = &drive.ok_or_else(none)?;
+        let velocity = best_next_to(&all, Quantity::Velocity, Some(position), in_same_file)
+            .or_else(|| best_next_to(&all, Quantity::Velocity, Some(position), in_other_file))
             .filter(|family| family.source.is_recorded());
         let fits = |family: &&Family| in_same_file(family) || in_other_file(family);
         let alternatives = [Some(position), velocity, Some(drive)]
             .map(|chosen| chosen.map_or_else(String::new, |chosen| alternatives(chosen, all.iter().filter(fits))));
+        let named =
+            |family: &Family| shown(&family.columns.iter().map(|(_, name)| name.clone()).collect::<Vec<_>>(), 1);
+        let equals = [(position, None), (drive, Some(position))]
+            .map(|(chosen, other)| equal_choice(&all, chosen, other, in_same_file).map(named));
 
-        let (Some(of_position), Some(of_drive)) = (ordered(position), ordered(drive)) else {
-            return Err(missing("torques, currents or commanded positions"));
-        };
+        let (Some(of_position), Some(of_drive)) = (ordered(position), ordered(drive)) else { return Err(none()) };
         let has = |log: &LogContents, columns: &[String]| {
             columns.iter().all(|column| log.channels.iter().any(|channel| channel.name == *column))
         };
@@ -247,9 +290,23 @@ impl RecognisedColumns {
             let name = group.time.as_ref()?;
             let unit = contents.unit(position.group, name);
             let is_named = group.name.is_some() || time_unit_s(&with_unit(name, unit)).is_some();
-            Some(LogClock { key: time_as_toml(name, unit), rate_hz: group.rate_hz, is_named })
+            let is_unit_of_rate = self::unit(name).is_none() && unit == Some("ms") && group.rate_hz == Some(1000.0);
+            let channel = contents.channels.iter().find(|channel| channel.name == *name);
+            let starts =
+                channel.and_then(|channel| channel.range).is_some_and(|[first, _]| [0.0, 1.0].contains(&first));
+            let counts = is_unit_of_rate && starts;
+            Some(LogClock { key: time_as_toml(name, unit), rate_hz: group.rate_hz, is_named, counts })
         });
-        let files = (0..logs.len()).filter(holds).collect();
+        let files: Vec<usize> = (0..logs.len()).filter(holds).collect();
+        let used = |log: &LogContents, name: &String| {
+            let channel = log.channels.iter().find(|channel| channel.name == *name)?;
+            Some((channel.samples + channel.missing) as f64 / channel.samples.max(1) as f64)
+        };
+        let shares = [(position, &of_position), (drive, &of_drive)].into_iter().flat_map(|(family, columns)| {
+            let own = if is_pair { vec![family.file] } else { files.clone() };
+            own.into_iter().flat_map(move |file| columns.iter().filter_map(move |name| used(&logs[file].1, name)))
+        });
+        let rows_of_complete_one = shares.fold(1.0, f64::max);
         Ok(Self {
             thresholds: thresholds.clone(),
             columns: [of_position, of_drive],
@@ -262,6 +319,8 @@ impl RecognisedColumns {
             drive: drive.clone(),
             velocity: velocity.cloned(),
             alternatives,
+            equals,
+            rows_of_complete_one,
         })
     }
 
@@ -330,28 +389,54 @@ impl RecognisedColumns {
 
     fn time_table(&self, request: &NewStudy) -> Table {
         let table = Table::new("[format]", "");
-        match (&self.time, request.rate_hz) {
-            (Some(LogClock { key, rate_hz, is_named }), _) => {
+        let table = match (&self.time, request.rate_hz) {
+            (Some(LogClock { key, rate_hz, counts: true, .. }), None) => {
+                let reason = "the stamps count 0, 1, 2, ..: milliseconds, or rows: then write rate_hz = the sample rate in place of time";
+                let rate = rate_hz.map_or_else(String::new, |rate_hz| format!("{rate_hz:.4} Hz on average; "));
+                table.with_unsure("time", key.clone(), format!("{rate}{reason}"))
+            }
+            (Some(LogClock { counts: true, .. }) | None, Some(rate_hz)) => {
+                table.with("rate_hz", format!("{rate_hz:?}"), "As given: no time column recognised")
+            }
+            (Some(LogClock { key, rate_hz, is_named, .. }), _) => {
                 let rate = rate_hz.map_or_else(String::new, |rate_hz| format!("{rate_hz:.4} Hz on average"));
                 let by = if *is_named { "" } else { ", a column that rises evenly" };
                 table.with("time", key.clone(), format!("{rate}{by}"))
-            }
-            (None, Some(rate_hz)) => {
-                table.with("rate_hz", format!("{rate_hz:?}"), "As given: no time column recognised")
             }
             (None, None) => table.with_unsure(
                 "rate_hz",
                 "1000.0",
                 "no time column recognised: give the sample rate, or time = { column = .. }",
             ),
+        };
+        let every = self.rows_of_complete_one.round();
+        if self.rows_of_complete_one <= 1.0 {
+            return table;
         }
+        let table = table.with("missing", quoted("drop"), "values are missing in some rows, which are left out");
+        if every < 2.0 {
+            return table;
+        }
+        let reason = format!(
+            "values are missing in most rows: probably a slower channel with a value in every row number {every}"
+        );
+        table.with_unsure("keep_every", format!("{every}"), reason)
+    }
+
+    /// The doubt about a choice between columns.
+    fn doubt(&self, place: usize) -> Option<String> {
+        let equal = self.equals[place].as_ref()?;
+        Some(format!("{equal} may equally be meant: the names do not decide, the first in the file are taken"))
     }
 
     fn position_table(&self, model: &Model, logs: &[(&Path, LogContents)]) -> Table {
         let [columns, _] = &self.columns;
-        let table = Table::new("[format.position]", basis(&self.position, "positions", &self.alternatives[0]))
-            .with_line("columns", column_list(columns), &self.logged.reason, self.position.basis != Basis::Order);
-        PositionUnits::of(self, model, logs).with_unit(table, self.position.unit)
+        let table = Table::new("[format.position]", basis(&self.position, "positions", &self.alternatives[0]));
+        let doubt = self.doubt(0);
+        let is_sure = doubt.is_none() && !matches!(self.position.basis, Basis::Order | Basis::Assumption);
+        let table =
+            table.with_line("columns", column_list(columns), doubt.as_ref().unwrap_or(&self.logged.reason), is_sure);
+        PositionUnits::of(self, model, logs).with_unit(table, &self.position, columns)
     }
 
     fn velocity_table(&self, model: &Model, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
@@ -363,8 +448,8 @@ impl RecognisedColumns {
             format!("Compared with the derivative of the positions{}", self.alternatives[1]),
         );
         let table = self.with_file(table, family, logs, from).with("columns", column_list(columns), "");
-        Some(match family.unit.filter(|unit| *unit != "rad/s") {
-            Some(unit) => table.with("unit", quoted(unit), "by the names"),
+        Some(match stated_units(family, columns, "rad/s") {
+            Some(units) => table.with("unit", units, "by the names"),
             None if family.unit.is_none() && PositionUnits::of(self, model, logs).are_degrees(self.position.unit) => {
                 table.with_unsure("unit", quoted("deg/s"), "positions are in degrees".to_owned())
             }
@@ -385,7 +470,7 @@ impl RecognisedColumns {
         );
         let table = self.with_file(Table::new("[format.command]", reason), &self.drive, logs, from);
         let table = table.with("columns", column_list(columns), "");
-        PositionUnits::of(self, model, logs).with_unit(table, self.drive.unit)
+        PositionUnits::of(self, model, logs).with_unit(table, &self.drive, columns)
     }
 
     fn torque_table(&self, logs: &[(&Path, LogContents)], from: &Path) -> Table {
@@ -399,18 +484,26 @@ impl RecognisedColumns {
             Source::Computed => {
                 table.with_unsure("columns", column_list(columns), "computed, not measured: no other torque was found")
             }
-            Source::Unstated | Source::Measured if self.drive.basis == Basis::Order => {
-                table.with_unsure("columns", column_list(columns), "the columns have no names: assigned in order")
+            Source::Unstated | Source::Measured | Source::Filtered => {
+                let doubt = match self.drive.basis {
+                    Basis::Order => Some("the columns have no names: assigned in order".to_owned()),
+                    Basis::Assumption => Some("their names state no quantity: no other torque was found".to_owned()),
+                    _ if is_numbered_next_to_names(&self.drive, &self.position) => {
+                        Some("numbers in place of names: assigned in the order of the robot description".to_owned())
+                    }
+                    Basis::ColumnNames | Basis::FileName => self.doubt(1),
+                };
+                let is_sure = doubt.is_none();
+                table.with_line("columns", column_list(columns), doubt.unwrap_or_default(), is_sure)
             }
-            Source::Unstated | Source::Measured => table.with("columns", column_list(columns), ""),
         };
         if self.drive.quantity == Quantity::Current {
             let unit = self.drive.unit.unwrap_or("A");
             let reason = "Nm/A: gear ratio times motor constant, one value per joint; with 1 torques remain in amperes";
             return table.with("unit", quoted(unit), "a current").with_unsure("scale", "1.0", reason);
         }
-        match self.drive.unit.filter(|unit| *unit != "N m") {
-            Some(unit) => table.with("unit", quoted(unit), "by the names"),
+        match stated_units(&self.drive, columns, "N m") {
+            Some(units) => table.with("unit", units, "by the names"),
             None => table,
         }
     }
@@ -449,6 +542,12 @@ impl RecognisedColumns {
         };
         self.files.iter().enumerate().map(table).collect()
     }
+}
+
+/// The units in the names of `columns`, if one is not the usual one.
+fn stated_units(family: &Family, columns: &[String], usual: &'static str) -> Option<String> {
+    let units: Vec<&str> = columns.iter().map(|column| family.unit_of(column).unwrap_or(usual)).collect();
+    units.iter().any(|unit| *unit != usual).then(|| one_or_list(&units))
 }
 
 fn key(name: &str) -> String {

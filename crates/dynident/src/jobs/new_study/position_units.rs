@@ -2,6 +2,7 @@
 
 use super::RecognisedColumns;
 use super::draft::Table;
+use crate::jobs::columns::Family;
 use crate::result::LogContents;
 use dynident_model::{JointKind, Model};
 use dynident_text::quoted;
@@ -30,6 +31,9 @@ pub(super) struct PositionUnits {
     gripper: Option<Gripper>,
     /// Largest position of a revolute joint that is implausible in radians.
     implausible: Option<f64>,
+    /// For each column, the largest position of a prismatic joint.
+    travel: Vec<Option<f64>>,
+    max_travel_m: f64,
 }
 
 impl PositionUnits {
@@ -77,7 +81,21 @@ impl PositionUnits {
         });
         let most = most.fold(0.0, f64::max);
         let limit = recognised.thresholds.max_radian_turns * core::f64::consts::TAU;
-        Self { columns: joints.len(), gripper, implausible: (most > limit).then_some(most) }
+        let is_prismatic = |place: usize| {
+            model.joints()[joints[place]].kind == JointKind::Prismatic
+                && gripper.as_ref().is_none_or(|gripper| gripper.place != place)
+        };
+        let travel = (0..joints.len()).map(|place| {
+            let [low, high] = ranges(place);
+            is_prismatic(place).then(|| high.max(-low))
+        });
+        Self {
+            columns: joints.len(),
+            travel: travel.collect(),
+            max_travel_m: recognised.thresholds.max_travel_m,
+            implausible: (most > limit).then_some(most),
+            gripper,
+        }
     }
 
     /// Whether the positions are probably in degrees; `stated` is the unit in their names.
@@ -85,17 +103,35 @@ impl PositionUnits {
         stated == Some("deg") || stated.is_none() && self.implausible.is_some()
     }
 
-    /// `table` with the unit of its columns, and the range of a gripper.
-    pub(super) fn with_unit(&self, table: Table, stated: Option<&'static str>) -> Table {
-        let table = match (stated, self.implausible) {
-            (Some("rad"), _) | (None, None) => table,
-            (Some(unit), _) => table.with("unit", quoted(unit), "by the names"),
-            (None, Some(most)) => {
+    /// Unit of a column of `family`, and the reason for a doubt.
+    fn unit(&self, place: usize, stated: Option<&'static str>) -> (&'static str, Option<String>) {
+        match (stated, self.travel[place]) {
+            (Some(unit @ ("m" | "mm")), _) | (Some(unit), None) => (unit, None),
+            (_, Some(travel)) if travel > self.max_travel_m => {
+                ("mm", Some(format!("a prismatic joint moves to {travel:.1}, which is implausible in metres")))
+            }
+            (_, Some(_)) => ("m", None),
+            (None, None) => self.implausible.map_or(("rad", None), |most| {
                 let reason = format!(
                     "a joint moves to {most:.1}, which is implausible in radians: degrees, or motor-side positions"
                 );
-                table.with_unsure("unit", quoted("deg"), reason)
-            }
+                ("deg", Some(reason))
+            }),
+        }
+    }
+
+    /// `table` with the unit of its `columns`, and the range of a gripper.
+    pub(super) fn with_unit(&self, table: Table, family: &Family, columns: &[String]) -> Table {
+        let stated = family.unit;
+        let units: Vec<_> =
+            columns.iter().enumerate().map(|(place, column)| self.unit(place, family.unit_of(column))).collect();
+        let doubt = units.iter().find_map(|(_, doubt)| doubt.clone());
+        let names: Vec<&str> = units.iter().map(|(unit, _)| *unit).collect();
+        let table = if names.iter().all(|unit| ["rad", "m"].contains(unit)) {
+            table
+        } else {
+            let reason = doubt.clone().unwrap_or_else(|| "by the names".to_owned());
+            table.with_line("unit", one_or_list(&names), reason, doubt.is_none())
         };
         let Some(Gripper { place, full, limits: [low, high] }) = &self.gripper else { return table };
         let unit = if self.are_degrees(stated) { core::f64::consts::PI / 180.0 } else { 1.0 };
@@ -107,5 +143,13 @@ impl PositionUnits {
             "the gripper is logged from 0 to {full}, probably a share of its range: mapped to the limits of the robot description"
         );
         table.with_unsure("scale", list(1.0, (high - low) / full / unit), reason).with("offset", list(0.0, *low), "rad")
+    }
+}
+
+/// One value if all are equal, otherwise a list.
+pub(super) fn one_or_list(units: &[&str]) -> String {
+    match units {
+        [first, rest @ ..] if rest.iter().all(|unit| unit == first) => quoted(first),
+        _ => format!("[{}]", units.iter().map(|unit| quoted(unit)).collect::<Vec<_>>().join(", ")),
     }
 }

@@ -15,6 +15,7 @@ pub(super) fn basis(family: &Family, what: &str, alternatives: &str) -> String {
         Basis::FileName => "by file name",
         Basis::ColumnNames => "by column names",
         Basis::Order => "by their order in the file",
+        Basis::Assumption => "by their number alone",
     };
     let unit = family.unit.map_or_else(String::new, |unit| format!(", in {unit}"));
     format!("{}{what} {by}{unit}{alternatives}", source_name(family.source))
@@ -24,6 +25,7 @@ fn source_name(source: Source) -> &'static str {
     match source {
         Source::Measured => "measured ",
         Source::Commanded => "commanded ",
+        Source::Filtered => "filtered ",
         Source::Computed => "computed ",
         Source::Unstated => "",
     }

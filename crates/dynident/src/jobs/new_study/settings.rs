@@ -12,11 +12,18 @@ pub struct NewStudySettings {
     pub validation_fraction: [f64; 2],
     /// Largest position that is assumed to be in radians, turns. Default 4.
     pub max_radian_turns: f64,
+    /// Largest position of a prismatic joint that is assumed to be in metres, m. Default 10.
+    pub max_travel_m: f64,
 }
 
 impl Default for NewStudySettings {
     fn default() -> Self {
-        Self { training_fraction: [0.0, 0.65], validation_fraction: [0.7, 1.0], max_radian_turns: 4.0 }
+        Self {
+            training_fraction: [0.0, 0.65],
+            validation_fraction: [0.7, 1.0],
+            max_radian_turns: 4.0,
+            max_travel_m: 10.0,
+        }
     }
 }
 
@@ -24,12 +31,14 @@ impl NewStudySettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// A fraction outside of 0 to 1, an overlap of training and validation, or a number of turns that is not positive.
+    /// A fraction outside of 0 to 1, an overlap of training and validation, or a number of turns or a travel that is
+    /// not positive.
     pub fn validate(&self) -> Result<(), StudyError> {
         let ([from, to], [validation_from, validation_to]) = (self.training_fraction, self.validation_fraction);
         Expected::Range(0.0, to).check("training_fraction", from)?;
         Expected::Range(to, validation_to).check("validation_fraction", validation_from)?;
         Expected::Range(0.0, 1.0).check("validation_fraction", validation_to)?;
-        Expected::Positive.check("max_radian_turns", self.max_radian_turns)
+        Expected::Positive.check("max_radian_turns", self.max_radian_turns)?;
+        Expected::Positive.check("max_travel_m", self.max_travel_m)
     }
 }
