@@ -13,8 +13,8 @@ pub(super) const INSTANTS: usize = 300;
 const REST_SHARE: f64 = 0.02;
 /// Least number of instants without a joint at rest for which the others are left out.
 const MIN_MOVING: usize = 100;
-/// Least share of instants with a joint at rest for which they are left out. The reversals of seven joints that move all
-/// the time are about a tenth.
+/// Least share of instants with a joint at rest for which they are left out. The reversals of seven joints that move
+/// all the time are about a tenth.
 const MIN_RESTING_SHARE: f64 = 0.15;
 
 /// Standard deviation of a normal distribution over the median of its magnitude.
@@ -202,8 +202,8 @@ impl MotionSamples {
     }
 }
 
-/// Rows in which a joint rests that moves in other rows; empty for motion without pauses ([`MIN_RESTING_SHARE`]), and if
-/// less than [`MIN_MOVING`] others would remain.
+/// Rows in which a joint rests that moves in other rows; empty for motion without pauses ([`MIN_RESTING_SHARE`]), and
+/// if less than [`MIN_MOVING`] others would remain.
 fn resting(rows: &MotionRows) -> Vec<bool> {
     let mut resting = vec![false; rows.len()];
     for dq in &rows.dq {
