@@ -399,7 +399,9 @@ mod tests {
             let columns = names.map(|name| log.names().unwrap().iter().position(|known| known == name).unwrap());
             log.select(&columns);
             let mut rows = [[0.0; 2]; 3];
-            rows.iter_mut().for_each(|row| assert!(log.next_row(row).unwrap()));
+            for row in &mut rows {
+                assert!(log.next_row(row).unwrap());
+            }
             assert_eq!(rows, [[1.0, 2.0], [3.0, 4.0], [8.0, 7.0]], "{text}");
         }
         assert!(table(numbered).names().unwrap().ends_with(&["other_0".to_owned(), "other_1".to_owned()]));
