@@ -125,7 +125,9 @@ impl PositionUnits {
         let stated = family.unit;
         let units: Vec<_> =
             columns.iter().enumerate().map(|(place, column)| self.unit(place, family.unit_of(column))).collect();
-        let doubt = units.iter().find_map(|(_, doubt)| doubt.clone());
+        let mut doubts: Vec<&str> = units.iter().filter_map(|(_, doubt)| doubt.as_deref()).collect();
+        doubts.dedup();
+        let doubt = (!doubts.is_empty()).then(|| doubts.join("; "));
         let names: Vec<&str> = units.iter().map(|(unit, _)| *unit).collect();
         let table = if names.iter().all(|unit| ["rad", "m"].contains(unit)) {
             table
