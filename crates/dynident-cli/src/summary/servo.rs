@@ -57,7 +57,9 @@ fn forms(file: &ServoFile) -> String {
         return String::new();
     };
     let form = |form: &ServoForm| {
-        let error = form.mean_errors().map_or_else(|| "diverges".to_owned(), |[own, _]| format!("{:.1}", 1e3 * own));
+        let error = form
+            .mean_errors()
+            .map_or_else(|| "unknown (no simulated motion)".to_owned(), |[own, _]| format!("{:.1}", 1e3 * own));
         format!("{} {error}", form.form)
     };
     let forms: Vec<String> = file.forms.iter().map(form).collect();
