@@ -174,3 +174,37 @@ fn a_log_that_check_cannot_use_is_a_doubt() {
     has(&found, &["time = { column = \"t\" }"]);
     assert!(found.check.is_none() && doubts(&found).contains("log.csv:702"), "{}", doubts(&found));
 }
+
+/// Followers are links of the tree, but not joints of the log.
+#[test]
+fn a_joint_that_carries_others_is_found_next_to_followers() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = |name: &str| {
+        format!(
+            "<link name=\"{name}\"><inertial><origin xyz=\"0.1 0 0\"/><mass value=\"1\"/>\
+             <inertia ixx=\"0.01\" iyy=\"0.01\" izz=\"0.01\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>"
+        )
+    };
+    let joint = |name: &str, parent: &str, child: &str, more: &str| {
+        format!(
+            "<joint name=\"{name}\" type=\"continuous\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+             <origin xyz=\"0.3 0 0\"/><axis xyz=\"0 1 0\"/>{more}</joint>"
+        )
+    };
+    let robot = folder.path().join("robot.urdf");
+    let follows = "<mimic joint=\"joint1\" multiplier=\"0.5\"/>";
+    let text = [
+        "<robot name=\"arm\"><link name=\"base\"/>".to_owned(),
+        ["follower", "link1", "link2"].map(link).concat(),
+        joint("first", "base", "follower", follows),
+        joint("joint1", "follower", "link1", ""),
+        joint("joint2", "link1", "link2", ""),
+        "</robot>".to_owned(),
+    ];
+    std::fs::write(&robot, text.concat()).unwrap();
+    let log = csv(folder.path(), "t,joint1_pos,joint2_pos,joint1_torque,joint2_torque", |at, row| timed(at, &row));
+    let found = written(&robot, &[log]);
+    assert!(!doubts(&found).contains("has no column"), "{}", doubts(&found));
+    let log = csv(folder.path(), "t,joint2_pos,other,joint2_torque,another", |at, row| timed(at, &row));
+    assert!(doubts(&written(&robot, &[log])).contains("`joint1`"));
+}

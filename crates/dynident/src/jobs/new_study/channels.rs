@@ -23,16 +23,15 @@ pub(super) struct RobotJoints<'a> {
     pub(super) free: Vec<usize>,
     /// Indices of the revolute ones among them.
     pub(super) turning: Vec<usize>,
-    /// The joint that carries each joint.
-    pub(super) parents: Vec<Option<usize>>,
+    /// The joints that carry each joint.
+    pub(super) carriers: Vec<Vec<usize>>,
 }
 
 impl RobotJoints<'_> {
     /// A joint that carries one of `joints` and is not among them, although it moves independently.
     fn missing_below(&self, joints: &[usize]) -> Option<&str> {
-        let parent = |joint: &usize| self.parents.get(*joint).copied().flatten();
-        let mut below = joints.iter().flat_map(|joint| core::iter::successors(parent(joint), parent));
-        below.find(|joint| self.free.contains(joint) && !joints.contains(joint)).map(|joint| &self.names[joint][..])
+        let mut below = joints.iter().filter_map(|joint| self.carriers.get(*joint)).flatten();
+        below.find(|joint| self.free.contains(joint) && !joints.contains(joint)).map(|joint| &self.names[*joint][..])
     }
 }
 
@@ -294,7 +293,7 @@ mod tests {
     use crate::result::{LOG_SCHEMA, LogChannel};
 
     fn robot(names: &[String], free: usize, turning: usize) -> RobotJoints<'_> {
-        RobotJoints { names, free: (0..free).collect(), turning: (0..turning).collect(), parents: Vec::new() }
+        RobotJoints { names, free: (0..free).collect(), turning: (0..turning).collect(), carriers: Vec::new() }
     }
 
     fn contents(names: &[&str]) -> LogContents {
@@ -364,7 +363,7 @@ mod tests {
     #[test]
     fn a_joint_between_logged_ones_is_a_doubt() {
         let names = ["a", "b", "c", "gripper"].map(|name| format!("joint_{name}"));
-        let robot = RobotJoints { parents: vec![None, Some(0), Some(1), Some(2)], ..robot(&names, 4, 4) };
+        let robot = RobotJoints { carriers: vec![vec![], vec![0], vec![0, 1], vec![0, 1, 2]], ..robot(&names, 4, 4) };
         let logged = |joints: &[&str]| {
             let columns: Vec<String> = joints.iter().map(|joint| format!("joint_{joint}.pos")).collect();
             let logs = [(Path::new("run"), contents(&columns.iter().map(String::as_str).collect::<Vec<_>>()))];

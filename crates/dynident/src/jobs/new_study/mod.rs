@@ -191,8 +191,10 @@ impl RecognisedColumns {
         let free: Vec<usize> = (0..model.dof()).filter(|&joint| model.joints()[joint].mimic.is_none()).collect();
         let is_rotary = |joint: &usize| model.joints()[*joint].kind != JointKind::Prismatic;
         let turning = free.iter().copied().filter(is_rotary).collect();
-        let parents = model.joints().iter().map(|joint| joint.parent).collect();
-        let robot = RobotJoints { names: &names, free, turning, parents };
+        let moves = |other: usize, joint: usize| other != joint && model.moves(other, model.body_of(joint));
+        let carriers_of = |joint| (0..model.dof()).filter(|&other| moves(other, joint)).collect();
+        let carriers = (0..model.dof()).map(carriers_of).collect();
+        let robot = RobotJoints { names: &names, free, turning, carriers };
         let paths = || logs.iter().map(|(path, log)| (*path, log));
         let mut all = families(paths(), &names);
         let counts = [robot.free.len(), robot.turning.len()];
