@@ -18,7 +18,7 @@ pub struct ExportFile {
     pub notes: Vec<String>,
     /// The output file; null if `text` contains the export.
     pub file: Option<String>,
-    /// For drives from commands: what the file does not contain, and the error of the motion simulated with it.
+    /// For drives from commands: the losses of the file, and the error of the motion simulated with it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub servo_forms: Vec<ServoForm>,
     /// The exported text.

@@ -2,7 +2,7 @@
 
 use crate::error::ResultFileError;
 use crate::provenance::Provenance;
-use crate::read::read_result;
+use crate::read::{parsed, read_result, schema_of};
 use crate::servo_form::ServoForm;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -73,20 +73,11 @@ impl ServoFile {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(text: &[u8], path: &Path) -> Result<Option<Self>, ResultFileError> {
-        #[derive(Deserialize)]
-        struct Schema {
-            schema: String,
-        }
-        let wrong = |message: String| ResultFileError::Content { path: path.to_owned(), message };
-        let not_a_result = |error: serde_json::Error| {
-            let (line, column) = (error.line(), error.column());
-            wrong(format!("line {line}, column {column}: not a result of `identify`: {error}"))
-        };
-        let Schema { schema } = serde_json::from_slice(text).map_err(not_a_result)?;
-        if schema != SERVO_SCHEMA {
+        if schema_of(text, path)? != SERVO_SCHEMA {
             return Ok(None);
         }
-        let file: Self = serde_json::from_slice(text).map_err(not_a_result)?;
+        let file: Self = parsed(text, path)?;
+        let wrong = |message: String| ResultFileError::Content { path: path.to_owned(), message };
         match file.implausible() {
             Some(problem) => Err(wrong(format!("{problem}: the file was edited or damaged; identify again"))),
             None => Ok(Some(file)),

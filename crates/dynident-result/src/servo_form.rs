@@ -1,4 +1,4 @@
-//! What files for simulators contain of identified drives, and the error that the rest causes.
+//! Losses of identified drives in files for simulators, and the error of the motion with them.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ pub struct ServoForm {
     /// Delay of each joint in steps; empty if the form has no delay, or a delay in seconds.
     #[serde(default)]
     pub delay_steps: Vec<u32>,
-    /// What the form does not contain, or represents by another law, in words.
+    /// Parts of the drives that are missing or represented by another law, in words.
     pub lost: Vec<String>,
     /// The errors on each log.
     pub logs: Vec<ServoFormLog>,
@@ -34,7 +34,7 @@ pub struct ServoFormLog {
 }
 
 impl ServoForm {
-    /// What the form lacks and its error, in sentences, for these joints; `what` is the name of the form in a sentence.
+    /// Losses and error in sentences, for these joints; `what` is the name of the form in a sentence.
     pub fn sentences(&self, what: &str, joints: &[String], rotary: &[bool]) -> Vec<String> {
         let mut all: Vec<String> = self.lost.iter().map(|lost| format!("{what}: {lost}.")).collect();
         let held_out = self.logs.iter().any(|log| log.held_out);

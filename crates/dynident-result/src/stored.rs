@@ -4,13 +4,12 @@ use super::identification::{RESULT_SCHEMA, ResultFile};
 use super::seal::{HASH_KEY, content_sha256, stated_sha256};
 use super::servo::SERVO_SCHEMA;
 use crate::error::ResultFileError;
-use crate::read::read_result;
+use crate::read::{parsed, read_result, schema_of};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::RegressorModel;
 use dynident_identification::payload::{KnownArm, Refit, known_payloads};
 use dynident_study::{JointDrive, Study, StudyError, StudyFile, StudyFileError};
 use nalgebra::DMatrix;
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::path::Path;
@@ -31,18 +30,10 @@ pub fn read_part<T: DeserializeOwned>(path: &Path) -> Result<T, ResultFileError>
     part_of(&bytes, path, Edits::Refused)
 }
 
-/// The same from the text of a result.
+/// As [`read_part`], from the text of a result.
 fn part_of<T: DeserializeOwned>(bytes: &[u8], path: &Path, edits: Edits) -> Result<T, ResultFileError> {
-    #[derive(Deserialize)]
-    struct Schema {
-        schema: String,
-    }
     let wrong = |message: String| ResultFileError::Content { path: path.to_owned(), message };
-    let not_a_result = |error: serde_json::Error| {
-        let (line, column) = (error.line(), error.column());
-        wrong(format!("line {line}, column {column}: not a result of `identify`: {error}"))
-    };
-    let Schema { schema } = serde_json::from_slice(bytes).map_err(not_a_result)?;
+    let schema = schema_of(bytes, path)?;
     if schema == SERVO_SCHEMA {
         let message = "a result of commands and positions holds no torque model: use its report, its JSON or the robot \
                        description next to it (page \"Arms without torque\")";
@@ -51,9 +42,9 @@ fn part_of<T: DeserializeOwned>(bytes: &[u8], path: &Path, edits: Edits) -> Resu
     if schema != RESULT_SCHEMA {
         return Err(wrong(format!("schema `{schema}`, not `{RESULT_SCHEMA}`: identify again with this version")));
     }
-    let part = serde_json::from_slice(bytes).map_err(not_a_result)?;
+    let part = parsed(bytes, path)?;
     if edits == Edits::Refused {
-        let content: Value = serde_json::from_slice(bytes).map_err(not_a_result)?;
+        let content: Value = parsed(bytes, path)?;
         if stated_sha256(&content).is_some_and(|stated| stated != content_sha256(&content)) {
             return Err(wrong(format!(
                 "the content does not match {HASH_KEY}: the file was edited or damaged; identify again, or call `export` or `validate` with --accept-edited if you trust the changes"

@@ -14,7 +14,7 @@ use crate::normal::{PeriodSums, Periods, period_errors, period_sums, symmetric, 
 use crate::parameters::{Change, FreeParameter, ServoRobot, VariedRobot};
 use crate::run::Run;
 use crate::settings::ServoSettings;
-use crate::start::{drive_coordinates, response_coordinates, with_equal_drives};
+use crate::start::{drive_coordinates, equal_drives, response_coordinates};
 use crate::step_state::Stepping;
 use crate::unknowns::unknowns;
 use nalgebra::{DMatrix, DVector};
@@ -229,7 +229,7 @@ impl Searcher<'_> {
     /// for each joint the search has more local minima; equal drives are a start that leads past most of them.
     fn equal_drives_start(&self) -> (Option<Vec<f64>>, usize) {
         let settings = ServoSettings { alike: true, ..self.settings.clone() };
-        let nominal = with_equal_drives(self.nominal);
+        let nominal = ServoRobot { drives: equal_drives(&self.nominal.drives), ..self.nominal.clone() };
         let parameters = unknowns(&nominal, &settings);
         let starts = vec![vec![0.0; parameters.len()], response_coordinates(&nominal, &parameters, self.runs, false)];
         let mut searcher = Searcher {

@@ -78,25 +78,7 @@ pub fn start_drives(model: &Model, runs: &[Run], stated: &[Drive], alike: bool) 
     for drive in &mut drives {
         drive.delay_s = delays[delays.len() / 2];
     }
-    if alike {
-        let mean = |value: fn(&Drive) -> f64| {
-            let sum: f64 = drives.iter().map(|drive| value(drive).ln()).sum();
-            (sum / drives.len() as f64).exp()
-        };
-        let common = Drive {
-            stiffness: mean(|drive| drive.stiffness),
-            damping: mean(|drive| drive.damping),
-            armature: mean(|drive| drive.armature),
-            coulomb: mean(|drive| drive.coulomb),
-            stribeck: mean(|drive| drive.stribeck),
-            ..drives[0]
-        };
-        for drive in &mut drives {
-            let Drive { profile_acceleration, profile_speed, .. } = *drive;
-            *drive = Drive { profile_acceleration, profile_speed, ..common };
-        }
-    }
-    drives
+    if alike { equal_drives(&drives) } else { drives }
 }
 
 /// The run with the set points of the drives' profiles as commands.
@@ -199,11 +181,12 @@ pub(crate) fn drive_coordinates(
     parameters.iter().map(coordinate).collect()
 }
 
-/// The robot with equal drives: each value is the mean over the joints. Profiles and torque limits stay.
-pub(crate) fn with_equal_drives(robot: &ServoRobot) -> ServoRobot {
+/// Drives with the same values: the means over the joints. Profiles, torque limits and zeros stay; the delay is that of
+/// the first drive.
+pub(crate) fn equal_drives(drives: &[Drive]) -> Vec<Drive> {
     let mean = |value: fn(&Drive) -> f64| {
-        let logs = robot.drives.iter().map(|drive| value(drive).max(f64::MIN_POSITIVE).ln());
-        (logs.sum::<f64>() / robot.drives.len() as f64).exp()
+        let logs = drives.iter().map(|drive| value(drive).max(f64::MIN_POSITIVE).ln());
+        (logs.sum::<f64>() / drives.len() as f64).exp()
     };
     let equal = Drive {
         stiffness: mean(|drive| drive.stiffness),
@@ -212,7 +195,7 @@ pub(crate) fn with_equal_drives(robot: &ServoRobot) -> ServoRobot {
         coulomb: mean(|drive| drive.coulomb),
         load_friction: mean(|drive| drive.load_friction),
         stribeck: mean(|drive| drive.stribeck),
-        ..robot.drives[0]
+        ..drives[0]
     };
     let with_own = |drive: &Drive| Drive {
         torque_limit: drive.torque_limit,
@@ -221,7 +204,7 @@ pub(crate) fn with_equal_drives(robot: &ServoRobot) -> ServoRobot {
         zero: drive.zero,
         ..equal
     };
-    ServoRobot { drives: robot.drives.iter().map(with_own).collect(), ..robot.clone() }
+    drives.iter().map(with_own).collect()
 }
 
 /// Response of one joint: natural frequency, rad/s, damping ratio and delay.

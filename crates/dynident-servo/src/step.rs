@@ -91,6 +91,16 @@ impl Mode {
         }
     }
 
+    /// The next mode on the way to `required`: one condition changes, and a controller passes from one limit to the
+    /// other through its linear part.
+    fn towards(self, required: Self) -> Self {
+        match (self.clip, required.clip) {
+            (own, other) if own == other => required,
+            (Clip::Inside, clip) => Self { clip, ..self },
+            _ => Self { clip: Clip::Inside, ..self },
+        }
+    }
+
     /// The mode that velocity `x` and the torque without friction at rest, `rest`, require.
     fn required(self, law: &JointLaw, x: f64, rest: f64) -> Self {
         let controller = law.pull - law.slope * x;
@@ -195,7 +205,7 @@ impl StepSolver {
             let contacts: f64 = laws.contacts.iter().map(|contact| contact.by_joint[joint] * contact.force).sum();
             let required = mode.required(law, x[joint], mode.piece(law).0 + contacts - inertial);
             if required != mode {
-                laws.modes[joint] = required;
+                laws.modes[joint] = if one { mode.towards(required) } else { required };
                 changed = true;
                 if one {
                     return true;

@@ -28,7 +28,7 @@ fn actuators() -> Vec<Actuator> {
     ]
 }
 
-/// What the functions return: implicit, delayed with the written step, delayed with a step of 1 ms.
+/// Results of the functions: implicit, delayed with the written step, delayed with a step of 1 ms.
 #[allow(clippy::print_stdout, reason = "a test that is skipped says so")]
 fn made() -> Option<Vec<Value>> {
     if !has("python3") {

@@ -9,7 +9,7 @@ use dynident_rows::{LogError, Logs, ParallelFilterSettings, RegressorModel, moti
 pub(super) const INSTANTS: usize = 300;
 
 /// Velocity of a joint at rest relative to its root mean square velocity. The friction of a joint at rest can have any
-/// value up to that in motion, so its torque says nothing about a robot.
+/// value up to that in motion, so its torque does not test a robot.
 const REST_SHARE: f64 = 0.02;
 /// Least number of instants without a joint at rest for which the others are left out.
 const MIN_MOVING: usize = 100;

@@ -289,13 +289,12 @@ fn tested_on_rest(
     (tested, share): (&ModelUnderTest<'_>, f64),
     alone: bool,
 ) -> Result<HeldOutExamination, LogError> {
-    let fitted = |theta: &[f64]| FittedOffsets::of(logs, model, index, theta, share);
-    let Some(own) = fitted(tested.theta)? else { return tested_on(logs, limits, model, index, tested, alone) };
-    // The residual of the consistent set has another mean.
-    let physical = match tested.physical {
-        Some(physical) => fitted(physical)?.map(|own| own.applied(model, physical)),
-        None => None,
+    let sets: Vec<&[f64]> = [Some(tested.theta), tested.physical].into_iter().flatten().collect();
+    let Some(fitted) = FittedOffsets::of(logs, model, index, &sets, share)? else {
+        return tested_on(logs, limits, model, index, tested, alone);
     };
+    let own = &fitted[0];
+    let physical = tested.physical.zip(fitted.get(1)).map(|(physical, own)| own.applied(model, physical));
     let theta = own.applied(model, tested.theta);
     let uncertainty = tested.uncertainty.map(|known| known.with_covariance(own.covariance(model, known.covariance())));
     let rest = own.rest(logs.recordings, index);

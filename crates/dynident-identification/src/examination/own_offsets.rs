@@ -51,41 +51,43 @@ pub(super) struct FittedOffsets {
     changes: Vec<(usize, f64, f64)>,
 }
 
-/// All filtered residuals of a recording.
-struct AllResiduals<'a>(TraceConsumer<'a>);
+/// All filtered residuals of a recording, for several sets of base parameters.
+struct AllResiduals<'a>(Vec<TraceConsumer<'a>>);
 
 impl RowConsumer for AllResiduals<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        self.0.filtered(rows);
+        self.0.iter_mut().for_each(|trace| trace.filtered(rows));
         Ok(())
     }
 
     fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
-        self.0.raw(samples);
+        self.0.iter_mut().for_each(|trace| trace.raw(samples));
         Ok(())
     }
 }
 
 impl FittedOffsets {
-    /// Estimates the offsets on the first `share` of recording `index` (in time) with base parameters `theta`; `None`
-    /// for a prepared motion, and without offsets or rows.
+    /// Estimates the offsets on the first `share` of recording `index` (in time) with each of the base parameters `sets`,
+    /// whose residuals have different means; `None` for a prepared motion, and without offsets or rows.
     pub(super) fn of(
         logs: &Logs<'_>,
         model: &RegressorModel,
         index: usize,
-        theta: &[f64],
+        sets: &[&[f64]],
         share: f64,
-    ) -> Result<Option<Self>, LogError> {
+    ) -> Result<Option<Vec<Self>>, LogError> {
         let recording = &logs.recordings[index];
         let has_offset = |joint: &usize| model.terms().contains(&TorqueTerm::Offset(Offset { joint: *joint }));
         let joints: Vec<usize> = (0..model.model().dof()).filter(has_offset).collect();
         if joints.is_empty() || !matches!(recording.samples, Samples::Log(_)) {
             return Ok(None);
         }
-        let mut all = AllResiduals(TraceConsumer::new(model, theta).with_all_rows());
+        let traces = sets.iter().map(|theta| TraceConsumer::new(model, theta).with_all_rows());
+        let mut all = AllResiduals(traces.collect());
         let statistics = LogPass { kept: None, ..logs.pass(model, index) }.run(&mut all)?;
-        let trace = all.0.finished(recording.name.clone(), recording.role, statistics.filtered_rate_hz);
-        Ok(Self::of_trace(&trace, &joints, share))
+        let finished =
+            |trace: TraceConsumer<'_>| trace.finished(String::new(), recording.role, statistics.filtered_rate_hz);
+        Ok(all.0.into_iter().map(|trace| Self::of_trace(&finished(trace), &joints, share)).collect())
     }
 
     fn of_trace(trace: &LogTrace, joints: &[usize], share: f64) -> Option<Self> {

@@ -1,7 +1,7 @@
 //! Torque that is a function of a joint's position and that the study does not state: a spring, a counterbalance, a
 //! cable.
 //!
-//! The torque of each joint is fitted by all columns w of its own rows, by further friction laws and an inertia, and by
+//! The torque of each joint is fitted by all columns w of its rows, by further friction laws and an inertia, and by
 //! piecewise linear functions h over the range of its position:
 //!
 //! ```text
@@ -67,7 +67,7 @@ impl PositionTorque {
         ]
     }
 
-    /// What was found, with its size.
+    /// The finding with its size, for a message.
     pub fn words(&self) -> String {
         format!(
             "a function of its position explains {:.0} % of its unexplained torque ({:.3} Nm (N) of {:.3}, root mean squares), as of a spring, \
@@ -89,7 +89,7 @@ pub fn position_torque_findings(found: &[PositionTorque]) -> impl Iterator<Item 
     })
 }
 
-/// Joints whose torque in the training logs `chosen` needs a function of their own position. All logs together give at
+/// Joints whose torque in the training logs `chosen` needs a function of their position. All logs together give at
 /// most as many samples as the lag of one log uses.
 ///
 /// # Errors
@@ -114,7 +114,7 @@ pub fn position_torques(
     Ok((0..model.dof()).filter_map(joint).collect())
 }
 
-/// Samples of one joint: the columns of its own rows with the torque behind them, row by row, and the position.
+/// Samples of one joint: its columns followed by its torque, row by row, and its motion.
 #[derive(Default)]
 struct JointSamples {
     rows: Vec<f64>,

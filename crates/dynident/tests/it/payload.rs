@@ -250,7 +250,7 @@ fn offsets_differ_from_log_to_log() {
         }
         assert!(test.model.relative_error_percent.unwrap() < 1e-4, "{:?}", test.model.relative_error_percent);
         let physical = test.physical.as_ref().unwrap();
-        // The consistent set has an error of its own. A tenth of the offset shows that the offset is removed.
+        // The consistent set has a separate error. A tenth of the offset shows that the offset is removed.
         assert!(physical.rmse_nm < 0.25, "{physical:?}");
     }
 }

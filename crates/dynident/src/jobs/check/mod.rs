@@ -186,19 +186,20 @@ pub(super) fn diagnosis_check(
     if let Some(currents) = currents_without_scale(study, settings) {
         let is_of_torque = |change: &StudyChange| change.table.ends_with("torque");
         let is_unit = |finding: &CheckFinding| finding.kind == "unit" && finding.write.iter().all(is_of_torque);
-        let estimated = check.findings.iter().find(|finding| is_unit(finding) && !finding.write.is_empty()).cloned();
-        check.findings.retain(|finding| !is_unit(finding));
-        let with_estimate = |estimated: CheckFinding| CheckFinding {
-            evidence: format!(
-                "{}; estimated with the masses of the robot description: {}",
-                currents.evidence, estimated.evidence
-            ),
-            write: estimated.write,
-            ..currents.clone()
-        };
-        check.findings.insert(0, estimated.map_or_else(|| currents.clone(), with_estimate));
+        let (mut units, others): (Vec<CheckFinding>, Vec<CheckFinding>) =
+            check.findings.into_iter().partition(|finding| is_unit(finding));
+        units.retain(|finding| !finding.write.is_empty());
+        let first = units.into_iter().next().map_or_else(|| currents.clone(), |unit| with_estimate(&currents, unit));
+        check.findings = core::iter::once(first).chain(others).collect();
     }
     check
+}
+
+/// Currents without a scale, with the scale that the masses of the robot description give.
+fn with_estimate(currents: &CheckFinding, estimated: CheckFinding) -> CheckFinding {
+    let evidence =
+        format!("{}; estimated with the masses of the robot description: {}", currents.evidence, estimated.evidence);
+    CheckFinding { evidence, write: estimated.write, ..currents.clone() }
 }
 
 fn import_findings(log: &str, import: &ImportReport) -> Vec<CheckFinding> {

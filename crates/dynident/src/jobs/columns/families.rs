@@ -39,6 +39,27 @@ pub(in crate::jobs) struct Family {
 }
 
 impl Family {
+    /// A family of one column.
+    fn of_column(
+        file: usize,
+        group: usize,
+        (quantity, source, basis): (Quantity, Source, Basis),
+        (unit, stem, column): (Option<&'static str>, String, (JointKey, String)),
+    ) -> Self {
+        Self {
+            file,
+            group,
+            quantity,
+            source,
+            unit,
+            other_units: Vec::new(),
+            basis,
+            in_message_order: false,
+            stem,
+            columns: vec![column],
+        }
+    }
+
     /// The unit in the name of one of its columns.
     pub(in crate::jobs) fn unit_of(&self, column: &str) -> Option<&'static str> {
         self.other_units.iter().find(|(name, _)| name == column).map_or(self.unit, |(_, unit)| *unit)
@@ -83,22 +104,10 @@ pub(in crate::jobs) fn families<'a>(
             let (quantity, source) = if bare { (of_file, source_of_file) } else { (quantity, source) };
             let Some(quantity) = quantity else { continue };
             let basis = if bare { Basis::FileName } else { Basis::ColumnNames };
+            let in_message_order = is_message(contents, channel.group) && is_array_entry(&channel.name);
             let column = (joint, channel.name.clone());
-            add(
-                &mut found,
-                Family {
-                    file,
-                    group: channel.group,
-                    quantity,
-                    source,
-                    unit,
-                    other_units: Vec::new(),
-                    basis,
-                    in_message_order: is_message(contents, channel.group) && is_array_entry(&channel.name),
-                    stem,
-                    columns: vec![column],
-                },
-            );
+            let family = Family::of_column(file, channel.group, (quantity, source, basis), (unit, stem, column));
+            add(&mut found, Family { in_message_order, ..family });
         }
     }
     in_order_of_joints(&mut found);
@@ -151,19 +160,9 @@ pub(in crate::jobs) fn families_without_quantity<'a>(
             let found_meaning = meaning(&with_unit(&channel.name, channel.unit.as_deref()), joints);
             let Meaning { quantity: None, is_part: false, joint, source, unit, stem } = found_meaning else { continue };
             if matches!(joint, JointKey::Joint(_) | JointKey::Number(_)) {
-                let family = Family {
-                    file,
-                    group: channel.group,
-                    quantity,
-                    source,
-                    unit,
-                    other_units: Vec::new(),
-                    basis: Basis::Assumption,
-                    in_message_order: false,
-                    stem,
-                    columns: vec![(joint, channel.name.clone())],
-                };
-                add(&mut found, family);
+                let column = (joint, channel.name.clone());
+                let kind = (quantity, source, Basis::Assumption);
+                add(&mut found, Family::of_column(file, channel.group, kind, (unit, stem, column)));
             }
         }
     }

@@ -24,7 +24,7 @@ pub enum ServoTarget {
 pub struct ServoExport {
     /// Text and notes.
     pub exported: Exported,
-    /// What the file does not contain, and the error of the motion simulated with it. Empty for URDF, which contains no
+    /// The losses of the file, and the error of the motion simulated with it. Empty for URDF, which contains no
     /// position controller, and for results of older versions.
     pub forms: Vec<ServoForm>,
 }

@@ -2,7 +2,8 @@
 
 use crate::digest::hexadecimal;
 use crate::result::{
-    EXPORT_VALIDATION_SCHEMA, ExportValidationFile, FormError, FormJointError, ResultFile, ServoFile, ServoForm,
+    EXPORT_VALIDATION_SCHEMA, ExportValidationFile, FormError, FormJointError, Provenance, ResultFile, ServoFile,
+    ServoForm,
 };
 use dynident_export::{Target, terms_left_out};
 use dynident_identification::examination::LogValidation;
@@ -43,20 +44,8 @@ pub fn servo_validation(
     file: &str,
     text: &str,
 ) -> ExportValidationFile {
-    ExportValidationFile {
-        schema: EXPORT_VALIDATION_SCHEMA.to_owned(),
-        provenance: stored.provenance.clone(),
-        name: stored.study.clone(),
-        form: form.to_owned(),
-        file: file.to_owned(),
-        sha256: hexadecimal(&Sha256::digest(text.as_bytes())),
-        refitted: false,
-        held_out: Vec::new(),
-        left_out: Vec::new(),
-        payload: None,
-        servo_forms: forms.to_vec(),
-        problems: stored.problems.clone(),
-    }
+    let of_result = (stored.provenance.as_ref(), &stored.study[..], &stored.problems[..]);
+    ExportValidationFile { servo_forms: forms.to_vec(), ..without_errors(of_result, form, file, text) }
 }
 
 fn of_class(
@@ -95,7 +84,17 @@ fn errors_of_model(stored: &ResultFile) -> Vec<FormError> {
 }
 
 fn empty(stored: &ResultFile, form: &str, file: &str, text: &str) -> ExportValidationFile {
-    let mut provenance = stored.provenance.clone();
+    without_errors((stored.provenance.as_ref(), &stored.name, &stored.problems), form, file, text)
+}
+
+/// An exported file of a result with this provenance, name and problems.
+fn without_errors(
+    (provenance, name, problems): (Option<&Provenance>, &str, &[String]),
+    form: &str,
+    file: &str,
+    text: &str,
+) -> ExportValidationFile {
+    let mut provenance = provenance.cloned();
     if let Some(provenance) = &mut provenance {
         // The seal of another file.
         provenance.content_sha256 = None;
@@ -103,7 +102,7 @@ fn empty(stored: &ResultFile, form: &str, file: &str, text: &str) -> ExportValid
     ExportValidationFile {
         schema: EXPORT_VALIDATION_SCHEMA.to_owned(),
         provenance,
-        name: stored.name.clone(),
+        name: name.to_owned(),
         form: form.to_owned(),
         file: file.to_owned(),
         sha256: hexadecimal(&Sha256::digest(text.as_bytes())),
@@ -112,6 +111,6 @@ fn empty(stored: &ResultFile, form: &str, file: &str, text: &str) -> ExportValid
         left_out: Vec::new(),
         payload: None,
         servo_forms: Vec::new(),
-        problems: stored.problems.clone(),
+        problems: problems.to_vec(),
     }
 }

@@ -1,9 +1,11 @@
 //! Assigns the columns of a family to the robot's joints.
 
-use super::position_units::GRIPPERS;
 use crate::jobs::columns::{Basis, Family, JointKey, words};
 use crate::result::LogContents;
 use std::path::Path;
+
+/// Parts of the names of joints that are often logged as a share of their range.
+pub(super) const GRIPPERS: [&str; 4] = ["gripper", "jaw", "finger", "claw"];
 
 /// Joint of each column, and whether the assignment is certain.
 #[derive(Clone, Debug, PartialEq, Eq)]

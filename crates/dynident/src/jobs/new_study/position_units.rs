@@ -1,15 +1,14 @@
 //! Units of positions and commands whose names state none, and grippers that are logged as a share of their range.
 
-use super::RecognisedColumns;
+use super::channels::GRIPPERS;
 use super::draft::Table;
+use super::recognised::RecognisedColumns;
 use crate::jobs::columns::Family;
 use crate::result::LogContents;
 use dynident_model::{JointKind, Model};
 use dynident_text::quoted;
 use std::path::Path;
 
-/// Parts of the names of joints that are often logged as a share of their range.
-pub(super) const GRIPPERS: [&str; 4] = ["gripper", "jaw", "finger", "claw"];
 /// Logged position of an open gripper, if it is logged as a share of its range: 1, or 100 for percent.
 const FULL_RANGES: [f64; 2] = [1.0, 100.0];
 /// Part of the full range by which a logged share may exceed it.

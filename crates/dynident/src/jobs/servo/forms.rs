@@ -90,7 +90,7 @@ fn effective_delay(drive: &Drive) -> f64 {
     (drive.delay_s - drive.read_delay_s).max(0.0)
 }
 
-/// What a form does not contain, or represents differently.
+/// Parts of the drives that a form lacks or represents by another law.
 fn lost(form: &Form, delay_steps: &[u32], file: &ServoFile, found: &Found) -> Vec<String> {
     let drives = &found.robot.drives;
     let list = |items: Vec<String>| items.join(", ");

@@ -1,0 +1,219 @@
+//! The columns of a study among those of its recordings.
+
+use super::channels::{
+    LoggedJoints, RobotJoints, in_order, logged_joints, with_numbered_names, with_partly_foreign_names,
+    without_foreign_grippers,
+};
+use super::reasons::{alternatives, recognised};
+use super::settings::NewStudySettings;
+use crate::error::NewStudyError;
+use crate::jobs::columns::{
+    Family, JointKey, Quantity, Source, best, best_command, best_next_to, best_torque, equal_choice, families,
+    families_by_order, families_without_quantity, is_unsigned, shown, time_as_toml, time_unit_s, unit as unit_of_name,
+    with_unit,
+};
+use crate::result::{LogContents, Unsure};
+use dynident_model::{JointKind, Model};
+use std::path::Path;
+
+/// The columns of a study among those of its recordings.
+pub(super) struct RecognisedColumns {
+    pub(super) thresholds: NewStudySettings,
+    /// Joint assignment, in the order of the columns.
+    pub(super) logged: LoggedJoints,
+    pub(super) position: Family,
+    /// Torques, or commanded positions in a log without torque.
+    pub(super) drive: Family,
+    pub(super) velocity: Option<Family>,
+    pub(super) columns: [Vec<String>; 2],
+    pub(super) velocity_columns: Option<Vec<String>>,
+    /// Recordings with these columns; recordings with torques only belong to one of them.
+    pub(super) files: Vec<usize>,
+    /// The episode of each recording, for files with several.
+    pub(super) parts: Vec<Option<String>>,
+    pub(super) time: Option<LogClock>,
+    /// Other columns of the quantities of positions, velocities and torques.
+    pub(super) alternatives: [String; 3],
+    /// Columns of positions and of torques that are as likely as the chosen ones.
+    pub(super) equals: [Option<String>; 2],
+    /// Rows of the recordings for one row with values in all columns.
+    pub(super) rows_of_complete_one: f64,
+}
+
+/// The clock of the recordings.
+pub(super) struct LogClock {
+    /// The value of `time`.
+    pub(super) key: String,
+    /// Mean rate, Hz.
+    pub(super) rate_hz: Option<f64>,
+    /// Whether its name, not its values, shows that it is the clock.
+    pub(super) is_named: bool,
+    /// Whether the stamps are 0, 1, 2, .. without a unit.
+    pub(super) counts: bool,
+}
+
+impl RecognisedColumns {
+    /// The columns of `logs` for the joints of `model`.
+    ///
+    /// # Errors
+    /// No columns of positions, or of torques or commands.
+    pub(super) fn find(
+        model: &Model,
+        logs: &[(&Path, LogContents)],
+        thresholds: &NewStudySettings,
+    ) -> Result<Self, NewStudyError> {
+        let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+        let free: Vec<usize> = (0..model.dof()).filter(|&joint| model.joints()[joint].mimic.is_none()).collect();
+        let is_rotary = |joint: &usize| model.joints()[*joint].kind != JointKind::Prismatic;
+        let turning = free.iter().copied().filter(is_rotary).collect();
+        let moves = |other: usize, joint: usize| other != joint && model.moves(other, model.body_of(joint));
+        let carriers_of = |joint| (0..model.dof()).filter(|&other| moves(other, joint)).collect();
+        let carriers = (0..model.dof()).map(carriers_of).collect();
+        let robot = RobotJoints { names: &names, free, turning, carriers };
+        let paths = || logs.iter().map(|(path, log)| (*path, log));
+        let mut all = families(paths(), &names);
+        let counts = [robot.free.len(), robot.turning.len()];
+        if all.is_empty() {
+            all = logs.iter().enumerate().flat_map(|(file, (_, log))| families_by_order(file, log, &counts)).collect();
+        }
+        let joined = with_numbered_names(&with_partly_foreign_names(&all, logs, &robot), logs, &robot);
+        let mut all = without_foreign_grippers(&joined, &robot);
+        let missing =
+            |quantity, all: &[Family]| NewStudyError::NotRecognised { quantity, found: recognised(all, logs) };
+        // Unknown columns, one for each joint.
+        let assume = |all: &mut Vec<Family>, quantity| {
+            let known: Vec<String> =
+                all.iter().flat_map(|family| &family.columns).map(|(_, name)| name.clone()).collect();
+            let is_new = |family: &Family| {
+                counts.contains(&family.columns.len()) && family.columns.iter().all(|(_, name)| !known.contains(name))
+            };
+            all.extend(families_without_quantity(paths(), &names, quantity).into_iter().find(is_new));
+        };
+        if best(&all, Quantity::Position, |_| true).is_none() {
+            assume(&mut all, Quantity::Position);
+        }
+        let position = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions", &all))?.clone();
+        let position = &position;
+        let same_kind = |family: &&Family| {
+            (family.file, family.group, family.quantity, &family.stem)
+                == (position.file, position.group, position.quantity, &position.stem)
+        };
+        let left_out: Vec<String> = joined
+            .iter()
+            .filter(same_kind)
+            .flat_map(|family| &family.columns)
+            .filter_map(|(key, _)| match key {
+                JointKey::Name(name) => Some(name.clone()),
+                JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
+            })
+            .collect();
+        let logged = logged_joints(position, &robot, &left_out).ok_or(NewStudyError::MoreColumnsThanJoints {
+            columns: position.columns.len(),
+            joints: robot.free.len(),
+        })?;
+        let ordered = |family: &Family| in_order(family, position, &logged.joints);
+
+        // In the file of the positions if present, otherwise in another file with the same number of rows.
+        let in_same_file = |family: &Family| family.file == position.file && ordered(family).is_some();
+        let rows = |family: &Family| logs[family.file].1.groups.get(family.group).map(|group| group.rows);
+        let in_other_file = |family: &Family| {
+            family.file != position.file && rows(family) == rows(position) && ordered(family).is_some()
+        };
+        let is_commanded = |family: &Family| position.source != Source::Commanded && family != position;
+        let find_drive = |all: &[Family]| {
+            let command = best_command(all, |family| is_commanded(family) && in_same_file(family))
+                .or_else(|| best_command(all, |family| is_commanded(family) && in_other_file(family)));
+            let is_torque = |family: &Family| command.is_none() || !is_unsigned(family, &logs[family.file].1);
+            let torques = |is_recorded: bool, fits: &dyn Fn(&Family) -> bool| {
+                let is_usable = |family: &Family| is_torque(family) && (family.source.is_recorded() || !is_recorded);
+                best_torque(all, Some(position), |family| is_usable(family) && fits(family))
+            };
+            let torque = torques(true, &in_same_file)
+                .or_else(|| torques(true, &in_other_file))
+                .or_else(|| torques(false, &in_same_file))
+                .or_else(|| torques(false, &in_other_file));
+            torque.or(command).cloned()
+        };
+        let mut drive = find_drive(&all);
+        if drive.is_none() {
+            assume(&mut all, Quantity::Torque);
+            drive = find_drive(&all);
+        }
+        let none = || missing("torques, currents or commanded positions", &all);
+        let drive = &drive.ok_or_else(none)?;
+        let velocity = best_next_to(&all, Quantity::Velocity, Some(position), in_same_file)
+            .or_else(|| best_next_to(&all, Quantity::Velocity, Some(position), in_other_file))
+            .filter(|family| family.source.is_recorded());
+        let fits = |family: &&Family| in_same_file(family) || in_other_file(family);
+        let alternatives = [Some(position), velocity, Some(drive)]
+            .map(|chosen| chosen.map_or_else(String::new, |chosen| alternatives(chosen, all.iter().filter(fits))));
+        let named =
+            |family: &Family| shown(&family.columns.iter().map(|(_, name)| name.clone()).collect::<Vec<_>>(), 1);
+        let equals = [(position, None), (drive, Some(position))]
+            .map(|(chosen, other)| equal_choice(&all, chosen, other, in_same_file).map(named));
+
+        let (Some(of_position), Some(of_drive)) = (ordered(position), ordered(drive)) else { return Err(none()) };
+        let has = |log: &LogContents, columns: &[String]| {
+            columns.iter().all(|column| log.channels.iter().any(|channel| channel.name == *column))
+        };
+        let is_pair = drive.file != position.file;
+        let holds = |file: &usize| {
+            let log = &logs[*file].1;
+            if is_pair { *file == position.file } else { has(log, &of_position) && has(log, &of_drive) }
+        };
+        let contents = &logs[position.file].1;
+        let group = contents.groups.get(position.group);
+        let time = group.and_then(|group| {
+            let name = group.time.as_ref()?;
+            let unit = contents.unit(position.group, name);
+            let is_named = group.name.is_some() || time_unit_s(&with_unit(name, unit)).is_some();
+            let is_unit_of_rate = unit_of_name(name).is_none() && unit == Some("ms") && group.rate_hz == Some(1000.0);
+            let channel = contents.channels.iter().find(|channel| channel.name == *name);
+            let starts =
+                channel.and_then(|channel| channel.range).is_some_and(|[first, _]| [0.0, 1.0].contains(&first));
+            let counts = is_unit_of_rate && starts;
+            Some(LogClock { key: time_as_toml(name, unit), rate_hz: group.rate_hz, is_named, counts })
+        });
+        let files: Vec<usize> = (0..logs.len()).filter(holds).collect();
+        let used = |log: &LogContents, name: &String| {
+            let channel = log.channels.iter().find(|channel| channel.name == *name)?;
+            Some((channel.samples + channel.missing) as f64 / channel.samples.max(1) as f64)
+        };
+        let shares = [(position, &of_position), (drive, &of_drive)].into_iter().flat_map(|(family, columns)| {
+            let own = if is_pair { vec![family.file] } else { files.clone() };
+            own.into_iter().flat_map(move |file| columns.iter().filter_map(move |name| used(&logs[file].1, name)))
+        });
+        let rows_of_complete_one = shares.fold(1.0, f64::max);
+        Ok(Self {
+            thresholds: thresholds.clone(),
+            columns: [of_position, of_drive],
+            velocity_columns: velocity.and_then(ordered),
+            files,
+            parts: vec![None; logs.len()],
+            time,
+            logged,
+            position: position.clone(),
+            drive: drive.clone(),
+            velocity: velocity.cloned(),
+            alternatives,
+            equals,
+            rows_of_complete_one,
+        })
+    }
+
+    /// Recordings whose columns are not used.
+    pub(super) fn unused_recordings(&self, logs: &[(&Path, LogContents)]) -> Vec<Unsure> {
+        let channel_files = [Some(&self.drive), self.velocity.as_ref()].into_iter().flatten().map(|family| family.file);
+        let used: Vec<usize> = self.files.iter().copied().chain(channel_files).collect();
+        let unused = logs.iter().enumerate().filter(|(number, _)| !used.contains(number));
+        let reason = |path: &Path| {
+            format!("{} is not in the study: its columns differ from those of the other recordings", path.display())
+        };
+        unused.map(|(_, (path, _))| Unsure { line: None, proposed: Vec::new(), reason: reason(path) }).collect()
+    }
+
+    /// Whether the log has commanded positions in place of torques.
+    pub(super) fn has_commands(&self) -> bool {
+        self.drive.quantity == Quantity::Position
+    }
+}
