@@ -67,8 +67,8 @@ impl RowConsumer for AllResiduals<'_> {
 }
 
 impl FittedOffsets {
-    /// Estimates the offsets on the first `share` of recording `index` (in time) with each of the base parameters `sets`,
-    /// whose residuals have different means; `None` for a prepared motion, and without offsets or rows.
+    /// Estimates the offsets on the first `share` of recording `index` (in time) with each of the base parameters
+    /// `sets`, whose residuals have different means; `None` for a prepared motion, and without offsets or rows.
     pub(super) fn of(
         logs: &Logs<'_>,
         model: &RegressorModel,
