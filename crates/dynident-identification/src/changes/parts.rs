@@ -15,7 +15,7 @@ const ROBOT_SHARE: f64 = 0.03;
 const TERM_SHARE: f64 = 0.5;
 
 /// A part of the robot: a body, or terms of joints.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Part {
     /// Body with this index.
     Body(usize),
@@ -28,6 +28,11 @@ pub enum Part {
 }
 
 impl Part {
+    /// Index of the body.
+    pub fn body(&self) -> Option<usize> {
+        if let Self::Body(body) = self { Some(*body) } else { None }
+    }
+
     /// Name of the part in a sentence.
     pub fn words(&self, model: &Model) -> String {
         let joint = |joint: &usize| &model.joints()[*joint].name;
@@ -65,10 +70,16 @@ pub(super) fn effects(base: &BaseParameters) -> DMatrix<f64> {
     all
 }
 
-/// The parts of a robot for the base parameters with indices `rows`. `size_of_term` is the larger of both values of a
-/// term with its error bar.
-pub fn parts(model: &Model, base: &BaseParameters, rows: &[usize], size_of_term: &dyn Fn(&TorqueTerm) -> f64) -> Parts {
+/// The parts of a robot for the base parameters with indices `rows`. `values` are their absolute values with their error
+/// bars, in the order of `rows`; of two results the larger one. A term that is one base parameter with others, such as
+/// the drive inertia of the first joint with the inertia of the first link, has at most the value of this parameter.
+pub fn parts(model: &Model, base: &BaseParameters, rows: &[usize], values: &[f64]) -> Parts {
     let effects = effects(base).select_rows(rows);
+    let largest_value = |column: usize| {
+        let of_column = effects.column(column);
+        let ratios = of_column.iter().zip(values).filter(|(effect, _)| **effect != 0.0);
+        ratios.map(|(effect, value)| value / effect.abs()).reduce(f64::min).unwrap_or(0.0)
+    };
     let total: f64 = model.inertials().iter().map(InertialParameters::mass_kg).sum();
     let mut found = Parts::default();
     let columns = base.all_columns();
@@ -77,7 +88,7 @@ pub fn parts(model: &Model, base: &BaseParameters, rows: &[usize], size_of_term:
         (0..columns.len()).filter(|&k| is_wanted(&columns[k])).collect::<Vec<_>>()
     };
     let size = |column: usize| match &columns[column] {
-        Column::Term(term) => TERM_SHARE * size_of_term(term),
+        Column::Term(_) => TERM_SHARE * largest_value(column),
         Column::Body { body, parameter } => {
             let [mass, length] = expected_change(model, *body, total);
             match parameter {

@@ -4,7 +4,7 @@ use super::problem::{MASS_STD_RATIO, consistent_body, reference_bodies, term_siz
 use super::settings::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::LinearProblem;
-use dynident_model::{Body, INERTIAL_NAMES, InertialParameters};
+use dynident_model::{INERTIAL_NAMES, InertialParameters};
 use nalgebra::{DMatrix, Matrix4};
 
 /// Standard deviation of a term, relative to the value for which the term alone explains the torque of its joint.
@@ -55,13 +55,11 @@ pub fn usual_errors_of_bodies(robot: &ParametricModel, settings: &ConsistencySet
 /// Change of all parameters of the bodies for independent errors of one relative standard deviation of 1, eleven for
 /// each body: the directions of [`nominal_covariance`] divided by its 30 %, and the distance of the centre of mass from
 /// the joint. Links are nearly symmetric about their length; the position of a motor along it may be wrong by more than
-/// a part of the motor's size. `None` if a body has no consistent description.
+/// a part of the motor's size. `None` if the nominal values of a body are not
+/// consistent.
 pub(crate) fn body_spread(robot: &ParametricModel, settings: &ConsistencySettings) -> Option<DMatrix<f64>> {
     let bodies = robot.model().bodies();
-    let is_described = |(index, body): (usize, &Body)| {
-        body.prior().is_some() && consistent_body(&robot.nominal()[10 * index..10 * index + 10]).0
-    };
-    if !bodies.iter().enumerate().all(is_described) {
+    if !robot.nominal()[..10 * bodies.len()].chunks_exact(10).all(|body| consistent_body(body).0) {
         return None;
     }
     let mut spread = DMatrix::zeros(10 * bodies.len(), 11 * bodies.len());
