@@ -1,6 +1,6 @@
 //! Evidence for explanations of the difference between an estimate and the robot description, or of two estimates.
 
-use super::parts::{Part, effects, parts};
+use super::parts::{Part, Parts, effects, parts};
 use super::spread::{SPREADS, Spread, covariances_of, nominal_values};
 use crate::consistent::{ConsistencySettings, body_spread};
 use crate::thresholds::DescriptionThresholds;
@@ -20,7 +20,8 @@ const OTHER_ROBOT_PROBABILITY: f64 = 0.05;
 /// Expected common factor of all values of a body that changed, minus 1.
 const EXPECTED_FACTOR: f64 = 0.5;
 
-/// Prior probability that a body changed in one of the two ways: a load, or a common factor of all its values.
+/// Prior probability of a change of terms, and of each of the two ways in which a body changes: a load, or a common
+/// factor of all its values.
 const CHANGE_PROBABILITY: f64 = 0.025;
 
 /// Expected difference of a term relative to its value: descriptions do not contain the friction of the real drive.
@@ -35,8 +36,8 @@ const MIN_SHARE_OF_LARGEST: f64 = 0.1;
 pub struct Differences {
     /// All explanations, the most probable first; `covariance` is the index of the spread of all bodies.
     pub explanations: Vec<Explanation>,
-    /// Part of each group of the explanations. From a description: a change of ten values and a common factor for each
-    /// body with an effect.
+    /// Part of each group of the explanations; two groups for each body with an effect: a change of ten values, and a
+    /// common factor.
     pub(super) parts: Vec<Part>,
     /// Change of the values of the part per unknown of each group; for a body, its ten inertial parameters.
     pub(super) unknowns: Vec<DMatrix<f64>>,
@@ -82,28 +83,19 @@ impl Differences {
             covariance += &effect * effect.transpose();
         }
         let sizes = SPREADS.to_vec();
+        let effects = all.columns(0, inertial).into_owned();
+        let all = parts(robot.model(), base, rows, &absolute);
+        let (parts, unknowns, groups) = groups(robot, all, &effects, |part| part.body().is_some());
         let mut found = Self {
             explanations: Vec::new(),
-            parts: Vec::new(),
-            unknowns: Vec::new(),
+            parts,
+            unknowns,
             difference,
             covariance,
-            effects: all.columns(0, inertial).into_owned(),
+            effects,
             spreads: covariances_of(&spread, robot, &sizes),
             sizes,
         };
-        let mut groups = Vec::new();
-        let all = parts(robot.model(), base, rows, &absolute);
-        for ((part, group), sizes) in all.parts.into_iter().zip(all.groups).zip(all.sizes) {
-            let Part::Body(body) = part else { continue };
-            let nominal = nominal_values(robot, body) * EXPECTED_FACTOR;
-            let factor = DMatrix::from_column_slice(10, 1, nominal.as_slice());
-            let effect = found.effects.columns(10 * body, 10) * &factor;
-            found.parts.extend([part.clone(), part]);
-            groups.push(ChangeGroup { name: group.name.clone(), effect });
-            groups.push(group);
-            found.unknowns.extend([factor, DMatrix::from_diagonal(&sizes)]);
-        }
         found.explain(&groups, CHANGE_PROBABILITY)?;
         let probability = |own: &Spread| {
             let of_all = if own.is_small() { SMALL_PROBABILITY } else { 1.0 - SMALL_PROBABILITY };
@@ -134,18 +126,20 @@ impl Differences {
         }
         let [first, second] = [absolute_values(old, old_covariance), absolute_values(new, new_covariance)];
         let larger: Vec<f64> = first.iter().zip(&second).map(|(first, second)| first.max(*second)).collect();
+        let effects = effects(robot.base()).select_rows(rows).columns(0, inertial).into_owned();
         let all = parts(robot.model(), robot.base(), rows, &larger);
+        let (parts, unknowns, groups) = groups(robot, all, &effects, |_| true);
         let mut found = Self {
             explanations: Vec::new(),
-            parts: all.parts,
-            unknowns: all.sizes.iter().map(DMatrix::from_diagonal).collect(),
+            parts,
+            unknowns,
             difference: new - old,
             covariance: old_covariance + new_covariance,
-            effects: effects(robot.base()).select_rows(rows).columns(0, inertial).into_owned(),
+            effects,
             sizes,
             spreads,
         };
-        found.explain(&all.groups, ChangeSettings::default().probability)?;
+        found.explain(&groups, CHANGE_PROBABILITY)?;
         let probability = |own: &Spread| {
             if own.largest() > 0.0 {
                 OTHER_ROBOT_PROBABILITY * own.share()
@@ -279,6 +273,34 @@ impl Differences {
         let sum: f64 = self.explanations.iter().filter(changed).map(|own| own.probability).sum();
         sum.min(1.0)
     }
+}
+
+/// Groups of unknowns for the parts that are `tested`: for a body a change of its ten values, as by a load, and a common factor of all its values; for
+/// another part its terms. Their parts, the change per unknown, and the effect on the base parameters.
+fn groups(
+    robot: &ParametricModel,
+    all: Parts,
+    effects: &DMatrix<f64>,
+    tested: impl Fn(&Part) -> bool,
+) -> (Vec<Part>, Vec<DMatrix<f64>>, Vec<ChangeGroup>) {
+    let (mut parts, mut unknowns, mut groups) = (Vec::new(), Vec::new(), Vec::new());
+    for ((part, group), sizes) in all.parts.into_iter().zip(all.groups).zip(all.sizes) {
+        if !tested(&part) {
+            continue;
+        }
+        if let Some(body) = part.body() {
+            let nominal = nominal_values(robot, body) * EXPECTED_FACTOR;
+            let factor = DMatrix::from_column_slice(10, 1, nominal.as_slice());
+            let effect = effects.columns(10 * body, 10) * &factor;
+            parts.push(part.clone());
+            groups.push(ChangeGroup { name: group.name.clone(), effect });
+            unknowns.push(factor);
+        }
+        parts.push(part);
+        groups.push(group);
+        unknowns.push(DMatrix::from_diagonal(&sizes));
+    }
+    (parts, unknowns, groups)
 }
 
 /// Absolute values with their standard deviations.
