@@ -135,7 +135,7 @@ pub struct WindowedFile {
     /// `gradient`, `cma-es`, `genetic`, or `given` for strokes in the study.
     pub optimiser: String,
     /// Objective H of the design: the sum of the condition numbers, plus a penalty if a limit is violated (equation 19
-    /// of the paper on step-wise design that the page on designs cites).
+    /// of *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*).
     pub fitness: f64,
     /// Sum of the condition numbers of all windows.
     pub condition_sum: f64,
