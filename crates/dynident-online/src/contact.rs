@@ -148,9 +148,9 @@ impl ContactMonitor {
     /// at [`ContactMonitor`], for a spectrum with two poles). Model errors change with the motion, so τ is the time
     /// scale of the motion (about one second), not that of the sensor noise; a larger τ gives higher thresholds.
     /// Second, white sensor noise: σ was measured after a low-pass of cut-off B, which removes noise that a mean with T
-    /// below `1/(4 B)` still contains. If all of σ² were white noise, the mean would have the variance `σ² min(1/(4 T),
-    /// rate/2)/B` and cross its level `rate acos(e^(−1/(T rate)))/2π` times per second. If undisturbed motion can be
-    /// recorded, the thresholds of [`new`](Self::new) are more accurate.
+    /// below `1/(4 B)` still contains. If all of σ² were white noise, the mean would have the variance
+    /// `σ² min(1/(4 T), rate/2)/B` and cross its level `rate acos(e^(−1/(T rate)))/2π` times per second. If undisturbed
+    /// motion can be recorded, the thresholds of [`new`](Self::new) are more accurate.
     ///
     /// # Errors
     /// Invalid settings; deviations, a time or a cut-off that are not positive.

@@ -75,17 +75,17 @@ pub struct DriftAlarm {
 /// Detects drift by comparing a recursive estimate, which forgets old samples, with a reference estimate.
 ///
 /// The recursive estimate of an [`OnlineEstimator`] solves `R θ = r` with a triangular matrix R; θ₀ is the reference
-/// with covariance V₀. If the reference is correct and the torque errors are as in the estimator's settings, `d = r − R
-/// θ₀` has the covariance `C = I + R V₀ Rᵀ`. The test statistic is `T = dᵀ C⁻¹ d`. If the samples determine all
-/// parameters, T is the squared distance between both estimates, weighted by the inverse of the sum of their
+/// with covariance V₀. If the reference is correct and the torque errors are as in the estimator's settings,
+/// `d = r − R θ₀` has the covariance `C = I + R V₀ Rᵀ`. The test statistic is `T = dᵀ C⁻¹ d`. If the samples determine
+/// all parameters, T is the squared distance between both estimates, weighted by the inverse of the sum of their
 /// covariances. Parameter combinations that the samples do not determine contribute nothing.
 ///
 /// Real errors are neither white nor of the assumed size. Therefore mean m and variance v of T are learned from n
-/// checks without drift. As a sum of squares of correlated Gaussian variables, T is approximately `m χ²_ν / ν` with `ν
-/// = 2 m²/v` (Satterthwaite, Biometrics Bulletin 2 (1946) 110), so that T/m of a later check follows `F(ν, n ν)`. For
-/// ν, the lower limit at 95 % confidence from the n checks is used. The threshold is the value that this F distribution
-/// exceeds with probability `f Δ`, where f is the allowed false-alarm rate and Δ the time between checks. Errors depend
-/// on speed and load, so the learning motion must be the motion that will be monitored.
+/// checks without drift. As a sum of squares of correlated Gaussian variables, T is approximately `m χ²_ν / ν` with
+/// `ν = 2 m²/v` (Satterthwaite, Biometrics Bulletin 2 (1946) 110), so that T/m of a later check follows `F(ν, n ν)`.
+/// For ν, the lower limit at 95 % confidence from the n checks is used. The threshold is the value that this F
+/// distribution exceeds with probability `f Δ`, where f is the allowed false-alarm rate and Δ the time between checks.
+/// Errors depend on speed and load, so the learning motion must be the motion that will be monitored.
 #[derive(Clone, Debug)]
 pub struct DriftMonitor {
     settings: DriftSettings,

@@ -34,9 +34,9 @@ pub struct TestedLog {
     /// Low-pass and decimation of measured and predicted torque before they are compared; null if every sample is
     /// compared. A held-out log has the filter of its test, a training log the filter of the fit.
     pub filter: Option<DecimationSettings>,
-    /// Coefficients of this low-pass filter. Filtered row k of a segment is a weighted sum of the samples from index `k
-    /// factor` on. Samples that are not `used` are set to zero, and the sum is divided by the sum of the coefficients
-    /// of the used samples. Rows for which the latter is below one half are not compared.
+    /// Coefficients of this low-pass filter. Filtered row k of a segment is a weighted sum of the samples from index
+    /// `k factor` on. Samples that are not `used` are set to zero, and the sum is divided by the sum of the
+    /// coefficients of the used samples. Rows for which the latter is below one half are not compared.
     pub taps: Vec<f64>,
 }
 

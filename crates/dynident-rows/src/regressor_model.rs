@@ -79,10 +79,10 @@ impl RegressorModel {
 
     /// Removes drive inertia from the base parameters of bodies.
     ///
-    /// The drive inertia of the first joints is only identifiable in a sum with the inertia of their bodies (`Izz1 +
-    /// Ia1`), but it does not load the gear. The part of the sum that exceeds the body's value in the robot description
-    /// (at most the whole sum) is attributed to the drive. Without a robot description the whole sum is attributed to
-    /// the body.
+    /// The drive inertia of the first joints is only identifiable in a sum with the inertia of their bodies
+    /// (`Izz1 + Ia1`), but it does not load the gear. The part of the sum that exceeds the body's value in the robot
+    /// description (at most the whole sum) is attributed to the drive. Without a robot description the whole sum is
+    /// attributed to the body.
     fn without_drives(&self, values: &[f64]) -> Vec<f64> {
         let mut bodies = values.to_vec();
         let (base, terms) = (self.base(), self.terms().len());
