@@ -9,23 +9,25 @@ use dynident_estimation::changes::{ChangeGroup, ChangeSettings, Explanation, exp
 use dynident_model::terms::TorqueTerm;
 use nalgebra::{DMatrix, DVector};
 
-/// Differences that all bodies have.
+/// Assumed size of the differences between all bodies and their description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
-    /// Relative standard deviation of a body in each direction: of its mass, its inertia, and its extent for the centre
-    /// of mass.
+    /// Relative standard deviation of a body in each independent direction: of its mass, of its inertia, and of its
+    /// centre of mass in units of the extent of the body.
     pub shape: f64,
-    /// Relative standard deviation of a common factor of all ten values of a body, as a wrong density causes.
+    /// Relative standard deviation of a common factor on all ten values of a body. A wrong density causes such a
+    /// factor.
     pub scale: f64,
 }
 
 impl Spread {
-    /// The larger of both deviations.
+    /// The larger of both standard deviations.
     pub fn largest(self) -> f64 {
         self.shape.max(self.scale)
     }
 
-    /// Prior probability: small and large differences have half each, in equal parts.
+    /// Prior probability of this size. All small sizes together have the probability one half, and so have all large
+    /// ones; within each group the sizes are equally probable.
     fn probability(self) -> f64 {
         let is_small = |own: &Self| own.largest() <= SMALL;
         let count = SPREADS.iter().filter(|own| is_small(own) == is_small(&self)).count();
@@ -34,11 +36,11 @@ impl Spread {
     }
 }
 
-/// Sizes of differences of all bodies: rounding of a description, tolerances of manufacturing, wrong densities, and
-/// descriptions that are only rough. A common factor may be large while the shape is exact: otherwise single bodies
-/// would explain densities that are wrong in every body. Neighbouring sizes of large differences have a ratio of 1.7,
-/// less than the uncertainty of a deviation that seven bodies determine: with a ratio of 3, bars were too narrow or too
-/// wide for the sizes between.
+/// Compared sizes of the differences of all bodies: rounding of a description, tolerances of manufacturing, wrong
+/// densities, and rough descriptions. The common factor may be large while the shape is exact. Otherwise densities that
+/// are wrong in all bodies would be attributed to single bodies. Neighbouring large sizes have a ratio of 1.7, which is
+/// less than the uncertainty of a standard deviation that seven bodies determine. With a ratio of 3, error bars were
+/// too narrow or too wide for sizes in between.
 pub const SPREADS: [Spread; 22] = [
     Spread { shape: 0.003, scale: 0.003 },
     Spread { shape: 0.003, scale: 0.01 },
@@ -64,49 +66,53 @@ pub const SPREADS: [Spread; 22] = [
     Spread { shape: 0.3, scale: 0.3 },
 ];
 
-/// Largest deviation of a small difference of all bodies.
+/// Largest standard deviation that is treated as a small difference of all bodies.
 const SMALL: f64 = 0.03;
 
-/// Prior probability of all small differences, and of all large ones: neither few nor all bodies are preferred.
+/// Prior probability of all small differences together, and of all large differences together, so that neither few nor
+/// all bodies are preferred.
 const SMALL_PROBABILITY: f64 = 0.5;
 
-/// Expected common factor of all values of a body that changed, minus 1.
+/// Expected value of the common factor of a changed body, minus 1.
 const EXPECTED_FACTOR: f64 = 0.5;
 
-/// Prior probability that a body changed in one of the two ways: a load, or a common factor of all its values.
+/// Prior probability that a body changed in one of two ways: by an attached load, or by a common factor on all its
+/// values.
 const CHANGE_PROBABILITY: f64 = 0.025;
 
-/// Expected difference of a term relative to its value: descriptions do not contain the friction of the real drive.
+/// Expected difference of a friction or drive parameter relative to its value. It is large because robot descriptions
+/// do not contain the friction of the real drive.
 const UNKNOWN_TERM_RATIO: f64 = 50.0;
 
-/// Smaller differences of the other bodies are preferred if their probability is at least this part of the largest one:
-/// a description is usually right.
+/// Among explanations with the same changed bodies, smaller differences of the other bodies are preferred if their
+/// probability is at least this share of the largest one, because descriptions are usually right.
 const MIN_SHARE_OF_LARGEST: f64 = 0.1;
 
 /// Explanations of the difference between an estimate and the description of its robot.
 #[derive(Clone, Debug)]
 pub struct DescriptionDifferences {
-    /// All explanations, the most probable first; `covariance` is the index of the spread of all bodies in
-    /// [`SPREADS`].
+    /// All explanations, the most probable first. `covariance` of an explanation is an index in [`SPREADS`]: the size
+    /// of the differences of all bodies.
     pub explanations: Vec<Explanation>,
-    /// Body of each group of the explanations: a change of ten values and a common factor for each body with an effect.
+    /// Body of each group of unknowns. Each body with an effect on the torque has two groups: a change of its ten
+    /// values, and a common factor.
     pub(super) bodies: Vec<usize>,
     /// Change of the ten values of the body per unknown of each group.
     pub(super) unknowns: Vec<DMatrix<f64>>,
-    /// Base parameters that are compared: their difference from the description.
+    /// Difference of the compared base parameters from the description.
     pub(super) difference: DVector<f64>,
-    /// Covariance of their estimate, with unknown terms.
+    /// Covariance of the estimates of these base parameters; it treats friction and drive parameters as unknown.
     pub(super) covariance: DMatrix<f64>,
-    /// `E`: effect of all parameters of the bodies on them.
+    /// Matrix E: effect of all inertial parameters on the compared base parameters.
     pub(super) effects: DMatrix<f64>,
-    /// Covariance of all parameters of the bodies for each of [`SPREADS`].
+    /// Prior covariance of all inertial parameters for each of [`SPREADS`].
     pub(super) spreads: Vec<DMatrix<f64>>,
 }
 
 impl DescriptionDifferences {
     /// Compares base parameters `values` with indices `rows` and their `covariance` with the nominal values of `robot`.
     /// Friction, offsets and drive inertia are unknown in a description and are not tested. `None` without nominal
-    /// values, or if the settings define single bodies, which are then not those of the description.
+    /// values, or if the settings define single bodies, so that these are not the bodies of the description.
     ///
     /// # Errors
     /// As [`explanations`].
@@ -155,7 +161,7 @@ impl DescriptionDifferences {
         Ok(Some(found))
     }
 
-    /// Multiplies the probability of each explanation by a factor; at least one must be positive.
+    /// Multiplies the probability of each explanation by a factor. At least one factor must be positive.
     pub(super) fn reweight(&mut self, factors: &[f64]) {
         for (own, factor) in self.explanations.iter_mut().zip(factors) {
             own.probability *= factor;
@@ -167,25 +173,26 @@ impl DescriptionDifferences {
         self.explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     }
 
-    /// Probability that every body differs by more than the small differences of `limits`, and none differs by more
-    /// than the others.
+    /// Probability that every body differs from the description by more than the small differences of `limits`, and
+    /// that no body differs by more than the others.
     pub fn everywhere(&self, limits: &DescriptionThresholds) -> f64 {
         let all = self.explanations.iter().filter(|own| is_everywhere(own, limits));
         all.map(|own| own.probability).sum::<f64>().min(1.0)
     }
 
-    /// `dᵀ C⁻¹ d` of the difference from the description, with unknown terms.
+    /// Test statistic `dᵀ C⁻¹ d` of the difference d from the description with its covariance C; friction and drive
+    /// parameters are treated as unknown.
     pub fn chi_squared(&self) -> f64 {
         let scale = self.covariance.diagonal().map(|value| value.max(f64::MIN_POSITIVE).sqrt().recip());
         let scales = DMatrix::from_diagonal(&scale);
         let scaled = &scales * &self.difference;
-        // Rounding of strong correlations must not make the matrix indefinite.
+        // For strong correlations, rounding could otherwise make the matrix indefinite.
         let rounding = DMatrix::from_diagonal_element(scale.len(), scale.len(), 1e-9);
         let factor = (&scales * &self.covariance * &scales + rounding).cholesky();
         factor.map_or(0.0, |factor| scaled.dot(&factor.solve(&scaled)))
     }
 
-    /// [`Explanation::remaining`] of the most probable explanation by all bodies; 1 without any.
+    /// [`Explanation::remaining`] of the most probable explanation by all bodies; 1 if there is none.
     pub fn remaining_everywhere(&self, limits: &DescriptionThresholds) -> f64 {
         let best = self.explanations.iter().find(|own| is_everywhere(own, limits));
         best.map_or(1.0, |own| own.remaining)
@@ -199,7 +206,7 @@ impl DescriptionDifferences {
         bodies
     }
 
-    /// Change of the ten values of a body under an explanation, with its covariance.
+    /// Change of the ten values of a body according to an explanation, with its covariance.
     pub fn change_of(&self, explanation: &Explanation, body: usize) -> (DVector<f64>, DMatrix<f64>) {
         let (mut change, mut covariance) = (DVector::zeros(10), DMatrix::zeros(10, 10));
         for (&group, (values, own)) in explanation.groups.iter().zip(&explanation.changes) {
@@ -212,10 +219,10 @@ impl DescriptionDifferences {
         (change, covariance)
     }
 
-    /// Sets of bodies that differ by more than the others, with their total probability over all sizes of the
-    /// differences of the others, the most probable first. The empty set means that all bodies differ at most by the
-    /// small differences of `limits`. Each set comes with the explanation with the smallest differences of the other
-    /// bodies that the logs do not contradict.
+    /// Sets of bodies that differ from the description by more than the other bodies, the most probable set first. The
+    /// probability of a set is the total over all sizes of the differences of the other bodies. The empty set means
+    /// that all bodies differ at most by the small differences of `limits`. Each set is returned with one explanation:
+    /// the smallest differences of the other bodies that the logs do not contradict.
     pub fn sets(&self, limits: &DescriptionThresholds) -> Vec<(f64, &Explanation)> {
         // Total and largest probability, and the explanation.
         let mut sets: Vec<(f64, f64, &Explanation)> = Vec::new();
@@ -235,10 +242,10 @@ impl DescriptionDifferences {
         sets.into_iter().map(|(total, _, chosen)| (total, chosen)).collect()
     }
 
-    /// The explanation by one or two bodies that the written model follows: the most probable one, if the evidence for
+    /// The explanation by one or two bodies that the exported model follows: the most probable one, if the evidence for
     /// such explanations reaches the threshold of `limits`.
     pub fn followed(&self, limits: &DescriptionThresholds) -> Option<&Explanation> {
-        // The other bodies differ at most by small differences: otherwise they cannot keep the description.
+        // The other bodies must differ at most by small differences, because they keep the values of the description.
         let is_small = |own: &&Explanation| SPREADS[own.covariance].largest() <= limits.max_small_share;
         let few = self.explanations.iter().filter(is_small).filter(|own| !own.groups.is_empty());
         let few: f64 = few.map(|own| own.probability).sum();
@@ -246,7 +253,8 @@ impl DescriptionDifferences {
         (few >= limits.min_probability && !best.groups.is_empty()).then_some(best)
     }
 
-    /// Probability that a body changed: the sum over explanations by few bodies with it, and those by all bodies.
+    /// Probability that a body changed: the sum over the explanations by few bodies that contain this body, and the
+    /// explanations by all bodies.
     pub fn body_probability(&self, body: usize, limits: &DescriptionThresholds) -> f64 {
         let changed = |own: &&Explanation| is_everywhere(own, limits) || self.bodies_of(own).contains(&body);
         let sum: f64 = self.explanations.iter().filter(changed).map(|own| own.probability).sum();
@@ -254,8 +262,9 @@ impl DescriptionDifferences {
     }
 }
 
-/// Groups of unknowns: for each body with an effect a change of its ten values, as by a load, and a common factor of
-/// all its values. Their bodies, the change per unknown, and the effect on the base parameters.
+/// Groups of unknowns: each body with an effect on the torque has a change of its ten values, as by an attached load,
+/// and a common factor on all its values. Returns the body of each group, the change of the body per unknown, and the
+/// effect on the base parameters.
 fn groups(
     robot: &ParametricModel,
     parts: Parts,

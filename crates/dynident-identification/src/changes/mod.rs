@@ -1,8 +1,8 @@
-//! Which parts of a robot differ from its description, or between two results.
+//! Statistical test of which parts of a robot differ from its description, or between two results.
 //!
 //! [`parts`] lists the parts with their effect on the base parameters. [`DescriptionDifferences`] compares explanations
-//! of the difference from the robot description: nothing, single bodies, pairs of bodies, or small or large differences
-//! of every body. It also gives the masses that follow from all explanations.
+//! of the difference from the robot description: no change, a change of single bodies or pairs of bodies, or small or
+//! large differences of every body. It also computes the uncertainty of the bodies over all explanations.
 
 mod average;
 mod description;
