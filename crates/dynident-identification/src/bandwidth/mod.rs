@@ -25,8 +25,8 @@ use simulated_copies::SimulatedCopies;
 /// Ratio of neighbouring candidate cut-offs.
 const CANDIDATE_RATIO: f64 = core::f64::consts::SQRT_2;
 /// Range of candidates: the lowest candidate relative to the lowest cut-off that the spectrum of a joint suggests, and
-/// the highest candidate relative to the highest of these cut-offs. Noise can raise the cut-offs from the spectra; the
-/// factor 0.7 ensures that the candidates begin low enough for every joint.
+/// the highest candidate relative to the highest of these cut-offs. The lowest candidate must not be above the velocity
+/// band of any joint, although noise can raise the cut-offs from the spectra.
 const CANDIDATE_RANGE: [f64; 2] = [0.7, 6.0];
 /// Maximum ratio of a candidate to the sample rate.
 const MAX_SAMPLE_RATE_RATIO: f64 = 0.4;
