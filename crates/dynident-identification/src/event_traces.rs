@@ -7,6 +7,7 @@ use dynident_events::{EventSearch, LogEvent};
 const MAX_TRACES: usize = 12;
 /// Minimum time that is shown before and after an event, s.
 const MIN_MARGIN_S: f64 = 1.0;
+/// Time that is shown before and after a long event, relative to its duration.
 const MARGIN_SHARE: f64 = 0.5;
 
 /// Measured and predicted torque around each event, for one joint each. `joints` are the names of the model's joints.
