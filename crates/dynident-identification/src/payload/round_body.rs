@@ -23,6 +23,7 @@ const DENSITY_KG_M3: f64 = 500.0;
 const LOG_MOMENT_STD: f64 = 0.7;
 /// Search range for the moment of inertia: this factor in both directions.
 const MAX_MOMENT_FACTOR: f64 = 100.0;
+/// Number of steps of this search in each direction.
 const MOMENT_STEPS: i32 = 60;
 /// Prior standard deviation of the moments of inertia around the moment of the sphere, relative to the latter. For
 /// example, a cuboid with edges 1:1:3 has moments of 0.27 and 1.36 times their mean.
