@@ -17,12 +17,14 @@ const END_FACTOR: f64 = 4.0;
 const END_CHANGE_RATIO: f64 = 2.0;
 const NEIGHBOURS: usize = 3;
 /// Maximum share of outliers that directly follow another outlier. If the share is larger, the deviations are pulses of
-/// the real torque. The share is used only with at least the given number of outliers.
+/// the real torque.
 const MAX_ADJACENT_SHARE: f64 = 0.2;
+/// Minimum number of outliers for which this share is used.
 const MIN_OUTLIERS_FOR_PULSES: usize = 10;
-/// Number of adjacent samples that form a pulse of the real torque (a contact, a drive that catches up). Each must
-/// deviate in the same direction, by at least the given share of the tested sample's deviation.
+/// Number of adjacent samples that form a pulse of the real torque (a contact, a drive that catches up), if all deviate
+/// in the same direction.
 const PULSE_SAMPLES: usize = 3;
+/// Minimum deviation of each sample of a pulse, as a share of the deviation of the tested sample.
 const MIN_PULSE_SHARE: f64 = 0.25;
 pub(super) const MIN_SAMPLES: usize = 64;
 /// Ratio of the standard deviation to the median absolute deviation of normal noise.

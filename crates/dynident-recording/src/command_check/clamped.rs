@@ -4,8 +4,9 @@ use super::response::{range, width};
 use super::settings::CommandCheckSettings;
 use super::{CommandFinding, JointMotion, Side};
 
-/// Tolerance around the limit: number of encoder counts; see also the constant in rad (m).
+/// Tolerance around the limit, encoder counts.
 const LIMIT_COUNTS: f64 = 3.0;
+/// Tolerance around the limit, rad (m); the larger tolerance is used.
 const LIMIT_TOLERANCE: f64 = 5e-3;
 /// Minimum share of the time with a command beyond the limit during which the position is at the limit. (The position
 /// needs some time to arrive.)
